@@ -1,0 +1,1 @@
+"""From external force to contact, and from contact to the reaction."""

@@ -1,0 +1,28 @@
+"""Exceptions for foreseeable misuse. Each message names what was wrong, the value, and the way out.
+
+A control step raises none of these: what can go wrong while the arm moves is a HOLD with a reason (`pretouch.modes`).
+"""
+
+
+class PretouchError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class ParameterError(PretouchError, ValueError):
+    """A parameter is outside its allowed range."""
+
+
+class RobotModelError(PretouchError, ValueError):
+    """A robot model cannot be used as it is, or a link or joint is unknown to it."""
+
+
+class SkinError(PretouchError, ValueError):
+    """A skin, or the file that describes it, is not usable."""
+
+
+class PathError(PretouchError, ValueError):
+    """A path to follow is not well defined."""
+
+
+class ExperimentError(PretouchError, ValueError):
+    """An experiment was asked for something it cannot do."""

@@ -1,0 +1,104 @@
+"""What the arm is doing and why: one transition table, with a sentence for each reason."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from pretouch.types import Mode
+
+
+class Event(Enum):
+    """What can make the mode change, seen in one control step."""
+
+    NOT_FINITE = auto()
+    TIME_BACKWARDS = auto()
+    STATE_STALE = auto()
+    SOLVER_FAILED = auto()
+    LATCHED = auto()
+    REACTING = auto()
+    CONTACT = auto()
+    SKIN_SILENT = auto()
+    NO_FORCE = auto()
+    WINDOW_FILLING = auto()
+    CLEAR = auto()
+
+
+@dataclass(frozen=True)
+class Transition:
+    """On `event` in one of the modes `source`, go to `target` and say `sentence` with the event's detail."""
+
+    event: Event
+    source: frozenset[Mode]
+    target: Mode
+    sentence: str
+    latches: bool = False
+    """Whether the HOLD lasts until a person resumes."""
+
+
+_ANY = frozenset(Mode)
+
+TABLE: tuple[Transition, ...] = (
+    Transition(
+        Event.NOT_FINITE, _ANY, Mode.HOLD,
+        "The robot's state holds numbers that are not finite ({}): check the connection to the arm, then resume.",
+        latches=True,
+    ),
+    Transition(
+        Event.TIME_BACKWARDS, _ANY, Mode.HOLD,
+        "Time went backwards ({}): let one monotonic clock stamp everything, then resume.", latches=True,
+    ),
+    Transition(
+        Event.STATE_STALE, _ANY, Mode.HOLD,
+        "The robot's state is {} old: check the connection to the arm, then resume.", latches=True,
+    ),
+    Transition(
+        Event.SOLVER_FAILED, _ANY, Mode.HOLD,
+        "The quadratic program gave no answer ({}): look at the last steps, then resume.", latches=True,
+    ),
+    Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "{}", latches=True),
+    Transition(Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT, "A contact of {}: moving with it."),
+    Transition(Event.REACTING, frozenset({Mode.REACT}), Mode.REACT, "Moving with a contact: {} left."),
+    Transition(
+        Event.SKIN_SILENT, _ANY, Mode.HOLD,
+        "No reading from {}: check power and radio of the unit; the arm goes on when it is heard again.",
+    ),
+    Transition(
+        Event.NO_FORCE, _ANY, Mode.HOLD,
+        "The robot has given no force estimate for {}, as near a singularity: contacts could not be felt.",
+    ),
+    Transition(
+        Event.WINDOW_FILLING, _ANY, Mode.HOLD,
+        "The force window is filling ({}): contacts cannot be told from noise yet.",
+    ),
+    Transition(Event.CLEAR, _ANY, Mode.TRACK, "Following the path."),
+)  # fmt: skip
+"""Read from the top: the first row whose event is present and whose source holds the mode is taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModeState:
+    """The mode, and why."""
+
+    mode: Mode
+    reason: str
+    latched: bool = False
+
+
+def mode_init() -> ModeState:
+    """Return the mode before the first step."""
+    return ModeState(Mode.HOLD, "The controller has not run yet.")
+
+
+def next_mode(state: ModeState, events: Mapping[Event, str], resume: bool) -> ModeState:
+    """Take the first row of the table that applies.
+
+    Args:
+        state: the mode so far.
+        events: what this step saw, each with the detail its sentence needs.
+        resume: whether a person asks to leave a latched HOLD; a cause that is still there latches again.
+    """
+    seen = {**events, Event.CLEAR: ""}
+    if state.latched and not resume:
+        seen[Event.LATCHED] = state.reason
+    row = next(row for row in TABLE if row.event in seen and state.mode in row.source)
+    return ModeState(row.target, row.sentence.format(seen[row.event]), row.latches)

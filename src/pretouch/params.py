@@ -1,0 +1,247 @@
+"""Every parameter of the controller: value, unit, meaning, source. Table I of the paper gives the defaults.
+
+A profile is a frozen set of them. `replace(profile, ...)` of the standard library makes a variant, checked again.
+"""
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Literal, get_args, get_origin, get_type_hints
+
+from pretouch.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class Check:
+    """Allowed range of a number, ends included unless `open_low`."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    open_low: bool = False
+
+    def problem(self, value: float) -> str | None:
+        """Say what is wrong with the value, or None."""
+        if not math.isfinite(value):
+            return "must be finite"
+        if value < self.low or (self.open_low and value == self.low):
+            return f"must be {'greater than' if self.open_low else 'at least'} {self.low:g}"
+        return f"must be at most {self.high:g}" if value > self.high else None
+
+
+Real = Annotated[float, Check()]
+Positive = Annotated[float, Check(low=0.0, open_low=True)]
+NonNegative = Annotated[float, Check(low=0.0)]
+Fraction = Annotated[float, Check(low=0.0, high=1.0)]
+PositiveCount = Annotated[int, Check(low=1)]
+
+
+class Checked:
+    """Base of parameter sets: checks every field when it is made."""
+
+    def __post_init__(self) -> None:
+        hints = get_type_hints(type(self), include_extras=True)
+        for item in fields(self):  # type: ignore[arg-type]
+            _check_field(type(self).__name__, item.name, hints[item.name], getattr(self, item.name))
+
+
+def _check_field(owner: str, name: str, hint: object, value: object) -> None:
+    if get_origin(hint) is Literal and value not in get_args(hint):
+        raise ParameterError(f"{owner}.{name} is {value!r}: choose one of {', '.join(map(str, get_args(hint)))}.")
+    for check in getattr(hint, "__metadata__", ()):
+        problem = check.problem(value) if isinstance(value, int | float) else "must be a number"
+        if problem:
+            raise ParameterError(f"{owner}.{name} is {value}: it {problem}.")
+
+
+@dataclass(frozen=True)
+class PerceptionParams(Checked):
+    """From readings to obstacle points (eq. 1)."""
+
+    enabled: bool = True
+    """Whether proximity is used at all; `blind` switches it off."""
+    persistence_s: Positive = 0.06
+    """How long a sensed point is kept after the measurement that showed it [s]: two missed readings at 50 Hz."""
+    self_margin_m: NonNegative = 0.06
+    """A reading is taken as the arm or a fixture from this much before its predicted return [m]: twice the
+    VL53L1X ranging error of 25 mm, and 10 mm of pose error."""
+    slow_after_s: Positive = 0.1
+    """Age of a unit's newest message at which the arm begins to slow [s]."""
+    silent_after_s: Positive = 0.3
+    """Age of a unit's newest message at which the unit counts as silent and the arm holds [s]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.slow_after_s >= self.silent_after_s:
+            raise ParameterError(
+                f"PerceptionParams.slow_after_s is {self.slow_after_s}: it must be less than silent_after_s,"
+                f" {self.silent_after_s}."
+            )
+
+
+@dataclass(frozen=True)
+class TaskParams(Checked):
+    """Following the path, and the cost of the QP (eq. 2)."""
+
+    speed_m_s: Positive = 0.3
+    """Largest end-effector speed along the path [m/s] (paper, IV-A)."""
+    acceleration_m_s2: Positive = 1.0
+    """Rate at which the speed along the path may grow [m/s^2]; slowing is not limited by it."""
+    position_gain_1_s: NonNegative = 2.0
+    """Velocity towards the path per metre off it [1/s]."""
+    off_path_m: Positive = 0.1
+    """Distance from the path at which the arm no longer advances along it but only returns [m]."""
+    orientation: Literal["free", "hold"] = "free"
+    """Whether the task is three-dimensional, or also keeps the hand's orientation at the start."""
+    orientation_gain_1_s: NonNegative = 1.0
+    """Angular velocity per radian of orientation error when it is held [1/s]."""
+    damping_max: NonNegative = 0.1
+    """Nakamura damping lambda_0, the factor mu of eq. 2 at a singularity (authors' code family)."""
+    manipulability_threshold: Positive = 0.001
+    """Manipulability w_0 below which damping begins (authors' code family)."""
+    mid_joint_gain: Positive = 0.001
+    """Weight k of the mid-joint term in eq. 2; larger values drag the arm off its path. It also keeps the
+    Hessian positive definite."""
+    mid_joint_time_s: Positive = 5.0
+    """Time t in which the mid-joint velocity would bring the joints to their middle [s]."""
+    control_period_s: Positive = 0.01
+    """Period of the controller [s] (paper: 100 Hz)."""
+    position_margin_rad: NonNegative = 0.01
+    """Distance the commanded joint positions keep from the joint limits [rad]."""
+
+
+@dataclass(frozen=True)
+class ReductionParams(Checked):
+    """Slowing the end-effector (eqs. 3-4)."""
+
+    d_max_m: Positive = 0.8
+    """Distance from the end-effector origin within which an obstacle slows the arm [m] (Table I)."""
+    l_max_cycles: PositiveCount = 200
+    """Control cycles until full speed is restored after the obstacle vanished (Table I, at 100 Hz)."""
+
+
+RestrictionMode = Literal["off", "hard", "slack", "floor"]
+
+
+@dataclass(frozen=True)
+class RestrictionParams(Checked):
+    """Restricting the body's approach to obstacles (eqs. 5-7)."""
+
+    mode: RestrictionMode = "slack"
+    """off: no rows. hard: rows as written, no slack. slack: a weighted slack for each row. floor: as slack, with
+    the limit never below `floor_m_s`."""
+    v_max_m_s: Positive = 0.04
+    """Largest approach and largest repulsive velocity V_max [m/s] (Table I)."""
+    beta: Real = -10.0
+    """Steepness of eqs. 5 and 6 (Table I)."""
+    d_repulse_m: Positive = 0.1
+    """Body distance below which the arm is pushed away [m] (Table I)."""
+    d_crit_m: Positive = 0.1
+    """Body distance d_crit of eqs. 5 and 6 [m] (Table I)."""
+    d_notice_m: Positive = 0.6
+    """Body distance from which an approach is restricted [m] (Table I)."""
+    floor_m_s: NonNegative = 0.02
+    """Smallest approach limit in mode floor, v_f [m/s]."""
+    slack_weight: Positive = 1000.0
+    """Weight of a row's squared violation against the squared task error of eq. 2, both in (m/s)^2."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.d_notice_m <= self.d_crit_m:
+            raise ParameterError(
+                f"RestrictionParams.d_notice_m is {self.d_notice_m}: it must be greater than d_crit_m, {self.d_crit_m}."
+            )
+
+
+@dataclass(frozen=True)
+class ThresholdParams(Checked):
+    """The force window and the contact thresholds (eqs. 8-11)."""
+
+    window_samples: Annotated[int, Check(low=2)] = 100
+    """Samples in the sliding window at the control rate; the paper does not say, the authors' code has 500."""
+    alpha: Fraction = 0.1
+    """Influence of an outlier on the value that enters the window, eq. 8 (Table I)."""
+    lambda_: NonNegative = 0.75
+    """Standard deviations beyond which a sample is an outlier, eq. 8 (Table I)."""
+    f_base_n: Positive = 10.0
+    """Base force F_b above the mean that makes a contact, eq. 9 [N] (Table I)."""
+    f_std_n: NonNegative = 3.0
+    """Largest addition F_std for a noisy signal, eq. 10 [N] (Table I)."""
+    sigma_max_n: Positive = 3.0
+    """Standard deviation at which that addition is full, eq. 10 [N] (Table I)."""
+    f_d_n: NonNegative = 4.0
+    """Largest reduction F_d near an obstacle, eq. 11 [N] (Table I)."""
+    d_max_m: Positive = 0.8
+    """Distance from the end-effector origin at which the reduction begins, eq. 11 [m] (Table I)."""
+    d_min_m: NonNegative = 0.05
+    """Distance from the end-effector origin at which it is full, eq. 11 [m] (Table I)."""
+    compare: Literal["filtered", "raw"] = "filtered"
+    """Which force is held against the thresholds: the newest value in the window (paper) or the raw sample
+    (the authors' code)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.d_max_m <= self.d_min_m:
+            raise ParameterError(
+                f"ThresholdParams.d_max_m is {self.d_max_m}: it must be greater than d_min_m, {self.d_min_m}."
+            )
+        if self.f_base_n <= self.f_d_n:
+            raise ParameterError(
+                f"ThresholdParams.f_base_n is {self.f_base_n}: it must be greater than f_d_n, {self.f_d_n}, or the"
+                " thresholds could cross."
+            )
+
+
+@dataclass(frozen=True)
+class ReactionParams(Checked):
+    """Moving with the push (eq. 12)."""
+
+    compliance_m_s_n: Positive = 0.03
+    """Diagonal of the compliance matrix C [(m/s)/N] (authors' code family)."""
+    speed_max_m_s: Positive = 0.3
+    """Bound on the norm of the reaction velocity [m/s] (authors' code family, there per axis)."""
+    decay_cycles: PositiveCount = 200
+    """Control cycles in which the reaction decays linearly to zero. Shorter than the window, the release of a
+    push is taken for a new contact."""
+
+
+@dataclass(frozen=True)
+class FailureParams(Checked):
+    """When to stop trusting the inputs."""
+
+    state_timeout_s: Positive = 0.05
+    """Age of the robot state at which the arm holds [s]."""
+    force_timeout_s: Positive = 0.2
+    """Time without a force estimate after which the arm holds [s]."""
+
+
+@dataclass(frozen=True)
+class Profile(Checked):
+    """A named set of parameters for the whole controller."""
+
+    name: str = "paper"
+    """Name shown in tables and files."""
+    perception: PerceptionParams = field(default_factory=PerceptionParams)
+    task: TaskParams = field(default_factory=TaskParams)
+    reduction: ReductionParams = field(default_factory=ReductionParams)
+    restriction: RestrictionParams = field(default_factory=RestrictionParams)
+    threshold: ThresholdParams = field(default_factory=ThresholdParams)
+    reaction: ReactionParams = field(default_factory=ReactionParams)
+    failure: FailureParams = field(default_factory=FailureParams)
+
+
+PROFILES: dict[str, Profile] = {
+    "paper": Profile(),
+    "blind": Profile(
+        name="blind",
+        perception=PerceptionParams(enabled=False),
+        restriction=RestrictionParams(mode="off"),
+    ),
+}
+"""`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0."""
+
+
+def profile(name: str) -> Profile:
+    """Look a profile up by name; an unknown one is a ParameterError that lists those there are."""
+    try:
+        return PROFILES[name]
+    except KeyError:
+        raise ParameterError(f"The profile {name!r} is unknown: choose from {', '.join(PROFILES)}.") from None

@@ -1,0 +1,1 @@
+"""From readings to obstacle points and the closest points of the body."""

@@ -1,0 +1,130 @@
+"""Where the sensed obstacles are: eq. 1, which readings count, and how long a point is kept."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from pretouch.perception.vectors import rotated
+from pretouch.robot.model import Kinematics
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import MIN_DISTANCE
+from pretouch.types import BoolArray, FloatArray, IntArray, RangeReadings, RangeStatus
+
+
+@dataclass(frozen=True, slots=True)
+class TrackState:
+    """The last point each of K units showed. NaN and -inf where there is none."""
+
+    point: FloatArray
+    """(K, 3) obstacle position, base frame [m]."""
+    seen: FloatArray
+    """(K,) instant of the measurement that showed it [s]."""
+    used: FloatArray
+    """(K,) stamp of the newest reading taken into account [s]."""
+    direction: FloatArray
+    """(K, 3) last direction from the body to the point."""
+
+
+def track_init(units: int) -> TrackState:
+    """Return the state before any reading."""
+    return TrackState(
+        np.full((units, 3), np.nan),
+        np.full(units, -np.inf),
+        np.full(units, -np.inf),
+        np.full((units, 3), np.nan),
+    )
+
+
+def sensor_poses(skin: Skin, kin: Kinematics) -> tuple[FloatArray, FloatArray]:
+    """Positions (K, 3) [m] and orientations (K, 3, 3) of the sensors, base frame: T_O_link @ T_link_sensor."""
+    return _poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
+
+
+@njit(cache=True)
+def _poses(
+    link_position: FloatArray, link_rotation: FloatArray, link: IntArray, T_link_sensor: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    position, rotation = np.empty((len(link), 3)), np.empty((len(link), 3, 3))
+    for k in range(len(link)):
+        R_O_link = link_rotation[link[k]]
+        position[k] = link_position[link[k]] + rotated(R_O_link, T_link_sensor[k, :3, 3])
+        for column in range(3):
+            rotation[k, :, column] = rotated(R_O_link, T_link_sensor[k, :3, column])
+    return position, rotation
+
+
+def locate(position: FloatArray, rotation: FloatArray, distance: FloatArray) -> FloatArray:
+    """Obstacle positions h_k = r_SUk + R_SUk [0 0 d_k]^T (K, 3) [m] in the base frame, eq. 1 of the paper.
+
+    `position` (K, 3) [m] and `rotation` (K, 3, 3) are the sensors' poses, `distance` (K,) the readings [m].
+    """
+    return position + rotation[:, :, 2] * distance[:, None]
+
+
+def measured_distance(readings: RangeReadings) -> FloatArray:
+    """Distance (K,) [m] each reading stands for, NaN where it shows no target.
+
+    A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone.
+    """
+    return _measured(readings.distance, readings.status)
+
+
+_OK, _NEAR = int(RangeStatus.OK), (int(RangeStatus.MIN_RANGE), int(RangeStatus.MIN_CLIPPED))
+
+
+@njit(cache=True)
+def _measured(distance: FloatArray, status: IntArray) -> FloatArray:
+    shown = np.full(len(distance), np.nan)
+    for k in range(len(distance)):
+        if status[k] in _NEAR:
+            shown[k] = MIN_DISTANCE
+        elif status[k] == _OK and np.isfinite(distance[k]) and distance[k] >= 0:
+            shown[k] = max(distance[k], MIN_DISTANCE)
+    return shown
+
+
+def track(
+    state: TrackState,
+    readings: RangeReadings,
+    points: FloatArray,
+    shows: BoolArray,
+    now: float,
+    persistence: float,
+) -> TrackState:
+    """Take new readings in.
+
+    A reading that shows something replaces its unit's point. One that shows nothing, or comes too late, leaves the
+    point as it was, so one missed reading removes no obstacle.
+
+    Args:
+        state: points known so far.
+        readings: the newest reading of each unit.
+        points: (K, 3) where the readings are, base frame [m].
+        shows: (K,) whether the reading shows an obstacle.
+        now: instant of this step [s].
+        persistence: age at which a point is given up [s].
+    """
+    fresh = is_fresh(state, readings, now)
+    take = fresh & shows & (now - readings.stamp <= persistence)
+    return TrackState(
+        point=np.where(take[:, None], points, state.point),
+        seen=np.where(take, readings.stamp, state.seen),
+        used=np.where(fresh, readings.stamp, state.used),
+        direction=state.direction,
+    )
+
+
+def is_fresh(state: TrackState, readings: RangeReadings, now: float) -> BoolArray:
+    """Say which units (K,) have a reading newer than the last one used, and not from the future."""
+    return (readings.stamp > state.used) & (readings.stamp <= now)
+
+
+def silence(readings: RangeReadings, now: float) -> FloatArray:
+    """Age (K,) of each unit's newest message [s].
+
+    Infinite for a unit never heard, and for a stamp that is no number or lies in the future: a unit whose clock is
+    wrong must not pass for one that is well.
+    """
+    age = now - readings.stamp
+    return np.where(np.isfinite(age) & (age >= 0), age, np.inf)

@@ -1,0 +1,41 @@
+"""What the loop needs from the outside world, as one or two methods each."""
+
+from typing import Protocol
+
+from pretouch.types import ControlStep, FloatArray, RangeReadings, RobotState
+
+
+class Robot(Protocol):
+    """An arm that is commanded by joint velocities."""
+
+    def read(self) -> RobotState:
+        """Return the newest state."""
+        ...
+
+    def command(self, qd: FloatArray) -> None:
+        """Take joint velocities (n,) [rad/s] as the set-point until the next command."""
+        ...
+
+
+class Skin(Protocol):
+    """The sensor units on the arm."""
+
+    def read(self) -> RangeReadings:
+        """Return the newest reading of each unit."""
+        ...
+
+
+class Clock(Protocol):
+    """The one clock all stamps come from."""
+
+    def tick(self) -> float:
+        """Wait for the next control period and return its instant [s]."""
+        ...
+
+
+class Recorder(Protocol):
+    """Something that keeps control steps."""
+
+    def record(self, step: ControlStep) -> None:
+        """Keep one step."""
+        ...

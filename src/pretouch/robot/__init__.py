@@ -1,0 +1,1 @@
+"""The arm: names and limits, kinematics and dynamics, and its body as capsules."""

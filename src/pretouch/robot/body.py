@@ -1,0 +1,58 @@
+"""The body of an arm as capsules fixed to its links."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from pretouch.errors import RobotModelError
+from pretouch.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Capsules:
+    """C capsules: the points within `radius` of the segment from `a` to `b`, in the frame of a link."""
+
+    link: IntArray
+    """(C,) index of the link each is fixed to."""
+    a: FloatArray
+    """(C, 3) one end of the axis, link frame [m]."""
+    b: FloatArray
+    """(C, 3) other end of the axis, link frame [m]."""
+    radius: FloatArray
+    """(C,) [m]."""
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    def of_links(self, links: IntArray) -> "Capsules":
+        """Return the capsules on the given links, in order."""
+        keep = np.isin(self.link, links)
+        return Capsules(self.link[keep], self.a[keep], self.b[keep], self.radius[keep])
+
+    def joined(self, other: "Capsules") -> "Capsules":
+        """Return these capsules followed by the other ones."""
+        return Capsules(
+            np.concatenate([self.link, other.link]),
+            np.concatenate([self.a, other.a]),
+            np.concatenate([self.b, other.b]),
+            np.concatenate([self.radius, other.radius]),
+        )
+
+
+def capsules_of(model: mujoco.MjModel) -> Capsules:
+    """Read the capsule geoms of an MJCF model; a link's index is its MuJoCo body id."""
+    other = [model.geom(g).name for g in range(model.ngeom) if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_CAPSULE]
+    if other:
+        raise RobotModelError(f"The geoms {', '.join(other)} are no capsules: describe the body by capsules only.")
+    half = np.zeros((model.ngeom, 3))
+    for g in range(model.ngeom):
+        axis = np.zeros(3)
+        mujoco.mju_rotVecQuat(axis, np.array([0.0, 0.0, 1.0]), model.geom_quat[g])
+        half[g] = axis * model.geom_size[g, 1]
+    return Capsules(
+        link=model.geom_bodyid.astype(np.int64),
+        a=model.geom_pos - half,
+        b=model.geom_pos + half,
+        radius=model.geom_size[:, 0].copy(),
+    )

@@ -1,0 +1,151 @@
+"""Kinematics and dynamics of an arm, over MuJoCo."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from pretouch.errors import RobotModelError
+from pretouch.robot.body import Capsules, capsules_of
+from pretouch.robot.description import RobotDescription
+from pretouch.types import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Kinematics:
+    """Where everything is in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
+
+    position: FloatArray
+    """(L, 3) link origins [m]."""
+    rotation: FloatArray
+    """(L, 3, 3) link orientations R_O_link."""
+    anchor: FloatArray
+    """(n, 3) a point on each joint's axis [m]."""
+    axis: FloatArray
+    """(n, 3) unit vectors of the joint axes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """Link-side dynamics in one state: mass_matrix @ qdd + coriolis + gravity = tau + tau_ext."""
+
+    mass_matrix: FloatArray
+    """(n, n) [kg m^2]."""
+    coriolis: FloatArray
+    """(n,) Coriolis and centrifugal torques C(q, qd) qd [Nm]."""
+    gravity: FloatArray
+    """(n,) torques that hold the arm against gravity [Nm]."""
+
+
+class RobotModel:
+    """Poses, Jacobians of any body point, mass matrix, Coriolis and gravity torques of an arm.
+
+    Rotor inertia and damping of the MJCF are left out: the joint torque sensors sit on the link side. The calls
+    depend on their arguments alone; the MuJoCo data is scratch memory, so one model serves one thread.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.description = description
+        self._model = mujoco.MjModel.from_xml_path(str(description.mjcf))
+        self._model.dof_armature[:] = 0.0
+        self._model.dof_damping[:] = 0.0
+        self._data = mujoco.MjData(self._model)
+        self.n: int = self._model.nv
+        # views into MuJoCo's memory, taken once: looking an attribute up costs as much as the arithmetic
+        data = self._data
+        self._qpos, self._qvel = data.qpos, data.qvel
+        self._frames = data.xpos, data.xmat.reshape(-1, 3, 3), data.xanchor, data.xaxis
+        self._check()
+        self.links: tuple[str, ...] = tuple(self._model.body(i).name for i in range(self._model.nbody))
+        """Names of the links; a link's index is its place here, 0 is the world."""
+        self.ee: int = self.link_index(description.ee_body)
+        """Index of the end-effector's link."""
+        self.capsules: Capsules = capsules_of(self._model)
+        """The body, base included."""
+        self.moved_by: BoolArray = self._moved_by()
+        """(L, n) whether a joint moves a link."""
+        self.body: Capsules = self.capsules.of_links(np.flatnonzero(self.moved_by.any(axis=1)))
+        """The part of the body that any joint moves."""
+        self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
+        self.q_max: FloatArray = self._model.jnt_range[:, 1].copy()
+        self.q_mid: FloatArray = (self.q_min + self.q_max) / 2
+
+    def _check(self) -> None:
+        """Refuse models the rest of the package would misunderstand."""
+        name = self.description.name
+        if self.n != len(self.description.q_ready):
+            raise RobotModelError(f"{name}: the MJCF has {self.n} joints, q_ready {len(self.description.q_ready)}.")
+        for j in range(self._model.njnt):
+            joint = self._model.joint(j).name
+            if self._model.jnt_type[j] != mujoco.mjtJoint.mjJNT_HINGE:
+                raise RobotModelError(f"{name}: joint {joint} is no hinge: only hinge joints are supported.")
+            if not self._model.jnt_limited[j]:
+                raise RobotModelError(f"{name}: joint {joint} has no range: give it its position limits.")
+
+    def _moved_by(self) -> BoolArray:
+        moved = np.zeros((self._model.nbody, self.n), dtype=np.bool_)
+        for body in range(1, self._model.nbody):
+            moved[body] = moved[self._model.body_parentid[body]]
+            start, count = self._model.body_jntadr[body], self._model.body_jntnum[body]
+            moved[body, start : start + count] = True
+        return moved
+
+    def link_index(self, name: str) -> int:
+        """Return the index of a link; an unknown name is a RobotModelError that lists those there are."""
+        try:
+            return self.links.index(name)
+        except ValueError:
+            known = ", ".join(self.links[1:])
+            raise RobotModelError(f"The link {name!r} is unknown: choose from {known}.") from None
+
+    def kinematics(self, q: FloatArray) -> Kinematics:
+        """Compute poses and joint axes at joint positions q (n,) [rad]."""
+        self._qpos[:] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        return Kinematics(*(view.copy() for view in self._frames))
+
+    def jacobian(self, kin: Kinematics, link: int, point: FloatArray) -> FloatArray:
+        """Jacobian (6, n) of a point (3,) [m, base frame] fixed to a link: velocity first, then angular velocity."""
+        return _jacobian(kin.anchor, kin.axis, self.moved_by[link], point)
+
+    def ee_jacobian(self, kin: Kinematics) -> FloatArray:
+        """Jacobian (6, n) of the end-effector origin."""
+        return self.jacobian(kin, self.ee, kin.position[self.ee])
+
+    def dynamics(self, q: FloatArray, qd: FloatArray) -> Dynamics:
+        """Compute mass matrix, Coriolis and gravity torques at q (n,) [rad] and qd (n,) [rad/s]."""
+        gravity = np.zeros(self.n)
+        mass_matrix, _ = self.mass_matrix_and_bias(q, np.zeros(self.n), gravity)
+        mass_matrix, bias = self.mass_matrix_and_bias(q, qd, np.zeros(self.n))
+        return Dynamics(mass_matrix, bias - gravity, gravity)
+
+    def mass_matrix_and_bias(self, q: FloatArray, qd: FloatArray, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compute the mass matrix (n, n) and, into `bias` (n,), Coriolis plus gravity torques [Nm]."""
+        model, data = self._model, self._data
+        self._qpos[:] = q
+        self._qvel[:] = qd
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_crb(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 0, bias)
+        mass_matrix = np.zeros((self.n, self.n))
+        mujoco.mj_fullM(model, data, mass_matrix)
+        return mass_matrix, bias
+
+
+@njit(cache=True)
+def _jacobian(anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray) -> FloatArray:
+    n = anchor.shape[0]
+    jacobian = np.zeros((6, n))
+    for j in range(n):
+        if moved[j]:
+            x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
+            jacobian[0, j] = axis[j, 1] * z - axis[j, 2] * y
+            jacobian[1, j] = axis[j, 2] * x - axis[j, 0] * z
+            jacobian[2, j] = axis[j, 0] * y - axis[j, 1] * x
+            jacobian[3, j] = axis[j, 0]
+            jacobian[4, j] = axis[j, 1]
+            jacobian[5, j] = axis[j, 2]
+    return jacobian

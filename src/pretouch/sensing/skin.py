@@ -1,0 +1,133 @@
+"""A set of sensor units on one arm, and the TOML file that describes it."""
+
+import tomllib
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+from scipy.spatial.transform import Rotation
+
+from pretouch.errors import SkinError
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.unit import SensorUnit
+from pretouch.types import FloatArray, IntArray
+
+
+class Skin:
+    """K sensor units on an arm, checked against its model. The order of the units is the order of all readings.
+
+    Raises SkinError for duplicate ids, a link the arm does not have, and a unit inside its own link.
+    """
+
+    def __init__(self, units: Sequence[SensorUnit], model: RobotModel) -> None:
+        self.units = tuple(units)
+        ids = [unit.id for unit in self.units]
+        twice = sorted({i for i in ids if ids.count(i) > 1})
+        if twice:
+            raise SkinError(f"The unit id {', '.join(twice)} is used more than once: give each unit its own id.")
+        for unit in self.units:
+            _check_place(unit, model)
+        self.ids: tuple[str, ...] = tuple(ids)
+        self.link: IntArray = np.array([model.link_index(u.link) for u in self.units], dtype=np.int64)
+        """(K,) index of the link each unit sits on."""
+        self.T_link_sensor: FloatArray = np.array([u.T_link_sensor for u in self.units]).reshape(-1, 4, 4)
+        """(K, 4, 4)."""
+
+    def __len__(self) -> int:
+        return len(self.units)
+
+
+def _check_place(unit: SensorUnit, model: RobotModel) -> None:
+    if unit.link not in model.links:
+        raise SkinError(
+            f"Unit {unit.id} is mounted on {unit.link!r}, which {model.description.name} does not have:"
+            f" choose from {', '.join(model.links[1:])}."
+        )
+    own = model.capsules.of_links(np.array([model.link_index(unit.link)]))
+    p = unit.T_link_sensor[:3, 3]
+    for a, b, radius in zip(own.a, own.b, own.radius, strict=True):
+        along = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
+        depth = radius - np.linalg.norm(p - a - along * (b - a))
+        if depth > 0:
+            raise SkinError(
+                f"Unit {unit.id} lies {1000 * depth:.1f} mm inside {unit.link}: move it out to the surface."
+            )
+
+
+def load_skin(path: Path, model: RobotModel) -> Skin:
+    """Read a skin file. What is wrong with it is a SkinError that names the file, the unit and the way out."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise SkinError(f"The skin file {path} is not UTF-8 text: {error.reason} at byte {error.start}.") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SkinError(f"The skin file {path} is not valid TOML: {error}.") from error
+    entries = data.get("unit")
+    if not isinstance(entries, list) or not entries:
+        raise SkinError(f"The skin file {path} names no unit: give at least one [[unit]] with id, link and pose.")
+    try:
+        return Skin([_unit_from(entry) for entry in entries], model)
+    except SkinError as error:
+        raise SkinError(f"{error} (in {path})") from error
+
+
+def save_skin(skin: Skin, path: Path) -> None:
+    """Write a skin file that `load_skin` reads back to the same poses."""
+    entries = [
+        {
+            "id": unit.id,
+            "link": unit.link,
+            "position_m": [float(v) for v in unit.T_link_sensor[:3, 3]],
+            "quaternion_wxyz": _quaternion(unit.T_link_sensor[:3, :3]),
+        }
+        for unit in skin.units
+    ]
+    path.write_text(tomli_w.dumps({"unit": entries}), encoding="utf-8")
+
+
+def paper_skin(model: RobotModel) -> Skin:
+    """Seven units for the paper's experiment on a Panda: four round the hand, one at the wrist, two on the forearm.
+
+    The paper does not publish its layout; this one is ours.
+    """
+    return load_skin(Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.toml")), model)
+
+
+def _unit_from(entry: Any) -> SensorUnit:
+    if not isinstance(entry, dict):
+        raise SkinError(f"A unit is {entry!r}: write it as a [[unit]] table.")
+    name = entry.get("id")
+    if not isinstance(name, str):
+        raise SkinError(f"A unit has the id {name!r}: give each [[unit]] an id in quotes.")
+    unknown = sorted(set(entry) - {"id", "link", "position_m", "quaternion_wxyz"})
+    if unknown:
+        raise SkinError(f"Unit {name} has the unknown key {unknown[0]}: use id, link, position_m, quaternion_wxyz.")
+    if not isinstance(entry.get("link"), str):
+        raise SkinError(f"Unit {name} has the link {entry.get('link')!r}: give the name of a link in quotes.")
+    T = np.eye(4)
+    T[:3, 3] = _numbers(entry, "position_m", 3)
+    quaternion = _numbers(entry, "quaternion_wxyz", 4)
+    if abs(np.linalg.norm(quaternion) - 1) > 1e-3:
+        raise SkinError(
+            f"Unit {name}: quaternion_wxyz has length {np.linalg.norm(quaternion):.4f}: it must be 1 to be a rotation."
+        )
+    T[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    return SensorUnit(name, entry["link"], T)
+
+
+def _numbers(entry: dict[str, Any], key: str, count: int) -> FloatArray:
+    value = entry.get(key)
+    ok = isinstance(value, list) and len(value) == count
+    if not ok or not all(isinstance(v, int | float) and np.isfinite(v) for v in value or []):
+        raise SkinError(f"Unit {entry['id']}: {key} is {value!r}: give {count} finite numbers.")
+    return np.array(value, dtype=np.float64)
+
+
+def _quaternion(R: FloatArray) -> list[float]:
+    wxyz: list[float] = Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True).tolist()
+    return wxyz

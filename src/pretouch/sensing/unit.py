@@ -1,0 +1,55 @@
+"""One sensor unit: a range finder at a known place on a link."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.errors import SkinError
+from pretouch.types import FloatArray
+
+CONE_ANGLE = np.deg2rad(27.0)
+"""Full angle of the VL53L1X field of view [rad] (data sheet DS12385, 16 x 16 SPAD)."""
+
+MIN_DISTANCE = 0.04
+"""Smallest distance the VL53L1X measures [m] (data sheet)."""
+
+
+@dataclass(frozen=True)
+class SensorUnit:
+    """A unit named `id` on a link, with its pose. The sensor's z axis points outwards along the beam."""
+
+    id: str
+    link: str
+    T_link_sensor: FloatArray
+    """(4, 4) maps sensor coordinates to link coordinates [m]."""
+
+    def __post_init__(self) -> None:
+        if not self.id:
+            raise SkinError("A sensor unit has an empty id: give each unit a name.")
+        T = np.asarray(self.T_link_sensor, dtype=np.float64)
+        if T.shape != (4, 4) or not np.all(np.isfinite(T)):
+            raise SkinError(f"Unit {self.id}: its pose holds {T.tolist()}: give a finite 4 x 4 matrix.")
+        R = T[:3, :3]
+        if np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0:
+            raise SkinError(
+                f"Unit {self.id}: its orientation is no proper rotation (determinant {np.linalg.det(R):.6f},"
+                f" R R^T off by {np.abs(R @ R.T - np.eye(3)).max():.2g}): give a right-handed rotation."
+            )
+        if np.abs(T[3] - [0.0, 0.0, 0.0, 1.0]).max() > 0:
+            raise SkinError(f"Unit {self.id}: the last row of its pose is {T[3].tolist()}: it must be 0 0 0 1.")
+        frozen = T.copy()
+        frozen.flags.writeable = False
+        object.__setattr__(self, "T_link_sensor", frozen)
+
+
+def cone_rays(rings: int) -> FloatArray:
+    """Unit vectors (1 + 3 rings (rings + 1), 3) that fill the field of view, sensor frame.
+
+    The axis comes first, then `rings` circles of 6, 12, ... rays, the outermost on the edge of the cone.
+    """
+    rays = [np.array([0.0, 0.0, 1.0])]
+    for ring in range(1, rings + 1):
+        tilt = CONE_ANGLE / 2 * ring / rings
+        for turn in 2 * np.pi * np.arange(6 * ring) / (6 * ring):
+            rays.append(np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)]))
+    return np.array(rays)

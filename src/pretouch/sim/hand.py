@@ -1,0 +1,112 @@
+"""A person's hand: a mass on a spring whose far end follows a script, with no more force than the script allows."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numba import njit
+
+from pretouch.sim.plant import Plant
+from pretouch.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class HandGoal:
+    """Where the arm of the person wants the hand to be."""
+
+    position: FloatArray
+    """(3,) base frame [m]."""
+    force_max: float
+    """Largest force the person pulls or pushes with [N]."""
+
+
+class HandScript(Protocol):
+    """What a person means to do."""
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        """Return the goal at a time [s], with the hand's position (3,) [m] and the arm for the person to look at."""
+        ...
+
+
+class Hand:
+    """Drives the hand of a scene by a script. Its speed is limited, so it cannot jump into the arm."""
+
+    def __init__(
+        self,
+        plant: Plant,
+        script: HandScript,
+        speed_max: float = 0.5,
+        stiffness: float = 2000.0,
+        damping: float = 60.0,
+    ) -> None:
+        """Attach to a plant whose scene has a hand.
+
+        `speed_max` [m/s] limits the goal, `stiffness` [N/m] and `damping` [N s/m] are the person's arm.
+        """
+        self._plant, self._script, self._speed = plant, script, speed_max
+        self._k, self._d = stiffness, damping
+        body = plant.mj_model.body("hand")
+        self._dof = int(plant.mj_model.body_dofadr[body.id])
+        self._home = np.array(body.pos)
+        self._goal = self._home.copy()
+        plant.before_each_step(self._drive)
+
+    @property
+    def position(self) -> FloatArray:
+        """Position of the hand (3,) [m], base frame."""
+        return self._home + self._plant.mj_data.qpos[self._dof : self._dof + 3]
+
+    @property
+    def velocity(self) -> FloatArray:
+        """Velocity of the hand (3,) [m/s]."""
+        return self._plant.mj_data.qvel[self._dof : self._dof + 3].copy()
+
+    def _drive(self, time: float) -> None:
+        goal = self._script.goal(time, self.position, self._plant)
+        reach = self._speed * self._plant.params.period_s
+        self._goal, force = _spring(
+            self._goal, goal.position, reach, self.position, self.velocity, self._k, self._d, goal.force_max
+        )
+        self._plant.mj_data.qfrc_applied[self._dof : self._dof + 3] = force
+
+
+@njit(cache=True)
+def _spring(
+    at: FloatArray,
+    goal: FloatArray,
+    reach: float,
+    x: FloatArray,
+    v: FloatArray,
+    k: float,
+    d: float,
+    force_max: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Move the spring's far end towards the goal by at most `reach`, and return it with the spring's force (3,) [N]."""
+    step = goal - at
+    length = np.sqrt(step @ step)
+    at = at + (step if length <= reach else step * (reach / length))
+    force = k * (at - x)
+    size = np.sqrt(force @ force)
+    if size > force_max:
+        force = force * (force_max / size)
+    return at, force - d * v
+
+
+def point_on_arm(plant: Plant, link: int, offset: FloatArray) -> FloatArray:
+    """Where a point fixed to a link, `offset` (3,) [m] in its frame, is now (3,) [m], base frame."""
+    position: FloatArray = plant.mj_data.xpos[link]
+    rotation: FloatArray = plant.mj_data.xmat[link].reshape(3, 3)
+    return position + rotation @ offset
+
+
+def arm_distance(plant: Plant, position: FloatArray) -> float:
+    """Distance [m] of a point (3,) [m] from the arm's surface, negative inside."""
+    best = np.inf
+    for a, b, radius, link in zip(
+        plant.model.body.a, plant.model.body.b, plant.model.body.radius, plant.model.body.link, strict=True
+    ):
+        start, end = point_on_arm(plant, link, a), point_on_arm(plant, link, b)
+        axis = end - start
+        along = np.clip((position - start) @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0)
+        best = min(best, float(np.linalg.norm(position - start - along * axis)) - radius)
+    return best

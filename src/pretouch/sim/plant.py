@@ -1,0 +1,166 @@
+"""The simulated arm behind its joint velocity interface: 1 kHz physics, joint impedance, sensors, observer."""
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from pretouch.contact.observer import ObserverState, observe, observer_init, wrench_from_torques
+from pretouch.robot.model import RobotModel
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.scene import ArmError, SceneSpec, build
+from pretouch.types import FloatArray, RobotState
+
+
+class Plant:
+    """One arm of a kind, in a scene: the port `Robot`.
+
+    The control law and the observer use the nominal model and what the sensors say; the physics has other masses,
+    a payload, joint friction, and contacts. What a real arm's owner cannot know is under `true_...`.
+    """
+
+    def __init__(self, model: RobotModel, scene: SceneSpec, params: PlantParams, q: FloatArray, seed: int) -> None:
+        """Build an arm at rest at q (n,) [rad]; the seed decides its errors and its noise."""
+        self.model, self.scene, self.params, self._n = model, scene, params, model.n
+        rng = np.random.default_rng([seed, 1])
+        self._rng = np.random.default_rng([seed, 2])
+        self.error = ArmError(
+            mass_factor=1.0 + params.mass_error * rng.uniform(-1, 1, len(model.links)),
+            payload=params.payload_max_kg * rng.uniform(),
+            armature=params.armature_kg_m2,
+        )
+        self._offset = np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n)
+        self._ripple_phase = rng.uniform(0, 2 * np.pi, self._n)
+        self.mj_model = build(model, scene, self.error)
+        self.mj_data = mujoco.MjData(self.mj_model)
+        self._k = np.array(params.stiffness_nm_rad)
+        self._friction = np.array([params.friction_f1_nm, params.friction_f2_s_rad, params.friction_f3_rad_s])
+        self._ripple = np.array([params.ripple_nm, params.ripple_cycles, self._ripple_phase])
+        self._arm_geoms = {g for g in range(self.mj_model.ngeom) if self._on_arm(g)}
+        self._before_step: list[Callable[[float], None]] = []
+        self._reset(q)
+
+    def _on_arm(self, geom: int) -> bool:
+        return 0 < int(self.mj_model.geom_bodyid[geom]) < len(self.model.links)
+
+    def _reset(self, q: FloatArray) -> None:
+        n, data = self._n, self.mj_data
+        # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
+        self._q, self._qd, self._qdd = data.qpos[:n], data.qvel[:n], data.qacc[:n]
+        self._applied = data.qfrc_applied[:n]
+        self._q[:] = q
+        mujoco.mj_forward(self.mj_model, data)
+        mass, bias = self.model.mass_matrix_and_bias(q, np.zeros(n), np.zeros(n))
+        inertia = np.diag(mass) + self.params.armature_kg_m2
+        self._d = 2.0 * self.params.damping_ratio * np.sqrt(self._k * inertia)
+        self._q_d, self._qd_set, self._qd_d = q.copy(), np.zeros(n), np.zeros(n)
+        # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
+        self._q_d += (data.qfrc_bias[:n] - bias) / self._k
+        self._q_meas, self._qd_meas = q.copy(), np.zeros(n)
+        self._noise = np.zeros(n)
+        self._observer: ObserverState = observer_init(mass, self._qd_meas)
+        self.time = 0.0
+        self.true_force = np.zeros(3)
+        """(3,) sum of the contact forces on the arm by everything else, base frame [N], at the last physics step."""
+        self.true_log: list[tuple[float, FloatArray]] = []
+        """(time, true_force) of every physics step so far."""
+        mujoco.mj_forward(self.mj_model, data)
+
+    def before_each_step(self, call: Callable[[float], None]) -> None:
+        """Have `call(time)` run before each physics step: hands and sensors are driven so."""
+        self._before_step.append(call)
+
+    # the port Robot
+
+    def read(self) -> RobotState:
+        """Return what the arm's interface reports now."""
+        p = self.params
+        kin = self.model.kinematics(self._q_meas)
+        tau_ext = self._observer.residual
+        wrench = wrench_from_torques(self.model.ee_jacobian(kin), tau_ext, p.wrench_damping, p.singular_value_min)
+        return RobotState(
+            self.time, self._q_meas, self._qd_meas, self._q_d.copy(), self._qd_set.copy(), tau_ext, wrench
+        )
+
+    def command(self, qd: FloatArray) -> None:
+        """Take joint velocities (n,) [rad/s] as the set-point."""
+        self._qd_set = np.array(qd, dtype=np.float64)
+
+    def advance(self, duration: float) -> None:
+        """Let time pass [s], in whole physics steps."""
+        p, n, dt = self.params, self._n, self.params.period_s
+        steps = round(duration / dt)
+        draws = self._rng.standard_normal((steps, 2, n))
+        keep = np.exp(-2 * np.pi * p.torque_noise_hz * dt)
+        drive = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
+        follow = 1.0 - np.exp(-2 * np.pi * p.set_point_hz * dt)
+        tau_max, data = self.model.description.tau_max, self.mj_data
+        bias = np.zeros(n)
+        for i in range(steps):
+            for call in self._before_step:
+                call(self.time)
+            self._q_d += self._qd_set * dt
+            self._qd_d += follow * (self._qd_set - self._qd_d)
+            q, qd = self._q.copy(), self._qd.copy()
+            qd_meas = qd + p.velocity_noise_rad_s * draws[i, 0]
+            mass, bias = self.model.mass_matrix_and_bias(q, qd_meas, bias)
+            tau, friction = _torques(q, qd, self._q_d, self._qd_d, bias, self._k, self._d, tau_max, self._friction)
+            self._applied[:] = tau - friction
+            mujoco.mj_step(self.mj_model, data)
+            self._noise = keep * self._noise + drive * draws[i, 1]
+            sensed = _sensed(
+                tau, self._qdd, p.armature_kg_m2, q, self._offset, self._ripple, self._noise,
+                friction, p.friction_compensated,
+            )  # fmt: skip
+            self._observer = observe(self._observer, mass, bias, qd_meas, sensed, p.observer_gain_1_s, dt)
+            self.time += dt
+            self._q_meas, self._qd_meas = q, qd_meas
+            self.true_force = self._contact_force() if data.ncon else np.zeros(3)
+            self.true_log.append((self.time, self.true_force))
+
+    def _contact_force(self) -> FloatArray:
+        """Sum of contact forces on the arm (3,) [N], base frame."""
+        total, wrench = np.zeros(3), np.zeros(6)
+        for i in range(self.mj_data.ncon):
+            contact = self.mj_data.contact[i]
+            mujoco.mj_contactForce(self.mj_model, self.mj_data, i, wrench)
+            force = contact.frame.reshape(3, 3).T @ wrench[:3]
+            # MuJoCo's contact force acts on the second geom
+            total += force if int(contact.geom2) in self._arm_geoms else -force
+        return total
+
+
+@njit(cache=True)
+def _torques(
+    q: FloatArray, qd: FloatArray, q_d: FloatArray, qd_d: FloatArray, bias: FloatArray, k: FloatArray, d: FloatArray,
+    tau_max: FloatArray, friction: FloatArray,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Motor torques of the joint impedance, and joint friction (n,) [Nm]."""
+    tau = k * (q_d - q) + d * (qd_d - qd) + bias
+    tau = np.minimum(np.maximum(tau, -tau_max), tau_max)
+    f1, f2, f3 = friction[0], friction[1], friction[2]
+    return tau, f1 / (1 + np.exp(-f2 * (qd + f3))) - f1 / (1 + np.exp(-f2 * f3))
+
+
+@njit(cache=True)
+def _sensed(
+    tau: FloatArray, qdd: FloatArray, armature: float, q: FloatArray, offset: FloatArray, ripple: FloatArray,
+    noise: FloatArray, friction: FloatArray, compensated: float,
+) -> FloatArray:  # fmt: skip
+    """Joint torques (n,) [Nm] as the link-side sensors report them, known friction already taken off."""
+    rippled = ripple[0] * np.sin(ripple[1] * q + ripple[2])
+    return tau - armature * qdd + offset + rippled + noise - compensated * friction
+
+
+class PlantClock:
+    """The port `Clock` of a simulated arm: each tick lets one control period pass."""
+
+    def __init__(self, plant: Plant, period: float) -> None:
+        """Take the arm and the control period [s]."""
+        self._plant, self._period = plant, period
+
+    def tick(self) -> float:
+        """Advance the physics by one period and return its time [s]."""
+        self._plant.advance(self._period)
+        return self._plant.time

@@ -1,0 +1,54 @@
+"""How far the simulated arm is from its model, and how its sensors err: figures of real Pandas."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pretouch.params import Check, Checked, Fraction, NonNegative, Positive
+
+Joints = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class PlantParams(Checked):
+    """One kind of simulated arm; a seed makes one arm of it. Tuples hold one value a joint."""
+
+    period_s: Positive = 0.001
+    """Physics, joint control and observer period [s]."""
+    stiffness_nm_rad: Joints = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)
+    """Joint impedance that realises the velocity interface [Nm/rad] (libfranka examples)."""
+    damping_ratio: Positive = 1.0
+    """Damping of that impedance as a fraction of critical for each joint's own inertia."""
+    armature_kg_m2: Positive = 0.1
+    """Rotor inertia at the joint [kg m^2] (model data of this package)."""
+    mass_error: Fraction = 0.04
+    """Link masses and inertias are off by up to this fraction, uniformly (realistic; 0.15 is a stress case)."""
+    payload_max_kg: NonNegative = 0.1
+    """Unknown mass at the TCP, uniform from 0 [kg] (realistic; 0.5 is a stress case)."""
+    friction_f1_nm: Joints = (0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489)
+    """Joint friction F1 / (1 + exp(-F2 (qd + F3))) - F1 / (1 + exp(-F2 F3)) [Nm], identified by Gaz et al. 2019."""
+    friction_f2_s_rad: Joints = (5.1181, 9.0657, 10.136, 5.5903, 8.3469, 17.133, 10.336)
+    """F2 [s/rad]."""
+    friction_f3_rad_s: Joints = (0.039533, 0.025882, -0.04607, 0.036194, 0.026226, -0.021047, 0.0035526)
+    """F3 [rad/s]."""
+    friction_compensated: Fraction = 0.2
+    """Part of the friction that the robot's interface knows and subtracts."""
+    torque_noise_nm: Joints = (0.26, 0.36, 0.23, 0.35, 0.05, 0.06, 0.01)
+    """Standard deviation of the torque sensors' noise [Nm], logged on a real Panda between 10 and 80 Hz."""
+    torque_noise_hz: Positive = 80.0
+    """Corner frequency of that noise [Hz]."""
+    torque_offset_nm: Joints = (0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.05)
+    """Constant error of each torque sensor, uniform up to this [Nm], logged on a real Panda."""
+    ripple_nm: Joints = (0.20, 0.21, 0.07, 0.15, 0.015, 0.015, 0.015)
+    """Amplitude of the gear ripple in the torque sensors [Nm], logged on a real Panda."""
+    ripple_cycles: Joints = (241.0, 241.0, 241.0, 241.0, 160.0, 160.0, 160.0)
+    """Ripple cycles in a turn of the joint."""
+    velocity_noise_rad_s: NonNegative = 0.008
+    """Standard deviation of the measured joint velocities' noise [rad/s], logged on a real Panda."""
+    observer_gain_1_s: Positive = 60.0
+    """Gain of the robot's momentum observer [1/s]: about 10 Hz, as the vendor's estimate."""
+    wrench_damping: NonNegative = 0.01
+    """Damping of the least squares that turn joint torques into a wrench."""
+    singular_value_min: NonNegative = 0.02
+    """Smallest singular value of the Jacobian at which the robot still gives a wrench."""
+    set_point_hz: Annotated[float, Check(low=0.0, open_low=True)] = 100.0
+    """Low-pass on the velocity set-points, the vendor's default cut-off [Hz]."""

@@ -1,0 +1,196 @@
+"""Model of the VL53L1X time-of-flight sensors of a skin, seen through the simulated room."""
+
+import heapq
+from dataclasses import dataclass
+from typing import Literal
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from pretouch.params import Checked, Fraction, NonNegative, Positive
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import MIN_DISTANCE, cone_rays
+from pretouch.sim.plant import Plant
+from pretouch.types import FloatArray, RangeReadings, RangeStatus
+
+
+@dataclass(frozen=True)
+class RangingMode:
+    """One distance mode of the sensor with a timing budget that serves it."""
+
+    period_s: float
+    """Time between readings: timing budget plus overhead [s]."""
+    distance_max_m: float
+    """Farthest target [m]."""
+
+
+MODES: dict[str, RangingMode] = {
+    "short": RangingMode(period_s=0.02, distance_max_m=1.3),
+    "long": RangingMode(period_s=0.14, distance_max_m=4.0),
+}
+"""50 Hz are to be had in short mode only; four metres need a budget of 140 ms (data sheet DS12385)."""
+
+
+@dataclass(frozen=True)
+class RangeFinderParams(Checked):
+    """How the sensors of a skin err."""
+
+    mode: Literal["short", "long"] = "short"
+    """Distance mode."""
+    rings: int = 2
+    """Circles of rays that fill the 27 degree cone; 2 make 19 rays."""
+    reflectance: Fraction = 0.5
+    """Diffuse reflectance of all surfaces at 940 nm; skin and light cloth reach 0.5 and more."""
+    reflectance_limit: Positive = 0.17
+    """Reflectance of a target that fills the cone and is just seen at the mode's greatest distance (sheet: grey)."""
+    merge_m: Positive = 0.1
+    """Returns within this of the nearest one are taken as one target, weighted by their strength [m]."""
+    noise_floor_m: NonNegative = 0.003
+    """Standard deviation at zero distance [m]."""
+    noise_rate: NonNegative = 0.006
+    """Growth of the standard deviation with distance for a target that fills the cone; weak targets are noisier."""
+    sigma_limit_m: Positive = 0.015
+    """Standard deviation above which a reading has status SIGMA [m] (data sheet default)."""
+    offset_max_m: NonNegative = 0.01
+    """Constant error of each sensor, uniform up to this [m]; the data sheet allows 20 to 25 mm in all."""
+    latency_s: NonNegative = 0.008
+    """Least time from measurement to arrival [s]: radio and receiver."""
+    jitter_s: NonNegative = 0.004
+    """Mean of the exponential addition to it [s]."""
+    period_jitter: Fraction = 0.02
+    """Standard deviation of the period as a fraction of it."""
+    dropout: Fraction = 0.005
+    """Probability that a reading is lost on its way."""
+
+
+class RangeFinders:
+    """All sensors of a skin in a simulated room: the port `Skin`, sampled and held.
+
+    Each unit measures at its own phase and rate; a reading arrives late, out of step with the others, or not at
+    all. A unit sees everything but its own link: objects, hand, floor, and the rest of the arm.
+    """
+
+    def __init__(self, plant: Plant, skin: Skin, params: RangeFinderParams, seed: int) -> None:
+        """Mount the sensors on a simulated arm; the seed decides offsets, phases, noise and losses."""
+        self._plant, self._skin, self._params, self._mode = plant, skin, params, MODES[params.mode]
+        self._rng = np.random.default_rng([seed, 3])
+        self._rays = cone_rays(params.rings)
+        rays = len(self._rays)
+        self._geom, self._hit, self._normal = np.zeros(rays, np.int32), np.zeros(rays), np.zeros(3 * rays)
+        self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
+        count = len(skin)
+        self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
+        self._due = self._rng.uniform(0, self._mode.period_s, count)
+        self._arriving: list[tuple[float, int, float, float, int]] = []
+        self._stamp = np.full(count, -np.inf)
+        self._distance = np.zeros(count)
+        self._status = np.full(count, RangeStatus.NONE, dtype=np.int64)
+        self.silenced: set[int] = set()
+        """Indices of units that no longer send."""
+        self._next_due = float(self._due.min(initial=np.inf))
+        plant.before_each_step(self._sample)
+
+    def read(self) -> RangeReadings:
+        """Return the newest reading of each unit that has arrived by now."""
+        while self._arriving and self._arriving[0][0] <= self._plant.time + 1e-9:
+            _, unit, stamp, distance, status = heapq.heappop(self._arriving)
+            if stamp > self._stamp[unit]:
+                self._stamp[unit], self._distance[unit], self._status[unit] = stamp, distance, status
+        return RangeReadings(self._stamp.copy(), self._distance.copy(), self._status.copy())
+
+    def _sample(self, time: float) -> None:
+        if time < self._next_due:
+            return
+        p, rng = self._params, self._rng
+        for unit in np.flatnonzero(self._due <= time):
+            self._due[unit] += self._mode.period_s * (1.0 + p.period_jitter * rng.standard_normal())
+            distance, status = self._measure(int(unit))
+            arrival = time + p.latency_s + rng.exponential(p.jitter_s)
+            lost = rng.uniform() < p.dropout
+            if not lost and unit not in self.silenced:
+                heapq.heappush(self._arriving, (arrival, int(unit), time, distance, status))
+        self._next_due = float(self._due.min())
+
+    def _measure(self, unit: int) -> tuple[float, int]:
+        p, link = self._params, int(self._skin.link[unit])
+        origin, rays = _beams(self._xpos[link], self._xmat[link], self._skin.T_link_sensor[unit], self._rays)
+        mujoco.mj_multiRay(
+            self._plant.mj_model, self._plant.mj_data, origin, rays.reshape(-1), None, True, link,
+            self._geom, self._hit, self._normal, len(rays), self._mode.distance_max_m,
+        )  # fmt: skip
+        return _reading(
+            self._hit, rays, self._normal.reshape(-1, 3), p.reflectance, p.reflectance_limit,
+            self._mode.distance_max_m, p.merge_m, p.noise_floor_m, p.noise_rate, p.sigma_limit_m, self._offset[unit],
+            self._rng.standard_normal(),
+        )  # fmt: skip
+
+
+@njit(cache=True)
+def _beams(
+    xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray, cone: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) [m] and unit vectors (N, 3) of a sensor's rays in the base frame."""
+    origin, R = np.zeros(3), np.zeros((3, 3))
+    for i in range(3):
+        origin[i] = xpos[i]
+        for k in range(3):
+            origin[i] += xmat[3 * i + k] * T_link_sensor[k, 3]
+            for j in range(3):
+                R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
+    rays = np.zeros_like(cone)
+    for ray in range(len(cone)):
+        for i in range(3):
+            for j in range(3):
+                rays[ray, i] += R[i, j] * cone[ray, j]
+    return origin, rays
+
+
+_OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
+    int(s) for s in (RangeStatus.OK, RangeStatus.SIGMA, RangeStatus.SIGNAL, RangeStatus.MIN_RANGE)
+)
+
+
+@njit(cache=True)
+def _reading(
+    distance: FloatArray, rays: FloatArray, normal: FloatArray, reflectance: float, reflectance_limit: float,
+    distance_max: float, merge: float, noise_floor: float, noise_rate: float, sigma_limit: float, offset: float,
+    draw: float,
+) -> tuple[float, int]:  # fmt: skip
+    """One reading [m] and its status from the returns of a bundle; a ray without a hit has a negative distance.
+
+    The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
+    distance and the cosine of incidence, relative to a target that is just detected at `distance_max`.
+    """
+    count = len(distance)
+    strength = np.zeros(count)
+    for i in range(count):
+        if 0.0 <= distance[i] <= distance_max:
+            slant = abs(rays[i, 0] * normal[i, 0] + rays[i, 1] * normal[i, 1] + rays[i, 2] * normal[i, 2])
+            ratio = distance_max / max(distance[i], 0.01)
+            strength[i] = reflectance / reflectance_limit * slant * ratio * ratio / count
+    start = 0.0
+    while True:
+        nearest = np.inf
+        for i in range(count):
+            if strength[i] > 0 and start <= distance[i] < nearest:
+                nearest = distance[i]
+        if nearest == np.inf:
+            return 0.0, _SIGNAL
+        total, mean = 0.0, 0.0
+        for i in range(count):
+            if nearest <= distance[i] <= nearest + merge:
+                total += strength[i]
+                mean += strength[i] * distance[i]
+        if total >= 1.0:
+            break
+        start = nearest + merge
+    mean /= total
+    full = reflectance / reflectance_limit * (distance_max / max(mean, 0.01)) ** 2
+    sigma = noise_floor + noise_rate * mean * np.sqrt(max(1.0, full / total))
+    measured = max(0.0, mean + offset + sigma * draw)
+    if sigma > sigma_limit:
+        return measured, _SIGMA
+    if measured < MIN_DISTANCE:
+        return measured, _MIN_RANGE
+    return measured, _OK

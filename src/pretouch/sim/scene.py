@@ -1,0 +1,146 @@
+"""What stands in the simulated room: the arm on its pedestal, a floor, static objects and a hand."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.robot.body import Capsules
+from pretouch.robot.model import RobotModel
+from pretouch.types import FloatArray
+
+_IMPEDANCE = 0.01
+"""Constant solver impedance d of all contacts; with it and an elliptic cone solref means N/m, see `_solref`."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A static box."""
+
+    name: str
+    center: tuple[float, float, float]
+    """[m], base frame."""
+    half_size: tuple[float, float, float]
+    """[m]"""
+    stiffness: float
+    """Force per penetration of one link capsule [N/m]."""
+
+
+@dataclass(frozen=True)
+class HandSpec:
+    """A person's fist: a ball on a spring, moved by `pretouch.sim.hand`."""
+
+    radius: float = 0.05
+    """[m]"""
+    mass: float = 0.6
+    """Effective mass of a hand in a transient contact [kg] (ISO/TS 15066, annex A)."""
+    stiffness: float = 75_000.0
+    """Contact stiffness of a hand [N/m] (ISO/TS 15066, annex A)."""
+    start: tuple[float, float, float] = (1.2, 0.0, 0.8)
+    """[m], base frame."""
+
+
+@dataclass(frozen=True)
+class SceneSpec:
+    """What to build round the arm."""
+
+    boxes: tuple[Box, ...] = ()
+    hand: HandSpec | None = None
+    floor_height: float = -0.2
+    """Height of the floor in the base frame [m]: the arm stands on a pedestal, or its hand would reach below it."""
+    pedestal_radius: float = 0.1
+    """[m]"""
+    damping_ratio: float = 0.1
+    """Damping of a contact as a fraction of critical for 2 kg."""
+
+
+def fixtures(spec: SceneSpec) -> Fixtures:
+    """What of a scene is declared to the controller: floor and pedestal, not the objects."""
+    radius, height = spec.pedestal_radius, spec.floor_height
+    return Fixtures(
+        planes=np.array([[0.0, 0.0, 1.0, height]]),
+        capsules=Capsules(
+            link=np.zeros(1, np.int64),
+            a=np.array([[0.0, 0.0, height]]),
+            b=np.array([[0.0, 0.0, -radius]]),
+            radius=np.array([radius]),
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class ArmError:
+    """How the simulated arm differs from its model."""
+
+    mass_factor: FloatArray
+    """(L,) factor on each link's mass and inertia."""
+    payload: float
+    """Unknown mass at the TCP [kg]."""
+    armature: float
+    """Rotor inertia as felt at the joint [kg m^2]."""
+
+
+def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:
+    """Build the MuJoCo model of a scene. Only declared pairs touch: each moving capsule with floor, boxes and hand."""
+    mj = mujoco.MjSpec.from_file(str(model.description.mjcf))
+    mj.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    for actuator in list(mj.actuators):
+        mj.delete(actuator)
+    for joint in mj.joints:
+        joint.armature = error.armature
+        joint.damping = np.zeros_like(joint.damping)
+    arm = [geom.name for geom in mj.geoms if model.moved_by[model.link_index(geom.parent.name)].any()]
+    if error.payload > 0:
+        body = mj.body(model.description.ee_body).add_body(name="payload")
+        body.mass, body.inertia = error.payload, np.full(3, 1e-5)
+        body.explicitinertial = True
+    stiffness = _add_objects(mj, spec)
+    pairs = [(link, thing) for link in arm for thing in stiffness]
+    for link, thing in pairs:
+        mj.add_pair(
+            geomname1=link, geomname2=thing, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
+            solimp=[_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0],
+        )  # fmt: skip
+    built = mj.compile()
+    links = len(model.links)
+    built.body_mass[:links] *= error.mass_factor
+    built.body_inertia[:links] *= error.mass_factor[:, None]
+    mujoco.mj_setConst(built, mujoco.MjData(built))
+    for i, (link, thing) in enumerate(pairs):
+        built.pair_solref[i] = _solref(built, link, thing, stiffness[thing], spec.damping_ratio)
+    return built
+
+
+def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
+    """Add floor, pedestal, boxes and hand; return the stiffness of each geom the arm can touch."""
+    world = mj.worldbody
+    off = {"contype": 0, "conaffinity": 0}
+    kind = mujoco.mjtGeom
+    low, radius = spec.floor_height, spec.pedestal_radius
+    world.add_geom(name="floor", type=kind.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, low], **off)
+    world.add_geom(
+        name="pedestal", type=kind.mjGEOM_CAPSULE, fromto=[0, 0, low, 0, 0, -radius], size=[radius, 0, 0], **off
+    )
+    stiffness = {"floor": 100_000.0}
+    for thing in spec.boxes:
+        world.add_geom(name=thing.name, type=kind.mjGEOM_BOX, size=thing.half_size, pos=thing.center, **off)
+        stiffness[thing.name] = thing.stiffness
+    if spec.hand:
+        body = world.add_body(name="hand", pos=spec.hand.start, gravcomp=1.0)
+        for axis in np.eye(3):
+            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        body.add_geom(name="hand", type=kind.mjGEOM_SPHERE, size=[spec.hand.radius, 0, 0], mass=spec.hand.mass, **off)
+        stiffness["hand"] = spec.hand.stiffness
+    return stiffness
+
+
+def _solref(built: mujoco.MjModel, link: str, thing: str, stiffness: float, damping_ratio: float) -> FloatArray:
+    """Direct solref (-K, -B) that makes a contact a spring of `stiffness` [N/m] and a damper.
+
+    MuJoCo's solref is normalised by the inverse masses w that meet in the contact: K = k (1 - d) w.
+    """
+    bodies = [built.geom_bodyid[built.geom(name).id] for name in (link, thing)]
+    w = sum(float(built.body_invweight0[b, 0]) for b in bodies)
+    damping = damping_ratio * 2.0 * np.sqrt(stiffness * 2.0)
+    return np.array([-stiffness, -damping]) * (1.0 - _IMPEDANCE) * w

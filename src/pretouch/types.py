@@ -1,0 +1,213 @@
+"""The values that travel along the line from a reading to a joint velocity.
+
+Everything here is a frozen value. Arrays are float64 and read-only once published; see `docs/conventions.md`.
+"""
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+class RangeStatus(IntEnum):
+    """Range status codes of the VL53L1X (ST, UM2356); 255 is set by the driver before the first measurement."""
+
+    OK = 0
+    SIGMA = 1
+    SIGNAL = 2
+    MIN_CLIPPED = 3
+    OUT_OF_BOUNDS = 4
+    HARDWARE = 5
+    NO_WRAP_CHECK = 6
+    WRAPPED = 7
+    CROSSTALK = 9
+    SYNC = 10
+    MERGED = 11
+    MIN_RANGE = 13
+    INVALID = 14
+    NONE = 255
+
+
+@dataclass(frozen=True, slots=True)
+class RangeReadings:
+    """The newest reading of each of K sensor units, in the order of the skin.
+
+    A unit that has never been heard has stamp -inf and status NONE.
+    """
+
+    stamp: FloatArray
+    """(K,) instant of each measurement [s]."""
+    distance: FloatArray
+    """(K,) distance along the beam from the sensor origin [m]; meaningless unless the status says so."""
+    status: IntArray
+    """(K,) `RangeStatus` codes."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """What the robot's own interface reports at one instant, n joints."""
+
+    stamp: float
+    """Instant of the measurement [s]."""
+    q: FloatArray
+    """(n,) measured joint positions [rad]."""
+    qd: FloatArray
+    """(n,) measured joint velocities [rad/s]."""
+    q_commanded: FloatArray
+    """(n,) joint positions the robot's motion generator is at [rad] (the vendor's q_d)."""
+    qd_commanded: FloatArray
+    """(n,) joint velocities the robot's motion generator is at [rad/s] (the vendor's dq_d)."""
+    tau_ext: FloatArray
+    """(n,) estimated torques by the environment on the joints [Nm]."""
+    wrench: FloatArray | None
+    """(6,) estimated force [N] and torque about the TCP [Nm] **on the robot by the environment**, base frame.
+
+    None where the robot has no estimate, as near a singularity.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """All that one control step is given."""
+
+    stamp: float
+    """Instant of this step [s]."""
+    robot: RobotState
+    readings: RangeReadings
+    resume: bool = False
+    """A person asks to leave a latched HOLD."""
+
+
+class Mode(Enum):
+    """What the arm is doing."""
+
+    TRACK = "track"
+    """Follow the path, slowed and restricted near obstacles."""
+    REACT = "react"
+    """Yield to a contact (eq. 12)."""
+    HOLD = "hold"
+    """Brake within limits, stand still, and say why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacles:
+    """K sensed points, each with its closest point on the robot's body. Base frame."""
+
+    unit: IntArray
+    """(K,) index of the sensing unit in the skin."""
+    point: FloatArray
+    """(K, 3) obstacle positions, eq. 1 [m]."""
+    ee_distance: FloatArray
+    """(K,) distance from the end-effector origin [m] (eqs. 3, 11)."""
+    body_point: FloatArray
+    """(K, 3) closest points on the surface of the body [m]."""
+    link: IntArray
+    """(K,) index of the link that carries the closest point."""
+    direction: FloatArray
+    """(K, 3) unit vectors from body to obstacle, defined in penetration too."""
+    body_distance: FloatArray
+    """(K,) signed distance from the body's surface [m] (eqs. 5-7)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """Contact thresholds of the three axes (eq. 9) and what they are made of. All (3,) [N], base frame."""
+
+    upper: FloatArray
+    lower: FloatArray
+    mean: FloatArray
+    sigma: FloatArray
+    obstacle_positive: FloatArray
+    """F_obs+ of eq. 11: an object at greater coordinate raises the lower threshold by this."""
+    obstacle_negative: FloatArray
+    """F_obs- of eq. 11: an object at smaller coordinate lowers the upper threshold by this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A contact found in one step."""
+
+    force: FloatArray
+    """(3,) external force F_ext = F_reading - mu of eq. 12 [N], base frame."""
+    axes: BoolArray
+    """(3,) axes whose threshold was crossed."""
+
+
+class QpOutcome(Enum):
+    """How a quadratic program ended."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    """Hard rows contradict the joint box: the answer is the braking command."""
+    FAILED = "failed"
+    """The solver gave no usable answer: the answer is the braking command."""
+    SKIPPED = "skipped"
+    """No problem was posed, because the arm holds: the answer is the braking command."""
+
+
+@dataclass(frozen=True, slots=True)
+class QpSolution:
+    """The answer to one quadratic program (eq. 2)."""
+
+    qd: FloatArray
+    """(n,) joint velocities [rad/s]."""
+    slack: FloatArray
+    """(K,) by how much each approach row is violated [m/s], zero where it holds."""
+    multipliers: FloatArray
+    """(n + K,) multipliers of joint box and rows, positive at an upper and negative at a lower bound."""
+    outcome: QpOutcome
+    status: str
+    """What happened, as a sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlStep:
+    """All that one step of the controller saw and decided.
+
+    The one record that figures, metrics and reports read, whether it comes from a simulation or from a real arm.
+    """
+
+    stamp: float
+    mode: Mode
+    reason: str
+    """Why the arm is in this mode, as a sentence."""
+    q: FloatArray
+    """(n,) measured joint positions [rad]."""
+    ee_position: FloatArray
+    """(3,) end-effector origin [m]."""
+    ee_velocity: FloatArray
+    """(3,) measured end-effector velocity [m/s]."""
+    path_position: FloatArray
+    """(3,) where on the path the arm should be [m]."""
+    path_phase: float
+    """Arc length travelled along the path [m]."""
+    desired_velocity: FloatArray
+    """(3,) end-effector velocity asked of the QP [m/s]."""
+    speed_scale: float
+    """Factor of eqs. 3 and 4 times that of units falling silent, in [0, 1]."""
+    range_stamp: FloatArray
+    """(K,) stamps of the readings used [s]."""
+    range_distance: FloatArray
+    """(K,) distances of the readings used [m], NaN where the unit reported no target."""
+    obstacles: Obstacles
+    force: FloatArray
+    """(3,) the robot's estimate of the external force on it [N], NaN where it has none."""
+    filtered_force: FloatArray
+    """(3,) newest value added to the window, eq. 8 [N]."""
+    thresholds: Thresholds
+    armed: bool
+    """Whether the window is full, so that a contact can be detected."""
+    contact: Contact | None
+    """The contact detected in this very step."""
+    reaction_velocity: FloatArray
+    """(3,) end-effector velocity of the reaction under way, zero otherwise [m/s]."""
+    approach_limit: FloatArray
+    """(K',) approach limits of eq. 7 in the QP [m/s], one for each restricted obstacle."""
+    qp: QpSolution
+    command: FloatArray
+    """(n,) joint velocity command [rad/s]."""
