@@ -57,7 +57,7 @@ def examine(
         last = watch.robot
         believed = replace(last, q_commanded=last.q_commanded + command * period, qd_commanded=command, wrench=None)
         return believed, faults, Watch(stamp, believed, min(watch.force_stamp, stamp))
-    if robot.wrench is not None and not np.all(np.isfinite(robot.wrench)):
+    if robot.wrench is not None and not np.isfinite(robot.wrench).all():
         robot = replace(robot, wrench=None)
     force_stamp = min(watch.force_stamp, stamp) if robot.wrench is None else stamp
     if stamp - force_stamp > params.force_timeout_s:
@@ -76,4 +76,4 @@ def _not_finite(inputs: Inputs) -> str:
         "commanded joint positions": robot.q_commanded,
         "commanded joint velocities": robot.qd_commanded,
     }
-    return next((name for name, value in parts.items() if not np.all(np.isfinite(value))), "")
+    return next((name for name, value in parts.items() if not np.isfinite(value).all()), "")

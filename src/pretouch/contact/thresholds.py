@@ -16,7 +16,7 @@ def obstacle_force(distance: FloatArray, f_d: float, d_max: float, d_min: float)
 
     `distance` [m] is from the end-effector origin; infinite where there is no object, which gives zero.
     """
-    return np.clip((d_max - distance) / (d_max - d_min), 0.0, 1.0) * f_d
+    return np.minimum(np.maximum((d_max - distance) / (d_max - d_min), 0.0), 1.0) * f_d
 
 
 def side_distances(

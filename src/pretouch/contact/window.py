@@ -65,7 +65,7 @@ def add(state: WindowState, reading: FloatArray, alpha: float, lambda_: float) -
     """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on."""
     x = weighted_value(reading, state.newest, state.mean(), state.std(), alpha, lambda_) if state.full else reading
     ring = state.ring.copy()
-    gone = ring[state.next] if state.full else None
+    gone = state.ring[state.next] if state.full else None
     ring[state.next] = x
     following = (state.next + 1) % len(ring)
     count = min(state.count + 1, len(ring))

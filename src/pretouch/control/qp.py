@@ -90,7 +90,7 @@ def solve(
         stop: (n,) braking command inside the box [rad/s].
     """
     n, count = len(lower), len(rows.h)
-    if not all(np.all(np.isfinite(a)) for a in (cost.H, cost.f, lower, upper, rows.G, rows.h)):
+    if not all(np.isfinite(a).all() for a in (cost.H, cost.f, lower, upper, rows.G, rows.h)):
         # the solver would answer NaN with success, or drop a row in silence
         return _braking(stop, rows, QpOutcome.FAILED, "the problem holds numbers that are not finite")
     model = daqp.Model()
@@ -105,7 +105,7 @@ def solve(
             reciprocal = np.full(n + count, 1.0 / slack_weight)
             model.soft_weights(reciprocal, reciprocal)
         x, _, flag, info = model.solve()
-    if flag not in (_OPTIMAL, _SOFT_OPTIMAL) or not np.all(np.isfinite(x)):
+    if flag not in (_OPTIMAL, _SOFT_OPTIMAL) or not np.isfinite(x).all():
         outcome = QpOutcome.INFEASIBLE if flag == _INFEASIBLE else QpOutcome.FAILED
         return _braking(stop, rows, outcome, _EXIT.get(flag, f"the solver failed with exit code {flag}"))
     # the box holds to the solver's tolerance only; the clip makes it exact

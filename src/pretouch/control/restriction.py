@@ -58,9 +58,11 @@ def approach_rows(
     J_c is the Jacobian of the closest body point, d the direction from it to the obstacle; `moved_by` (L, n) says
     which joint moves which link.
     """
+    if params.mode == "off" or len(obstacles.unit) == 0:
+        return ApproachRows(np.zeros((0, len(kin.anchor))), np.zeros(0), soft=False), np.zeros(0, np.int64)
     soft = params.mode in ("slack", "floor")
     limit = approach_limit(obstacles.body_distance, params)
-    which = np.flatnonzero(np.isfinite(limit)) if params.mode != "off" else np.zeros(0, np.int64)
+    which = np.flatnonzero(np.isfinite(limit))
     G = _rows(
         kin.anchor,
         kin.axis,

@@ -35,10 +35,12 @@ def perceive(
     if not params.enabled or len(skin) == 0:
         return no_obstacles(), state
     position, rotation = sensor_poses(skin, kin)
-    if is_fresh(state, readings, now).any():
+    fresh = np.flatnonzero(is_fresh(state, readings, now))
+    if len(fresh):
         distance = measured_distance(readings)
-        own = expected_range(kin, position, rotation, skin.link, model.capsules, fixtures)
-        shows = distance < own - params.self_margin_m
+        known = np.zeros(len(skin))
+        known[fresh] = expected_range(kin, position[fresh], rotation[fresh], skin.link[fresh], model.capsules, fixtures)
+        shows = distance < known - params.self_margin_m
         points = locate(position, rotation, np.where(shows, distance, 0.0))
         state = track(state, readings, points, shows, now, params.persistence_s)
     unit = np.flatnonzero(now - state.seen <= params.persistence_s)
@@ -60,6 +62,8 @@ def silent_units(skin: Skin, readings: RangeReadings, now: float, params: Percep
     if not params.enabled or len(skin) == 0:
         return 1.0, ""
     age = silence(readings, now)
+    oldest = float(age.max())
+    if oldest <= params.slow_after_s:
+        return 1.0, ""
     names = ", ".join(skin.ids[k] for k in np.flatnonzero(age >= params.silent_after_s))
-    left = (params.silent_after_s - float(age.max())) / (params.silent_after_s - params.slow_after_s)
-    return min(1.0, max(0.0, left)), names
+    return max(0.0, (params.silent_after_s - oldest) / (params.silent_after_s - params.slow_after_s)), names

@@ -13,6 +13,9 @@ from pretouch.types import FloatArray, IntArray
 
 _RAYS = cone_rays(2)
 
+_TOUCHING = 1e-9
+"""Distance to a capsule's side below which rounding may put the start of a ray on either side of it [m]."""
+
 
 @dataclass(frozen=True)
 class Fixtures:
@@ -48,32 +51,40 @@ def expected_range(
         body: the arm as capsules, base included.
         fixtures: what stands around it.
     """
-    scene = body.joined(fixtures.capsules)
-    a, b = placed(scene, kin)
-    return _expected(position, rotation, own_link, scene.link, a, b, scene.radius, fixtures.planes, _RAYS)
+    near = np.full(len(own_link), np.inf)
+    for part in (body, fixtures.capsules):
+        a, b = placed(part, kin)
+        _see_capsules(near, position, rotation, own_link, part.link, a, b, part.radius, _RAYS)
+    _see_planes(near, position, rotation, fixtures.planes, _RAYS)
+    return near
 
 
 @njit(cache=True)
-def _expected(
-    position: FloatArray, rotation: FloatArray, own: IntArray, link: IntArray, a: FloatArray, b: FloatArray,
-    radius: FloatArray, planes: FloatArray, rays: FloatArray,
-) -> FloatArray:  # fmt: skip
-    nearest = np.full(len(own), np.inf)
+def _see_capsules(
+    near: FloatArray, position: FloatArray, rotation: FloatArray, own: IntArray, link: IntArray, a: FloatArray,
+    b: FloatArray, radius: FloatArray, rays: FloatArray,
+) -> None:  # fmt: skip
     beam = np.empty(3)
     for k in range(len(own)):
         p, R = position[k], rotation[k]
         beam[:] = R[:, 2]
-        near = np.array([link[c] != own[k] and _may_meet(p, beam, a[c], b[c], radius[c]) for c in range(len(link))])
-        for i in range(len(rays)):
-            ray = rotated(R, rays[i])
-            for c in range(len(link)):
-                if near[c]:
-                    nearest[k] = min(nearest[k], ray_capsule(p, ray, a[c], b[c], radius[c]))
-            for m in range(len(planes)):
-                rate, height = dot(planes[m], ray), dot(planes[m], p) - planes[m, 3]
+        for c in range(len(link)):
+            if link[c] != own[k] and _may_meet(p, beam, a[c], b[c], radius[c]):
+                for i in range(len(rays)):
+                    near[k] = min(near[k], ray_capsule(p, rotated(R, rays[i]), a[c], b[c], radius[c]))
+
+
+@njit(cache=True)
+def _see_planes(
+    near: FloatArray, position: FloatArray, rotation: FloatArray, planes: FloatArray, rays: FloatArray
+) -> None:
+    for k in range(len(near)):
+        for m in range(len(planes)):
+            height = dot(planes[m], position[k]) - planes[m, 3]
+            for i in range(len(rays)):
+                rate = dot(planes[m], rotated(rotation[k], rays[i]))
                 if rate < 0 and height >= 0:
-                    nearest[k] = min(nearest[k], -height / rate)
-    return nearest
+                    near[k] = min(near[k], -height / rate)
 
 
 @njit(cache=True)
@@ -107,8 +118,8 @@ def ray_capsule(p: FloatArray, ray: FloatArray, a: FloatArray, b: FloatArray, ra
         if disc >= 0:
             t = (-half_b - np.sqrt(disc)) / quad
             y = ao + t * ar
-            if t >= 0 and 0 < y < aa:
-                best = t
+            if t >= -_TOUCHING and 0 < y < aa:
+                best = max(t, 0.0)
     for end in (a, b):
         to = p - end
         half_b, free = dot(ray, to), dot(to, to) - radius * radius

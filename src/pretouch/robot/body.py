@@ -30,15 +30,6 @@ class Capsules:
         keep = np.isin(self.link, links)
         return Capsules(self.link[keep], self.a[keep], self.b[keep], self.radius[keep])
 
-    def joined(self, other: "Capsules") -> "Capsules":
-        """Return these capsules followed by the other ones."""
-        return Capsules(
-            np.concatenate([self.link, other.link]),
-            np.concatenate([self.a, other.a]),
-            np.concatenate([self.b, other.b]),
-            np.concatenate([self.radius, other.radius]),
-        )
-
 
 def capsules_of(model: mujoco.MjModel) -> Capsules:
     """Read the capsule geoms of an MJCF model; a link's index is its MuJoCo body id."""

@@ -47,7 +47,10 @@ class RobotModel:
 
     def __init__(self, description: RobotDescription) -> None:
         self.description = description
-        self._model = mujoco.MjModel.from_xml_path(str(description.mjcf))
+        try:
+            self._model = mujoco.MjModel.from_xml_path(str(description.mjcf))
+        except ValueError as error:
+            raise RobotModelError(f"{description.name}: {description.mjcf} cannot be read: {error}") from error
         self._model.dof_armature[:] = 0.0
         self._model.dof_damping[:] = 0.0
         self._data = mujoco.MjData(self._model)
@@ -67,6 +70,8 @@ class RobotModel:
         """(L, n) whether a joint moves a link."""
         self.body: Capsules = self.capsules.of_links(np.flatnonzero(self.moved_by.any(axis=1)))
         """The part of the body that any joint moves."""
+        if not len(self.body):
+            raise RobotModelError(f"{description.name}: no joint moves a capsule: give the links capsule geoms.")
         self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
         self.q_max: FloatArray = self._model.jnt_range[:, 1].copy()
         self.q_mid: FloatArray = (self.q_min + self.q_max) / 2

@@ -15,11 +15,16 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray, IntArray
 
+_FAR = 0.5
+"""Distance from its link beyond which a unit cannot be mounted on it [m]: millimetres taken for metres, most likely."""
+
+_LARGEST = float(np.finfo(np.float64).max)
+
 
 class Skin:
     """K sensor units on an arm, checked against its model. The order of the units is the order of all readings.
 
-    Raises SkinError for duplicate ids, a link the arm does not have, and a unit inside its own link.
+    Raises SkinError for duplicate ids, a link the arm does not have, and a unit inside its own link or far off it.
     """
 
     def __init__(self, units: Sequence[SensorUnit], model: RobotModel) -> None:
@@ -48,13 +53,16 @@ def _check_place(unit: SensorUnit, model: RobotModel) -> None:
         )
     own = model.capsules.of_links(np.array([model.link_index(unit.link)]))
     p = unit.T_link_sensor[:3, 3]
+    height = np.inf
     for a, b, radius in zip(own.a, own.b, own.radius, strict=True):
         along = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
-        depth = radius - np.linalg.norm(p - a - along * (b - a))
-        if depth > 0:
-            raise SkinError(
-                f"Unit {unit.id} lies {1000 * depth:.1f} mm inside {unit.link}: move it out to the surface."
-            )
+        height = min(height, float(np.linalg.norm(p - a - along * (b - a)) - radius))
+    if height < 0:
+        raise SkinError(f"Unit {unit.id} lies {-1000 * height:.1f} mm inside {unit.link}: move it out to the surface.")
+    if len(own) and height > _FAR:
+        raise SkinError(
+            f"Unit {unit.id} lies {height:.4g} m off {unit.link}: give its position in metres, from the link's origin."
+        )
 
 
 def load_skin(path: Path, model: RobotModel) -> Skin:
@@ -123,7 +131,7 @@ def _unit_from(entry: Any) -> SensorUnit:
 def _numbers(entry: dict[str, Any], key: str, count: int) -> FloatArray:
     value = entry.get(key)
     ok = isinstance(value, list) and len(value) == count
-    if not ok or not all(isinstance(v, int | float) and np.isfinite(v) for v in value or []):
+    if not ok or not all(type(v) in (int, float) and abs(v) <= _LARGEST for v in value or []):
         raise SkinError(f"Unit {entry['id']}: {key} is {value!r}: give {count} finite numbers.")
     return np.array(value, dtype=np.float64)
 

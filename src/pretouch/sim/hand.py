@@ -35,7 +35,7 @@ class Hand:
         self,
         plant: Plant,
         script: HandScript,
-        speed_max: float = 0.5,
+        speed_max: float = 0.8,
         stiffness: float = 2000.0,
         damping: float = 60.0,
     ) -> None:
@@ -63,33 +63,32 @@ class Hand:
 
     def _drive(self, time: float) -> None:
         goal = self._script.goal(time, self.position, self._plant)
-        reach = self._speed * self._plant.params.period_s
         self._goal, force = _spring(
-            self._goal, goal.position, reach, self.position, self.velocity, self._k, self._d, goal.force_max
-        )
+            self._goal, goal.position, self._speed, self.position, self.velocity, self._k, self._d, goal.force_max,
+            self._plant.params.period_s,
+        )  # fmt: skip
         self._plant.mj_data.qfrc_applied[self._dof : self._dof + 3] = force
 
 
 @njit(cache=True)
 def _spring(
-    at: FloatArray,
-    goal: FloatArray,
-    reach: float,
-    x: FloatArray,
-    v: FloatArray,
-    k: float,
-    d: float,
-    force_max: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Move the spring's far end towards the goal by at most `reach`, and return it with the spring's force (3,) [N]."""
-    step = goal - at
-    length = np.sqrt(step @ step)
-    at = at + (step if length <= reach else step * (reach / length))
-    force = k * (at - x)
-    size = np.sqrt(force @ force)
-    if size > force_max:
-        force = force * (force_max / size)
-    return at, force - d * v
+    last: FloatArray, goal: FloatArray, speed: float, x: FloatArray, v: FloatArray, k: float, d: float,
+    force_max: float, dt: float,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Move the spring's far end towards the goal, and return it with the force (3,) [N] on the hand.
+
+    The far end is never farther ahead than the largest force stretches the spring, so a person who lets go pulls
+    back at once.
+    """
+    at = last + _shortened(goal - last, speed * dt)
+    at = x + _shortened(at - x, force_max / k)
+    return at, _shortened(k * (at - x) + d * ((at - last) / dt - v), force_max)
+
+
+@njit(cache=True)
+def _shortened(vector: FloatArray, length: float) -> FloatArray:
+    size = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    return vector if size <= length else vector * (length / size)
 
 
 def point_on_arm(plant: Plant, link: int, offset: FloatArray) -> FloatArray:

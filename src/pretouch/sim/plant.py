@@ -12,6 +12,8 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import ArmError, SceneSpec, build
 from pretouch.types import FloatArray, RobotState
 
+_NO_FORCE = np.zeros(3)
+
 
 class Plant:
     """One arm of a kind, in a scene: the port `Robot`.
@@ -91,32 +93,30 @@ class Plant:
         """Let time pass [s], in whole physics steps."""
         p, n, dt = self.params, self._n, self.params.period_s
         steps = round(duration / dt)
-        draws = self._rng.standard_normal((steps, 2, n))
         keep = np.exp(-2 * np.pi * p.torque_noise_hz * dt)
-        drive = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
         follow = 1.0 - np.exp(-2 * np.pi * p.set_point_hz * dt)
-        tau_max, data = self.model.description.tau_max, self.mj_data
-        bias = np.zeros(n)
+        draws = self._rng.standard_normal((steps, 2, n))
+        velocity_noise = p.velocity_noise_rad_s * draws[:, 0]
+        torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2) * draws[:, 1]
+        tau_max = self.model.description.tau_max
         for i in range(steps):
             for call in self._before_step:
                 call(self.time)
-            self._q_d += self._qd_set * dt
-            self._qd_d += follow * (self._qd_set - self._qd_d)
-            q, qd = self._q.copy(), self._qd.copy()
-            qd_meas = qd + p.velocity_noise_rad_s * draws[i, 0]
-            mass, bias = self.model.mass_matrix_and_bias(q, qd_meas, bias)
-            tau, friction = _torques(q, qd, self._q_d, self._qd_d, bias, self._k, self._d, tau_max, self._friction)
-            self._applied[:] = tau - friction
-            mujoco.mj_step(self.mj_model, data)
-            self._noise = keep * self._noise + drive * draws[i, 1]
+            q, qd_meas = self._q.copy(), self._qd + velocity_noise[i]
+            mass, bias = self.model.mass_matrix_and_bias(q, qd_meas, np.empty(n))
+            tau, friction = _drive(
+                q, self._qd, self._q_d, self._qd_d, self._qd_set, dt, follow, bias, self._k, self._d, tau_max,
+                self._friction, self._applied,
+            )  # fmt: skip
+            mujoco.mj_step(self.mj_model, self.mj_data)
             sensed = _sensed(
-                tau, self._qdd, p.armature_kg_m2, q, self._offset, self._ripple, self._noise,
+                tau, self._qdd, p.armature_kg_m2, q, self._offset, self._ripple, self._noise, keep, torque_noise[i],
                 friction, p.friction_compensated,
             )  # fmt: skip
             self._observer = observe(self._observer, mass, bias, qd_meas, sensed, p.observer_gain_1_s, dt)
             self.time += dt
             self._q_meas, self._qd_meas = q, qd_meas
-            self.true_force = self._contact_force() if data.ncon else np.zeros(3)
+            self.true_force = self._contact_force() if self.mj_data.ncon else _NO_FORCE
             self.true_log.append((self.time, self.true_force))
 
     def _contact_force(self) -> FloatArray:
@@ -132,25 +132,35 @@ class Plant:
 
 
 @njit(cache=True)
-def _torques(
-    q: FloatArray, qd: FloatArray, q_d: FloatArray, qd_d: FloatArray, bias: FloatArray, k: FloatArray, d: FloatArray,
-    tau_max: FloatArray, friction: FloatArray,
+def _drive(
+    q: FloatArray, qd: FloatArray, q_d: FloatArray, qd_d: FloatArray, qd_set: FloatArray, dt: float, follow: float,
+    bias: FloatArray, k: FloatArray, d: FloatArray, tau_max: FloatArray, friction: FloatArray, applied: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Motor torques of the joint impedance, and joint friction (n,) [Nm]."""
-    tau = k * (q_d - q) + d * (qd_d - qd) + bias
-    tau = np.minimum(np.maximum(tau, -tau_max), tau_max)
-    f1, f2, f3 = friction[0], friction[1], friction[2]
-    return tau, f1 / (1 + np.exp(-f2 * (qd + f3))) - f1 / (1 + np.exp(-f2 * f3))
+    """Advance the motion generator (q_d, qd_d), apply motor torques less friction, and return both (n,) [Nm]."""
+    tau, lost = np.empty(len(q)), np.empty(len(q))
+    for i in range(len(q)):
+        q_d[i] += qd_set[i] * dt
+        qd_d[i] += follow * (qd_set[i] - qd_d[i])
+        wanted = k[i] * (q_d[i] - q[i]) + d[i] * (qd_d[i] - qd[i]) + bias[i]
+        tau[i] = min(max(wanted, -tau_max[i]), tau_max[i])
+        f1, f2, f3 = friction[0, i], friction[1, i], friction[2, i]
+        lost[i] = f1 / (1 + np.exp(-f2 * (qd[i] + f3))) - f1 / (1 + np.exp(-f2 * f3))
+        applied[i] = tau[i] - lost[i]
+    return tau, lost
 
 
 @njit(cache=True)
 def _sensed(
     tau: FloatArray, qdd: FloatArray, armature: float, q: FloatArray, offset: FloatArray, ripple: FloatArray,
-    noise: FloatArray, friction: FloatArray, compensated: float,
+    noise: FloatArray, keep: float, drive: FloatArray, friction: FloatArray, compensated: float,
 ) -> FloatArray:  # fmt: skip
     """Joint torques (n,) [Nm] as the link-side sensors report them, known friction already taken off."""
-    rippled = ripple[0] * np.sin(ripple[1] * q + ripple[2])
-    return tau - armature * qdd + offset + rippled + noise - compensated * friction
+    sensed = np.empty(len(q))
+    for i in range(len(q)):
+        noise[i] = keep * noise[i] + drive[i]
+        rippled = ripple[0, i] * np.sin(ripple[1, i] * q[i] + ripple[2, i])
+        sensed[i] = tau[i] - armature * qdd[i] + offset[i] + rippled + noise[i] - compensated * friction[i]
+    return sensed
 
 
 class PlantClock:

@@ -1,0 +1,75 @@
+"""Paper IV-B: a person holds a hand beside the circle, on one side and then on the other."""
+
+from typing import Any
+
+import numpy as np
+
+from pretouch.control.path import Circle
+from pretouch.experiments.cell import Cell, Context
+from pretouch.experiments.metrics import rounded
+from pretouch.experiments.pushes import Visit, Visitor
+from pretouch.experiments.static import configured
+from pretouch.experiments.trial import Record, Setup, play
+from pretouch.params import RestrictionMode
+from pretouch.sim.scene import HandSpec, SceneSpec
+
+NAME = "avoidance"
+DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+
+_DURATION_S = 40.0
+_VISITS_S = ((4.0, 14.0), (20.0, 30.0))
+_BESIDE_M = 0.35
+"""Distance of the centre of the person's hand from the plane y = 0 [m]: half of it is in the way, for the side of the
+robot's hand comes to 0.35 m on the free circle."""
+_SPREAD_M = 0.03
+
+
+def cells(profiles: tuple[str, ...]) -> list[Cell]:
+    """One cell for each profile."""
+    return [Cell(NAME, profile, {}) for profile in profiles]
+
+
+def visits(seed: int) -> tuple[Visit, ...]:
+    """One visit on each side of the circle, at a place that the seed varies by a few centimetres."""
+    rng = np.random.default_rng([seed, 12])
+    return tuple(
+        Visit(arrive, leave, np.array([0.5, side * _BESIDE_M, 0.3]) + _SPREAD_M * rng.uniform(-1, 1, 3))
+        for (arrive, leave), side in zip(_VISITS_S, (-1.0, 1.0), strict=True)
+    )
+
+
+def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+    """Run one trial; return its row of results and what it left behind."""
+    profile = configured(context.profile(cell.profile), context.restrictions or DEFAULT_RESTRICTIONS)
+    hand = HandSpec()
+    setup = Setup(
+        model=context.model,
+        skin=context.skin,
+        profile=profile,
+        scene=SceneSpec(hand=hand),
+        path=Circle(),
+        seed=seed,
+        hand=Visitor(context.model, visits(seed)),
+    )
+    record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
+    steps = record.steps
+    off = [float(np.linalg.norm(s.ee_position - s.path_position)) for s in steps]
+    row = {
+        "experiment": NAME,
+        "profile": cell.profile,
+        "restrictions": profile.restriction.mode,
+        "seed": seed,
+        "contact": record.first_contact() is not None,
+        "true_peak_n": rounded(float(np.linalg.norm(record.true_force, axis=1).max())),
+        "deviation_m": rounded(max(off), 4),
+        "least_speed_scale": rounded(min(s.speed_scale for s in steps)),
+        "largest_slack_m_s": rounded(max(float(s.qp.slack.max(initial=0.0)) for s in steps), 4),
+        "travelled_m": rounded(steps[-1].path_phase),
+        "false_detections": sum(
+            record.first_contact(after=s.stamp - 0.5) is None
+            or (record.first_contact(after=s.stamp - 0.5) or 0.0) > s.stamp
+            for s in record.reactions()
+        ),
+        "held": record.held(),
+    }
+    return row, record

@@ -1,0 +1,38 @@
+"""What tells one trial from another, and what all trials of a run share."""
+
+from dataclasses import dataclass, replace
+
+from pretouch.params import Profile, RestrictionMode, profile
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of an experiment's table: all its trials differ by their seed only."""
+
+    experiment: str
+    profile: str
+    where: dict[str, str]
+    """What else tells the cell from the others, in the order of the table."""
+
+    @property
+    def name(self) -> str:
+        """Name for files: safe characters only."""
+        return "_".join([self.experiment, *self.where.values(), self.profile]).replace("+", "plus-").replace("-y", "y-")
+
+
+@dataclass(frozen=True)
+class Context:
+    """What all trials of a run share."""
+
+    model: RobotModel
+    skin: Skin
+    stiffness: float
+    """Contact stiffness of static objects [N/m]."""
+    restrictions: RestrictionMode | None
+    """Restriction mode for all experiments, or None for each experiment's own."""
+
+    def profile(self, name: str) -> Profile:
+        """Return a profile by name."""
+        return replace(profile(name))

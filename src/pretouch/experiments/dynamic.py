@@ -1,0 +1,115 @@
+"""Paper IV-C: thirty seconds with a person who pushes the moving arm three times from different directions."""
+
+from typing import Any
+
+import numpy as np
+
+from pretouch.control.path import Circle
+from pretouch.experiments.cell import Cell, Context
+from pretouch.experiments.metrics import angle_deg, mean_over, peak, rounded
+from pretouch.experiments.pushes import Push, Pusher
+from pretouch.experiments.static import configured
+from pretouch.experiments.trial import Record, Setup, play
+from pretouch.params import RestrictionMode
+from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.types import ControlStep, FloatArray
+
+NAME = "dynamic"
+DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+
+_DURATION_S = 30.0
+_STARTS_S = (4.0, 13.0, 22.0)
+_DIRECTIONS = np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+_TILT = 0.25
+_FORCE_N = (15.0, 30.0)
+_LASTING_S = (0.2, 0.5)
+_NOTICE_S = 0.3
+"""A reaction up to this long after the release still answers the push [s]."""
+_REBOUND_S = 3.0
+"""A later reaction up to this long after the release is the push's echo [s]."""
+
+
+def cells(profiles: tuple[str, ...]) -> list[Cell]:
+    """One cell for each profile."""
+    return [Cell(NAME, profile, {}) for profile in profiles]
+
+
+def pushes(seed: int) -> tuple[Push, ...]:
+    """Three pushes from +y, -y and the front, in an order, direction, size and length the seed decides."""
+    rng = np.random.default_rng([seed, 11])
+    planned = []
+    for start, which in zip(_STARTS_S, rng.permutation(len(_DIRECTIONS)), strict=True):
+        direction = _DIRECTIONS[which] + _TILT * rng.uniform(-1, 1, 3)
+        direction /= np.linalg.norm(direction)
+        planned.append(Push(start + rng.uniform(0, 2), direction, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S)))
+    return tuple(planned)
+
+
+def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+    """Run one trial; return its row of results and what it left behind."""
+    profile = configured(context.profile(cell.profile), context.restrictions or DEFAULT_RESTRICTIONS)
+    person = Pusher(context.model, pushes(seed))
+    setup = Setup(
+        model=context.model,
+        skin=context.skin,
+        profile=profile,
+        scene=SceneSpec(hand=HandSpec()),
+        path=Circle(),
+        seed=seed,
+        hand=person,
+    )
+    record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
+    true = np.linalg.norm(record.true_force, axis=1)
+    reactions = record.reactions()
+    contacts = [
+        _contact(record, reactions, push, touched)
+        for push, touched in zip(person.pushes, person.contacts, strict=False)
+    ]
+    spans = [t for t in person.contacts if t is not None]
+    row = {
+        "experiment": NAME,
+        "profile": cell.profile,
+        "restrictions": profile.restriction.mode,
+        "seed": seed,
+        "contacts": contacts,
+        "peak_estimate_n": rounded(peak(np.linalg.norm(record.forces(), axis=1))),
+        "true_peak_20ms_n": rounded(peak(mean_over(true, 20))),
+        "true_peak_n": rounded(peak(true)),
+        "false_detections": sum(not any(a <= s.stamp <= b + _REBOUND_S for a, b in spans) for s in reactions),
+        "held": record.held(),
+    }
+    return row, record
+
+
+def _contact(
+    record: Record, reactions: list[ControlStep], push: Push, touched: tuple[float, float] | None
+) -> dict[str, Any]:
+    """Judge how the arm answered one push."""
+    row: dict[str, Any] = {
+        "detected": False,
+        "delay_s": None,
+        "direction_error_deg": None,
+        "push_n": rounded(push.force),
+        "push_s": rounded(push.duration),
+        "reaction_towards_person": False,
+    }
+    if touched is None:
+        return row | {"push_s": 0.0}
+    touch, release = touched
+    answers = [s for s in reactions if touch <= s.stamp <= release + _REBOUND_S]
+    pushed = _mean_force(record, touch, release)
+    row["reaction_towards_person"] = any(float(s.reaction_velocity @ pushed) < 0 for s in answers)
+    if answers and answers[0].stamp <= release + _NOTICE_S:
+        first = answers[0]
+        row["detected"] = True
+        row["delay_s"] = rounded(first.stamp - touch, 4)
+        before = _mean_force(record, max(touch, first.stamp - 0.05), first.stamp)
+        angle = angle_deg(first.reaction_velocity, before)
+        row["direction_error_deg"] = None if angle is None else rounded(angle, 2)
+    return row
+
+
+def _mean_force(record: Record, start: float, end: float) -> FloatArray:
+    """Mean true force (3,) [N] between two instants [s]."""
+    during = (record.true_time >= start) & (record.true_time <= end)
+    return np.asarray(record.true_force[during].mean(axis=0))

@@ -1,0 +1,134 @@
+"""Paper IV-A: the arm runs into a large static object, on a circle and on a line, from either side."""
+
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from pretouch.control.path import Circle, Path, line
+from pretouch.experiments.cell import Cell, Context
+from pretouch.experiments.metrics import mean_over, peak, rounded
+from pretouch.experiments.trial import Record, Setup, play
+from pretouch.params import Profile, RestrictionMode
+from pretouch.sim.plant import Plant
+from pretouch.sim.scene import Box, SceneSpec
+from pretouch.types import ControlStep
+
+NAME = "static"
+DEFAULT_RESTRICTIONS: RestrictionMode = "off"
+"""The paper "purposefully allows contact"; at Table I's values its restrictions forbid it."""
+
+TRAJECTORIES = ("circle", "line")
+SIDES = ("-y", "+y")
+
+_FACE_M = 0.25
+"""Distance of the object's face from the plane y = 0 [m]."""
+_FACE_SPREAD_M = 0.02
+"""The seed moves the face by up to this [m]."""
+_TIME_LIMIT_S = 40.0
+_AFTER_DETECTION_S = 1.0
+
+
+def cells(profiles: tuple[str, ...]) -> list[Cell]:
+    """All combinations of trajectory, side and profile."""
+    return [
+        Cell(NAME, profile, {"trajectory": trajectory, "side": side})
+        for trajectory, side, profile in product(TRAJECTORIES, SIDES, profiles)
+    ]
+
+
+def path(trajectory: str, side: str) -> Path:
+    """Return the paper's path, begun on the side away from the object so that the arm runs into it at speed."""
+    sign = 1.0 if side == "+y" else -1.0
+    if trajectory == "circle":
+        return Circle(start_angle=np.pi if side == "+y" else 0.0)
+    return line((0.4, -0.5 * sign, 0.5), (0.4, 0.5 * sign, 0.5))
+
+
+def scene(side: str, stiffness: float, seed: int) -> SceneSpec:
+    """Return a wall on one side, its face a little nearer or farther with each seed."""
+    sign = 1.0 if side == "+y" else -1.0
+    face = _FACE_M + _FACE_SPREAD_M * np.random.default_rng([seed, 10]).uniform(-1, 1)
+    return SceneSpec(boxes=(Box("object", (0.45, sign * (face + 0.02), 0.3), (0.3, 0.02, 0.45), stiffness),))
+
+
+def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+    """Run one trial; return its row of results and what it left behind."""
+    profile = configured(context.profile(cell.profile), context.restrictions or DEFAULT_RESTRICTIONS)
+    side = cell.where["side"]
+    setup = Setup(
+        model=context.model,
+        skin=context.skin,
+        profile=profile,
+        scene=scene(side, context.stiffness, seed),
+        path=path(cell.where["trajectory"], side),
+        seed=seed,
+    )
+    record = play(setup, _done())
+    row = {
+        "experiment": NAME,
+        **cell.where,
+        "profile": cell.profile,
+        "restrictions": profile.restriction.mode,
+        "stiffness_n_per_m": context.stiffness,
+        "seed": seed,
+        **results(record, -1.0 if side == "+y" else 1.0),
+    }
+    return row, record
+
+
+def configured(profile: Profile, restrictions: RestrictionMode) -> Profile:
+    """Return the profile with a restriction mode; without proximity there is nothing to restrict."""
+    if not profile.perception.enabled:
+        return profile
+    return replace(profile, restriction=replace(profile.restriction, mode=restrictions))
+
+
+def _done() -> Any:
+    """End a while after the first reaction that a true contact caused, or at the time limit."""
+    touched: list[float] = []
+    detected: list[float] = []
+
+    def done(step: ControlStep, plant: Plant) -> bool:
+        if not touched and np.linalg.norm(plant.true_force) > 1.0:
+            touched.append(step.stamp)
+        if touched and not detected and step.contact is not None:
+            detected.append(step.stamp)
+        over = bool(detected) and step.stamp >= detected[0] + _AFTER_DETECTION_S
+        return over or step.stamp >= _TIME_LIMIT_S
+
+    return done
+
+
+def results(record: Record, push: float) -> dict[str, Any]:
+    """Numbers of one trial; `push` is the sign of the force along y by which the object pushes the arm."""
+    touch = record.first_contact()
+    reactions = record.reactions()
+    row: dict[str, Any] = {
+        "contact": touch is not None,
+        "impact_speed_m_s": None,
+        "detection_delay_s": None,
+        "filtered_at_detection_n": None,
+        "raw_at_detection_n": None,
+        "peak_estimate_n": None,
+        "true_peak_20ms_n": None,
+        "true_peak_n": None,
+        "false_detections": sum(touch is None or s.stamp < touch for s in reactions),
+        "held": record.held(),
+    }
+    if touch is None:
+        return row
+    times, along = record.times(), push * record.forces()[:, 1]
+    true = np.linalg.norm(record.true_force, axis=1)
+    velocity = np.array([s.ee_velocity[1] for s in record.steps])
+    row["impact_speed_m_s"] = rounded(-push * float(np.interp(touch, times, velocity)), 4)
+    row["peak_estimate_n"] = rounded(peak(along[times >= touch]))
+    row["true_peak_n"] = rounded(peak(true))
+    row["true_peak_20ms_n"] = rounded(peak(mean_over(true, 20)))
+    detection = next((s for s in reactions if s.stamp >= touch), None)
+    if detection is not None:
+        row["detection_delay_s"] = rounded(detection.stamp - touch, 4)
+        row["filtered_at_detection_n"] = rounded(push * float(detection.filtered_force[1]))
+        row["raw_at_detection_n"] = rounded(push * float(detection.force[1]))
+    return row

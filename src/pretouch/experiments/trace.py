@@ -1,0 +1,79 @@
+"""The course of one trial as arrays, kept in a file: what figures are drawn from."""
+
+import os
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.experiments.trial import Record
+from pretouch.types import BoolArray, FloatArray, Mode
+
+
+@dataclass(frozen=True)
+class Trace:
+    """S control steps of one trial. Base frame."""
+
+    time: FloatArray
+    """(S,) [s]"""
+    ee_position: FloatArray
+    """(S, 3) [m]"""
+    ee_velocity: FloatArray
+    """(S, 3) [m/s]"""
+    path_position: FloatArray
+    """(S, 3) [m]"""
+    speed_scale: FloatArray
+    """(S,)"""
+    range_distance: FloatArray
+    """(S, K) [m], NaN for no target"""
+    force: FloatArray
+    """(S, 3) [N]"""
+    filtered_force: FloatArray
+    """(S, 3) [N]"""
+    upper: FloatArray
+    """(S, 3) [N]"""
+    lower: FloatArray
+    """(S, 3) [N]"""
+    true_force: FloatArray
+    """(S, 3) mean true force since the last step [N]"""
+    reacting: BoolArray
+    """(S,)"""
+    detected: BoolArray
+    """(S,) a reaction begins"""
+
+
+def trace_of(record: Record) -> Trace:
+    """Take from a record what figures need."""
+    steps, times = record.steps, record.times()
+    edges = np.searchsorted(record.true_time, times, side="right")
+    summed = np.vstack([np.zeros(3), np.cumsum(record.true_force, axis=0)])
+    starts = np.concatenate([[0], edges[:-1]])
+    true = (summed[edges] - summed[starts]) / np.maximum(edges - starts, 1)[:, None]
+    return Trace(
+        time=times,
+        ee_position=np.array([s.ee_position for s in steps]),
+        ee_velocity=np.array([s.ee_velocity for s in steps]),
+        path_position=np.array([s.path_position for s in steps]),
+        speed_scale=np.array([s.speed_scale for s in steps]),
+        range_distance=np.array([s.range_distance for s in steps]),
+        force=record.forces(),
+        filtered_force=np.array([s.filtered_force for s in steps]),
+        upper=np.array([s.thresholds.upper for s in steps]),
+        lower=np.array([s.thresholds.lower for s in steps]),
+        true_force=true,
+        reacting=np.array([s.mode is Mode.REACT for s in steps]),
+        detected=np.array([s.contact is not None for s in steps]),
+    )
+
+
+def save_trace(trace: Trace, path: Path) -> None:
+    """Write a trace, whole or not at all."""
+    temporary = path.with_suffix(".tmp.npz")
+    np.savez_compressed(temporary, **{f.name: getattr(trace, f.name) for f in fields(trace)})
+    os.replace(temporary, path)
+
+
+def load_trace(path: Path) -> Trace:
+    """Read a trace that `save_trace` wrote."""
+    with np.load(path) as data:
+        return Trace(**{f.name: data[f.name] for f in fields(Trace)})

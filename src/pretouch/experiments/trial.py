@@ -1,0 +1,105 @@
+"""One trial: an arm in a scene under the controller, and everything it left behind."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pretouch.control.path import Path
+from pretouch.controller import Controller
+from pretouch.experiments.posture import brought_to
+from pretouch.loop import run
+from pretouch.params import Profile
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sim.hand import Hand, HandScript
+from pretouch.sim.plant import Plant, PlantClock
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.types import ControlStep, FloatArray, Mode
+
+SETTLE_S = 0.2
+"""Time the arm stands before the controller starts [s]: the observer's transient is over."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a trial is made of."""
+
+    model: RobotModel
+    skin: Skin
+    profile: Profile
+    scene: SceneSpec
+    path: Path
+    seed: int
+    hand: HandScript | None = None
+    plant: PlantParams = field(default_factory=PlantParams)
+    ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a trial left behind."""
+
+    steps: list[ControlStep]
+    true_time: FloatArray
+    """(T,) instants of the physics [s]."""
+    true_force: FloatArray
+    """(T, 3) sum of the contact forces on the arm [N], base frame."""
+    hand_position: FloatArray
+    """(S, 3) centre of the hand at each control step [m], NaN without a hand."""
+
+    def times(self) -> FloatArray:
+        """Instants (S,) of the control steps [s]."""
+        return np.array([s.stamp for s in self.steps])
+
+    def forces(self) -> FloatArray:
+        """Estimated external forces (S, 3) [N]."""
+        return np.array([s.force for s in self.steps])
+
+    def first_contact(self, after: float = 0.0, force: float = 1.0) -> float | None:
+        """Instant [s] at which the true force first passes `force` [N] after a time [s], or None."""
+        touching = np.flatnonzero((np.linalg.norm(self.true_force, axis=1) > force) & (self.true_time > after))
+        return float(self.true_time[touching[0]]) if len(touching) else None
+
+    def reactions(self) -> list[ControlStep]:
+        """Return the steps in which a reaction began."""
+        return [s for s in self.steps if s.contact is not None]
+
+    def held(self) -> bool:
+        """Whether the arm held for another reason than filling its window at the start."""
+        start = next((i for i, s in enumerate(self.steps) if s.mode is not Mode.HOLD), len(self.steps))
+        return any(s.mode is Mode.HOLD for s in self.steps[start:])
+
+
+class _Recorder:
+    """Keeps each step, and where the hand was."""
+
+    def __init__(self, hand: Hand | None) -> None:
+        self._hand = hand
+        self.steps: list[ControlStep] = []
+        self.hand_position: list[FloatArray] = []
+
+    def record(self, step: ControlStep) -> None:
+        self.steps.append(step)
+        self.hand_position.append(self._hand.position.copy() if self._hand else np.full(3, np.nan))
+
+
+def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
+    """Run a trial until `done` says so of a step."""
+    model, scene, profile = setup.model, setup.scene, setup.profile
+    plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
+    units = RangeFinders(plant, setup.skin, setup.ranging, setup.seed)
+    hand = Hand(plant, setup.hand) if setup.hand else None
+    recorder = _Recorder(hand)
+    controller = Controller(model, setup.skin, fixtures(scene), setup.path, profile)
+    clock = PlantClock(plant, profile.task.control_period_s)
+    plant.advance(SETTLE_S)
+    run(controller, plant, units, clock, recorder, lambda step: done(step, plant))
+    return Record(
+        recorder.steps,
+        np.array([t for t, _ in plant.true_log]),
+        np.array([f for _, f in plant.true_log]),
+        np.array(recorder.hand_position),
+    )
