@@ -46,7 +46,10 @@ class Checked:
 def _check_field(owner: str, name: str, hint: object, value: object) -> None:
     if get_origin(hint) is Literal and value not in get_args(hint):
         raise ParameterError(f"{owner}.{name} is {value!r}: choose one of {', '.join(map(str, get_args(hint)))}.")
+    whole = getattr(hint, "__origin__", None) is int
     for check in getattr(hint, "__metadata__", ()):
+        if whole and not isinstance(value, int):
+            raise ParameterError(f"{owner}.{name} is {value}: it must be a whole number.")
         problem = check.problem(value) if isinstance(value, int | float) else "must be a number"
         if problem:
             raise ParameterError(f"{owner}.{name} is {value}: it {problem}.")

@@ -19,8 +19,10 @@ DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
 
 _DURATION_S = 30.0
 _STARTS_S = (4.0, 13.0, 22.0)
-_DIRECTIONS = np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+_FACES = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+"""Outward normals of the faces that are pushed, in the frame of the robot's hand: right, left, front."""
 _TILT = 0.25
+"""The push leaves the normal by up to this in each component."""
 _FORCE_N = (15.0, 30.0)
 _LASTING_S = (0.2, 0.5)
 _NOTICE_S = 0.3
@@ -35,13 +37,13 @@ def cells(profiles: tuple[str, ...]) -> list[Cell]:
 
 
 def pushes(seed: int) -> tuple[Push, ...]:
-    """Three pushes from +y, -y and the front, in an order, direction, size and length the seed decides."""
+    """Three pushes against different faces, in an order, direction, size and length the seed decides."""
     rng = np.random.default_rng([seed, 11])
     planned = []
-    for start, which in zip(_STARTS_S, rng.permutation(len(_DIRECTIONS)), strict=True):
-        direction = _DIRECTIONS[which] + _TILT * rng.uniform(-1, 1, 3)
-        direction /= np.linalg.norm(direction)
-        planned.append(Push(start + rng.uniform(0, 2), direction, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S)))
+    for start, which in zip(_STARTS_S, rng.permutation(len(_FACES)), strict=True):
+        inwards = _TILT * rng.uniform(-1, 1, 3) - _FACES[which]
+        inwards /= np.linalg.norm(inwards)
+        planned.append(Push(start + rng.uniform(0, 2), inwards, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S)))
     return tuple(planned)
 
 

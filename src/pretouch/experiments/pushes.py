@@ -41,12 +41,12 @@ def way_round(hand: FloatArray, goal: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Push:
-    """One push: from where, when, how hard, how long."""
+    """One push against a face of the robot's hand."""
 
     start: float
     """When the person reaches for the arm [s]."""
-    direction: FloatArray
-    """(3,) unit vector of the push, base frame."""
+    inwards: FloatArray
+    """(3,) unit vector of the push in the frame of the robot's hand: against the normal of a face, or nearly."""
     force: float
     """[N]"""
     duration: float
@@ -55,7 +55,7 @@ class Push:
 
 @dataclass
 class Pusher:
-    """Brings the hand beside the robot's hand, follows it, pushes it as planned, and goes home between pushes."""
+    """Brings the hand before a face of the robot's hand, follows it, pushes as planned, and goes home in between."""
 
     model: RobotModel
     pushes: tuple[Push, ...]
@@ -66,21 +66,27 @@ class Pusher:
         self._link = self.model.link_index("panda_hand")
         self._touch: float | None = None
         self._release = -np.inf
+        self._direction = np.zeros(3)
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Reach for the arm from the push's start, push for its duration, withdraw the way it came."""
+        """Reach for the arm from the push's start, push for its duration, withdraw the way it came.
+
+        The direction follows the robot's hand as it turns until the touch, and stays from then on.
+        """
         palm = point_on_arm(plant, self._link, _PALM)
         number = len(self.contacts)
         if time < self._release + 1.0:
-            return HandGoal(palm - _STAND_OFF_M * self.pushes[number - 1].direction, _FREE_N)
+            return HandGoal(palm - _STAND_OFF_M * self._direction, _FREE_N)
         if number == len(self.pushes) or time < self.pushes[number].start - _LEAD_S:
             return HandGoal(way_round(hand, _HOME), _FREE_N)
         push = self.pushes[number]
+        if self._touch is None:
+            self._direction = point_on_arm(plant, self._link, _PALM + push.inwards) - palm
         if time < push.start:
-            return HandGoal(way_round(hand, palm - _STAND_OFF_M * push.direction), _FREE_N)
+            return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction), _FREE_N)
         self._watch(time, push, plant)
         ahead = _SPEED_M_S * (time - push.start) - _STAND_OFF_M
-        return HandGoal(palm + min(ahead, _STAND_OFF_M) * push.direction, push.force)
+        return HandGoal(palm + min(ahead, _STAND_OFF_M) * self._direction, push.force)
 
     def _watch(self, time: float, push: Push, plant: Plant) -> None:
         """Notice the touch, and end the push after its time or when the person loses patience."""

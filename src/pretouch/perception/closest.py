@@ -65,7 +65,7 @@ def _closest(
             foot = a[c] + along * axis
             gap = point[k] - foot
             from_axis = np.sqrt(dot(gap, gap))
-            if from_axis - radius[c] < distance[k]:
+            if c == 0 or from_axis - radius[c] < distance[k]:
                 distance[k] = from_axis - radius[c]
                 on_link[k] = link[c]
                 direction[k] = gap / from_axis if from_axis > _ON_AXIS else last_direction[k]

@@ -8,7 +8,7 @@ from numba import njit
 from pretouch.perception.vectors import rotated
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import MIN_DISTANCE
+from pretouch.sensing.unit import MAX_DISTANCE, MIN_DISTANCE
 from pretouch.types import BoolArray, FloatArray, IntArray, RangeReadings, RangeStatus
 
 
@@ -65,7 +65,8 @@ def locate(position: FloatArray, rotation: FloatArray, distance: FloatArray) -> 
 def measured_distance(readings: RangeReadings) -> FloatArray:
     """Distance (K,) [m] each reading stands for, NaN where it shows no target.
 
-    A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone.
+    A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone. A number
+    beyond what it can measure shows nothing, whatever its status.
     """
     return _measured(readings.distance, readings.status)
 
@@ -79,7 +80,7 @@ def _measured(distance: FloatArray, status: IntArray) -> FloatArray:
     for k in range(len(distance)):
         if status[k] in _NEAR:
             shown[k] = MIN_DISTANCE
-        elif status[k] == _OK and np.isfinite(distance[k]) and distance[k] >= 0:
+        elif status[k] == _OK and 0 <= distance[k] <= MAX_DISTANCE:
             shown[k] = max(distance[k], MIN_DISTANCE)
     return shown
 

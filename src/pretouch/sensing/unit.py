@@ -13,6 +13,9 @@ CONE_ANGLE = np.deg2rad(27.0)
 MIN_DISTANCE = 0.04
 """Smallest distance the VL53L1X measures [m] (data sheet)."""
 
+MAX_DISTANCE = 4.0
+"""Largest distance the VL53L1X measures [m] (data sheet, paper III-A)."""
+
 
 @dataclass(frozen=True)
 class SensorUnit:

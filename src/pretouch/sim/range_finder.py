@@ -160,13 +160,17 @@ def _reading(
     """One reading [m] and its status from the returns of a bundle; a ray without a hit has a negative distance.
 
     The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
-    distance and the cosine of incidence, relative to a target that is just detected at `distance_max`.
+    distance and the cosine of incidence, relative to a target that is just detected at `distance_max`. A ray that
+    leaves a body began inside it: what presses on the sensor is at distance 0, not where the ray comes out.
     """
     count = len(distance)
     strength = np.zeros(count)
     for i in range(count):
         if 0.0 <= distance[i] <= distance_max:
-            slant = abs(rays[i, 0] * normal[i, 0] + rays[i, 1] * normal[i, 1] + rays[i, 2] * normal[i, 2])
+            outwards = rays[i, 0] * normal[i, 0] + rays[i, 1] * normal[i, 1] + rays[i, 2] * normal[i, 2]
+            slant = abs(outwards)
+            if outwards > 0:
+                distance[i] = 0.0
             ratio = distance_max / max(distance[i], 0.01)
             strength[i] = reflectance / reflectance_limit * slant * ratio * ratio / count
     start = 0.0
