@@ -187,3 +187,7 @@ def _show(console: Console, summary: dict[str, Any]) -> None:
         console.print(drawn)
         console.print(table.note, style="dim", markup=False)
     console.print()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

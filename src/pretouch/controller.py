@@ -70,8 +70,9 @@ class Controller:
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         """Run one control cycle."""
-        p, model, now = self.profile, self.model, inputs.stamp
+        p, model = self.profile, self.model
         robot, events, watch = examine(state.watch, inputs, state.command, p.task.control_period_s, p.failure)
+        now = watch.stamp
         kin = model.kinematics(robot.q)
         J = model.ee_jacobian(kin)
         x, rotation = kin.position[model.ee], kin.rotation[model.ee]
@@ -115,7 +116,8 @@ class Controller:
         tracking = mode.mode is Mode.TRACK
         reacting = mode.mode is Mode.REACT
         step = ControlStep(
-            stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, ee_position=x, ee_velocity=J[:3] @ robot.qd,
+            stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
+            ee_position=x, ee_velocity=J[:3] @ robot.qd,
             path_position=self.path.point(state.path.phase), path_phase=state.path.phase, desired_velocity=desired,
             speed_scale=scale * heard, range_stamp=inputs.readings.stamp,
             range_distance=measured_distance(inputs.readings), obstacles=obstacles,
@@ -126,7 +128,8 @@ class Controller:
         return step, ControllerState(
             watch=watch, tracks=tracks, window=window, reduction=reduction,
             reaction=reaction.advance(react) if reacting else react,
-            path=paths.advance(self.path, state.path, J[:3] @ qp.qd, p.task) if tracking else paths.pause(state.path),
+            path=paths.advance(self.path, state.path, x, J[:3] @ qp.qd, p.task)
+            if tracking else paths.pause(state.path),
             mode=mode, command=qp.qd, rotation_goal=state.rotation_goal,
         )  # fmt: skip
 

@@ -15,7 +15,7 @@ class Watch:
     """What is remembered to judge the next inputs."""
 
     stamp: float
-    """Instant of the last step [s]."""
+    """Instant of the last step [s], always finite."""
     robot: RobotState
     """The last state that was believed."""
     force_stamp: float

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pretouch.control.joint_box import brake, joint_box
-from pretouch.controller import Controller
+from pretouch.controller import Controller, ControllerState
 from pretouch.ports import Clock, Recorder, Robot, Skin
 from pretouch.types import ControlStep, Inputs
 
@@ -56,16 +56,20 @@ def run(
             if done(step):
                 return
     finally:
-        come_to_rest(controller, robot, clock)
+        come_to_rest(controller, robot, clock, state)
 
 
-def come_to_rest(controller: Controller, robot: Robot, clock: Clock) -> None:
-    """Command the arm to rest within its limits."""
+def come_to_rest(controller: Controller, robot: Robot, clock: Clock, last: ControllerState) -> None:
+    """Command the arm to rest within its limits, from its last command where its state cannot be believed."""
+    q, qd, period = last.watch.robot.q_commanded, last.command, controller.limits.period
     for _ in range(_REST_CYCLES):
-        state = robot.read()
-        lower, upper = joint_box(state.q_commanded, state.qd_commanded, controller.limits)
-        slower = brake(state.qd_commanded, lower, upper, controller.limits)
-        robot.command(slower)
-        if not np.any(slower):
-            return
         clock.tick()
+        state = robot.read()
+        if np.isfinite(state.q_commanded).all() and np.isfinite(state.qd_commanded).all():
+            q, qd = state.q_commanded, state.qd_commanded
+        else:
+            q = q + qd * period
+        qd = brake(qd, *joint_box(q, qd, controller.limits), controller.limits)
+        robot.command(qd)
+        if not np.any(qd):
+            return

@@ -5,6 +5,7 @@ A profile is a frozen set of them. `replace(profile, ...)` of the standard libra
 
 import math
 from dataclasses import dataclass, field, fields
+from numbers import Integral, Real
 from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 
 from pretouch.errors import ParameterError
@@ -12,11 +13,12 @@ from pretouch.errors import ParameterError
 
 @dataclass(frozen=True)
 class Check:
-    """Allowed range of a number, ends included unless `open_low`."""
+    """Allowed range of a finite number, ends included unless they are open."""
 
     low: float = -math.inf
     high: float = math.inf
     open_low: bool = False
+    open_high: bool = False
 
     def problem(self, value: float) -> str | None:
         """Say what is wrong with the value, or None."""
@@ -24,10 +26,12 @@ class Check:
             return "must be finite"
         if value < self.low or (self.open_low and value == self.low):
             return f"must be {'greater than' if self.open_low else 'at least'} {self.low:g}"
-        return f"must be at most {self.high:g}" if value > self.high else None
+        if value > self.high or (self.open_high and value == self.high):
+            return f"must be {'less than' if self.open_high else 'at most'} {self.high:g}"
+        return None
 
 
-Real = Annotated[float, Check()]
+Negative = Annotated[float, Check(high=0.0, open_high=True)]
 Positive = Annotated[float, Check(low=0.0, open_low=True)]
 NonNegative = Annotated[float, Check(low=0.0)]
 Fraction = Annotated[float, Check(low=0.0, high=1.0)]
@@ -48,9 +52,9 @@ def _check_field(owner: str, name: str, hint: object, value: object) -> None:
         raise ParameterError(f"{owner}.{name} is {value!r}: choose one of {', '.join(map(str, get_args(hint)))}.")
     whole = getattr(hint, "__origin__", None) is int
     for check in getattr(hint, "__metadata__", ()):
-        if whole and not isinstance(value, int):
+        if whole and not isinstance(value, Integral):
             raise ParameterError(f"{owner}.{name} is {value}: it must be a whole number.")
-        problem = check.problem(value) if isinstance(value, int | float) else "must be a number"
+        problem = check.problem(float(value)) if isinstance(value, Real) else "must be a number"
         if problem:
             raise ParameterError(f"{owner}.{name} is {value}: it {problem}.")
 
@@ -92,8 +96,9 @@ class TaskParams(Checked):
     """Velocity towards the path per metre off it [1/s]."""
     off_path_m: Positive = 0.1
     """Distance from the path at which the arm no longer advances along it but only returns [m]."""
-    orientation: Literal["free", "hold"] = "free"
-    """Whether the task is three-dimensional, or also keeps the hand's orientation at the start."""
+    orientation: Literal["free", "hold"] = "hold"
+    """Whether the task is the hand's velocity alone, or also keeps its orientation at the start. The paper does not
+    say. Free, the hand rolls its units out of view of what restricts it (docs/experiments.md)."""
     orientation_gain_1_s: NonNegative = 1.0
     """Angular velocity per radian of orientation error when it is held [1/s]."""
     damping_max: NonNegative = 0.1
@@ -133,8 +138,8 @@ class RestrictionParams(Checked):
     the limit never below `floor_m_s`."""
     v_max_m_s: Positive = 0.04
     """Largest approach and largest repulsive velocity V_max [m/s] (Table I)."""
-    beta: Real = -10.0
-    """Steepness of eqs. 5 and 6 (Table I)."""
+    beta: Negative = -10.0
+    """Steepness of eqs. 5 and 6 (Table I); negative, so that nearer means slower."""
     d_repulse_m: Positive = 0.1
     """Body distance below which the arm is pushed away [m] (Table I)."""
     d_crit_m: Positive = 0.1

@@ -178,6 +178,8 @@ class ControlStep:
     """Why the arm is in this mode, as a sentence."""
     q: FloatArray
     """(n,) measured joint positions [rad]."""
+    q_commanded: FloatArray
+    """(n,) joint positions the robot's motion generator was at [rad]."""
     ee_position: FloatArray
     """(3,) end-effector origin [m]."""
     ee_velocity: FloatArray

@@ -130,20 +130,32 @@ def follow(path: Path, state: PathState, position: FloatArray, params: TaskParam
     `position` (3,) [m] is the end-effector origin.
     """
     error = path.point(state.phase) - position
-    off = float(np.sqrt(error @ error))
-    forward = state.speed * max(0.0, 1.0 - off / params.off_path_m)
-    velocity = forward * path.tangent(state.phase) + params.position_gain_1_s * error
+    velocity = _forward(error, state, params) * path.tangent(state.phase) + params.position_gain_1_s * error
     speed = float(np.sqrt(velocity @ velocity))
     return velocity if speed <= params.speed_m_s else velocity * (params.speed_m_s / speed)
 
 
-def advance(path: Path, state: PathState, velocity: FloatArray, params: TaskParams) -> PathState:
-    """Move the phase on by what the commanded velocity (3,) [m/s] achieves along the path in one period, never back.
+def _forward(error: FloatArray, state: PathState, params: TaskParams) -> float:
+    """Speed along the path [m/s] at a distance `error` (3,) [m] from it."""
+    return state.speed * max(0.0, 1.0 - float(np.sqrt(error @ error)) / params.off_path_m)
 
-    Slowing or blocking the arm so slows the phase. The speed allowed next grows by the task's acceleration.
+
+def advance(path: Path, state: PathState, position: FloatArray, velocity: FloatArray, params: TaskParams) -> PathState:
+    """Move the phase on by one period of the task's forward speed, less what the arm falls short of it, never back.
+
+    Slowing or blocking the arm so slows the phase. The way back to the path is no way along it, so an arm pushed
+    ahead or back meets the path where it left. The speed allowed next grows by the task's acceleration.
+
+    Args:
+        path: the path.
+        state: phase and speed so far.
+        position: (3,) end-effector origin [m].
+        velocity: (3,) velocity commanded there [m/s].
+        params: speed, gains and period.
     """
-    achieved = max(0.0, float(velocity @ path.tangent(state.phase)))
-    phase = state.phase + achieved * params.control_period_s
+    missing = (follow(path, state, position, params) - velocity) @ path.tangent(state.phase)
+    forward = _forward(path.point(state.phase) - position, state, params)
+    phase = state.phase + max(0.0, forward - max(0.0, float(missing))) * params.control_period_s
     if not path.closed:
         phase = min(phase, path.length)
     return PathState(phase, min(params.speed_m_s, state.speed + params.acceleration_m_s2 * params.control_period_s))

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import cache
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
+from threading import Thread
 from types import ModuleType
 from typing import Any, cast, get_args
 
@@ -113,7 +114,7 @@ def run_campaign(request: Request, out: Path, progress: Callable[[int, int], Non
     if not missing:
         return
     workers = min(len(missing), os.cpu_count() or 1)
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_ignore_interrupt)
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
     try:
         futures = [pool.submit(_work, request, out, cell, seed) for cell, seed in missing]
         for done, future in enumerate(as_completed(futures), start=len(tasks) - len(missing) + 1):
@@ -143,10 +144,18 @@ def finished(request: Request, out: Path) -> list[dict[str, Any]]:
     return [json.loads(file.read_text(encoding="utf-8")) for file in files if file.exists()]
 
 
-def _ignore_interrupt() -> None:
-    """Leave Ctrl-C to the parent, which ends the workers in order."""
+def _start_worker() -> None:
+    """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @cache

@@ -34,7 +34,8 @@ def static_figure(traces: Mapping[tuple[str, str, str], Trace], profile: str) ->
             axes.set_title(f"{trajectory}, object at {side}")
             axes.set_xlim(-1.0, 0.6)
             axes.grid(alpha=0.3)
-    panels[0, 0].legend(loc="upper left")
+    if panels[0, 0].lines:
+        panels[0, 0].legend(loc="upper left")
     figure.supxlabel("time from first touch [s]")
     figure.supylabel("force along y, away from the object [N]")
     figure.suptitle(f"Contact with a static object: estimated force and contact thresholds, blind and {profile}")

@@ -61,6 +61,7 @@ class Plant:
         self._q_d += (data.qfrc_bias[:n] - bias) / self._k
         self._q_meas, self._qd_meas = q.copy(), np.zeros(n)
         self._noise = np.zeros(n)
+        self._bias = bias
         self._observer: ObserverState = observer_init(mass, self._qd_meas)
         self.time = 0.0
         self.true_force = np.zeros(3)
@@ -102,20 +103,21 @@ class Plant:
         for i in range(steps):
             for call in self._before_step:
                 call(self.time)
-            q, qd_meas = self._q.copy(), self._qd + velocity_noise[i]
-            mass, bias = self.model.mass_matrix_and_bias(q, qd_meas, np.empty(n))
             tau, friction = _drive(
-                q, self._qd, self._q_d, self._qd_d, self._qd_set, dt, follow, bias, self._k, self._d, tau_max,
-                self._friction, self._applied,
+                self._q, self._qd, self._q_d, self._qd_d, self._qd_set, dt, follow, self._bias, self._k, self._d,
+                tau_max, self._friction, self._applied,
             )  # fmt: skip
             mujoco.mj_step(self.mj_model, self.mj_data)
+            # the state after the step goes with the torques that led to it
+            q, qd = self._q.copy(), self._qd + velocity_noise[i]
             sensed = _sensed(
                 tau, self._qdd, p.armature_kg_m2, q, self._offset, self._ripple, self._noise, keep, torque_noise[i],
                 friction, p.friction_compensated,
             )  # fmt: skip
-            self._observer = observe(self._observer, mass, bias, qd_meas, sensed, p.observer_gain_1_s, dt)
+            mass, self._bias = self.model.mass_matrix_and_bias(q, qd, np.empty(n))
+            self._observer = observe(self._observer, mass, self._bias, qd, sensed, p.observer_gain_1_s, dt)
             self.time += dt
-            self._q_meas, self._qd_meas = q, qd_meas
+            self._q_meas, self._qd_meas = q, qd
             self.true_force = self._contact_force() if self.mj_data.ncon else _NO_FORCE
             self.true_log.append((self.time, self.true_force))
 

@@ -76,6 +76,7 @@ class RangeFinders:
         self._plant, self._skin, self._params, self._mode = plant, skin, params, MODES[params.mode]
         self._rng = np.random.default_rng([seed, 3])
         self._rays = cone_rays(params.rings)
+        self._calibration = _flat_wall(self._rays[:, 2])
         rays = len(self._rays)
         self._geom, self._hit, self._normal = np.zeros(rays, np.int32), np.zeros(rays), np.zeros(3 * rays)
         self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
@@ -121,9 +122,17 @@ class RangeFinders:
         )  # fmt: skip
         return _reading(
             self._hit, rays, self._normal.reshape(-1, 3), p.reflectance, p.reflectance_limit,
-            self._mode.distance_max_m, p.merge_m, p.noise_floor_m, p.noise_rate, p.sigma_limit_m, self._offset[unit],
-            self._rng.standard_normal(),
+            self._mode.distance_max_m, p.merge_m, self._calibration, p.noise_floor_m, p.noise_rate, p.sigma_limit_m,
+            self._offset[unit], self._rng.standard_normal(),
         )  # fmt: skip
+
+
+def _flat_wall(cosines: FloatArray) -> float:
+    """Factor that makes a flat wall square to the beam read at its distance, as a calibrated sensor does.
+
+    Rays at an angle meet it farther away by 1 / cos, and with strength cos^3: slant, and the distance squared.
+    """
+    return float((cosines**3).sum() / (cosines**2).sum())
 
 
 @njit(cache=True)
@@ -154,8 +163,8 @@ _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
 @njit(cache=True)
 def _reading(
     distance: FloatArray, rays: FloatArray, normal: FloatArray, reflectance: float, reflectance_limit: float,
-    distance_max: float, merge: float, noise_floor: float, noise_rate: float, sigma_limit: float, offset: float,
-    draw: float,
+    distance_max: float, merge: float, calibration: float, noise_floor: float, noise_rate: float,
+    sigma_limit: float, offset: float, draw: float,
 ) -> tuple[float, int]:  # fmt: skip
     """One reading [m] and its status from the returns of a bundle; a ray without a hit has a negative distance.
 
@@ -189,7 +198,7 @@ def _reading(
         if total >= 1.0:
             break
         start = nearest + merge
-    mean /= total
+    mean *= calibration / total
     full = reflectance / reflectance_limit * (distance_max / max(mean, 0.01)) ** 2
     sigma = noise_floor + noise_rate * mean * np.sqrt(max(1.0, full / total))
     measured = max(0.0, mean + offset + sigma * draw)

@@ -1,0 +1,156 @@
+"""The paths of the paper by numbers, and how the phase moves along them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from pretouch.control.path import Circle, Path, PathState, WayPoints, advance, follow, line, pause
+from pretouch.errors import PathError
+from pretouch.params import TaskParams
+
+CIRCLE = Circle()  # paper, IV-A: radius 0.25 m round (0.5, 0, 0.25)
+LINE = line((0.4, 0.5, 0.5), (0.4, -0.5, 0.5))  # paper, IV-A
+SQUARE = WayPoints(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), closed=True)
+PARAMS = TaskParams()
+
+
+def test_circle_starts_at_its_left_and_rises():
+    np.testing.assert_allclose(CIRCLE.point(0.0), [0.5, 0.25, 0.25])
+    # counter-clockwise seen from +x: from +y towards +z
+    np.testing.assert_allclose(CIRCLE.tangent(0.0), [0, 0, 1])
+    quarter = 2 * np.pi * 0.25 / 4
+    np.testing.assert_allclose(CIRCLE.point(quarter), [0.5, 0, 0.5], atol=1e-12)
+    np.testing.assert_allclose(CIRCLE.tangent(quarter), [0, -1, 0], atol=1e-12)
+    assert CIRCLE.closed
+    np.testing.assert_allclose(CIRCLE.length, 4 * quarter)
+
+
+def test_line_by_numbers():
+    assert LINE.length == 1.0
+    np.testing.assert_allclose(LINE.point(0.25), [0.4, 0.25, 0.5])
+    np.testing.assert_allclose(LINE.tangent(0.25), [0, -1, 0])
+    # an open path ends: it goes nowhere from there
+    np.testing.assert_allclose(LINE.point(2.0), [0.4, -0.5, 0.5])
+    np.testing.assert_array_equal(LINE.tangent(1.0), 0.0)
+    np.testing.assert_allclose(LINE.point(-1.0), [0.4, 0.5, 0.5])
+
+
+def test_closed_way_points_by_numbers():
+    assert SQUARE.length == 4.0
+    np.testing.assert_allclose(SQUARE.point(2.5), [0.5, 1, 0])
+    np.testing.assert_allclose(SQUARE.point(3.75), [0, 0.25, 0])
+    np.testing.assert_allclose(SQUARE.tangent(3.75), [0, -1, 0])
+    np.testing.assert_allclose(SQUARE.point(4.25), SQUARE.point(0.25))
+
+
+@pytest.mark.parametrize("path", [CIRCLE, LINE, SQUARE])
+@given(phase=st.floats(0.0, 10.0))
+@settings(deadline=None, derandomize=True, max_examples=100)
+def test_tangent_is_the_derivative_of_the_point_by_arc_length(path: Path, phase: float):
+    step = 1e-6
+    at_corner = not isinstance(path, Circle) and (phase + step) % 1.0 < 2 * step
+    beyond = not path.closed and phase >= path.length
+    if not at_corner and not beyond:
+        slope = (path.point(phase + step) - path.point(phase)) / step
+        np.testing.assert_allclose(path.tangent(phase), slope, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "points", [[[0.0, 0, 0]], [[0.0, 0], [1, 1]], [[0.0, 0, 0], [np.nan, 0, 0]], [[0.0, 0, 0], [1, 0, 0], [1, 0, 0]]]
+)
+def test_unusable_way_points_are_refused(points: list[list[float]]):
+    with pytest.raises(PathError, match="way-point"):
+        WayPoints(np.array(points))
+
+
+@pytest.mark.parametrize("bad", [{"radius": 0.0}, {"radius": -1.0}, {"radius": np.nan}, {"center": (0, np.inf, 0)}])
+def test_unusable_circles_are_refused(bad: dict):
+    with pytest.raises(PathError, match="circle"):
+        Circle(**bad)
+
+
+def test_on_the_path_the_task_runs_along_it():
+    velocity = follow(LINE, PathState(0.25, 0.2), np.array([0.4, 0.25, 0.5]), PARAMS)
+    np.testing.assert_allclose(velocity, [0, -0.2, 0], atol=1e-12)
+
+
+def test_beside_the_path_the_task_returns_by_numbers():
+    # 0.05 m off in z: forward 0.2 * (1 - 0.05 / 0.1) = 0.1, back 2 * 0.05 = 0.1
+    velocity = follow(LINE, PathState(0.25, 0.2), np.array([0.4, 0.25, 0.45]), PARAMS)
+    np.testing.assert_allclose(velocity, [0, -0.1, 0.1], atol=1e-12)
+
+
+def test_far_off_the_path_the_arm_only_returns_at_the_task_speed():
+    velocity = follow(LINE, PathState(0.25, 0.3), np.array([0.9, 0.25, 0.5]), PARAMS)
+    np.testing.assert_allclose(velocity, [-0.3, 0, 0], atol=1e-12)
+
+
+@given(arrays(np.float64, 3, elements=st.floats(-2, 2)), st.floats(0, 10), st.floats(0, 0.3))
+@settings(deadline=None, derandomize=True, max_examples=200)
+def test_the_task_is_never_faster_than_asked(position: np.ndarray, phase: float, speed: float):
+    velocity = follow(CIRCLE, PathState(phase, speed), position, PARAMS)
+    assert np.linalg.norm(velocity) <= PARAMS.speed_m_s * (1 + 1e-12)
+
+
+def test_the_phase_moves_by_what_was_achieved_along_the_path():
+    # asked for 0.3 m/s along -y, the arm does 0.2 m/s for 0.01 s; the 0.5 m/s across do not count
+    after = advance(LINE, PathState(0.25, 0.3), LINE.point(0.25), np.array([0.5, -0.2, 0]), PARAMS)
+    np.testing.assert_allclose(after.phase, 0.252)
+
+
+def test_the_speed_grows_by_the_task_acceleration():
+    # 1 m/s^2 for 0.01 s
+    after = advance(LINE, PathState(0.25, 0.1), LINE.point(0.25), np.zeros(3), PARAMS)
+    np.testing.assert_allclose(after.speed, 0.11)
+
+
+def test_a_blocked_arm_stops_the_phase_and_never_turns_it_back():
+    for velocity in (np.zeros(3), np.array([0, 0.2, 0])):
+        assert advance(LINE, PathState(0.25, 0.1), LINE.point(0.25), velocity, PARAMS).phase == 0.25
+
+
+def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
+    # 0.05 m behind: asked for 0.2 * 0.5 + 2 * 0.05 = 0.2 m/s, and does it; 0.1 of it is progress, 0.1 catches up
+    state, behind = PathState(0.25, 0.2), LINE.point(0.2)
+    np.testing.assert_allclose(follow(LINE, state, behind, PARAMS), [0, -0.2, 0], atol=1e-12)
+    np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.2, 0]), PARAMS).phase, 0.251)
+    # slowed to a half it does 0.1 m/s, 0.1 less than asked: all of that is catching up
+    np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.1, 0]), PARAMS).phase, 0.25)
+
+
+def test_the_phase_of_an_open_path_stops_at_its_end():
+    after = advance(LINE, PathState(0.9999, 0.3), LINE.point(0.9999), np.array([0, -0.3, 0]), PARAMS)
+    assert after.phase == 1.0
+
+
+def test_the_phase_of_a_closed_path_goes_on():
+    start = CIRCLE.point(0.0)
+    after = advance(CIRCLE, PathState(CIRCLE.length, 0.3), start, np.array([0, 0, 0.3]), PARAMS)
+    np.testing.assert_allclose(after.phase, CIRCLE.length + 0.003)
+
+
+@pytest.mark.parametrize("path", [CIRCLE, line((0.0, 0.0, 0.0), (0.0, 9.0, 0.0))])
+@given(away=arrays(np.float64, 3, elements=st.floats(-0.3, 0.3)), slowed=st.floats(0.2, 1.0))
+@settings(deadline=None, derandomize=True, max_examples=30)
+def test_wherever_it_was_pushed_the_arm_comes_back_and_goes_on(path: Path, away: np.ndarray, slowed: float):
+    state, position = PathState(), path.point(0.0) + away
+    for _ in range(2500):  # 0.5 m at a fifth of 0.3 m/s is 8 s, and then as long again
+        velocity = slowed * follow(path, state, position, PARAMS)
+        state = advance(path, state, position, velocity, PARAMS)
+        position = position + 0.01 * velocity
+    assert np.linalg.norm(path.point(state.phase) - position) < 0.005
+    assert np.linalg.norm(velocity) > 0.95 * slowed * PARAMS.speed_m_s
+    assert state.phase > 0.2
+
+
+def test_the_speed_grows_to_the_task_speed_and_starts_again_after_a_pause():
+    state = PathState()
+    for _ in range(29):
+        state = advance(LINE, state, LINE.point(0), np.zeros(3), PARAMS)
+    np.testing.assert_allclose(state.speed, 0.29)
+    for _ in range(5):
+        state = advance(LINE, state, LINE.point(0), np.zeros(3), PARAMS)
+    assert state.speed == 0.3
+    assert pause(PathState(0.7, 0.3)) == PathState(0.7, 0.0)

@@ -1,0 +1,269 @@
+"""Eq. 2 by numbers, and the solver's answers against the conditions of optimality."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog, minimize
+
+from pretouch.control.joint_box import JointLimits, joint_box
+from pretouch.control.qp import Cost, damping, manipulability, mid_joint_velocity, skipped, solve, task_cost
+from pretouch.control.restriction import ApproachRows, approach_rows
+from pretouch.params import RestrictionParams, TaskParams
+from pretouch.perception.closest import closest_points
+from pretouch.robot.model import RobotModel
+from pretouch.types import QpOutcome, QpSolution
+
+TASK = TaskParams()
+WEIGHT = RestrictionParams().slack_weight
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is handed to the solver, and the braking command it falls back on."""
+
+    cost: Cost
+    lower: np.ndarray
+    upper: np.ndarray
+    rows: ApproachRows
+    stop: np.ndarray
+
+    def solve(self) -> QpSolution:
+        return solve(self.cost, self.lower, self.upper, self.rows, WEIGHT, self.stop)
+
+
+def panda_problem(model: RobotModel, seed: int, soft: bool, count: int | None = None, still: bool = False) -> Problem:
+    """A random posture, velocity and task, with the rows of random points near the body."""
+    rng = np.random.default_rng(seed)
+    arm, q = model.description, rng.uniform(model.q_min, model.q_max)
+    qd = np.zeros(7) if still else arm.qd_max * rng.uniform(-0.7, 0.7, 7)
+    kin = model.kinematics(q)
+    jacobian = model.ee_jacobian(kin)[: 3 if seed % 2 else 6]
+    lower, upper = joint_box(q, qd, JointLimits(model.q_min, model.q_max, arm.qd_max, arm.qdd_max, 0.01))
+    k = int(rng.integers(0, 12)) if count is None else count
+    points = kin.position[rng.integers(2, model.ee + 1, k)] + rng.uniform(-0.6, 0.6, (k, 3))
+    obstacles = closest_points(kin, model.body, kin.position[model.ee], np.arange(k), points, np.ones((k, 3)))
+    restriction = RestrictionParams(mode="slack" if soft else "hard")
+    rows, _ = approach_rows(kin, model.moved_by, obstacles, restriction)
+    # moving fast, most scenes leave hard rows no way out: give them more room
+    h = rows.h if soft else rows.h + rng.uniform(0, 0.5)
+    velocity = rng.uniform(-0.5, 0.5, len(jacobian))
+    cost = task_cost(jacobian, velocity, q, model.q_mid, TASK)
+    return Problem(cost, lower, upper, replace(rows, h=h), np.clip(qd, lower, upper))
+
+
+def kkt_residual(p: Problem, x: np.ndarray, multipliers: np.ndarray) -> float:
+    """Largest violation of the conditions of Karush, Kuhn and Tucker, each scaled by the size of its terms."""
+    on_box, on_rows = multipliers[: len(x)], multipliers[len(x) :]
+    parts = np.array([p.cost.H @ x, p.cost.f, on_box, p.rows.G.T @ on_rows])
+    stationarity = np.abs(parts.sum(axis=0)).max() / (1 + np.abs(parts).max())
+    above, below = x - p.upper, p.lower - x
+    residuals = [stationarity, above.max(), below.max()]
+    # a multiplier is positive at an upper bound, negative at a lower one, zero between
+    scale = 1 + np.abs(multipliers).max()
+    residuals += [(np.maximum(on_box, 0) * -above).max() / scale, (np.maximum(-on_box, 0) * -below).max() / scale]
+    if len(on_rows):
+        excess = p.rows.G @ x - p.rows.h
+        residuals.append((-on_rows).max() / scale)
+        if p.rows.soft:
+            # the penalty WEIGHT / 2 s^2 of s = max(0, excess) pushes back with WEIGHT s
+            residuals.append(np.abs(on_rows - WEIGHT * np.maximum(excess, 0)).max() / (scale + WEIGHT))
+        else:
+            residuals += [excess.max(), np.abs(on_rows * excess).max() / scale]
+    return float(max(residuals))
+
+
+def feasible(p: Problem) -> bool:
+    """Whether box and rows can be met together, by linear programming."""
+    bounds = list(zip(p.lower, p.upper, strict=True))
+    return linprog(np.zeros(7), A_ub=p.rows.G, b_ub=p.rows.h, bounds=bounds).status == 0
+
+
+def objective(p: Problem, x: np.ndarray) -> float:
+    slack = np.maximum(p.rows.G @ x - p.rows.h, 0) if p.rows.soft else np.zeros(1)
+    return float(0.5 * x @ p.cost.H @ x + p.cost.f @ x + WEIGHT / 2 * slack @ slack)
+
+
+# eq. 2
+
+
+def test_damping_and_mid_joint_velocity_by_numbers():
+    # 0.1 * (1 - 0.0005 / 0.001)^2 = 0.1 * 0.25;   none from the threshold on;   all of it at a singularity
+    assert damping(0.0005, 0.1, 0.001) == pytest.approx(0.025)
+    assert damping(0.001, 0.1, 0.001) == 0.0
+    assert damping(0.0, 0.1, 0.001) == 0.1
+    # (1 - 3) rad in 5 s
+    np.testing.assert_allclose(mid_joint_velocity(np.array([3.0]), np.array([1.0]), 5.0), [-0.4])
+
+
+def test_manipulability_by_numbers():
+    # J J^T = diag(4, 9), det 36, root 6
+    assert manipulability(np.array([[2.0, 0, 0], [0, 3.0, 0]])) == pytest.approx(6.0)
+    assert manipulability(np.array([[1.0, 2, 3], [2, 4, 6]])) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_cost_by_numbers():
+    # J = (1, 2), x_d = 3; w = sqrt(5) is far from singular, so mu = 0; k = 0.1; qd_mid = (0.4 - 0.4, 1.4 - 0.4) / 5
+    params = TaskParams(mid_joint_gain=0.1)
+    cost = task_cost(np.array([[1.0, 2.0]]), np.array([3.0]), np.full(2, 0.4), np.array([0.4, 1.4]), params)
+    np.testing.assert_allclose(cost.H, [[1.1, 2.0], [2.0, 4.1]])
+    np.testing.assert_allclose(cost.f, [-3.0, -6.0 - 0.1 * 0.2])
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-2])
+@pytest.mark.parametrize("seed", range(10))
+def test_gradient_is_that_of_eq_2_written_out(seed: int, scale: float):
+    rng = np.random.default_rng(seed)
+    J, x_d = scale * rng.normal(size=(3, 7)), rng.normal(size=3)  # the smaller scale is damped
+    q, q_mid, at = rng.normal(size=7), rng.normal(size=7), rng.normal(size=7)
+    w = np.sqrt(np.linalg.det(J @ J.T))
+    mu = 0.1 * (1 - w / 0.001) ** 2 if w < 0.001 else 0.0
+    assert (mu > 0) == (scale < 1)
+
+    def g(qd: np.ndarray) -> float:
+        error, to_middle = x_d - J @ qd, (q_mid - q) / 5.0 - qd
+        return 0.5 * error @ error + mu / 2 * qd @ qd + 0.001 / 2 * to_middle @ to_middle
+
+    cost = task_cost(J, x_d, q, q_mid, TASK)
+    differences = [(g(at + 1e-4 * e) - g(at - 1e-4 * e)) / 2e-4 for e in np.eye(7)]
+    np.testing.assert_allclose(cost.H @ at + cost.f, differences, rtol=1e-8, atol=1e-8)
+
+
+# answers
+
+
+@pytest.mark.parametrize("block", range(8))
+@pytest.mark.parametrize("soft", [True, False])
+def test_answers_are_optimal(panda_model: RobotModel, soft: bool, block: int):
+    solved = 0
+    for seed in range(50 * block, 50 * block + 50):
+        problem = panda_problem(panda_model, seed, soft)
+        answer = problem.solve()
+        if answer.outcome is QpOutcome.SOLVED:
+            solved += 1
+            assert kkt_residual(problem, answer.qd, answer.multipliers) <= 1e-8
+            excess = problem.rows.G @ answer.qd - problem.rows.h
+            np.testing.assert_allclose(answer.slack, np.maximum(excess, 0), atol=1e-12)
+            assert np.all((problem.lower <= answer.qd) & (answer.qd <= problem.upper))
+        else:
+            assert answer.outcome is QpOutcome.INFEASIBLE
+            assert not problem.rows.soft
+            assert not feasible(problem)
+    assert solved >= (50 if soft else 15)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_from_rest_hard_rows_ahead_of_d_repulse_are_always_solved(panda_model: RobotModel, seed: int):
+    problem = panda_problem(panda_model, seed, soft=False, count=10, still=True)
+    ahead = replace(problem, rows=replace(problem.rows, h=np.maximum(problem.rows.h, 0.0)))
+    answer = ahead.solve()
+    assert answer.outcome is QpOutcome.SOLVED
+    assert kkt_residual(ahead, answer.qd, answer.multipliers) <= 1e-8
+
+
+@pytest.mark.parametrize("soft", [True, False])
+@pytest.mark.parametrize("seed", range(5))
+def test_an_independent_solver_finds_the_same(panda_model: RobotModel, seed: int, soft: bool):
+    problem = panda_problem(panda_model, seed, soft, count=6, still=True)
+    if not soft:
+        problem = replace(problem, rows=replace(problem.rows, h=np.abs(problem.rows.h)))
+    constraints = [] if soft else [{"type": "ineq", "fun": lambda x: problem.rows.h - problem.rows.G @ x}]
+    other = minimize(
+        lambda x: objective(problem, x), problem.stop, method="SLSQP", constraints=constraints,
+        bounds=list(zip(problem.lower, problem.upper, strict=True)), options={"ftol": 1e-14, "maxiter": 500},
+    )  # fmt: skip
+    answer = problem.solve()
+    assert objective(problem, answer.qd) <= other.fun + 1e-9
+    np.testing.assert_allclose(answer.qd, other.x, atol=2e-4)
+
+
+# what solvers get wrong
+
+
+def simple(G: np.ndarray | None = None, h: float = 0.0, soft: bool = False) -> Problem:
+    """Minimise |qd - 0.5|^2 / 2 over seven joints in [-1, 1]."""
+    rows = np.zeros((0, 7)) if G is None else np.atleast_2d(G)
+    return Problem(
+        Cost(np.eye(7), np.full(7, -0.5)), np.full(7, -1.0), np.full(7, 1.0),
+        ApproachRows(rows, np.full(len(rows), h), soft), np.full(7, 0.123),
+    )  # fmt: skip
+
+
+def assert_braking(answer: QpSolution, problem: Problem, outcome: QpOutcome) -> None:
+    assert answer.outcome is outcome
+    np.testing.assert_array_equal(answer.qd, problem.stop)
+    assert answer.multipliers.shape == (7 + len(problem.rows.h),)
+    assert np.all(np.isfinite(answer.multipliers))
+
+
+def test_no_rows_at_all():
+    answer = simple().solve()
+    np.testing.assert_allclose(answer.qd, 0.5)
+    assert answer.slack.shape == (0,)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", ["H", "f", "lower", "upper", "G", "h"])
+@pytest.mark.parametrize("soft", [True, False])
+def test_numbers_that_are_not_finite_brake(where: str, value: float, soft: bool):
+    problem = simple(np.eye(7)[:2], 0.1, soft)
+    parts = {
+        "H": problem.cost.H, "f": problem.cost.f, "lower": problem.lower, "upper": problem.upper,
+        "G": problem.rows.G, "h": problem.rows.h,
+    }  # fmt: skip
+    parts[where].flat[1] = value
+    answer = problem.solve()
+    assert_braking(answer, problem, QpOutcome.FAILED)
+    assert "not finite" in answer.status
+
+
+def test_hard_rows_against_the_box_brake():
+    problem = simple(np.eye(7)[0], -1.5)
+    answer = problem.solve()
+    assert_braking(answer, problem, QpOutcome.INFEASIBLE)
+    # the braking command misses the row by 0.123 + 1.5
+    np.testing.assert_allclose(answer.slack, [1.623])
+
+
+def test_hard_rows_against_each_other_brake():
+    problem = simple(np.array([np.eye(7)[0], -np.eye(7)[0]]), -0.1)
+    assert_braking(problem.solve(), problem, QpOutcome.INFEASIBLE)
+
+
+def test_a_row_no_joint_can_move_is_not_dropped_in_silence():
+    hard, soft = simple(np.zeros(7), -0.04), simple(np.zeros(7), -0.04, soft=True)
+    assert_braking(hard.solve(), hard, QpOutcome.INFEASIBLE)
+    answer = soft.solve()
+    np.testing.assert_allclose(answer.qd, 0.5)
+    np.testing.assert_allclose(answer.slack, [0.04])
+
+
+def test_a_cost_that_is_not_convex_brakes():
+    problem = replace(simple(), cost=Cost(-np.eye(7), np.zeros(7)))
+    assert_braking(problem.solve(), problem, QpOutcome.FAILED)
+
+
+def test_a_box_without_width_is_answered():
+    problem = replace(simple(np.ones(7), 0.0, soft=True), lower=np.full(7, 0.3), upper=np.full(7, 0.3))
+    answer = problem.solve()
+    np.testing.assert_allclose(answer.qd, 0.3)
+    np.testing.assert_allclose(answer.slack, [2.1])
+
+
+def test_soft_rows_trade_against_the_task_by_numbers():
+    # one joint: 1/2 (x - 0.5)^2 + 1000 / 2 (x - 0.1)^2 is least at x = (0.5 + 1000 * 0.1) / 1001 = 0.1003996
+    answer = simple(np.eye(7)[0], 0.1, soft=True).solve()
+    assert answer.outcome is QpOutcome.SOLVED
+    np.testing.assert_allclose(answer.qd[0], 100.5 / 1001, rtol=1e-9)
+    np.testing.assert_allclose(answer.slack[0], 100.5 / 1001 - 0.1, rtol=1e-6)
+
+
+def test_repeated_rows_change_nothing():
+    once = simple(np.eye(7)[:1], 0.1).solve()
+    often = simple(np.tile(np.eye(7)[:1], (20, 1)), 0.1).solve()
+    np.testing.assert_allclose(often.qd, once.qd, atol=1e-12)
+
+
+def test_skipped_is_the_braking_command():
+    problem = simple(np.eye(7)[0], 0.1)
+    assert_braking(skipped(problem.stop, problem.rows), problem, QpOutcome.SKIPPED)

@@ -1,0 +1,45 @@
+"""What the QP tracks, with and without the hand's orientation."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pretouch.control.task import rotation_error, task
+from pretouch.params import TaskParams
+
+J = np.arange(42.0).reshape(6, 7)
+V = np.array([0.1, 0.2, 0.3])
+
+
+def test_free_orientation_tracks_the_velocity_alone():
+    jacobian, velocity = task(J, V, np.eye(3), np.eye(3), TaskParams(orientation="free"))
+    np.testing.assert_array_equal(jacobian, J[:3])
+    np.testing.assert_array_equal(velocity, V)
+
+
+def test_held_orientation_adds_the_turn_back():
+    # 30 degrees to go about z at 2 1/s: 2 * sin(30 deg) = 1 rad/s
+    goal = Rotation.from_euler("z", 30, degrees=True).as_matrix()
+    params = TaskParams(orientation="hold", orientation_gain_1_s=2.0)
+    jacobian, velocity = task(J, V, np.eye(3), goal, params)
+    np.testing.assert_array_equal(jacobian, J)
+    np.testing.assert_allclose(velocity, [0.1, 0.2, 0.3, 0, 0, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_rotation_error_is_axis_times_sine_in_the_base_frame(seed: int):
+    rng = np.random.default_rng(seed)
+    rotation, goal = Rotation.random(2, rng)
+    # the turn from one to the other in the base frame is goal * rotation^-1
+    turn = (goal * rotation.inv()).as_rotvec()
+    angle = np.linalg.norm(turn)
+    expected = turn / angle * np.sin(angle)
+    np.testing.assert_allclose(rotation_error(rotation.as_matrix(), goal.as_matrix()), expected, atol=1e-12)
+
+
+def test_turning_with_the_error_reaches_the_goal():
+    rotation, goal = Rotation.from_euler("xyz", [0.5, -0.8, 0.3]), Rotation.from_euler("xyz", [-0.2, 0.4, 0.1])
+    for _ in range(1000):
+        error = rotation_error(rotation.as_matrix(), goal.as_matrix())
+        rotation = Rotation.from_rotvec(0.01 * error) * rotation
+    assert (goal * rotation.inv()).magnitude() < 1e-3

@@ -1,0 +1,81 @@
+import json
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pretouch.errors import ExperimentError
+from pretouch.experiments import dynamic, static
+from pretouch.experiments.campaign import Request, open_folder, trace_file, trial_file, write_json
+from pretouch.experiments.cell import Cell
+from pretouch.experiments.report import write_report
+from pretouch.experiments.summary import summarise
+from pretouch.experiments.trace import load_trace, save_trace, trace_of
+
+
+class Links(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.images, self.tables = [], 0
+
+    def handle_starttag(self, tag, attrs):
+        if tag == "img":
+            self.images.append(dict(attrs)["src"])
+        self.tables += tag == "table"
+
+
+@pytest.fixture(scope="module")
+def request_and_folder(context, tmp_path_factory):
+    request, out = Request(("static", "dynamic"), seeds=1), tmp_path_factory.mktemp("run")
+    open_folder(request, out)
+    cells = [c for c in static.cells(request.profiles) if c.where == {"trajectory": "line", "side": "-y"}]
+    for cell in [*cells, Cell(dynamic.NAME, "paper", {})]:
+        row, record = (static if cell.experiment == "static" else dynamic).trial(cell, 0, context)
+        save_trace(trace_of(record), trace_file(out, cell, 0))
+        write_json(row, trial_file(out, cell, 0))
+    return request, out
+
+
+def test_the_page_shows_each_table_and_picture(request_and_folder):
+    request, out = request_and_folder
+    rows = [json.loads(file.read_text()) for file in (out / "trials").iterdir()]
+    page = write_report([(request, out)], summarise(rows), out)
+    links = Links()
+    links.feed(page.read_text())
+    assert links.tables == 2
+    assert links.images == ["static.png", "dynamic.png"]
+    for name in links.images:
+        with Image.open(out / name) as picture:
+            assert picture.width >= 1000
+            assert np.asarray(picture.convert("L")).std() > 10
+
+
+def test_a_run_without_trials_still_has_a_page(tmp_path):
+    request = Request(("static",), seeds=1)
+    open_folder(request, tmp_path)
+    assert "<table" not in write_report([(request, tmp_path)], {}, tmp_path).read_text()
+
+
+def test_a_page_that_cannot_be_written_is_named(tmp_path):
+    request = Request(("avoidance",), seeds=1)
+    with pytest.raises(ExperimentError, match="page cannot be written"):
+        write_report([(request, tmp_path / "none")], {}, tmp_path / "none")
+
+
+def test_a_trace_is_read_back(request_and_folder, tmp_path):
+    _, out = request_and_folder
+    trace = load_trace(next((out / "traces").glob("dynamic*.npz")))
+    save_trace(trace, tmp_path / "again.npz")
+    again = load_trace(tmp_path / "again.npz")
+    np.testing.assert_array_equal(again.force, trace.force)
+    assert [p.name for p in tmp_path.iterdir()] == ["again.npz"]
+
+
+def test_a_trace_has_the_mean_true_force_of_each_step(context):
+    _, record = static.trial(Cell(static.NAME, "blind", {"trajectory": "line", "side": "+y"}), 1, context)
+    trace = trace_of(record)
+    i = int(np.abs(trace.true_force[:, 1]).argmax())
+    since = (record.true_time > trace.time[i - 1] + 1e-9) & (record.true_time <= trace.time[i] + 1e-9)
+    assert since.sum() == 10
+    np.testing.assert_allclose(trace.true_force[i], record.true_force[since].mean(axis=0))

@@ -1,0 +1,66 @@
+from pretouch.experiments.summary import summarise
+from pretouch.experiments.tables import tables
+
+
+def static_row(profile, seed, peak, **changes):
+    return {
+        "experiment": "static", "trajectory": "circle", "side": "-y", "profile": profile, "restrictions": "off",
+        "stiffness_n_per_m": 25e3, "seed": seed, "contact": True, "impact_speed_m_s": 0.2, "detection_delay_s": 0.05,
+        "filtered_at_detection_n": 12.0, "raw_at_detection_n": 30.0, "peak_estimate_n": peak, "true_peak_20ms_n": 40.0,
+        "true_peak_n": 41.0, "false_detections": 0, "held": False,
+    } | changes  # fmt: skip
+
+
+def contact(**changes):
+    return {
+        "detected": True, "delay_s": 0.06, "direction_error_deg": 4.0, "push_n": 20.0, "push_s": 0.3,
+        "reaction_towards_person": False,
+    } | changes  # fmt: skip
+
+
+def dynamic_row(contacts):
+    return {
+        "experiment": "dynamic", "profile": "paper", "restrictions": "slack", "seed": 0, "contacts": contacts,
+        "peak_estimate_n": 30.0, "true_peak_20ms_n": 30.0, "true_peak_n": 50.0, "false_detections": 1, "held": False,
+    }  # fmt: skip
+
+
+def test_ratios_pair_trials_of_the_same_seed():
+    rows = [static_row("blind", 0, 80.0), static_row("blind", 1, 90.0), static_row("paper", 0, 20.0)]
+    rows += [static_row("paper", 1, 30.0), static_row("paper", 2, 1.0)]
+    (ratio,) = summarise(rows)["static"]["ratios"]
+    assert ratio["of"] == "blind/paper"
+    assert ratio["peak_estimate_n"] == {"median": 3.5, "p10": 3.1, "p90": 3.9, "n": 2}
+
+
+def test_trials_without_contact_are_counted_but_not_averaged():
+    missed = static_row("paper", 1, None, contact=False, detection_delay_s=None)
+    (cell,) = summarise([static_row("paper", 0, 20.0), missed])["static"]["cells"]
+    assert cell["contact_fraction"] == 0.5
+    assert cell["detected_fraction"] == 0.5
+    assert cell["peak_estimate_n"]["n"] == 1
+
+
+def test_pushes_of_all_trials_are_pooled():
+    missed = contact(detected=False, delay_s=None, direction_error_deg=None, reaction_towards_person=True)
+    (cell,) = summarise([dynamic_row([contact(), missed]), dynamic_row([contact(delay_s=0.08)])])["dynamic"]["cells"]
+    assert (cell["detected"], cell["pushes"]) == (2, 3)
+    assert cell["delay_s"]["median"] == 0.07
+    assert cell["reactions_towards_person"] == 1
+    assert cell["false_detections"] == 2
+
+
+def test_only_experiments_that_ran_are_summarised():
+    assert set(summarise([dynamic_row([contact()])])) == {"dynamic"}
+    assert summarise([]) == {}
+
+
+def test_tables_show_medians_and_ratios():
+    rows = [static_row("blind", 0, 80.0), static_row("paper", 0, 20.0), dynamic_row([contact()])]
+    static, dynamic = tables(summarise(rows))
+    assert [row[:2] for row in static.rows] == [("circle -y", "blind"), ("circle -y", "paper"), ("", "ratio")]
+    assert static.rows[0][6] == "80.0"
+    assert static.rows[2][6] == "4.00\n4.0-4.0"
+    assert dynamic.rows[0][:3] == ("paper", "1 of 1", "60")
+    for table in (static, dynamic):
+        assert all(len(row) == len(table.header) for row in table.rows)

@@ -1,0 +1,201 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
+
+from pretouch.perception.obstacles import (
+    is_fresh,
+    locate,
+    measured_distance,
+    sensor_poses,
+    silence,
+    track,
+    track_init,
+)
+from pretouch.robot.description import panda
+from pretouch.sensing.skin import Skin
+from pretouch.types import RangeReadings, RangeStatus
+
+INF, NAN = np.inf, np.nan
+anything = st.floats(allow_nan=True, allow_infinity=True)
+
+
+def _readings(stamp, distance=0.5, status=RangeStatus.OK) -> RangeReadings:
+    stamp = np.atleast_1d(np.asarray(stamp, dtype=np.float64))
+    return RangeReadings(stamp, np.full(len(stamp), distance), np.full(len(stamp), status, dtype=np.int64))
+
+
+def _take(state, stamp, now, x=1.0, shows=True):
+    """One reading of one unit that shows something at (x, 0, 0)."""
+    return track(state, _readings(stamp), np.array([[x, 0.0, 0.0]]), np.array([shows]), now, 0.06)
+
+
+# Eq. 1
+
+
+def test_an_obstacle_lies_along_the_beam():
+    position = np.array([[0.1, 0.2, 0.3], [1.0, 0.0, 0.0]])
+    tilted = [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]  # beam along (0.6, 0, 0.8)
+    level = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]  # beam along x
+    found = locate(position, np.array([tilted, level]), np.array([0.5, 0.25]))
+    np.testing.assert_allclose(found, [[0.4, 0.2, 0.7], [1.25, 0.0, 0.0]], atol=1e-15)
+
+
+@given(
+    position=arrays(np.float64, 3, elements=st.floats(-2, 2)),
+    turn=arrays(np.float64, 3, elements=st.floats(-4, 4)),
+    distance=st.floats(0, 4),
+)
+def test_an_obstacle_is_at_its_reading_seen_from_the_sensor(position, turn, distance):
+    R = Rotation.from_rotvec(turn).as_matrix()
+    (found,) = locate(position[None], R[None], np.array([distance]))
+    np.testing.assert_allclose(R.T @ (found - position), [0, 0, distance], atol=1e-12)
+
+
+def test_no_sensor_has_no_obstacle():
+    assert locate(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0)).shape == (0, 3)
+
+
+def test_sensor_poses_chain_link_and_mounting(panda_model, paper_skin):
+    kin = panda_model.kinematics(np.linspace(-1.5, 1.5, 7))
+    position, rotation = sensor_poses(paper_skin, kin)
+    for k, (link, T_link_sensor) in enumerate(zip(paper_skin.link, paper_skin.T_link_sensor, strict=True)):
+        T_O_link = np.eye(4)
+        T_O_link[:3, :3], T_O_link[:3, 3] = kin.rotation[link], kin.position[link]
+        T_O_sensor = T_O_link @ T_link_sensor
+        np.testing.assert_allclose(position[k], T_O_sensor[:3, 3], atol=1e-15)
+        np.testing.assert_allclose(rotation[k], T_O_sensor[:3, :3], atol=1e-15)
+
+
+def test_the_left_unit_of_the_hand_looks_left(panda_model, paper_skin):
+    kin = panda_model.kinematics(panda().q_ready)
+    position, rotation = sensor_poses(paper_skin, kin)
+    left = paper_skin.ids.index("hand_left")
+    np.testing.assert_allclose(position[left] - kin.position[panda_model.ee], [0.0, 0.108, 0.1034 - 0.045], atol=1e-5)
+    np.testing.assert_allclose(rotation[left, :, 2], [0, 1, 0], atol=1e-5)
+
+
+def test_an_empty_skin_has_no_poses(panda_model):
+    position, rotation = sensor_poses(Skin([], panda_model), panda_model.kinematics(np.zeros(7)))
+    assert position.shape == (0, 3)
+    assert rotation.shape == (0, 3, 3)
+
+
+# What a reading stands for
+
+
+@pytest.mark.parametrize("status", [s for s in RangeStatus if s is not RangeStatus.OK])
+def test_only_good_and_too_near_readings_show_a_target(status):
+    near = status in (RangeStatus.MIN_RANGE, RangeStatus.MIN_CLIPPED)
+    for distance in (0.5, 0.0, NAN, INF, -1.0):
+        (shown,) = measured_distance(_readings(0.0, distance, status))
+        np.testing.assert_equal(shown, 0.04 if near else NAN)
+
+
+@pytest.mark.parametrize(
+    ("distance", "shown"),
+    [(0.5, 0.5), (4.0, 4.0), (0.04, 0.04), (0.01, 0.04), (0.0, 0.04)]
+    + [(impossible, NAN) for impossible in (-0.01, 4.1, 65.535, 1e300, INF, NAN)],
+)
+def test_a_good_reading_is_taken_within_what_the_sensor_can_measure(distance, shown):
+    np.testing.assert_equal(measured_distance(_readings(0.0, distance)), [shown])
+
+
+@given(distance=anything, status=st.integers(-1, 300))
+def test_whatever_arrives_is_a_distance_or_nothing(distance, status):
+    (shown,) = measured_distance(_readings(0.0, distance, status))
+    assert np.isnan(shown) or 0.04 <= shown <= 4.0
+
+
+# How long a point is kept
+
+
+def test_a_point_outlives_missed_readings_but_not_its_persistence():
+    state = _take(track_init(1), 10.0, now=10.0)
+    state = _take(state, 10.02, now=10.02, x=NAN, shows=False)
+    np.testing.assert_array_equal(state.point, [[1, 0, 0]])
+    assert state.seen == 10.0  # when it was shown, not when it was missed
+    assert state.used == 10.02
+
+
+def test_a_newer_point_replaces_an_older_one():
+    state = _take(_take(track_init(1), 10.0, now=10.0), 10.02, now=10.03, x=2.0)
+    np.testing.assert_array_equal(state.point, [[2, 0, 0]])
+    assert state.seen == 10.02
+
+
+@pytest.mark.parametrize("late", [10.0, 9.99, -INF, NAN])
+def test_a_reading_that_is_not_newer_changes_nothing(late):
+    state = _take(track_init(1), 10.0, now=10.0)
+    again = _take(state, late, now=10.01, x=2.0)
+    np.testing.assert_array_equal(again.point, state.point)
+    np.testing.assert_array_equal([again.seen, again.used], [state.seen, state.used])
+
+
+def test_an_older_miss_does_not_hide_behind_a_newer_hit():
+    state = _take(track_init(1), 10.02, now=10.02)
+    state = _take(state, 10.0, now=10.03, shows=False)
+    assert (state.seen, state.used) == (10.02, 10.02)
+
+
+def test_a_reading_from_the_future_waits_until_its_time():
+    state = _take(track_init(1), 10.02, now=10.0)
+    assert state.seen == state.used == -INF
+    assert _take(state, 10.02, now=10.02).seen == 10.02
+
+
+def test_a_reading_that_comes_too_late_is_used_up_but_shows_nothing():
+    state = _take(track_init(1), 10.0, now=10.07)
+    assert (state.used, state.seen) == (10.0, -INF)
+    assert np.isnan(state.point).all()
+
+
+def test_units_are_kept_apart():
+    points = np.array([[1.0, 0, 0], [2.0, 0, 0], [3.0, 0, 0]])
+    shows = np.array([True, False, True])
+    state = track(track_init(3), _readings([1.0, 1.0, -INF]), points, shows, 1.0, 0.06)
+    np.testing.assert_array_equal(state.point, [[1, 0, 0], [NAN] * 3, [NAN] * 3])
+    np.testing.assert_array_equal(state.seen, [1, -INF, -INF])
+    np.testing.assert_array_equal(state.used, [1, 1, -INF])
+
+
+@given(
+    messages=st.lists(
+        st.tuples(st.integers(0, 30) | st.sampled_from([NAN, INF, -INF]), st.booleans()), min_size=1, max_size=12
+    )
+)
+def test_a_track_holds_what_was_really_shown(messages):
+    state, before = track_init(1), -INF
+    for tick, (at, shows) in enumerate(messages):
+        now, stamp = 0.02 * tick, 0.02 * at
+        state = _take(state, stamp, now, x=stamp, shows=shows)  # the point tells its stamp
+        assert before <= state.used[0] <= now
+        assert state.seen[0] <= state.used[0]
+        before = state.used[0]
+        if state.seen[0] > -INF:
+            assert state.point[0, 0] == state.seen[0]
+            assert any(shown and 0.02 * a == state.seen[0] for a, shown in messages[: tick + 1])
+
+
+def test_an_unheard_unit_is_not_fresh():
+    state = track_init(4)
+    np.testing.assert_array_equal(is_fresh(state, _readings([-INF, NAN, INF, 0.0]), 0.0), [False, False, False, True])
+
+
+# Silence
+
+
+def test_silence_is_the_age_of_the_newest_message():
+    ages = silence(_readings([9.5, 10.0, -INF]), 10.0)
+    np.testing.assert_array_equal(ages, [0.5, 0.0, INF])
+
+
+@pytest.mark.parametrize(("stamp", "now"), [(10.001, 10.0), (NAN, 10.0), (INF, 10.0), (10.0, NAN)])
+def test_a_stamp_that_cannot_be_is_silence(stamp, now):
+    assert silence(_readings(stamp), now) == INF
+
+
+def test_a_status_without_target_is_not_silence():
+    assert silence(_readings(9.9, NAN, RangeStatus.SIGNAL), 10.0) == pytest.approx(0.1)

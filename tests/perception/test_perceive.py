@@ -1,0 +1,268 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pretouch.params import PerceptionParams
+from pretouch.perception.obstacles import track_init
+from pretouch.perception.perceive import perceive, silent_units
+from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.perception.vectors import placed
+from pretouch.robot.body import Capsules
+from pretouch.robot.description import panda
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
+from pretouch.types import RangeReadings, RangeStatus
+
+FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
+TCP = np.array([0.30689, 0.0, 0.48688])
+"""End-effector origin in the ready posture, see `test_model.py` [m]."""
+PARAMS = PerceptionParams()
+
+
+def _left_of_hand(distance: float) -> np.ndarray:
+    """Where the unit hand_left, which looks along +y in the ready posture, sees something (1, 3) [m]."""
+    return TCP[None] + np.array([0.0, 0.108 + distance, 0.1034 - 0.045])
+
+
+class _Watcher:
+    """Perception in a chosen posture, its state carried along."""
+
+    def __init__(self, model, skin, fixtures=FLOOR, params=PARAMS):
+        self.model, self.skin, self.fixtures, self.params = model, skin, fixtures, params
+        self.kin = model.kinematics(panda().q_ready)
+        self.state = track_init(len(skin))
+
+    def readings(self, stamp: float, status=RangeStatus.OK, **distance: float) -> RangeReadings:
+        heard = [unit in distance for unit in self.skin.ids]
+        return RangeReadings(
+            np.where(heard, stamp, -np.inf),
+            np.array([distance.get(unit, np.nan) for unit in self.skin.ids]),
+            np.where(heard, int(status), int(RangeStatus.NONE)),
+        )
+
+    def take(self, readings: RangeReadings, now: float):
+        obstacles, self.state = perceive(
+            self.state, self.model, self.skin, self.fixtures, self.kin, readings, now, self.params
+        )
+        return obstacles
+
+    def see(self, now: float, status=RangeStatus.OK, **distance: float):
+        return self.take(self.readings(now, status, **distance), now)
+
+
+@pytest.fixture
+def watcher(panda_model, paper_skin):
+    return _Watcher(panda_model, paper_skin)
+
+
+@pytest.fixture
+def looking_down(panda_model):
+    """A unit 20 mm below the fingertips of the ready posture, on the beam's way to the floor."""
+    T = np.eye(4)
+    T[2, 3] = 0.1034 + 0.03
+    return _Watcher(panda_model, Skin([SensorUnit("down", "panda_hand", T)], panda_model))
+
+
+# One obstacle
+
+
+def test_a_reading_becomes_an_obstacle_beside_the_hand(watcher):
+    found = watcher.see(1.0, hand_left=0.3)
+    np.testing.assert_array_equal(found.unit, [watcher.skin.ids.index("hand_left")])
+    np.testing.assert_allclose(found.point, _left_of_hand(0.3), atol=1e-4)
+    np.testing.assert_allclose(found.ee_distance, [np.hypot(0.408, 0.0584)], atol=1e-4)
+    assert watcher.model.links[found.link[0]] == "panda_hand"
+    np.testing.assert_allclose(found.direction, [[0, 1, 0]], atol=0.1)
+    assert found.body_distance == pytest.approx(0.305, abs=2e-3)  # the unit sits 5 mm above the surface
+
+
+def test_units_are_told_apart(watcher):
+    found = watcher.see(1.0, hand_left=0.3, hand_right=0.5, forearm_right=0.2)
+    assert [watcher.skin.ids[k] for k in found.unit] == ["hand_left", "hand_right", "forearm_right"]
+    np.testing.assert_allclose(found.point[:, 1], [0.108 + 0.3, -0.107 - 0.5, -0.05 - 0.2], atol=1e-4)
+
+
+def test_nothing_is_seen_before_the_first_reading(watcher):
+    assert len(watcher.see(1.0).unit) == 0
+
+
+def test_a_target_too_near_to_measure_stays_at_40_mm(watcher):
+    watcher.see(1.0, hand_left=0.05)
+    found = watcher.see(1.02, status=RangeStatus.MIN_RANGE, hand_left=0.0)
+    np.testing.assert_allclose(found.point, _left_of_hand(0.04), atol=1e-4)
+
+
+def test_perception_can_be_switched_off(panda_model, paper_skin):
+    watcher = _Watcher(panda_model, paper_skin, params=PerceptionParams(enabled=False))
+    before = watcher.state
+    assert len(watcher.see(1.0, hand_left=0.3).unit) == 0
+    assert watcher.state is before
+
+
+def test_a_bare_arm_sees_nothing(panda_model):
+    assert len(_Watcher(panda_model, Skin([], panda_model)).see(1.0).unit) == 0
+
+
+# How long
+
+
+@pytest.mark.parametrize("status", [RangeStatus.SIGNAL, RangeStatus.WRAPPED, RangeStatus.NONE])
+def test_one_missed_reading_takes_no_obstacle_away(watcher, status):
+    shown = watcher.see(1.0, hand_left=0.3)
+    kept = watcher.see(1.02, status=status, hand_left=np.nan)
+    np.testing.assert_array_equal(kept.point, shown.point)
+
+
+def test_an_obstacle_is_given_up_after_its_persistence(watcher):
+    watcher.see(1.0, hand_left=0.3)
+    old = watcher.readings(1.0, hand_left=0.3)
+    assert len(watcher.take(old, 1.059).unit) == 1
+    assert len(watcher.take(old, 1.061).unit) == 0
+    assert len(watcher.take(old, 1.02).unit) == 1  # by the time it was seen, not by how often it was asked
+
+
+@pytest.mark.parametrize(("stamp", "now"), [(1.0, 1.1), (1.001, 1.0), (np.nan, 1.0), (np.inf, 1.0)])
+def test_a_reading_too_old_or_ahead_of_its_time_shows_nothing(watcher, stamp, now):
+    assert len(watcher.take(watcher.readings(stamp, hand_left=0.3), now).unit) == 0
+
+
+def test_a_late_message_does_not_bring_an_older_obstacle_back(watcher):
+    watcher.see(1.02, hand_left=0.5)
+    found = watcher.take(watcher.readings(1.0, hand_left=0.3), 1.03)
+    np.testing.assert_allclose(found.point, _left_of_hand(0.5), atol=1e-4)
+
+
+def test_an_obstacle_stays_where_it_was_while_the_arm_moves(watcher):
+    shown = watcher.see(1.0, hand_left=0.3)
+    watcher.kin = watcher.model.kinematics(panda().q_ready + 0.3 * np.eye(7)[0])  # turn towards it
+    kept = watcher.take(watcher.readings(1.0, hand_left=0.3), 1.03)
+    np.testing.assert_array_equal(kept.point, shown.point)
+    assert kept.body_distance[0] < shown.body_distance[0] - 0.05
+
+
+# What is known to be there
+
+
+@pytest.mark.parametrize(("distance", "shown"), [(0.70, 0), (0.657, 0), (0.60, 0), (0.59, 1), (0.3, 1)])
+def test_the_floor_is_no_obstacle_but_what_stands_on_it_is(looking_down, distance, shown):
+    found = looking_down.see(1.0, down=distance)  # 0.2 m pedestal, 0.457 m below it the fingertips: 0.657 m
+    assert len(found.unit) == shown
+    if shown:
+        np.testing.assert_allclose(found.point, [TCP - [0, 0, 0.03 + distance]], atol=1e-4)
+
+
+@pytest.mark.parametrize(("distance", "shown"), [(0.40, 0), (0.35, 0), (0.30, 0), (0.28, 1)])
+def test_the_forearm_is_no_obstacle_but_what_is_before_it_is(watcher, distance, shown):
+    # the unit on the hand's back sees the arm at 0.354 m, on the edge of its cone
+    assert len(watcher.see(1.0, hand_back=distance).unit) == shown
+
+
+def test_only_the_unit_that_sees_the_arm_is_silenced(watcher):
+    watcher.see(1.0, hand_left=0.35)
+    found = watcher.take(watcher.readings(1.02, hand_back=0.35, wrist_front=0.35), 1.02)
+    assert [watcher.skin.ids[k] for k in found.unit] == ["hand_left", "wrist_front"]
+
+
+def test_a_declared_post_is_no_obstacle(panda_model, paper_skin):
+    ends = np.array([[0.307, 0.6, -0.2], [0.307, 0.6, 1.0]])
+    post = Capsules(np.zeros(1, np.int64), ends[:1], ends[1:], np.array([0.1]))
+    watcher = _Watcher(panda_model, paper_skin, replace(FLOOR, capsules=post))
+    assert len(watcher.see(1.0, hand_left=0.39).unit) == 0  # its surface is at 0.6 - 0.1 - 0.108 = 0.392 m
+    assert len(watcher.see(1.02, hand_left=0.3).unit) == 1
+
+
+@pytest.mark.parametrize(("distance", "shown"), [(0.42, 0), (0.37, 0), (0.34, 1)])
+def test_the_base_is_seen_but_never_the_part_to_move_away(watcher, distance, shown):
+    # hand low before the base, its back 0.416 m from it; the first link lies 35 mm behind the base's front
+    watcher.kin = watcher.model.kinematics(np.deg2rad([0, 35, 0, -130, 0, 165, 45]))
+    found = watcher.see(1.0, hand_back=distance)
+    assert len(found.unit) == shown
+    assert "panda_link0" not in [watcher.model.links[link] for link in found.link]
+
+
+# On the axis of a capsule
+
+
+@pytest.mark.parametrize("last", [None, (0.6, 0.0, 0.8)])
+def test_on_the_axis_the_last_direction_holds_or_else_the_beam(watcher, last):
+    a, b = placed(watcher.model.body, watcher.kin)
+    finger = watcher.model.body.radius.argmin()
+    unit = watcher.skin.ids.index("hand_left")
+    watcher.state.point[unit], watcher.state.seen[unit] = (a[finger] + b[finger]) / 2, 1.0
+    if last:
+        watcher.state.direction[unit] = last
+    found = watcher.take(watcher.readings(-np.inf), 1.01)
+    np.testing.assert_allclose(found.direction, [last or (0, 1, 0)], atol=1e-5)
+    np.testing.assert_array_equal(watcher.state.direction[unit], found.direction[0])
+
+
+# Whatever arrives
+
+stamps = st.floats(0.9, 1.3) | st.sampled_from([np.nan, np.inf, -np.inf])
+distances = st.floats(0.0, 4.0) | st.sampled_from([np.nan, np.inf, -1.0, 65.535, 1e155, 1e300])
+statuses = st.just(0) | st.sampled_from([int(s) for s in RangeStatus]) | st.integers(-1, 300)
+messages = st.lists(st.tuples(stamps, distances, statuses), min_size=7, max_size=7)
+
+
+@given(steps=st.lists(messages, min_size=1, max_size=4))
+def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
+    watcher = _Watcher(panda_model, paper_skin)
+    for tick, step in enumerate(steps):
+        now = 1.0 + 0.05 * tick
+        stamp, distance, status = (np.array(part) for part in zip(*step, strict=True))
+        found = watcher.take(RangeReadings(stamp.astype(float), distance.astype(float), status.astype(np.int64)), now)
+        assert np.all(now - watcher.state.seen[found.unit] <= PARAMS.persistence_s)
+        assert np.all(watcher.state.seen[found.unit] <= now)
+        for part in (found.point, found.body_point, found.direction, found.body_distance, found.ee_distance):
+            assert np.all(np.isfinite(part))
+        np.testing.assert_allclose(np.linalg.norm(found.direction, axis=1), 1.0, atol=1e-9)
+        assert set(found.link) <= set(panda_model.body.link)
+        reach = np.maximum(1.0, found.body_distance)[:, None]
+        between = found.point - found.body_point - found.body_distance[:, None] * found.direction
+        assert np.all(np.abs(between) <= 1e-9 * reach)
+
+
+# Silent units
+
+
+def _heard(watcher, age: float) -> RangeReadings:
+    everyone = dict.fromkeys(watcher.skin.ids, 0.5)
+    heard = watcher.readings(10.0, **everyone)
+    heard.stamp[watcher.skin.ids.index("wrist_front")] = 10.0 - age
+    return heard
+
+
+@pytest.mark.parametrize(
+    ("age", "factor", "names"),
+    [(0.0, 1.0, ""), (0.05, 1.0, ""), (0.2, 0.5, ""), (0.25, 0.25, ""), (0.31, 0.0, "wrist_front")]
+    + [(age, 0.0, "wrist_front") for age in (np.inf, -0.01, np.nan)],
+)
+def test_a_unit_that_falls_silent_slows_the_arm_and_is_named(watcher, age, factor, names):
+    left, silent = silent_units(watcher.skin, _heard(watcher, age), 10.0, PARAMS)
+    assert left == pytest.approx(factor)
+    assert silent == names
+
+
+def test_all_units_never_heard_are_named(watcher):
+    left, silent = silent_units(watcher.skin, watcher.readings(0.0), 10.0, PARAMS)
+    assert left == 0.0
+    assert silent == ", ".join(watcher.skin.ids)
+
+
+@given(ages=st.lists(st.floats(-0.1, 0.5), min_size=7, max_size=7))
+def test_the_arm_stands_exactly_when_a_unit_is_named(paper_skin, ages):
+    heard = RangeReadings(10.0 - np.array(ages), np.ones(7), np.zeros(7, np.int64))
+    left, silent = silent_units(paper_skin, heard, 10.0, PARAMS)
+    assert 0.0 <= left <= 1.0
+    assert (left == 0.0) == bool(silent)
+    assert left == 1.0 or max(ages) > 0.0999 or min(ages) < 0.0
+
+
+def test_without_proximity_no_unit_is_missed(panda_model, watcher):
+    nothing = watcher.readings(0.0)
+    assert silent_units(watcher.skin, nothing, 10.0, PerceptionParams(enabled=False)) == (1.0, "")
+    bare = Skin([], panda_model)
+    assert silent_units(bare, RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64)), 10.0, PARAMS) == (1.0, "")

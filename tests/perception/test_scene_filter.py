@@ -1,0 +1,209 @@
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
+
+from pretouch.perception.closest import closest_points
+from pretouch.perception.obstacles import sensor_poses
+from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures, ray_capsule
+from pretouch.robot.body import Capsules
+from pretouch.robot.description import panda
+from pretouch.robot.model import Kinematics
+from pretouch.sensing.unit import CONE_ANGLE, cone_rays
+
+INF = np.inf
+LOW, HIGH = np.zeros(3), np.array([0.0, 0.0, 1.0])
+vectors = arrays(np.float64, 3, elements=st.floats(-2, 2))
+
+
+def _ray(p, towards, radius=0.1, a=LOW, b=HIGH) -> float:
+    ray = np.array(towards, dtype=np.float64)
+    return ray_capsule(np.array(p, dtype=np.float64), ray / np.linalg.norm(ray), a, b, radius)
+
+
+def _gap(p: np.ndarray, a: np.ndarray, b: np.ndarray, radius: float) -> float:
+    """Distance from a point to a capsule, by sampling its axis; at most 1e-6 m too large."""
+    return np.linalg.norm(a + np.linspace(0, 1, 4001)[:, None] * (b - a) - p, axis=1).min() - radius
+
+
+def _capsules(*capsules, link: int = 0) -> Capsules:
+    a, b, radius = (np.array(part, dtype=np.float64) for part in zip(*capsules, strict=True))
+    return Capsules(np.full(len(radius), link), a, b, radius)
+
+
+def _looking(p, along, fixtures: Fixtures, body: Capsules | None = None, own: int = 1) -> float:
+    """What one sensor at p that looks along a direction is expected to see."""
+    still = Kinematics(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((0, 3)), np.zeros((0, 3)))
+    along = np.array(along, dtype=np.float64) / np.linalg.norm(along)
+    R = Rotation.align_vectors([along], [[0, 0, 1]])[0].as_matrix()
+    body = no_fixtures().capsules if body is None else body
+    position = np.array(p, dtype=np.float64)[None]
+    return float(expected_range(still, position, R[None], np.array([own]), body, fixtures)[0])
+
+
+def _floor(height: float) -> Fixtures:
+    return Fixtures(np.array([[0.0, 0.0, 1.0, height]]), no_fixtures().capsules)
+
+
+# One ray, one capsule
+
+
+@pytest.mark.parametrize(
+    ("p", "towards", "distance"),
+    [
+        ((1, 0, 0.5), (-1, 0, 0), 0.9),  # its side
+        ((1, 0, 0.5), (1, 0, 0), INF),  # away from it
+        ((1, 0, 0.5), (0, 0, 1), INF),  # past it
+        ((0, 0, 2), (0, 0, -1), 0.9),  # its end, along the axis
+        ((0.06, 0, -1), (0, 0, 1), 0.92),  # its other end, beside the axis: 1 - sqrt(0.1^2 - 0.06^2)
+        ((0.11, 0, -1), (0, 0, 1), INF),  # parallel to it, just outside
+        ((0.3, 0, 1.4), (-0.6, 0, -0.8), 0.4),  # aimed at an end's centre, 0.5 away
+        ((1, 0.06, 0.5), (-1, 0, 0), 0.92),  # off centre: 1 - 0.08
+        ((0, 0, 0.5), (1, 0, 0), 0.0),  # from the axis
+        ((0.05, 0, 1.05), (0, 0, 1), 0.0),  # from within an end
+    ],
+)
+def test_a_ray_meets_a_rod(p, towards, distance):
+    assert _ray(p, towards) == pytest.approx(distance, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("p", "towards", "distance"),
+    [
+        ((2, 0, 0), (-1, 0, 0), 1.9),
+        ((-1.2, -0.9, 0), (0.8, 0.6, 0), 1.4),
+        ((2, 0, 0.06), (-1, 0, 0), 1.92),
+        ((2, 0, 0.11), (-1, 0, 0), INF),
+        ((2, 0, 0), (1, 0, 0), INF),
+        ((0, 0, 0), (1, 0, 0), 0.0),
+    ],
+)
+def test_a_capsule_of_no_length_is_met_as_a_ball(p, towards, distance):
+    assert _ray(p, towards, b=LOW) == pytest.approx(distance, abs=1e-12)
+
+
+@given(p=vectors, towards=vectors, a=vectors, b=vectors, radius=st.floats(0.02, 0.5))
+def test_a_ray_meets_a_capsule_where_mujoco_says(p, towards, a, b, radius):
+    length = np.linalg.norm(b - a)
+    assume(np.linalg.norm(towards) > 0.1)
+    assume(length > 1e-3)
+    assume(_gap(p, a, b, radius) > 1e-4)  # from inside MuJoCo answers where the ray leaves
+    towards = towards / np.linalg.norm(towards)
+    R = Rotation.align_vectors([(b - a) / length], [[0, 0, 1]])[0].as_matrix()
+    size = np.array([radius, length / 2, 0])
+    met = mujoco.mju_rayGeom((a + b) / 2, R.ravel(), size, p, towards, mujoco.mjtGeom.mjGEOM_CAPSULE)
+    assert _ray(p, towards, radius, a, b) == pytest.approx(met if met >= 0 else INF, abs=1e-7)
+
+
+@given(p=vectors, a=vectors, b=vectors, radius=st.floats(0.02, 0.5), share=st.floats(0, 1))
+def test_a_ray_aimed_at_the_axis_meets_the_surface_on_the_way(p, a, b, radius, share):
+    target = a + share * (b - a)
+    assume(_gap(p, a, b, radius) > 1e-5)
+    distance = _ray(p, target - p, radius, a, b)
+    assert distance <= np.linalg.norm(target - p)
+    met = p + distance * (target - p) / np.linalg.norm(target - p)
+    assert abs(_gap(met, a, b, radius)) < 1e-5
+
+
+@pytest.mark.parametrize("lift", [0.0, 1e-17, 1e-16, 1e-15, 1e-12, 1e-9])
+def test_a_ray_into_the_rod_from_its_very_surface_is_met_at_once(lift):
+    rng = np.random.default_rng(3)
+    for turn, height, radius in rng.uniform([0, 0, 0.02], [2 * np.pi, 1, 0.5], size=(300, 3)):
+        outwards = np.array([np.cos(turn), np.sin(turn), 0.0])
+        start = height * HIGH + (radius + lift) * outwards
+        distance = _ray(start, -outwards, radius)
+        assert distance >= 0.0
+        assert distance == pytest.approx(lift, abs=1e-12)
+
+
+# A sensor's cone
+
+
+def test_the_floor_below_is_seen_at_its_distance():
+    assert _looking((0.3, 0.1, 0.5), (0, 0, -1), _floor(-0.2)) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("along", [(0, 0, 1), (1, 0, 0.3), (0, -1, 0.3)])
+def test_the_floor_is_not_seen_by_looking_up(along):
+    assert _looking((0, 0, 0.5), along, _floor(-0.2)) == INF
+
+
+def test_a_plane_hides_nothing_from_behind():
+    assert _looking((0, 0, -0.5), (0, 0, -1), _floor(-0.2)) == INF
+    assert _looking((0, 0, -0.5), (0, 0, 1), _floor(-0.2)) == INF
+
+
+def test_on_the_floor_it_is_at_no_distance():
+    assert _looking((0, 0, -0.2), (0, 0, -1), _floor(-0.2)) == 0.0
+
+
+@given(height=st.floats(0.01, 2), tilt=st.floats(0, 1.2), turn=st.floats(0, 6.3))
+def test_the_floor_is_seen_by_the_lowest_ray_of_the_cone(height, tilt, turn):
+    along = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), -np.cos(tilt)])
+    seen = _looking((0, 0, height - 0.2), along, _floor(-0.2))
+    assert height / np.cos(max(0.0, tilt - CONE_ANGLE / 2)) <= seen + 1e-12
+    assert seen <= height / np.cos(tilt) + 1e-12  # no farther than along the beam
+
+
+def test_the_nearest_plane_counts():
+    corner = Fixtures(np.array([[0.0, 0, 1, 0], [-1.0, 0, 0, -3]]), no_fixtures().capsules)  # floor, wall at x = 3
+    assert _looking((2.5, 0, 1), (1, 0, 0), corner) == pytest.approx(0.5)
+    assert _looking((0.5, 0, 0.25), (0, 0, -1), corner) == pytest.approx(0.25)
+
+
+def test_a_post_is_seen_off_the_beam_but_within_the_cone():
+    for degrees, visible in ((0, True), (13, True), (20, False)):
+        y = np.tan(np.deg2rad(degrees))
+        post = Fixtures(np.zeros((0, 4)), _capsules(((1, y, -1), (1, y, 1), 0.02)))
+        assert np.isfinite(_looking((0, 0, 0), (1, 0, 0), post)) == visible
+
+
+def test_a_unit_sees_other_links_but_not_its_own():
+    rod = _capsules(((1, 0, -1), (1, 0, 1), 0.1), link=1)
+    assert _looking((0, 0, 0), (1, 0, 0), no_fixtures(), rod, own=0) == pytest.approx(0.9)
+    assert _looking((0, 0, 0), (1, 0, 0), no_fixtures(), rod, own=1) == INF
+
+
+def test_inside_another_link_nothing_else_is_seen():
+    rod = _capsules(((0, 0, -1), (0, 0, 1), 0.1), link=1)
+    assert _looking((0.05, 0, 0), (1, 0, 0), no_fixtures(), rod, own=0) == 0.0
+
+
+def test_nothing_around_is_seen_nowhere():
+    assert _looking((0, 0, 0), (1, 0, 0), no_fixtures()) == INF
+
+
+@pytest.fixture(scope="module")
+def mujoco_arm():
+    model = mujoco.MjModel.from_xml_path(str(panda().mjcf))
+    return model, mujoco.MjData(model)
+
+
+def test_the_arm_is_seen_where_mujocos_rays_meet_it(panda_model, paper_skin, mujoco_arm):
+    model, data = mujoco_arm
+    rays, seen, buried = cone_rays(2), 0, 0
+    for fraction in np.random.default_rng(1).uniform(size=(500, 7)):
+        q = panda_model.q_min + fraction * (panda_model.q_max - panda_model.q_min)
+        kin = panda_model.kinematics(q)
+        position, rotation = sensor_poses(paper_skin, kin)
+        expected = expected_range(kin, position, rotation, paper_skin.link, panda_model.capsules, no_fixtures())
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        for k, own in enumerate(paper_skin.link):
+            others = panda_model.capsules.of_links(np.setdiff1d(panda_model.capsules.link, [own]))
+            here = closest_points(kin, others, np.zeros(3), np.zeros(1, np.int64), position[k : k + 1], np.eye(3)[:1])
+            if here.body_distance[0] <= 0:  # the posture drives the unit into another link
+                assert expected[k] == 0
+                buried += 1
+                continue
+            met, geom = np.zeros(len(rays)), np.zeros(len(rays), np.int32)
+            along = (rays @ rotation[k].T).ravel()
+            mujoco.mj_multiRay(model, data, position[k], along, None, True, own, geom, met, None, len(rays), 1e6)
+            nearest = np.where(met < 0, INF, met).min()
+            assert expected[k] == pytest.approx(nearest, abs=1e-7)
+            seen += np.isfinite(nearest)
+    assert seen > 200
+    assert buried > 10

@@ -1,0 +1,231 @@
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
+
+from pretouch.errors import RobotModelError
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+
+postures = arrays(np.float64, 7, elements=st.floats(0.0, 1.0))
+"""Joint positions as fractions of their range."""
+velocities = arrays(np.float64, 7, elements=st.floats(-2.0, 2.0))
+moving_links = st.integers(2, 11)
+points = arrays(np.float64, 3, elements=st.floats(-0.5, 0.5))
+
+
+def _q(model: RobotModel, fraction: np.ndarray) -> np.ndarray:
+    return model.q_min + fraction * (model.q_max - model.q_min)
+
+
+def _steps(h: float) -> np.ndarray:
+    return h * np.eye(7)
+
+
+@pytest.fixture(scope="module")
+def bare():
+    """The same MJCF for MuJoCo's own answers, without rotor inertia, damping and constraints."""
+    model = mujoco.MjModel.from_xml_path(str(panda().mjcf))
+    model.dof_armature[:] = model.dof_damping[:] = 0.0
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    return model, mujoco.MjData(model)
+
+
+# Kinematics
+
+
+def test_tcp_of_the_stretched_arm_adds_up_the_vendors_lengths(panda_model):
+    kin = panda_model.kinematics(np.zeros(7))
+    np.testing.assert_allclose(
+        kin.position[panda_model.ee], [0.088, 0.0, 0.333 + 0.316 + 0.384 - 0.107 - 0.1034], atol=1e-6
+    )
+    np.testing.assert_allclose(kin.rotation[panda_model.ee] @ [0, 0, 1], [0, 0, -1], atol=1e-5)
+
+
+def test_tcp_of_the_ready_posture(panda_model):
+    s = np.sqrt(0.5)  # upper arm leans back by 45 deg, forearm is level, hand points down
+    x = s * (-0.316 + 0.0825) + 0.384 + 0.088
+    z = 0.333 + s * (0.316 + 0.0825) + 0.0825 - 0.107 - 0.1034
+    kin = panda_model.kinematics(panda().q_ready)
+    np.testing.assert_allclose(kin.position[panda_model.ee], [x, 0.0, z], atol=1e-5)
+
+
+def test_turning_the_base_joint_turns_the_arm_to_the_left(panda_model):
+    kin = panda_model.kinematics(panda().q_ready + np.pi / 2 * np.eye(7)[0])
+    x, y, _ = kin.position[panda_model.ee]
+    assert y > 0.3
+    assert abs(x) < 1e-5
+
+
+@given(fraction=postures, link=moving_links, p_link=points)
+def test_jacobian_is_the_derivative_of_the_pose(panda_model, fraction, link, p_link):
+    q = _q(panda_model, fraction)
+    kin = panda_model.kinematics(q)
+    jacobian = panda_model.jacobian(kin, link, kin.position[link] + kin.rotation[link] @ p_link)
+    h = 1e-5
+    for j, step in enumerate(_steps(h)):
+        ahead, behind = panda_model.kinematics(q + step), panda_model.kinematics(q - step)
+        p_ahead = ahead.position[link] + ahead.rotation[link] @ p_link
+        p_behind = behind.position[link] + behind.rotation[link] @ p_link
+        turned = Rotation.from_matrix(ahead.rotation[link] @ behind.rotation[link].T).as_rotvec()
+        np.testing.assert_allclose(jacobian[:3, j], (p_ahead - p_behind) / (2 * h), atol=1e-8)
+        np.testing.assert_allclose(jacobian[3:, j], turned / (2 * h), atol=1e-8)
+
+
+@given(fraction=postures)
+def test_ee_jacobian_is_the_one_of_mujoco(panda_model, bare, fraction):
+    model, data = bare
+    data.qpos[:] = _q(panda_model, fraction)
+    mujoco.mj_fwdPosition(model, data)
+    velocity, angular = np.zeros((3, 7)), np.zeros((3, 7))
+    mujoco.mj_jacBody(model, data, velocity, angular, model.body("panda_hand_tcp").id)
+    jacobian = panda_model.ee_jacobian(panda_model.kinematics(data.qpos))
+    np.testing.assert_allclose(jacobian, np.vstack([velocity, angular]), atol=1e-12)
+
+
+def test_only_joints_before_a_link_move_it(panda_model):
+    kin = panda_model.kinematics(panda().q_ready)
+    base, fourth = panda_model.link_index("panda_link0"), panda_model.link_index("panda_link4")
+    far = np.array([1.0, 2.0, 3.0])
+    assert not panda_model.jacobian(kin, base, far).any()
+    np.testing.assert_array_equal(panda_model.jacobian(kin, fourth, far).any(axis=0), [True] * 4 + [False] * 3)
+
+
+# Dynamics
+
+
+def _link_energies(panda_model, bare, q):
+    """Mass matrix and potential energy, link by link from the inertias, poses and Jacobians."""
+    model, _ = bare
+    kin = panda_model.kinematics(q)
+    mass_matrix, potential = np.zeros((7, 7)), 0.0
+    for link in range(1, model.nbody):
+        com = kin.position[link] + kin.rotation[link] @ model.body_ipos[link]
+        R = kin.rotation[link] @ Rotation.from_quat(model.body_iquat[link], scalar_first=True).as_matrix()
+        jacobian = panda_model.jacobian(kin, link, com)
+        inertia = R @ np.diag(model.body_inertia[link]) @ R.T
+        mass_matrix += model.body_mass[link] * jacobian[:3].T @ jacobian[:3] + jacobian[3:].T @ inertia @ jacobian[3:]
+        potential += model.body_mass[link] * 9.81 * com[2]
+    return mass_matrix, potential
+
+
+@given(fraction=postures)
+def test_mass_matrix_is_the_kinetic_energy_of_the_links(panda_model, bare, fraction):
+    q = _q(panda_model, fraction)
+    mass_matrix = panda_model.dynamics(q, np.zeros(7)).mass_matrix
+    np.testing.assert_allclose(mass_matrix, _link_energies(panda_model, bare, q)[0], atol=1e-9)
+    assert np.linalg.eigvalsh(mass_matrix).min() > 0
+
+
+@given(fraction=postures)
+def test_gravity_is_the_slope_of_the_potential_energy(panda_model, bare, fraction):
+    q, h = _q(panda_model, fraction), 1e-5
+    slope = [
+        (_link_energies(panda_model, bare, q + step)[1] - _link_energies(panda_model, bare, q - step)[1]) / (2 * h)
+        for step in _steps(h)
+    ]
+    np.testing.assert_allclose(panda_model.dynamics(q, np.ones(7)).gravity, slope, atol=1e-6)
+
+
+@given(fraction=postures, qd=velocities)
+def test_coriolis_torques_follow_from_the_mass_matrix(panda_model, fraction, qd):
+    q, h = _q(panda_model, fraction), 1e-5
+    slope = np.array(
+        [
+            panda_model.dynamics(q + step, qd).mass_matrix - panda_model.dynamics(q - step, qd).mass_matrix
+            for step in _steps(h)
+        ]
+    ) / (2 * h)  # (j, n, n): dM / dq_j
+    changing = np.einsum("jab,j,b->a", slope, qd, qd)  # dM/dt qd
+    kinetic = np.einsum("jab,a,b->j", slope, qd, qd) / 2  # gradient of the kinetic energy
+    dynamics = panda_model.dynamics(q, qd)
+    np.testing.assert_allclose(dynamics.coriolis, changing - kinetic, atol=1e-6)
+
+
+@given(fraction=postures, qd=velocities, qdd=velocities)
+def test_dynamics_are_the_inverse_dynamics_of_mujoco(panda_model, bare, fraction, qd, qdd):
+    model, data = bare
+    data.qpos[:], data.qvel[:], data.qacc[:] = _q(panda_model, fraction), qd, qdd
+    mujoco.mj_inverse(model, data)
+    dynamics = panda_model.dynamics(data.qpos, qd)
+    torque = dynamics.mass_matrix @ qdd + dynamics.coriolis + dynamics.gravity
+    np.testing.assert_allclose(torque, data.qfrc_inverse, atol=1e-9)
+
+
+def test_bias_is_coriolis_plus_gravity(panda_model):
+    q, qd = panda().q_ready, np.linspace(-1, 1, 7)
+    dynamics = panda_model.dynamics(q, qd)
+    mass_matrix, bias = panda_model.mass_matrix_and_bias(q, qd, np.zeros(7))
+    np.testing.assert_array_equal(mass_matrix, dynamics.mass_matrix)
+    np.testing.assert_allclose(bias, dynamics.coriolis + dynamics.gravity, atol=1e-12)
+    assert np.abs(dynamics.coriolis).max() > 0.1
+
+
+@pytest.mark.parametrize("disturbance", [1.0, np.nan, np.inf])
+def test_answers_depend_on_the_arguments_alone(panda_model, disturbance):
+    q, qd = panda().q_ready, np.linspace(-1, 1, 7)
+    kin, dynamics = panda_model.kinematics(q), panda_model.dynamics(q, qd)
+    kept = kin.position.copy()
+    panda_model.dynamics(np.full(7, disturbance), np.full(7, disturbance))
+    panda_model.kinematics(np.full(7, disturbance))
+    np.testing.assert_array_equal(kin.position, kept)  # what was handed out stays as it was
+    np.testing.assert_array_equal(panda_model.kinematics(q).position, kept)
+    again = panda_model.dynamics(q, qd)
+    np.testing.assert_array_equal(again.mass_matrix, dynamics.mass_matrix)
+    np.testing.assert_array_equal(again.coriolis, dynamics.coriolis)
+
+
+# Models that are refused
+
+
+def test_joint_ranges_are_those_of_the_vendor(panda_model):
+    np.testing.assert_allclose(panda_model.q_min, [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
+    np.testing.assert_allclose(panda_model.q_max, [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
+    np.testing.assert_allclose(panda_model.q_mid, [0, 0, 0, -1.5708, 0, 1.8675, 0], atol=1e-12)
+
+
+def test_an_unknown_link_is_answered_with_those_there_are(panda_model):
+    assert panda_model.links[panda_model.link_index("panda_link5")] == "panda_link5"
+    with pytest.raises(RobotModelError, match=r"link 'elbow' is unknown: choose from panda_link0, .*panda_hand_tcp\."):
+        panda_model.link_index("elbow")
+
+
+def _one_joint_arm(path: Path, joint: str, geom: str = '<geom type="capsule" size="0.1 0.2"/>') -> RobotModel:
+    file = path / "arm.xml"
+    file.write_text(
+        f'<mujoco><worldbody><body name="tool"><joint name="pivot" {joint}/><inertial pos="0 0 0" mass="1"'
+        f' diaginertia="1 1 1"/>{geom}</body></worldbody></mujoco>'
+    )
+    one = np.ones(1)
+    return RobotModel(replace(panda(), mjcf=file, ee_body="tool", qd_max=one, qdd_max=one, tau_max=one, q_ready=one))
+
+
+def test_an_arm_of_one_hinge_is_accepted(tmp_path):
+    assert _one_joint_arm(tmp_path, 'range="-90 90"').q_max == pytest.approx(np.pi / 2)
+
+
+@pytest.mark.parametrize(
+    ("joint", "geom", "message"),
+    [
+        ('type="slide" range="-1 1"', '<geom type="capsule" size="0.1 0.2"/>', "joint pivot is no hinge"),
+        ("", '<geom type="capsule" size="0.1 0.2"/>', "joint pivot has no range: give it its position limits"),
+        ('type="ball"', '<geom type="capsule" size="0.1 0.2"/>', "the MJCF has 3 joints, q_ready 1"),
+        ('range="-90 90"', '<geom name="plate" type="box" size="1 1 1"/>', "plate are no capsules"),
+        ('range="-90 90"', "", "no joint moves a capsule"),
+        ('range="-90 90"', "<geom", "cannot be read"),
+    ],
+)
+def test_a_model_that_would_be_misunderstood_is_refused(tmp_path, joint, geom, message):
+    with pytest.raises(RobotModelError, match=message):
+        _one_joint_arm(tmp_path, joint, geom)
+
+
+def test_an_unknown_end_effector_is_refused():
+    with pytest.raises(RobotModelError, match="link 'gripper' is unknown"):
+        RobotModel(replace(panda(), ee_body="gripper"))

@@ -1,0 +1,187 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from pretouch.errors import SkinError
+from pretouch.sensing.skin import Skin, load_skin, save_skin
+from pretouch.sensing.unit import SensorUnit
+
+ENTRY = {
+    "id": '"left"',
+    "link": '"panda_hand"',
+    "position_m": "[0.0, -0.108, 0.045]",
+    "quaternion_wxyz": "[0.6, 0.8, 0.0, 0.0]",
+}
+
+
+def _unit(name: str, link: str = "panda_hand", position=(0.0, -0.108, 0.045), R=None) -> SensorUnit:
+    T = np.eye(4)
+    T[:3, 3] = position
+    if R is not None:
+        T[:3, :3] = R
+    return SensorUnit(name, link, T)
+
+
+def _file(folder: Path, text: str) -> Path:
+    path = folder / "skin.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def _entry(**changes: str | None) -> str:
+    lines = [f"{key} = {value}" for key, value in (ENTRY | changes).items() if value is not None]
+    return "\n".join(["[[unit]]", *lines, ""])
+
+
+# A skin
+
+
+def test_units_keep_their_order(panda_model):
+    skin = Skin([_unit("b"), _unit("a", "panda_link6", (0.2, 0, 0)), _unit("c")], panda_model)
+    assert skin.ids == ("b", "a", "c")
+    assert [panda_model.links[i] for i in skin.link] == ["panda_hand", "panda_link6", "panda_hand"]
+    np.testing.assert_array_equal(skin.T_link_sensor[:, 0, 3], [0, 0.2, 0])
+
+
+def test_an_empty_skin_has_empty_arrays(panda_model):
+    skin = Skin([], panda_model)
+    assert len(skin) == 0
+    assert skin.ids == ()
+    assert skin.link.shape == (0,)
+    assert skin.T_link_sensor.shape == (0, 4, 4)
+
+
+def test_duplicate_ids_are_named(panda_model):
+    with pytest.raises(SkinError, match="id a, c is used more than once: give each unit its own id"):
+        Skin([_unit(name) for name in "cabac"], panda_model)
+
+
+def test_an_unknown_link_is_answered_with_those_there_are(panda_model):
+    with pytest.raises(SkinError, match=r"Unit a .* 'elbow', which panda does not have: choose from panda_link0, "):
+        Skin([_unit("a", "elbow")], panda_model)
+
+
+def test_a_unit_inside_its_link_is_refused_with_its_depth(panda_model):
+    hand = panda_model.capsules.of_links(np.array([panda_model.link_index("panda_hand")]))
+    finger = hand.radius.argmin()  # 11.5 mm, along the hand's z axis
+    x, y, z = hand.b[finger]
+    with pytest.raises(SkinError, match=r"Unit a lies 8\.0 mm inside panda_hand: move it out to the surface"):
+        Skin([_unit("a", position=(x, y, z + 0.0035))], panda_model)
+    assert len(Skin([_unit("a", position=(x, y, z + 0.0116))], panda_model)) == 1
+
+
+def test_a_link_without_a_body_can_carry_a_unit(panda_model):
+    assert len(Skin([_unit("a", "panda_hand_tcp", (0.0, 0.0, 0.01))], panda_model)) == 1
+
+
+def test_the_paper_skin_looks_outwards_from_the_surface(panda_model, paper_skin):
+    assert len(paper_skin) == 7
+    for link, T in zip(paper_skin.link, paper_skin.T_link_sensor, strict=True):
+        own = panda_model.capsules.of_links(np.array([link]))
+        steps = np.linspace(0, 1, 101)[:, None, None]
+        axis = own.a + steps * (own.b - own.a)
+        here, ahead = (
+            (np.linalg.norm(T[:3, 3] + move * T[:3, 2] - axis, axis=2) - own.radius).min() for move in (0.0, 0.02)
+        )
+        assert 0.0 < here < 0.015
+        assert ahead > here + 0.015
+
+
+# Its file
+
+
+@given(
+    turns=st.lists(st.tuples(*[st.floats(-4, 4)] * 3), min_size=1, max_size=3),
+    position=st.tuples(st.floats(0.2, 0.4), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)),
+    names=st.lists(st.text(min_size=1, alphabet=st.characters(codec="utf-8")), min_size=3, max_size=3, unique=True),
+)
+def test_a_saved_skin_is_read_back(panda_model, tmp_path_factory, turns, position, names):
+    units = [
+        _unit(name, "panda_link6", position, Rotation.from_rotvec(turn).as_matrix())
+        for name, turn in zip(names, turns, strict=False)
+    ]
+    skin, path = Skin(units, panda_model), tmp_path_factory.mktemp("skin") / "skin.toml"
+    save_skin(skin, path)
+    back = load_skin(path, panda_model)
+    assert back.ids == skin.ids
+    np.testing.assert_array_equal(back.link, skin.link)
+    np.testing.assert_array_equal(back.T_link_sensor[:, :3, 3], skin.T_link_sensor[:, :3, 3])
+    np.testing.assert_allclose(back.T_link_sensor, skin.T_link_sensor, atol=1e-14)
+
+
+def test_a_quaternion_begins_with_w(panda_model, tmp_path):
+    skin = load_skin(_file(tmp_path, _entry()), panda_model)
+    # turned about x by 2 atan2(0.8, 0.6): cosine 0.36 - 0.64, sine 2 * 0.48; the beam is the third column
+    np.testing.assert_allclose(skin.T_link_sensor[0, :3, 2], [0.0, -0.96, -0.28], atol=1e-12)
+    np.testing.assert_allclose(skin.T_link_sensor[0, :3, 3], [0.0, -0.108, 0.045])
+
+
+def test_a_rounded_quaternion_is_taken(panda_model, tmp_path):
+    skin = load_skin(_file(tmp_path, _entry(quaternion_wxyz="[0.7071, 0, 0.7071, 0]")), panda_model)
+    np.testing.assert_allclose(skin.T_link_sensor[0, :3, 2], [1, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"id": None}, "a unit has the id None: give each .* an id in quotes"),
+        ({"id": "7"}, "a unit has the id 7: .*in quotes"),
+        ({"id": '""'}, "empty id: give each unit a name"),
+        ({"link": None}, "unit left has the link None: give the name of a link"),
+        ({"link": '"elbow"'}, "unit left .*'elbow'.*choose from panda_link0"),
+        ({"colour": '"red"'}, "unit left has the unknown key colour: use id, link, position_m, quaternion_wxyz"),
+        ({"position_m": None}, "unit left: position_m is none: give 3 finite numbers"),
+        ({"position_m": "[0.0, 0.1]"}, r"position_m is \[0.0, 0.1\]: give 3 finite numbers"),
+        ({"position_m": "0.1"}, "position_m is 0.1: give 3 finite numbers"),
+        ({"position_m": "[nan, 0, 0]"}, r"position_m is \[nan, 0, 0\]: give 3 finite numbers"),
+        ({"position_m": "[-inf, 0, 0]"}, "give 3 finite numbers"),
+        ({"position_m": '["0.1", 0, 0]'}, "give 3 finite numbers"),
+        ({"position_m": "[true, 0, 0]"}, "give 3 finite numbers"),
+        ({"position_m": f"[1{'0' * 400}, 0, 0]"}, "give 3 finite numbers"),
+        ({"position_m": "[0.0, 0.0, 0.045]"}, "unit left lies .* mm inside panda_hand: move it out"),
+        ({"position_m": "[0.0, -108.0, 45.0]"}, "unit left lies .* m off panda_hand: give its position in metres"),
+        ({"quaternion_wxyz": None}, "quaternion_wxyz is none: give 4 finite numbers"),
+        ({"quaternion_wxyz": "[1, 0, 0]"}, "give 4 finite numbers"),
+        ({"quaternion_wxyz": "[1, 0, 0, nan]"}, "give 4 finite numbers"),
+        ({"quaternion_wxyz": "[0, 0, 0, 0]"}, "unit left: quaternion_wxyz has length 0.0000: it must be 1"),
+        ({"quaternion_wxyz": "[1, 1, 0, 0]"}, "has length 1.4142: it must be 1"),
+    ],
+)
+def test_what_is_wrong_with_a_unit_is_said_with_unit_and_file(panda_model, tmp_path, changes, message):
+    path = _file(tmp_path, _entry(**changes))
+    with pytest.raises(SkinError, match=f"(?i){message}") as caught:
+        load_skin(path, panda_model)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"names no unit: give at least one \[\[unit\]\] with id, link and pose"),
+        ("unit = []", "names no unit"),
+        ("unit = 3", "names no unit"),
+        ("[unit]\nid = 'a'", "names no unit"),
+        ("unit = [3]", r"A unit is 3: write it as a \[\[unit\]\] table"),
+        ("[[unit]\n", "is not valid TOML"),
+        (_entry() + _entry(), "unit id left is used more than once: give each unit its own id"),
+    ],
+)
+def test_a_file_that_describes_no_skin_is_refused(panda_model, tmp_path, text, message):
+    path = _file(tmp_path, text)
+    with pytest.raises(SkinError, match=message) as caught:
+        load_skin(path, panda_model)
+    assert str(path) in str(caught.value)
+
+
+def test_a_file_that_cannot_be_read_is_named(panda_model, tmp_path):
+    with pytest.raises(SkinError, match=r"nowhere\.toml cannot be read: No such file"):
+        load_skin(tmp_path / "nowhere.toml", panda_model)
+    with pytest.raises(SkinError, match="cannot be read: Is a directory"):
+        load_skin(tmp_path, panda_model)
+    (tmp_path / "latin.toml").write_bytes(b'id = "\xe9"')
+    with pytest.raises(SkinError, match=r"latin\.toml is not UTF-8 text: .* at byte 6"):
+        load_skin(tmp_path / "latin.toml", panda_model)

@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from pretouch.errors import SkinError
+from pretouch.sensing.unit import CONE_ANGLE, SensorUnit, cone_rays
+
+
+def _pose(**changes: np.ndarray) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3] = changes.get("rotation", np.eye(3))
+    T[:3, 3] = changes.get("position", np.zeros(3))
+    T[3] = changes.get("last_row", T[3])
+    return T
+
+
+def test_a_unit_keeps_its_own_read_only_pose():
+    T = _pose(position=np.array([0.1, 0.2, 0.3]))
+    unit = SensorUnit("hand", "panda_hand", T)
+    T[:] = 0.0
+    np.testing.assert_array_equal(unit.T_link_sensor[:3, 3], [0.1, 0.2, 0.3])
+    with pytest.raises(ValueError, match="read-only"):
+        unit.T_link_sensor[0, 0] = 2.0
+
+
+@pytest.mark.parametrize(
+    ("pose", "message"),
+    [
+        (np.eye(3), "give a finite 4 x 4 matrix"),
+        (_pose(position=np.array([np.nan, 0, 0])), "give a finite 4 x 4 matrix"),
+        (_pose(rotation=np.full((3, 3), np.inf)), "give a finite 4 x 4 matrix"),
+        (_pose(rotation=np.diag([1.0, 1.0, -1.0])), "no proper rotation .determinant -1.*right-handed"),
+        (_pose(rotation=1.01 * np.eye(3)), "no proper rotation .*give a right-handed rotation"),
+        (_pose(rotation=np.zeros((3, 3))), "no proper rotation .determinant 0"),
+        (_pose(last_row=np.array([0.0, 0.0, 0.0, 2.0])), "last row of its pose .*must be 0 0 0 1"),
+    ],
+)
+def test_a_pose_that_is_none_is_refused_with_the_units_name(pose, message):
+    with pytest.raises(SkinError, match=f"Unit hand: .*{message}"):
+        SensorUnit("hand", "panda_hand", pose)
+
+
+def test_a_unit_without_a_name_is_refused():
+    with pytest.raises(SkinError, match="empty id: give each unit a name"):
+        SensorUnit("", "panda_hand", np.eye(4))
+
+
+@pytest.mark.parametrize(("rings", "count"), [(0, 1), (1, 7), (2, 19), (3, 37)])
+def test_cone_rays_are_unit_vectors_from_axis_to_edge(rings, count):
+    rays = cone_rays(rings)
+    assert rays.shape == (count, 3)
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1.0, atol=1e-12)
+    np.testing.assert_array_equal(rays[0], [0, 0, 1])
+    tilt = np.rad2deg(np.arccos(np.minimum(rays[:, 2], 1.0)))
+    assert tilt.max() == pytest.approx(13.5 if rings else 0.0)  # half of the data sheet's 27 degrees
+
+
+@given(tilt=st.floats(0.0, 1.0), turn=st.floats(0.0, 2 * np.pi))
+def test_no_direction_in_the_field_of_view_is_far_from_a_ray(tilt, turn):
+    seen = Rotation.from_euler("zy", [turn, tilt * CONE_ANGLE / 2]).apply([0, 0, 1])
+    nearest = (cone_rays(2) @ seen).max()
+    assert np.rad2deg(np.arccos(min(nearest, 1.0))) < 5.0  # rings and rays lie about 7 degrees apart

@@ -1,0 +1,168 @@
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import pytest
+
+from pretouch.sim.hand import Hand, HandGoal, arm_distance, point_on_arm
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.types import FloatArray
+
+FREE = (1.2, 0.0, 0.8)
+"""Where nothing is in the hand's way [m]."""
+
+
+@dataclass
+class Script:
+    """A person who wants the hand where `where(time)` says."""
+
+    where: Callable[[float], FloatArray]
+    force_max: float = 1000.0
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        return HandGoal(self.where(time), self.force_max)
+
+
+def stay(point) -> Callable[[float], FloatArray]:
+    return lambda time: np.array(point, dtype=float)
+
+
+@pytest.fixture
+def plant_with_hand(panda_model) -> Callable[..., Plant]:
+    def make(start: tuple[float, float, float], seed: int = 0) -> Plant:
+        spec = SceneSpec(hand=HandSpec(start=start))
+        return Plant(panda_model, spec, PlantParams(), panda_model.description.q_ready, seed)
+
+    return make
+
+
+def each_step(plant: Plant, duration: float, look: Callable[[], object]) -> np.ndarray:
+    """What `look` sees after each physics step."""
+    return np.array([(plant.advance(0.001), look())[1] for _ in range(round(duration / 0.001))])
+
+
+def test_a_hand_travels_at_the_speed_of_its_person_and_arrives(plant_with_hand):
+    hand = Hand(plant := plant_with_hand(FREE), Script(stay((1.2, 1.0, 0.8))), speed_max=0.5)
+    assert hand.position == pytest.approx(np.array(FREE))
+    velocity = each_step(plant, 1.9, lambda: hand.velocity)
+    assert velocity[200:1800] == pytest.approx(np.tile([0.0, 0.5, 0.0], (1600, 1)), abs=0.01)
+    assert np.linalg.norm(velocity, axis=1).max() < 0.6, "the spring lets the mass overshoot by a sixth, not more"
+    plant.advance(0.6)
+    assert hand.position == pytest.approx([1.2, 1.0, 0.8], abs=1e-3)
+    assert hand.velocity == pytest.approx(np.zeros(3), abs=1e-3)
+
+
+def test_a_hand_never_jumps_though_its_goal_does(plant_with_hand):
+    def jumping(time: float) -> FloatArray:
+        return np.array([1.2, 0.5 if int(time / 0.05) % 2 else -0.5, 0.8])
+
+    hand = Hand(plant := plant_with_hand(FREE), Script(jumping), speed_max=0.5)
+    path = np.vstack([FREE, each_step(plant, 1.0, lambda: hand.position)])
+    limit = 0.5 * (1.0 + 2.0 / 6.0)  # the spring overshoots by a sixth, at a reversal twice
+    assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() < limit * 0.001
+    assert np.ptp(path[:, 1]) > 0.01, "the hand does not move at all"
+
+
+def test_a_hand_follows_a_slow_script_closely(plant_with_hand):
+    def swinging(time: float) -> FloatArray:
+        return np.array([1.2, 0.1 * np.sin(2 * np.pi * 0.5 * time), 0.8])  # at most 0.31 m/s
+
+    hand = Hand(plant := plant_with_hand(FREE), Script(swinging))
+    error = each_step(plant, 2.0, lambda: hand.position - swinging(plant.time))
+    assert np.linalg.norm(error, axis=1).max() < 0.012
+
+
+def test_a_script_sees_the_hand_the_time_and_the_arm(plant_with_hand):
+    seen = []
+
+    class Curious:
+        def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+            seen.append((time, hand, plant))
+            return HandGoal(hand, 10.0)
+
+    Hand(plant := plant_with_hand(FREE), Curious())
+    plant.advance(0.003)
+    assert [time for time, _, _ in seen] == pytest.approx([0.0, 0.001, 0.002])
+    assert all(hand == pytest.approx(np.array(FREE)) and arm is plant for _, hand, arm in seen)
+
+
+def test_a_disturbed_hand_comes_to_rest(plant_with_hand):
+    hand = Hand(plant := plant_with_hand(FREE), Script(stay(FREE)))
+    plant.mj_data.qvel[-3:] = [0.5, 0.0, 0.0]
+    away = each_step(plant, 0.5, lambda: hand.position[0] - FREE[0])
+    # a mass of 0.6 kg on 2000 N/m and 60 N s/m: omega 57.7 1/s, zeta 0.866, crest 0.5 / omega * 0.404
+    assert away.max() == pytest.approx(0.0035, rel=0.1)
+    assert away.min() > -0.05 * away.max()
+    assert np.abs(away[200:]).max() < 1e-4
+
+
+def push_up(hand_plant: Callable[..., Plant], force_max: float) -> tuple[Plant, Hand]:
+    """A hand 2 cm below the fingertip that wants to go 10 cm up."""
+    plant = hand_plant((0.3069, 0.0, 0.4082))
+    return plant, Hand(plant, Script(stay((0.3069, 0.0, 0.5)), force_max), speed_max=0.1)
+
+
+@pytest.mark.parametrize("force_max", [5.0, 20.0, 40.0])
+def test_a_hand_pushes_with_no_more_than_its_force(plant_with_hand, force_max):
+    plant, hand = push_up(plant_with_hand, force_max)
+    applied = each_step(plant, 1.5, lambda: plant.mj_data.qfrc_applied[-3:])
+    assert np.linalg.norm(applied, axis=1).max() <= force_max + 1e-9
+    assert np.linalg.norm(plant.true_force) == pytest.approx(force_max, rel=0.02)
+    assert plant.true_force[2] > 0.9 * force_max
+    assert np.linalg.norm(hand.velocity) < 0.02
+
+
+def test_a_soft_goal_inside_the_arm_pushes_as_its_spring(plant_with_hand):
+    plant = plant_with_hand((0.3069, 0.0, 0.4262))
+    Hand(plant, Script(stay((0.3069, 0.0, 0.4362)), force_max=100.0), speed_max=0.1)
+    plant.advance(1.0)
+    depth = 0.4362 - (plant.mj_data.body("hand").xpos[2])
+    assert 0.006 < depth < 0.01
+    assert plant.true_force[2] == pytest.approx(2000.0 * depth, rel=0.03)
+
+
+def test_a_hand_that_pushes_to_the_left_puts_a_force_to_the_left_on_the_arm(plant_with_hand):
+    # between the two capsules of the gripper's side, where the ball rests stably
+    plant = plant_with_hand((0.3069, -0.18, 0.5595))
+    Hand(plant, Script(stay((0.3069, -0.132, 0.5595)), force_max=50.0), speed_max=0.1)
+    before = np.mean(each_step(plant, 0.2, lambda: plant.read().wrench), axis=0)
+    plant.advance(1.0)
+    assert plant.true_force[1] > 20.0
+    assert plant.true_force == pytest.approx(plant.mj_data.qfrc_applied[-3:], abs=0.5)  # at rest
+    after = np.mean(each_step(plant, 0.3, lambda: plant.read().wrench), axis=0)
+    assert (after - before)[:3] == pytest.approx(plant.true_force, abs=1.5)
+
+
+def test_a_person_who_lets_go_pulls_back_at_once(plant_with_hand):
+    plant = plant_with_hand((0.3069, 0.0, 0.4082))
+    up, down = np.array([0.3069, 0.0, 0.5]), np.array([0.3069, 0.0, 0.3])
+    hand = Hand(plant, Script(lambda time: up if time < 1.0 else down, 30.0), speed_max=0.2)
+    plant.advance(1.0)
+    assert plant.true_force[2] == pytest.approx(30.0, rel=0.02)
+    force = each_step(plant, 0.3, lambda: plant.true_force[2])
+    assert 0.001 * np.argmax(force == 0.0) < 0.15
+    assert hand.position[2] < 0.42
+
+
+def test_a_point_on_the_arm_moves_with_its_link(panda_model, plant_with_hand):
+    plant, offset = plant_with_hand(FREE), np.array([0.02, -0.05, 0.1])
+    link = panda_model.link_index("panda_link5")
+    for speed in (0.3, 0.0):
+        plant.command(np.full(7, speed))
+        plant.advance(0.5)
+    kin = panda_model.kinematics(plant.read().q)
+    expected = kin.position[link] + kin.rotation[link] @ offset
+    assert point_on_arm(plant, link, offset) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize("start", [FREE, (0.3, 0.2, 0.5), (0.1, -0.2, 0.75), (-0.3, 0.1, 0.6), (0.31, 0.0, 0.72)])
+def test_the_distance_to_the_arm_is_that_of_the_physics(panda_model, plant_with_hand, start):
+    plant = plant_with_hand(start)
+    built, data = plant.mj_model, plant.mj_data
+    ball = built.geom("hand")
+    arm = [g for g, b in enumerate(built.geom_bodyid) if b < len(panda_model.links) and panda_model.moved_by[b].any()]
+    nearest = min(mujoco.mj_geomDistance(built, data, ball.id, g, 5.0, None) for g in arm)
+    assert arm_distance(plant, np.array(start)) == pytest.approx(nearest + ball.size[0], abs=1e-6)

@@ -1,0 +1,73 @@
+import json
+
+import pytest
+
+from pretouch import cli
+
+
+def run(capsys, *args):
+    code = cli.main(list(args))
+    return code, capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("reproduce", "statik"), "The experiment 'statik' is unknown"),
+        (("reproduce", "static", "--profiles", "paper,brave"), "The profile 'brave' is unknown"),
+        (("reproduce", "static", "--restrictions", "firm"), "The mode 'firm' is unknown"),
+        (("reproduce", "static", "--seeds", "-1"), "The number of seeds is -1"),
+        (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
+        (("reproduce", "static", "--out", "/dev/null/x"), "/dev/null/x cannot be used"),
+        (("reproduce", "static", "--out", "OUT", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
+        (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "cannot be written: Is a directory"),
+        (("demo", "--seeds", "0"), "The number of seeds is 0"),
+    ],
+)
+def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, args, words):
+    code, said = run(capsys, *(str(tmp_path / "out") if arg == "OUT" else arg for arg in args))
+    assert code == 2
+    assert words in said.err
+    assert said.err.count("\n") == 1
+    assert said.out == ""
+
+
+@pytest.mark.parametrize("args", [(), ("dance",), ("reproduce", "--seeds", "many"), ("demo", "--nothing")])
+def test_words_it_does_not_know_end_with_code_2(capsys, args):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(list(args))
+    assert stop.value.code == 2
+
+
+def test_help_names_the_commands(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["--help"])
+    assert stop.value.code == 0
+    said = capsys.readouterr().out
+    assert "demo" in said
+    assert "reproduce" in said
+
+
+def test_a_run_writes_what_it_says(capsys, tmp_path):
+    out, numbers = tmp_path / "out", tmp_path / "numbers.json"
+    args = ("reproduce", "static", "--seeds", "1", "--out", str(out), "--json", str(numbers))
+    code, said = run(capsys, *args)
+    assert code == 0
+    for words in ("Static object", "circle -y", "line +y", "ratio", str(out / "index.html"), str(numbers)):
+        assert words in said.out
+    results = json.loads(numbers.read_text())
+    assert len(results["trials"]) == 8
+    assert len(results["summary"]["static"]["cells"]) == 8
+    ratios = results["summary"]["static"]["ratios"]
+    assert [r["of"] for r in ratios] == ["blind/paper"] * 4
+    assert all(r["peak_estimate_n"]["median"] > 1 for r in ratios)
+    assert max(len(line) for line in said.out.splitlines() if str(tmp_path) not in line) <= 80
+    code, said = run(capsys, *args[:-4], "--out", str(out), "--stiffness", "2000")
+    assert code == 2
+    assert "holds a run with stiffness = 25000.0" in said.err
+
+
+def test_a_new_demo_gets_a_new_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / "demo-1").mkdir(parents=True)
+    assert str(cli._new_folder("demo")) == "runs/demo-2"

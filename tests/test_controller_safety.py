@@ -1,0 +1,225 @@
+"""Whatever it is given, the controller answers with a command within the limits of the arm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pretouch.control.path import Circle, Path, line
+from pretouch.controller import Controller
+from pretouch.params import PROFILES, Profile
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, RangeStatus, RobotState
+
+DT = 0.01
+SHORT = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=5))
+HARD = replace(SHORT, restriction=replace(SHORT.restriction, mode="hard"))
+STATUS = [int(s) for s in RangeStatus]
+FAULTS = [
+    "q", "qd", "q_commanded", "qd_commanded", "wrench", "no wrench", "robot stamp", "step stamp", "stale", "backwards",
+    "jump", "distance", "range stamp", "dead",
+]  # fmt: skip
+LATCHING = FAULTS[:4] + FAULTS[6:11]
+
+
+class Arm:
+    """An arm that does exactly what it is told, whatever its interface reports, and checks each command."""
+
+    def __init__(self, model: RobotModel, skin: Skin, profile: Profile = SHORT, path: Path | None = None) -> None:
+        self.model, self.skin = model, skin
+        self.q, self.qd, self.time = model.description.q_ready.copy(), np.zeros(7), 0.0
+        self.controller = Controller(model, skin, no_fixtures(), path or Circle(), profile)
+        self.limits = self.controller.limits
+        self.start()
+
+    def start(self) -> None:
+        self.state = self.controller.init(self.robot())
+
+    def robot(self, force: np.ndarray | None = None) -> RobotState:
+        wrench = np.concatenate([np.zeros(3) if force is None else force, np.zeros(3)])
+        return RobotState(self.time, self.q, self.qd, self.q, self.qd, np.zeros(7), wrench)
+
+    def inputs(
+        self, distance: float = 0.0, status: int = RangeStatus.SIGNAL, force: np.ndarray | None = None
+    ) -> Inputs:
+        k = len(self.skin)
+        readings = RangeReadings(np.full(k, self.time), np.full(k, distance), np.full(k, int(status)))
+        return Inputs(self.time, self.robot(force), readings)
+
+    def step(self, inputs: Inputs) -> ControlStep:
+        step, self.state = self.controller.step(self.state, inputs)
+        assert np.all(np.isfinite(step.command))
+        assert np.all(np.abs(step.command - self.qd) <= self.limits.qdd_max * DT + 1e-9)
+        assert step.reason
+        self.qd, self.q, self.time = step.command, self.q + step.command * DT, self.time + DT
+        return step
+
+    def check_position_and_velocity(self) -> None:
+        assert np.all(np.abs(self.qd) <= self.limits.qd_max + 1e-9)
+        assert np.all(self.q >= self.limits.q_min - 1e-9)
+        assert np.all(self.q <= self.limits.q_max + 1e-9)
+
+
+def spoiled(inputs: Inputs, fault: str, value: float = np.nan) -> Inputs:
+    """The same inputs with one thing wrong."""
+    robot, readings, now = inputs.robot, inputs.readings, inputs.stamp
+    if fault in ("q", "qd", "q_commanded", "qd_commanded", "wrench"):
+        wrong = getattr(robot, fault).copy()
+        wrong[3] = value
+        return replace(inputs, robot=replace(robot, **{fault: wrong}))
+    if fault in ("no wrench", "robot stamp", "stale"):
+        wrong = {"no wrench": {"wrench": None}, "robot stamp": {"stamp": value}, "stale": {"stamp": now - 0.2}}[fault]
+        return replace(inputs, robot=replace(robot, **wrong))
+    if fault in ("step stamp", "backwards", "jump"):
+        return replace(inputs, stamp={"step stamp": value, "backwards": now - 1.0, "jump": now + 60.0}[fault])
+    if fault == "dead":
+        silent = replace(readings, stamp=np.full(len(readings.stamp), -np.inf))
+        return replace(inputs, readings=replace(silent, status=np.full(len(readings.status), 255)))
+    name = {"distance": "distance", "range stamp": "stamp"}[fault]
+    wrong = getattr(readings, name).copy()
+    wrong[::2] = value
+    return replace(inputs, readings=replace(readings, **{name: wrong}))
+
+
+def assert_at_rest(arm: Arm) -> None:
+    np.testing.assert_array_equal(arm.qd, 0.0)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_one_fault_that_lasts(panda_model: RobotModel, paper_skin: Skin, fault: str, value: float):
+    arm = Arm(panda_model, paper_skin)
+    for _ in range(60):
+        arm.step(arm.inputs())
+    assert np.linalg.norm(arm.qd) > 0.05
+    for _ in range(60):
+        last = arm.step(spoiled(arm.inputs(distance=0.3, status=RangeStatus.OK), fault, value))
+        arm.check_position_and_velocity()
+    if fault != "distance":
+        assert last.mode is Mode.HOLD
+        assert_at_rest(arm)
+    for _ in range(60):
+        last = arm.step(arm.inputs())
+    # what latches stays, and what does not goes on by itself
+    assert last.mode is (Mode.HOLD if fault in LATCHING else Mode.TRACK)
+    assert arm.step(replace(arm.inputs(), resume=True)).mode is Mode.TRACK
+
+
+events = st.tuples(
+    st.sampled_from([None, None, None, *FAULTS]),
+    st.sampled_from([np.nan, np.inf, -np.inf, 1e4, -1e4]),
+    st.floats(0.0, 4.0),
+    st.sampled_from([RangeStatus.OK, RangeStatus.OK, *STATUS]),
+    st.tuples(*[st.floats(-80, 80)] * 3),
+    st.booleans(),
+)
+
+
+@given(st.lists(events, min_size=5, max_size=40), st.sampled_from([SHORT, HARD]))
+@settings(deadline=None, derandomize=True, max_examples=60)
+def test_any_sequence_of_faults_pushes_and_readings(panda_model, paper_skin, sequence, profile):
+    arm = Arm(panda_model, paper_skin, profile)
+    for _ in range(20):
+        arm.step(arm.inputs())
+    for fault, value, distance, status, force, resume in sequence:
+        inputs = replace(arm.inputs(distance, status, np.array(force)), resume=resume)
+        # a wrong but finite posture is what the arm would go by, so only a finite answer can be asked of it
+        lies = fault in ("q_commanded", "qd_commanded") and np.isfinite(value)
+        step = arm.step(spoiled(inputs, fault, value) if fault and not lies else inputs)
+        arm.check_position_and_velocity()
+        assert np.isfinite(step.speed_scale)
+
+
+@pytest.mark.parametrize("profile", [SHORT, HARD, replace(SHORT, threshold=replace(SHORT.threshold, compare="raw"))])
+@pytest.mark.parametrize("seed", range(2))
+def test_long_wild_run(panda_model: RobotModel, paper_skin: Skin, profile: Profile, seed: int):
+    rng = np.random.default_rng(seed)
+    arm, modes, outcomes = Arm(panda_model, paper_skin, profile), set(), set()
+    force, distance, status = np.zeros(3), 1.0, RangeStatus.OK
+    for i in range(1500):
+        if i % 20 == 0:
+            force = rng.normal(scale=80, size=3) * (rng.random() < 0.3)
+            distance, status = rng.uniform(0.0, 1.0), rng.choice(STATUS) if rng.random() < 0.5 else RangeStatus.OK
+        inputs = replace(arm.inputs(distance, status, force + rng.normal(scale=0.5, size=3)), resume=i % 50 == 0)
+        step = arm.step(spoiled(inputs, rng.choice(FAULTS)) if rng.random() < 0.02 else inputs)
+        arm.check_position_and_velocity()
+        modes.add(step.mode)
+        outcomes.add(step.qp.outcome)
+    assert modes == set(Mode)
+    assert QpOutcome.FAILED not in outcomes
+    assert (QpOutcome.INFEASIBLE in outcomes) == (profile is HARD)
+
+
+@pytest.mark.parametrize("name", ["q", "qd", "q_commanded", "qd_commanded"])
+def test_a_finite_lie_gets_a_finite_answer(panda_model: RobotModel, paper_skin: Skin, name: str):
+    arm = Arm(panda_model, paper_skin)
+    for value in (1e3, -1e3, 1e9):
+        inputs = spoiled(arm.inputs(0.3, RangeStatus.OK), name, value)
+        step, arm.state = arm.controller.step(arm.state, inputs)
+        assert np.all(np.isfinite(step.command))
+
+
+def test_an_arm_without_units_follows_its_path(panda_model: RobotModel):
+    arm = Arm(panda_model, Skin([], panda_model))
+    for _ in range(40):
+        step = arm.step(arm.inputs())
+        arm.check_position_and_velocity()
+    assert step.mode is Mode.TRACK
+    assert step.speed_scale == 1.0
+
+
+def test_an_arm_whose_units_were_never_heard_stands(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin)
+    for _ in range(40):
+        step = arm.step(spoiled(arm.inputs(), "dead"))
+        assert_at_rest(arm)
+    assert step.mode is Mode.HOLD
+    assert all(name in step.reason for name in paper_skin.ids)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("joint", range(7))
+def test_an_arm_that_starts_beyond_a_joint_limit_never_goes_further(
+    panda_model: RobotModel, paper_skin: Skin, joint: int, sign: float
+):
+    arm = Arm(panda_model, paper_skin)
+    beyond = (arm.limits.q_max if sign > 0 else arm.limits.q_min)[joint] + sign * 0.05
+    arm.q[joint] = beyond
+    arm.start()
+    for _ in range(100):
+        before = arm.q[joint]
+        arm.step(arm.inputs())
+        if sign * (before - (beyond - sign * 0.05)) > 0:
+            assert sign * arm.qd[joint] <= 1e-12
+    assert sign * (arm.q[joint] - beyond) <= 1e-12
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.5])
+def test_an_arm_that_is_handed_over_moving_brakes_within_its_limits(
+    panda_model: RobotModel, paper_skin: Skin, factor: float
+):
+    arm = Arm(panda_model, paper_skin)
+    arm.qd = factor * arm.limits.qd_max * np.array([1, -1, 1, 1, -1, 1, -1])
+    arm.start()
+    for _ in range(5):  # the window is filling, so the arm holds
+        before = np.abs(arm.qd)
+        arm.step(arm.inputs())
+        assert np.all(np.abs(arm.qd) <= before)
+    assert np.all(np.abs(arm.qd) < factor * arm.limits.qd_max)
+
+
+@pytest.mark.parametrize("goal", [(3.0, 0.0, 0.5), (0.0, 0.0, 3.0), (0.0, 0.0, 0.4), (0.4, 2.0, 0.1)])
+def test_a_path_out_of_reach_ends_within_the_limits(
+    panda_model: RobotModel, paper_skin: Skin, goal: tuple[float, float, float]
+):
+    # a stretched arm is singular, and one folded into itself meets its joint limits
+    start = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
+    arm = Arm(panda_model, paper_skin, path=line(tuple(start), goal))
+    for _ in range(800):
+        step = arm.step(arm.inputs())
+        arm.check_position_and_velocity()
+    assert step.qp.outcome is QpOutcome.SOLVED

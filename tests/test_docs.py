@@ -1,0 +1,54 @@
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROWS = re.findall(
+    r"^\| (?:(\d+) \| )?.*? \| `(pretouch[\w.]+)` \| `(tests/[\w/]+\.py)::(\w+)` \|$",
+    (ROOT / "docs" / "equations.md").read_text(),
+    flags=re.MULTILINE,
+)
+
+
+def resolve(path):
+    parts = path.split(".")
+    for cut in range(len(parts), 0, -1):
+        try:
+            found = importlib.import_module(".".join(parts[:cut]))
+        except ModuleNotFoundError:
+            continue
+        for name in parts[cut:]:
+            found = getattr(found, name)
+        return found
+    raise AssertionError(f"{path} does not exist")
+
+
+def test_every_equation_is_in_the_table():
+    assert {int(number) for number, *_ in ROWS if number} == set(range(1, 13))
+    assert len(ROWS) == 18
+
+
+@pytest.mark.parametrize(("number", "function", "file", "test"), ROWS)
+def test_the_table_of_equations_is_true(number, function, file, test):
+    found = resolve(function)
+    assert callable(found)
+    if number:
+        assert re.search(rf"\beqs?\. {number}\b", found.__doc__)
+    assert f"def {test}(" in (ROOT / file).read_text()
+
+
+def test_links_between_documents_lead_somewhere():
+    for document in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", document.read_text()):
+            assert (document.parent / target).exists(), f"{document.name}: {target}"
+
+
+def test_names_in_the_notation_exist():
+    text = (ROOT / "docs" / "notation.md").read_text()
+    for owner, name in re.findall(r"`(\w+)\.(\w+)(?:\.min\(\))?`", text):
+        if owner[0].isupper() and owner != "RobotModel":
+            modules = ("pretouch.types", "pretouch.params", "pretouch.control.reduction", "pretouch.contact.window")
+            owners = [vars(importlib.import_module(m)).get(owner) for m in modules]
+            assert any(name in getattr(o, "__annotations__", {}) for o in owners if o), f"{owner}.{name}"

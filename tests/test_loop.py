@@ -1,0 +1,228 @@
+"""The loop with fakes for everything around it, and the clock without waiting."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from pretouch import loop
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
+from pretouch.params import PROFILES
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, Mode, RangeReadings, RangeStatus, RobotState
+
+DT = 0.01
+PAPER = PROFILES["paper"]
+PROFILE = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=2))
+
+
+class World:
+    """An arm that holds its last command until the next tick, a skin that sees nothing, and their clock."""
+
+    def __init__(self, model: RobotModel, units: int) -> None:
+        self.model, self.units = model, units
+        self.now, self.q, self.qd = 0.0, model.description.q_ready.copy(), np.zeros(7)
+        self.broken = False
+        self.held: list[np.ndarray] = [self.qd]
+        """Velocity of each period so far."""
+
+    def tick(self) -> float:
+        self.now += DT
+        self.q = self.q + self.qd * DT
+        self.held.append(self.qd)
+        return self.now
+
+    def read(self) -> RobotState:
+        q = np.full(7, np.nan) if self.broken else self.q
+        return RobotState(self.now, q, self.qd, q, self.qd, np.zeros(7), np.zeros(6))
+
+    def command(self, qd: np.ndarray) -> None:
+        assert np.all(np.isfinite(qd))
+        self.qd = qd
+
+    def skin(self) -> "FakeSkin":
+        return FakeSkin(self)
+
+
+@dataclass
+class FakeSkin:
+    world: World
+
+    def read(self) -> RangeReadings:
+        k = self.world.units
+        return RangeReadings(np.full(k, self.world.now), np.zeros(k), np.full(k, int(RangeStatus.SIGNAL)))
+
+
+@dataclass
+class FakeRecorder:
+    steps: list[ControlStep] = field(default_factory=list)
+    on_step: Callable[[int], None] = lambda count: None
+
+    def record(self, step: ControlStep) -> None:
+        self.steps.append(step)
+        self.on_step(len(self.steps))
+
+
+@pytest.fixture
+def world(panda_model: RobotModel, paper_skin: Skin) -> World:
+    return World(panda_model, len(paper_skin))
+
+
+@pytest.fixture
+def controller(panda_model: RobotModel, paper_skin: Skin) -> Controller:
+    return Controller(panda_model, paper_skin, no_fixtures(), Circle(), PROFILE)
+
+
+def turn(controller: Controller, world: World, recorder: FakeRecorder, done: Callable[[ControlStep], bool]) -> None:
+    loop.run(controller, world, world.skin(), world, recorder, done)
+
+
+def never(step: ControlStep) -> bool:
+    assert step.stamp < 10, "the loop should have ended"
+    return False
+
+
+def raise_at(count: int, error: BaseException) -> Callable[[int], None]:
+    def on_step(steps: int) -> None:
+        if steps == count:
+            raise error
+
+    return on_step
+
+
+def assert_brought_to_rest(world: World) -> None:
+    """The arm stands, had moved, and was never asked for more than its acceleration."""
+    world.tick()
+    np.testing.assert_array_equal(world.held[-1], 0.0)
+    assert max(np.linalg.norm(qd) for qd in world.held) > 0.05
+    change = np.abs(np.diff(world.held, axis=0)).max(axis=0) / DT
+    assert np.all(change <= world.model.description.qdd_max + 1e-9)
+
+
+def test_the_loop_ends_when_done_says_so(controller: Controller, world: World):
+    recorder = FakeRecorder()
+    turn(controller, world, recorder, lambda step: step.stamp >= 0.5 - 1e-9)
+    # a step at every tick, the last one recorded too
+    np.testing.assert_allclose([s.stamp for s in recorder.steps], 0.01 * np.arange(1, 51))
+    assert recorder.steps[-1].mode is Mode.TRACK
+    assert_brought_to_rest(world)
+
+
+def test_each_step_is_commanded(controller: Controller, world: World):
+    recorder = FakeRecorder()
+    turn(controller, world, recorder, lambda step: step.stamp >= 0.3)
+    # held[0] is before the first tick, held[1] the period before the first command
+    for step, held in zip(recorder.steps, world.held[2:], strict=False):
+        np.testing.assert_array_equal(held, step.command)
+
+
+def test_an_arm_at_rest_needs_no_braking(controller: Controller, world: World):
+    turn(controller, world, FakeRecorder(), lambda step: True)
+    np.testing.assert_array_equal(world.qd, 0.0)
+    assert len(world.held) <= 3
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), RuntimeError("the disk is full")])
+def test_an_interrupt_or_error_brings_the_arm_to_rest_and_is_passed_on(
+    controller: Controller, world: World, error: BaseException
+):
+    recorder = FakeRecorder(on_step=raise_at(50, error))
+    with pytest.raises(type(error)) as caught:
+        turn(controller, world, recorder, never)
+    assert caught.value is error
+    assert len(recorder.steps) == 50
+    assert_brought_to_rest(world)
+
+
+def test_an_error_between_step_and_command_keeps_the_acceleration_limits(
+    controller: Controller, world: World, monkeypatch: pytest.MonkeyPatch
+):
+    calls = []
+
+    def command(qd: np.ndarray) -> None:
+        calls.append(qd)
+        if len(calls) == 40:
+            raise ConnectionError("lost")
+        World.command(world, qd)
+
+    monkeypatch.setattr(world, "command", command)
+    with pytest.raises(ConnectionError, match="lost"):
+        turn(controller, world, FakeRecorder(), never)
+    assert_brought_to_rest(world)
+
+
+def test_stopping_in_the_middle_of_braking_keeps_the_acceleration_limits(controller: Controller, world: World):
+    def break_down(count: int) -> None:
+        world.broken = count == 50
+
+    recorder = FakeRecorder(on_step=break_down)
+    turn(controller, world, recorder, lambda step: step.stamp > 0.4 and step.mode is Mode.HOLD)
+    assert recorder.steps[-1].mode is Mode.HOLD
+    assert_brought_to_rest(world)
+
+
+def test_an_arm_whose_state_is_lost_is_brought_to_rest_by_what_it_was_last_told(controller: Controller, world: World):
+    def break_down(count: int) -> None:
+        world.broken = count >= 50
+
+    turn(controller, world, FakeRecorder(on_step=break_down), lambda step: step.stamp >= 0.5 - 1e-9)
+    assert_brought_to_rest(world)
+
+
+class FakeTime:
+    """Stands in for the time module: sleeping only moves its hands."""
+
+    def __init__(self) -> None:
+        self.now, self.slept = 100.0, 0.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, duration: float) -> None:
+        assert duration > 0
+        self.now += duration
+        self.slept += duration
+
+
+@pytest.fixture
+def fake_time(monkeypatch: pytest.MonkeyPatch) -> FakeTime:
+    fake = FakeTime()
+    monkeypatch.setattr(loop, "time", fake)
+    return fake
+
+
+def test_the_clock_ticks_at_its_period(fake_time: FakeTime):
+    clock, ticks = loop.MonotonicClock(0.01), []
+    for _ in range(5):
+        ticks.append(clock.tick())
+        fake_time.now += 0.004  # the work of a step
+    np.testing.assert_allclose(np.diff(ticks), 0.01)
+    assert clock.missed == 0
+
+
+def test_a_late_caller_gets_one_tick_at_once_and_the_rest_are_counted(fake_time: FakeTime):
+    clock = loop.MonotonicClock(0.01)
+    clock.tick()  # at 100.00; the next ticks are 100.01, 100.02, ...
+    fake_time.now = 100.035
+    fake_time.slept = 0.0
+    # 100.01 and 100.02 went by unused, 100.03 is taken now
+    assert clock.tick() == pytest.approx(100.035)
+    assert fake_time.slept == 0.0
+    assert clock.missed == 2
+    # then in step again, without a burst
+    assert clock.tick() == pytest.approx(100.04)
+    assert clock.tick() == pytest.approx(100.05)
+    assert clock.missed == 2
+
+
+def test_a_little_late_is_not_missed(fake_time: FakeTime):
+    clock = loop.MonotonicClock(0.01)
+    clock.tick()
+    fake_time.now = 100.019
+    assert clock.tick() == pytest.approx(100.019)
+    assert clock.tick() == pytest.approx(100.02)
+    assert clock.missed == 0

@@ -1,0 +1,107 @@
+"""The transition table: one mode for every set of events, causes that latch, and sentences that say why."""
+
+from collections.abc import Iterator
+from itertools import chain, combinations
+
+import pytest
+
+from pretouch.modes import TABLE, Event, ModeState, mode_init, next_mode
+from pretouch.types import Mode
+
+LATCHING = [Event.NOT_FINITE, Event.TIME_BACKWARDS, Event.STATE_STALE, Event.SOLVER_FAILED]
+PASSING = [Event.SKIN_SILENT, Event.NO_FORCE, Event.WINDOW_FILLING]
+REPORTED = [*LATCHING, Event.REACTING, Event.CONTACT, *PASSING]
+STATES = [
+    ModeState(Mode.TRACK, "before"), ModeState(Mode.REACT, "before"), ModeState(Mode.HOLD, "before"),
+    ModeState(Mode.HOLD, "before", latched=True),
+]  # fmt: skip
+
+
+def every_set_of_events() -> Iterator[dict[Event, str]]:
+    for chosen in chain.from_iterable(combinations(REPORTED, k) for k in range(len(REPORTED) + 1)):
+        yield {event: f"<{event.name}>" for event in chosen}
+
+
+def expected(state: ModeState, events: dict[Event, str], resume: bool) -> tuple[Mode, bool, Event | None]:
+    """The rules of the table in words: next mode, whether it latches, and the event that explains it."""
+    for fault in LATCHING:  # what makes the inputs or the answer unusable comes before everything
+        if fault in events:
+            return Mode.HOLD, True, fault
+    if state.latched and not resume:  # only a person ends a latched hold
+        return Mode.HOLD, True, None
+    if state.mode is Mode.REACT:  # one reaction at a time, to its end
+        if Event.REACTING in events:
+            return Mode.REACT, False, Event.REACTING
+    elif Event.CONTACT in events:  # a push is answered even while holding
+        return Mode.REACT, False, Event.CONTACT
+    for cause in PASSING:
+        if cause in events:
+            return Mode.HOLD, False, cause
+    return Mode.TRACK, False, None
+
+
+@pytest.mark.parametrize("resume", [False, True])
+@pytest.mark.parametrize("state", STATES, ids=lambda s: f"{s.mode.value}{'-latched' if s.latched else ''}")
+def test_every_set_of_events_ends_in_the_mode_the_rules_say(state: ModeState, resume: bool):
+    for events in every_set_of_events():
+        after = next_mode(state, events, resume)
+        mode, latched, cause = expected(state, events, resume)
+        assert (after.mode, after.latched) == (mode, latched)
+        # the sentence carries the detail of its cause and of no other
+        assert [e for e in events if f"<{e.name}>" in after.reason] == ([cause] if cause else [])
+        assert "{" not in after.reason
+        if latched and cause is None:
+            assert after.reason == "before"
+
+
+def test_only_a_hold_latches():
+    assert all(row.target is Mode.HOLD for row in TABLE if row.latches)
+
+
+def test_every_event_has_a_row():
+    assert {row.event for row in TABLE} == set(Event)
+
+
+@pytest.mark.parametrize("cause", LATCHING)
+def test_a_latched_hold_lasts_until_a_person_resumes(cause: Event):
+    state = next_mode(ModeState(Mode.TRACK, ""), {cause: "why"}, resume=False)
+    for _ in range(10):
+        state = next_mode(state, {}, resume=False)
+        assert state.mode is Mode.HOLD
+        assert "why" in state.reason
+        assert "resume" in state.reason
+    assert next_mode(state, {}, resume=True).mode is Mode.TRACK
+
+
+@pytest.mark.parametrize("cause", LATCHING)
+def test_resuming_while_the_cause_is_there_holds_again(cause: Event):
+    state = ModeState(Mode.HOLD, "", latched=True)
+    state = next_mode(state, {cause: "still"}, resume=True)
+    assert state.mode is Mode.HOLD
+    assert state.latched
+
+
+@pytest.mark.parametrize("cause", PASSING)
+def test_a_passing_cause_clears_by_itself(cause: Event):
+    state = next_mode(ModeState(Mode.TRACK, ""), {cause: "why"}, resume=False)
+    assert state.mode is Mode.HOLD
+    assert next_mode(state, {}, resume=False).mode is Mode.TRACK
+
+
+def test_after_a_reaction_the_arm_follows_its_path_again():
+    state = next_mode(ModeState(Mode.TRACK, ""), {Event.CONTACT: "12.0 N"}, resume=False)
+    assert (state.mode, state.reason) == (Mode.REACT, "A contact of 12.0 N: moving with it.")
+    state = next_mode(state, {Event.REACTING: "1.20 s"}, resume=False)
+    assert (state.mode, state.reason) == (Mode.REACT, "Moving with a contact: 1.20 s left.")
+    assert next_mode(state, {}, resume=False).mode is Mode.TRACK
+
+
+def test_a_contact_during_a_reaction_starts_no_other_one():
+    state = ModeState(Mode.REACT, "")
+    after = next_mode(state, {Event.CONTACT: "30.0 N", Event.REACTING: "1.00 s"}, resume=False)
+    assert "30.0 N" not in after.reason
+
+
+def test_the_arm_holds_before_its_first_step():
+    assert mode_init().mode is Mode.HOLD
+    assert not mode_init().latched

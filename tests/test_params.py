@@ -1,0 +1,135 @@
+"""Table I, and that no bad value gets past the parameters."""
+
+import dataclasses
+import math
+from dataclasses import fields, replace
+
+import pytest
+
+from pretouch.errors import ParameterError, PretouchError
+from pretouch.params import (
+    PROFILES,
+    FailureParams,
+    PerceptionParams,
+    Profile,
+    ReactionParams,
+    ReductionParams,
+    RestrictionParams,
+    TaskParams,
+    ThresholdParams,
+    profile,
+)
+
+SETS = [
+    PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), ReactionParams(),
+    FailureParams(),
+]  # fmt: skip
+NUMBERS = [
+    (s, f.name)
+    for s in SETS
+    for f in fields(s)
+    if isinstance(getattr(s, f.name), int | float) and not isinstance(getattr(s, f.name), bool)
+]
+CHOICES = [(s, f.name) for s in SETS for f in fields(s) if isinstance(getattr(s, f.name), str)]
+COUNTS = [(s, name) for s, name in NUMBERS if isinstance(getattr(s, name), int)]
+
+
+def name_of(value: object) -> str:
+    return value if isinstance(value, str) else type(value).__name__
+
+
+def test_the_paper_profile_is_table_i():
+    p = profile("paper")
+    # d_max appears in eqs. 3, 4 and in eq. 11
+    assert (p.reduction.d_max_m, p.threshold.d_max_m) == (0.8, 0.8)
+    assert p.threshold.d_min_m == 0.05
+    # 200 cycles at 100 Hz
+    assert (p.reduction.l_max_cycles, p.task.control_period_s) == (200, 0.01)
+    assert p.restriction.v_max_m_s == 0.04
+    assert p.restriction.d_repulse_m == 0.1
+    assert p.restriction.d_crit_m == 0.1
+    assert p.restriction.d_notice_m == 0.6
+    assert p.threshold.alpha == 0.1
+    assert p.restriction.beta == -10
+    assert p.threshold.lambda_ == 0.75
+    assert p.threshold.f_std_n == 3
+    assert p.threshold.f_d_n == 4
+    assert p.threshold.f_base_n == 10
+    assert p.threshold.sigma_max_n == 3
+    # IV-A: trajectories at 0.3 m/s
+    assert p.task.speed_m_s == 0.3
+
+
+def test_blind_is_the_paper_without_proximity():
+    paper, blind = profile("paper"), profile("blind")
+    assert not blind.perception.enabled
+    assert blind.restriction.mode == "off"
+    same = replace(blind, name="paper", perception=paper.perception, restriction=paper.restriction)
+    assert same == paper
+
+
+def test_each_profile_is_found_by_its_own_name():
+    assert {name: p.name for name, p in PROFILES.items()} == {name: name for name in PROFILES}
+
+
+def test_an_unknown_profile_lists_those_there_are():
+    with pytest.raises(ParameterError, match="'papre' is unknown: choose from paper, blind"):
+        profile("papre")
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, None, "fast"])
+@pytest.mark.parametrize(("params", "name"), NUMBERS, ids=name_of)
+def test_every_number_must_be_a_finite_number(params: object, name: str, value: object):
+    with pytest.raises(ParameterError, match=rf"{type(params).__name__}\.{name} is {value}: it must be "):
+        replace(params, **{name: value})
+
+
+@pytest.mark.parametrize(("params", "name"), [n for n in NUMBERS if n[1] != "beta"], ids=name_of)
+def test_no_number_but_beta_may_be_negative(params: object, name: str):
+    with pytest.raises(ParameterError, match=name):
+        replace(params, **{name: -1})
+
+
+@pytest.mark.parametrize(("params", "name"), COUNTS, ids=name_of)
+def test_counts_are_whole_and_not_zero(params: object, name: str):
+    for value in (0, 100.5):
+        with pytest.raises(ParameterError, match=name):
+            replace(params, **{name: value})
+
+
+@pytest.mark.parametrize(("params", "name"), CHOICES, ids=name_of)
+def test_choices_are_listed_when_refused(params: object, name: str):
+    with pytest.raises(ParameterError, match=r"is 'sideways': choose one of .*" + str(getattr(params, name))):
+        replace(params, **{name: "sideways"})
+
+
+@pytest.mark.parametrize(
+    ("params", "change", "other"),
+    [
+        (PerceptionParams(), {"slow_after_s": 0.3}, "silent_after_s"),
+        (RestrictionParams(), {"d_notice_m": 0.1}, "d_crit_m"),
+        (ThresholdParams(), {"d_max_m": 0.05}, "d_min_m"),
+        (ThresholdParams(), {"f_base_n": 4.0}, "f_d_n"),
+    ],
+    ids=name_of,
+)
+def test_values_that_contradict_each_other_are_refused(params: object, change: dict, other: str):
+    with pytest.raises(ParameterError, match=other):
+        replace(params, **change)
+
+
+def test_fractions_end_at_one():
+    assert ThresholdParams(alpha=1.0).alpha == 1.0
+    with pytest.raises(ParameterError, match=r"alpha is 1\.1: it must be at most 1"):
+        ThresholdParams(alpha=1.1)
+
+
+def test_parameters_are_frozen():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Profile().task.speed_m_s = 1.0  # type: ignore[misc]
+
+
+def test_a_bad_value_is_a_value_error_and_one_of_ours():
+    with pytest.raises(ValueError, match="speed_m_s") as caught:
+        TaskParams(speed_m_s=0.0)
+    assert isinstance(caught.value, PretouchError)
