@@ -15,7 +15,8 @@ def run(capsys, *args):
     [
         (("reproduce", "statik"), "The experiment 'statik' is unknown"),
         (("reproduce", "static", "--profiles", "paper,brave"), "The profile 'brave' is unknown"),
-        (("reproduce", "static", "--restrictions", "firm"), "The mode 'firm' is unknown"),
+        (("reproduce", "static", "--restrictions", "firm"), "The restriction mode 'firm' is unknown"),
+        (("reproduce", "static", "--orientation", "up"), "The orientation 'up' is unknown: choose from free, hold"),
         (("reproduce", "static", "--seeds", "-1"), "The number of seeds is -1"),
         (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("reproduce", "static", "--out", "/dev/null/x"), "/dev/null/x cannot be used"),

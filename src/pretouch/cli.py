@@ -48,6 +48,8 @@ class Reproduce:
     """Profiles to compare, separated by commas."""
     restrictions: str = ""
     """off, hard, slack or floor for all experiments; by default off in the static one and slack in the others."""
+    orientation: str = ""
+    """free or hold: whether the task keeps the hand's orientation; by default the profile's own, hold."""
     stiffness: float = 25_000.0
     """Contact stiffness of the static object [N/m]."""
     skin: str = ""
@@ -114,6 +116,7 @@ def _reproduce(command: Reproduce) -> None:
         seeds=command.seeds,
         profiles=tuple(part.strip() for part in command.profiles.split(",") if part.strip()),
         restrictions=command.restrictions or None,
+        orientation=command.orientation or None,
         stiffness=command.stiffness,
         skin=command.skin or None,
     )

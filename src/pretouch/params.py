@@ -84,6 +84,9 @@ class PerceptionParams(Checked):
             )
 
 
+Orientation = Literal["free", "hold"]
+
+
 @dataclass(frozen=True)
 class TaskParams(Checked):
     """Following the path, and the cost of the QP (eq. 2)."""
@@ -96,7 +99,7 @@ class TaskParams(Checked):
     """Velocity towards the path per metre off it [1/s]."""
     off_path_m: Positive = 0.1
     """Distance from the path at which the arm no longer advances along it but only returns [m]."""
-    orientation: Literal["free", "hold"] = "hold"
+    orientation: Orientation = "hold"
     """Whether the task is the hand's velocity alone, or also keeps its orientation at the start. The paper does not
     say. Free, the hand rolls its units out of view of what restricts it (docs/experiments.md)."""
     orientation_gain_1_s: NonNegative = 1.0

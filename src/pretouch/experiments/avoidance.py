@@ -8,9 +8,9 @@ from pretouch.control.path import Circle
 from pretouch.experiments.cell import Cell, Context
 from pretouch.experiments.metrics import rounded
 from pretouch.experiments.pushes import Visit, Visitor
-from pretouch.experiments.static import configured
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
+from pretouch.perception.closest import closest_points
 from pretouch.sim.scene import HandSpec, SceneSpec
 
 NAME = "avoidance"
@@ -18,9 +18,9 @@ DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
 
 _DURATION_S = 40.0
 _VISITS_S = ((4.0, 14.0), (20.0, 30.0))
-_BESIDE_M = 0.35
-"""Distance of the centre of the person's hand from the plane y = 0 [m]: half of it is in the way, for the side of the
-robot's hand comes to 0.35 m on the free circle."""
+_BESIDE_M = 0.43
+"""Distance of the centre of the person's hand from the plane y = 0 [m]: 3 cm clear of the robot's, whose side comes
+to 0.35 m on the free circle."""
 _SPREAD_M = 0.03
 
 
@@ -40,7 +40,7 @@ def visits(seed: int) -> tuple[Visit, ...]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
-    profile = configured(context.profile(cell.profile), context.restrictions or DEFAULT_RESTRICTIONS)
+    profile = context.profile(cell.profile, DEFAULT_RESTRICTIONS)
     hand = HandSpec()
     setup = Setup(
         model=context.model,
@@ -61,6 +61,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "seed": seed,
         "contact": record.first_contact() is not None,
         "true_peak_n": rounded(float(np.linalg.norm(record.true_force, axis=1).max())),
+        "least_gap_m": rounded(_least_gap(record, context, hand.radius), 4),
         "deviation_m": rounded(max(off), 4),
         "least_speed_scale": rounded(min(s.speed_scale for s in steps)),
         "largest_slack_m_s": rounded(max(float(s.qp.slack.max(initial=0.0)) for s in steps), 4),
@@ -73,3 +74,14 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "held": record.held(),
     }
     return row, record
+
+
+def _least_gap(record: Record, context: Context, radius: float) -> float:
+    """Least distance [m] between the person's hand and the arm."""
+    model, unit, aside = context.model, np.zeros(1, np.int64), np.array([[0.0, 0.0, 1.0]])
+    gaps = []
+    for step, hand in zip(record.steps, record.hand_position, strict=True):
+        kin = model.kinematics(step.q)
+        nearest = closest_points(kin, model.body, step.ee_position, unit, hand[None], aside)
+        gaps.append(float(nearest.body_distance[0]) - radius)
+    return min(gaps)

@@ -18,7 +18,7 @@ from pretouch.errors import ExperimentError
 from pretouch.experiments import avoidance, dynamic, static
 from pretouch.experiments.cell import Cell, Context
 from pretouch.experiments.trace import save_trace, trace_of
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import Orientation, RestrictionMode, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin
@@ -35,6 +35,8 @@ class Request:
     profiles: tuple[str, ...] = ("blind", "paper")
     restrictions: str | None = None
     """Restriction mode, or None for each experiment's own."""
+    orientation: str | None = None
+    """Whether the hand's orientation is free or held, or None for the profile's own."""
     stiffness: float = 25_000.0
     """Contact stiffness of static objects [N/m]."""
     skin: str | None = None
@@ -51,9 +53,13 @@ class Request:
             raise ExperimentError(f"The profiles are {','.join(self.profiles) or 'none'}: name each wanted one once.")
         for name in self.profiles:
             profile(name)
-        modes = get_args(RestrictionMode)
-        if self.restrictions is not None and self.restrictions not in modes:
-            raise ExperimentError(f"The mode {self.restrictions!r} is unknown: choose from {', '.join(modes)}.")
+        choices: tuple[tuple[str, str | None, tuple[str, ...]], ...] = (
+            ("restriction mode", self.restrictions, get_args(RestrictionMode)),
+            ("orientation", self.orientation, get_args(Orientation)),
+        )
+        for what, choice, allowed in choices:
+            if choice is not None and choice not in allowed:
+                raise ExperimentError(f"The {what} {choice!r} is unknown: choose from {', '.join(allowed)}.")
         if not 100.0 <= self.stiffness <= 1e6:
             raise ExperimentError(f"The stiffness is {self.stiffness:g} N/m: give one from 100 to 1000000 N/m.")
 
@@ -61,7 +67,8 @@ class Request:
         """Load what all trials share."""
         model = RobotModel(panda())
         skin = load_skin(Path(self.skin), model) if self.skin else paper_skin(model)
-        return Context(model, skin, self.stiffness, cast(RestrictionMode | None, self.restrictions))
+        restrictions = cast(RestrictionMode | None, self.restrictions)
+        return Context(model, skin, self.stiffness, restrictions, cast(Orientation | None, self.orientation))
 
     def tasks(self) -> list[tuple[Cell, int]]:
         """Every trial, seed by seed, so that a stopped run has some of each cell."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from pretouch.params import Profile, RestrictionMode, profile
+from pretouch.params import Orientation, Profile, RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 
@@ -32,7 +32,15 @@ class Context:
     """Contact stiffness of static objects [N/m]."""
     restrictions: RestrictionMode | None
     """Restriction mode for all experiments, or None for each experiment's own."""
+    orientation: Orientation | None = None
+    """Whether the hand's orientation is free or held, or None for the profile's own."""
 
-    def profile(self, name: str) -> Profile:
-        """Return a profile by name."""
-        return replace(profile(name))
+    def profile(self, name: str, restrictions: RestrictionMode) -> Profile:
+        """Return a profile by name, as this run has it; `restrictions` is the experiment's own mode.
+
+        Without proximity there is nothing to restrict.
+        """
+        found = profile(name)
+        if found.perception.enabled:
+            found = replace(found, restriction=replace(found.restriction, mode=self.restrictions or restrictions))
+        return replace(found, task=replace(found.task, orientation=self.orientation or found.task.orientation))

@@ -8,7 +8,6 @@ from pretouch.control.path import Circle
 from pretouch.experiments.cell import Cell, Context
 from pretouch.experiments.metrics import angle_deg, mean_over, peak, rounded
 from pretouch.experiments.pushes import Push, Pusher
-from pretouch.experiments.static import configured
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -49,7 +48,7 @@ def pushes(seed: int) -> tuple[Push, ...]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
-    profile = configured(context.profile(cell.profile), context.restrictions or DEFAULT_RESTRICTIONS)
+    profile = context.profile(cell.profile, DEFAULT_RESTRICTIONS)
     person = Pusher(context.model, pushes(seed))
     setup = Setup(
         model=context.model,

@@ -86,7 +86,7 @@ def _figures(request: Request, out: Path) -> list[tuple[str, str]]:
     file = trace_file(out, Cell(avoidance.NAME, shown, {}), 0)
     if avoidance.NAME in request.experiments and file.exists():
         save(avoidance_figure(load_trace(file), shown), out / "avoidance.png")
-        pictures.append(("avoidance.png", "End-effector path with a hand in the way"))
+        pictures.append(("avoidance.png", "End-effector path with a hand beside it"))
     file = trace_file(out, Cell(dynamic.NAME, shown, {}), 0)
     if dynamic.NAME in request.experiments and file.exists():
         units = request.context().skin.ids

@@ -1,6 +1,5 @@
 """Paper IV-A: the arm runs into a large static object, on a circle and on a line, from either side."""
 
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -10,7 +9,7 @@ from pretouch.control.path import Circle, Path, line
 from pretouch.experiments.cell import Cell, Context
 from pretouch.experiments.metrics import mean_over, peak, rounded
 from pretouch.experiments.trial import Record, Setup, play
-from pretouch.params import Profile, RestrictionMode
+from pretouch.params import RestrictionMode
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import Box, SceneSpec
 from pretouch.types import ControlStep
@@ -55,7 +54,7 @@ def scene(side: str, stiffness: float, seed: int) -> SceneSpec:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
-    profile = configured(context.profile(cell.profile), context.restrictions or DEFAULT_RESTRICTIONS)
+    profile = context.profile(cell.profile, DEFAULT_RESTRICTIONS)
     side = cell.where["side"]
     setup = Setup(
         model=context.model,
@@ -76,13 +75,6 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         **results(record, -1.0 if side == "+y" else 1.0),
     }
     return row, record
-
-
-def configured(profile: Profile, restrictions: RestrictionMode) -> Profile:
-    """Return the profile with a restriction mode; without proximity there is nothing to restrict."""
-    if not profile.perception.enabled:
-        return profile
-    return replace(profile, restriction=replace(profile.restriction, mode=restrictions))
 
 
 def _done() -> Any:

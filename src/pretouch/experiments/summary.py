@@ -10,7 +10,7 @@ _MEASURES = {
         "impact_speed_m_s", "detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n", "peak_estimate_n",
         "true_peak_20ms_n", "true_peak_n",
     ),
-    "avoidance": ("deviation_m", "least_speed_scale", "largest_slack_m_s", "travelled_m", "true_peak_n"),
+    "avoidance": ("least_gap_m", "deviation_m", "least_speed_scale", "largest_slack_m_s", "travelled_m", "true_peak_n"),
     "dynamic": ("peak_estimate_n", "true_peak_20ms_n", "true_peak_n"),
 }  # fmt: skip
 _PLACE = ("trajectory", "side")
@@ -70,6 +70,8 @@ def _ratios(name: str, rows: list[Row]) -> list[Row]:
             for row in rows
             if row["profile"] == "blind" and all(row.get(p) == place.get(p) for p in _PLACE)
         }
+        if not blind:
+            continue
         ratio: Row = {**place, "of": f"blind/{place['profile']}"}
         for measure in _MEASURES[name]:
             pairs = [(blind[s][measure], here[s][measure]) for s in here if s in blind]

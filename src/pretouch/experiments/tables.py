@@ -87,7 +87,7 @@ def _avoidance(part: Row) -> TextTable:
         (
             cell["profile"],
             f"{100 * cell['contact_fraction']:.0f}",
-            _number(cell["true_peak_n"], 1),
+            _number(cell["least_gap_m"], 3),
             _number(cell["deviation_m"], 3),
             _number(cell["least_speed_scale"], 2),
             _number(cell["travelled_m"], 2),
@@ -96,11 +96,11 @@ def _avoidance(part: Row) -> TextTable:
         for cell in part["cells"]
     )
     return TextTable(
-        "A hand is held in the way: medians",
-        ("profile", "contact\n[%]", "true\n[N]", "off path\n[m]", "least\nspeed", "way\n[m]", "false"),
+        "A person holds a hand beside the path: medians",
+        ("profile", "contact\n[%]", "least\ngap [m]", "off path\n[m]", "least\nspeed", "way\n[m]", "false"),
         rows,
-        "Half of the person's hand is in the way of the robot's. True: peak of the true force. Least speed: factor of"
-        " eqs. 3 and 4. Way: travelled along the path in 40 s.",
+        "Gap: between the person's hand and the arm. Least speed: factor of eqs. 3 and 4. Way: travelled along the"
+        " path in 40 s.",
     )
 
 
