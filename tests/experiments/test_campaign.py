@@ -1,10 +1,10 @@
 import json
-import multiprocessing.connection
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import replace
+from multiprocessing.connection import wait
 from pathlib import Path
 
 import pytest
@@ -93,18 +93,36 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
         open_folder(SMALL, tmp_path / "file" / "below")
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)])
-def test_a_stopped_run_leaves_whole_results(tmp_path, number, code):
+@pytest.fixture
+def long_run(tmp_path):
+    """A run of many trials as its own process, some of them finished."""
     out = tmp_path / "out"
     command = [sys.executable, "-m", "pretouch.cli", "reproduce", "static", "--seeds", "50", "--out", str(out)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 100
-    while len(list((out / "trials").glob("*.json"))) < 3:
-        assert process.poll() is None, process.stderr.read()
-        assert time.monotonic() < deadline
-        multiprocessing.connection.wait([process.stderr], 0.1)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        # a background job of a shell inherits that Ctrl-C is ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    with process:
+        try:
+            deadline = time.monotonic() + 200
+            while len(list((out / "trials").glob("[!.]*.json"))) < 3:
+                assert process.poll() is None, process.stderr.read()
+                assert time.monotonic() < deadline
+                wait([process.stderr], 0.1)
+            yield process, out
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)])
+def test_a_stopped_run_leaves_whole_results(long_run, number, code):
+    process, out = long_run
     process.send_signal(number)
-    said = process.communicate(timeout=60)[1]
+    said = process.communicate(timeout=100)[1]
     assert process.returncode == code
     rows = [json.loads(file.read_text()) for file in (out / "trials").glob("[!.]*.json")]
     assert len(rows) >= 3
