@@ -1,8 +1,11 @@
 import json
+import subprocess
+import sys
 
 import pytest
 
 from pretouch import cli
+from pretouch.errors import ExperimentError
 
 
 def run(capsys, *args):
@@ -22,6 +25,7 @@ def run(capsys, *args):
         (("reproduce", "static", "--out", "/dev/null/x"), "/dev/null/x cannot be used"),
         (("reproduce", "static", "--out", "OUT", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
         (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "cannot be written: Is a directory"),
+        (("reproduce", "static", "--out", "OUT", "--json", "x" * 256), "cannot be written: File name too long"),
         (("demo", "--seeds", "0"), "The number of seeds is 0"),
     ],
 )
@@ -31,6 +35,71 @@ def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, args, wor
     assert words in said.err
     assert said.err.count("\n") == 1
     assert said.out == ""
+
+
+@pytest.mark.parametrize("name", ["run.json", "trials/x.json", "traces/a/b.json", "trials", "../link/run.json"])
+def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
+    out = tmp_path / "out"
+    (tmp_path / "link").symlink_to(out)
+    code, said = run(capsys, "reproduce", "static", "--out", str(out), "--json", str(out / name))
+    assert code == 2
+    assert "would take the place of the run's own" in said.err
+    assert said.err.count("\n") == 1
+    assert not out.exists()
+
+
+def _row(request, out):
+    from pretouch.experiments.campaign import trial_file, write_json
+
+    cell, seed = request.tasks()[0]
+    row = {"experiment": cell.experiment, "profile": cell.profile, "seed": seed}
+    write_json(row, trial_file(out, cell, seed))
+
+
+@pytest.mark.parametrize("error", [RuntimeError("crash"), ExperimentError("full"), KeyboardInterrupt()])
+def test_finished_trials_are_kept_whatever_ends_a_run(capsys, tmp_path, monkeypatch, error):
+    def play(request, out, _progress):
+        _row(request, out)
+        raise error
+
+    monkeypatch.setattr("pretouch.experiments.campaign.run_campaign", play)
+    monkeypatch.setattr("pretouch.experiments.summary.summarise", len)
+    args = ("reproduce", "static", "--out", str(tmp_path))
+    if isinstance(error, RuntimeError):
+        with pytest.raises(RuntimeError, match="crash"):
+            cli.main(list(args))
+    else:
+        code, said = run(capsys, *args)
+        assert code == (2 if isinstance(error, ExperimentError) else 130)
+        assert "full\n" in said.err or "the 1 finished trials are in" in said.err
+    assert len(json.loads((tmp_path / "results.json").read_text())["trials"]) == 1
+
+
+def test_results_that_cannot_be_written_at_the_end_are_said(capsys, tmp_path, monkeypatch):
+    def full(_value, _path):
+        raise OSError(28, "No space left on device")
+
+    def play(request, out, _progress):
+        monkeypatch.setattr("pretouch.experiments.campaign.write_json", full)
+
+    monkeypatch.setattr("pretouch.experiments.campaign.run_campaign", play)
+    code, said = run(capsys, "reproduce", "static", "--out", str(tmp_path))
+    assert code == 2
+    assert "results.json cannot be written: No space left on device" in said.err
+
+
+def test_help_needs_none_of_the_heavy_packages():
+    heavy = ("numpy", "scipy", "numba", "mujoco", "matplotlib")
+    code = f"import sys, pretouch.cli; sys.exit(', '.join(m for m in {heavy} if m in sys.modules) or 0)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_ctrl_c_while_words_are_read_ends_in_order(monkeypatch):
+    def stop(*_args, **_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli.tyro, "cli", stop)
+    assert cli.main(["demo"]) == 130
 
 
 @pytest.mark.parametrize("args", [(), ("dance",), ("reproduce", "--seeds", "many"), ("demo", "--nothing")])

@@ -1,15 +1,16 @@
 """The command `pretouch`."""
 
+import os
 import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from rich.console import Console
@@ -17,10 +18,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.experiments.campaign import EXPERIMENTS, Request, finished, open_folder, run_campaign, write_json
-from pretouch.experiments.report import write_report
-from pretouch.experiments.summary import summarise
-from pretouch.experiments.tables import tables
+
+# the rest of the package takes a second to import: only the functions that run something do
+if TYPE_CHECKING:
+    from pretouch.experiments.campaign import Request
 
 _USAGE, _INTERRUPTED = 2, 130
 _TERMINATED = 143
@@ -81,10 +82,10 @@ def _sigterm_raises() -> Iterator[None]:
 
 def main(args: list[str] | None = None) -> int:
     """Run the command; return its exit code: 2 for bad input, 130 or 143 after Ctrl-C or SIGTERM."""
-    command = tyro.cli(Command, prog="pretouch", description="Contact-anticipating robot arms.", args=args)
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
     try:
         with _sigterm_raises():
+            command = tyro.cli(Command, prog="pretouch", description="Contact-anticipating robot arms.", args=args)
             if isinstance(command, Demo):
                 _demo(command)
             else:
@@ -100,6 +101,8 @@ def main(args: list[str] | None = None) -> int:
 
 
 def _demo(command: Demo) -> None:
+    from pretouch.experiments.campaign import Request
+
     out = Path(command.out) if command.out else _new_folder("demo")
     few = Request(("avoidance", "dynamic"), seeds=1)
     many = Request(("static",), seeds=command.seeds)
@@ -111,6 +114,8 @@ def _new_folder(name: str) -> Path:
 
 
 def _reproduce(command: Reproduce) -> None:
+    from pretouch.experiments.campaign import EXPERIMENTS, Request
+
     request = Request(
         experiments=tuple(EXPERIMENTS) if command.experiment == "all" else (command.experiment,),
         seeds=command.seeds,
@@ -124,17 +129,30 @@ def _reproduce(command: Reproduce) -> None:
     _run([(request, out)], out, Path(command.json) if command.json else out / "results.json")
 
 
-def _run(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) -> None:
+def _run(parts: list[tuple["Request", Path]], folder: Path, json_file: Path) -> None:
     """Run one or more campaigns; whatever happens, summarise and keep what was finished."""
+    from pretouch.experiments.campaign import open_folder
+    from pretouch.experiments.report import write_report
+
+    for _, out in parts:
+        _check_apart(json_file, out)
     for request, out in parts:
         request.context()
         open_folder(request, out)
     _check_writable(json_file)
     try:
         _play(parts)
-    except (KeyboardInterrupt, _Terminated):
-        done = len(_keep(parts, json_file)["trials"])
-        print(f"Stopped: the {done} finished trials are in {json_file}; the same command goes on.", file=sys.stderr)
+    except PretouchError:
+        with suppress(PretouchError):  # one sentence is enough, and the first is the cause
+            _keep(parts, json_file)
+        raise
+    except BaseException:
+        try:
+            done = len(_keep(parts, json_file)["trials"])
+            said = f"Stopped: the {done} finished trials are in {json_file}; the same command goes on."
+        except PretouchError as error:
+            said = str(error)
+        print(said, file=sys.stderr)
         raise
     summary = _keep(parts, json_file)["summary"]
     console = Console(highlight=False)
@@ -143,26 +161,48 @@ def _run(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) -> No
     console.print(f"Numbers: {json_file}", soft_wrap=True, markup=False)
 
 
-def _keep(parts: list[tuple[Request, Path]], json_file: Path) -> dict[str, Any]:
+def _keep(parts: list[tuple["Request", Path]], json_file: Path) -> dict[str, Any]:
     """Write all finished trials and their summary, and return them."""
+    from pretouch.experiments.campaign import finished, write_json
+    from pretouch.experiments.summary import summarise
+
     trials = [row for request, out in parts for row in finished(request, out)]
     results = {"trials": trials, "summary": summarise(trials)}
-    write_json(results, json_file)
+    with _unwritable_said(json_file):
+        write_json(results, json_file)
     return results
 
 
-def _check_writable(json_file: Path) -> None:
+def _check_apart(json_file: Path, out: Path) -> None:
+    """Refuse a file for the results in the place of one that the run keeps for itself."""
+    wanted = Path(os.path.realpath(json_file))
+    for name in ("run.json", "trials", "traces"):
+        if wanted.is_relative_to(os.path.realpath(out / name)):
+            raise ExperimentError(f"The file {json_file} would take the place of the run's own {name}: give another.")
+
+
+@contextmanager
+def _unwritable_said(json_file: Path) -> Iterator[None]:
     try:
-        json_file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=json_file.parent):
-            pass
-        if json_file.is_dir():
-            raise IsADirectoryError(21, "Is a directory")
+        yield
     except OSError as error:
         raise ExperimentError(f"The file {json_file} cannot be written: {error.strerror}: give another.") from error
 
 
-def _play(parts: list[tuple[Request, Path]]) -> None:
+def _check_writable(json_file: Path) -> None:
+    with _unwritable_said(json_file):
+        json_file.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=json_file.parent):
+            pass
+        with suppress(FileNotFoundError):
+            os.stat(json_file)  # a name too long, for one
+        if json_file.is_dir():
+            raise IsADirectoryError(21, "Is a directory")
+
+
+def _play(parts: list[tuple["Request", Path]]) -> None:
+    from pretouch.experiments.campaign import run_campaign
+
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
     with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True)) as progress:
         for request, out in parts:
@@ -179,6 +219,8 @@ def _shower(progress: Progress, name: str) -> Callable[[int, int], None]:
 
 
 def _show(console: Console, summary: dict[str, Any]) -> None:
+    from pretouch.experiments.tables import tables
+
     for table in tables(summary):
         console.print()
         console.print(table.title, style="bold", markup=False)

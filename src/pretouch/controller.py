@@ -13,10 +13,11 @@ from pretouch.contact.window import WindowState, window_init
 from pretouch.control import path as paths
 from pretouch.control.joint_box import JointLimits, brake, joint_box
 from pretouch.control.qp import skipped, solve, task_cost
-from pretouch.control.reduction import ReductionState, reduce_speed
-from pretouch.control.restriction import approach_rows
+from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
+from pretouch.control.restriction import ApproachRows, approach_rows
 from pretouch.control.task import task
-from pretouch.faults import Watch, examine, watch_init
+from pretouch.errors import RobotStateError
+from pretouch.faults import Watch, examine, not_finite, watch_init
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.params import Profile
 from pretouch.perception.obstacles import TrackState, measured_distance, track_init
@@ -24,7 +25,7 @@ from pretouch.perception.perceive import perceive, silent_units
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Contact, ControlStep, FloatArray, Inputs, Mode, QpOutcome, RobotState
+from pretouch.types import Contact, ControlStep, FloatArray, Inputs, Mode, QpOutcome, QpSolution, RobotState
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,10 @@ class Controller:
         )
 
     def init(self, robot: RobotState) -> ControllerState:
-        """Return the state before the first step, from a robot state known to be good."""
+        """Return the state before the first step; a robot state that is not finite is a RobotStateError."""
+        wrong = not_finite(robot)
+        if wrong:
+            raise RobotStateError(f"The robot's first state has {wrong} that are not finite: check the connection.")
         return ControllerState(
             watch=watch_init(robot),
             tracks=track_init(len(self.skin)),
@@ -75,12 +79,12 @@ class Controller:
         now = watch.stamp
         kin = model.kinematics(robot.q)
         J = model.ee_jacobian(kin)
-        x, rotation = kin.position[model.ee], kin.rotation[model.ee]
+        x = kin.position[model.ee]
 
         # what is near: eq. 1 and the closest points of the body
         known = track_init(len(self.skin)) if Event.TIME_BACKWARDS in events else state.tracks
         obstacles, tracks = perceive(known, model, self.skin, self.fixtures, kin, inputs.readings, now, p.perception)
-        heard, silent = silent_units(self.skin, inputs.readings, now, p.perception)
+        heard, silent = silent_units(self.skin, tracks, now, p.perception)
 
         # what is felt: eqs. 8-11
         force = None if robot.wrench is None else robot.wrench[:3]
@@ -94,44 +98,55 @@ class Controller:
         react = reaction.start_reaction(contact.force, p.reaction) if contact else state.reaction
 
         # how fast: eqs. 3-4 on the path, or eq. 12
-        scale, reduction = reduce_speed(state.reduction, obstacles.ee_distance.min(initial=np.inf), p.reduction)
+        nearest = float(obstacles.ee_distance.min(initial=np.inf))
+        scale, reduction = reduce_speed(
+            state.reduction, min(heard, speed_scale(nearest, p.reduction.d_max_m)), p.reduction
+        )
         if mode.mode is Mode.REACT:
             desired = reaction.decayed(react, p.reaction)
         else:
             react = reaction.reaction_init(p.reaction)
-            desired = paths.follow(self.path, state.path, x, p.task) * (scale * heard)
+            desired = paths.follow(self.path, state.path, x, p.task) * scale
 
         # how near: eqs. 5-7, and the joint velocities: eq. 2
-        lower, upper = joint_box(robot.q_commanded, robot.qd_commanded, self.limits)
-        stop = brake(robot.qd_commanded, lower, upper, self.limits)
-        rows, _ = approach_rows(kin, model.moved_by, obstacles, p.restriction)
-        if mode.mode is Mode.HOLD:
-            desired, qp = np.zeros(3), skipped(stop, rows)
-        else:
-            cost = task_cost(*task(J, desired, rotation, state.rotation_goal, p.task), robot.q, model.q_mid, p.task)
-            qp = solve(cost, lower, upper, rows, p.restriction.slack_weight, stop)
-            if qp.outcome is QpOutcome.FAILED:
-                mode = next_mode(mode, {Event.SOLVER_FAILED: qp.status}, resume=False)
+        rows, restricted = approach_rows(kin, model.moved_by, obstacles, p.restriction)
+        goal = task(J, desired, kin.rotation[model.ee], state.rotation_goal, p.task)
+        qp = self._solve(mode.mode, goal, robot, rows)
+        if qp.outcome in _TROUBLE:
+            mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)
 
-        tracking = mode.mode is Mode.TRACK
         reacting = mode.mode is Mode.REACT
         step = ControlStep(
             stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
-            ee_position=x, ee_velocity=J[:3] @ robot.qd,
-            path_position=self.path.point(state.path.phase), path_phase=state.path.phase, desired_velocity=desired,
-            speed_scale=scale * heard, range_stamp=inputs.readings.stamp,
-            range_distance=measured_distance(inputs.readings), obstacles=obstacles,
+            ee_position=x, ee_velocity=J[:3] @ robot.qd, path_position=self.path.point(state.path.phase),
+            path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
+            speed_scale=scale, range_distance=measured_distance(inputs.readings), obstacles=obstacles,
             force=np.full(3, np.nan) if force is None else force, filtered_force=window.newest,
             thresholds=felt.thresholds, armed=felt.armed, contact=contact,
-            reaction_velocity=desired if reacting else np.zeros(3), approach_limit=rows.h, qp=qp, command=qp.qd,
+            reaction_velocity=desired if reacting else np.zeros(3), restricted=restricted, approach_limit=rows.h,
+            qp=qp, command=qp.qd,
         )  # fmt: skip
         return step, ControllerState(
             watch=watch, tracks=tracks, window=window, reduction=reduction,
             reaction=reaction.advance(react) if reacting else react,
             path=paths.advance(self.path, state.path, x, J[:3] @ qp.qd, p.task)
-            if tracking else paths.pause(state.path),
+            if mode.mode is Mode.TRACK else paths.pause(state.path),
             mode=mode, command=qp.qd, rotation_goal=state.rotation_goal,
         )  # fmt: skip
+
+    def _solve(
+        self, mode: Mode, goal: tuple[FloatArray, FloatArray], robot: RobotState, rows: ApproachRows
+    ) -> QpSolution:
+        """Minimise eq. 2 for a task (Jacobian and velocity) within the joint box and rows; brake in HOLD."""
+        lower, upper = joint_box(robot.q_commanded, robot.qd_commanded, self.limits)
+        stop = brake(robot.qd_commanded, lower, upper, self.limits)
+        if mode is Mode.HOLD:
+            return skipped(stop, rows)
+        cost = task_cost(*goal, robot.q, self.model.q_mid, self.profile.task)
+        return solve(cost, lower, upper, rows, self.profile.restriction.slack_weight, stop)
+
+
+_TROUBLE = {QpOutcome.FAILED: Event.SOLVER_FAILED, QpOutcome.INFEASIBLE: Event.BLOCKED}
 
 
 def _events(

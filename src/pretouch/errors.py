@@ -16,6 +16,10 @@ class RobotModelError(PretouchError, ValueError):
     """A robot model cannot be used as it is, or a link or joint is unknown to it."""
 
 
+class RobotStateError(PretouchError, ValueError):
+    """The controller cannot start from what the robot reports."""
+
+
 class SkinError(PretouchError, ValueError):
     """A skin, or the file that describes it, is not usable."""
 

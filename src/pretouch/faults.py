@@ -43,7 +43,7 @@ def examine(
     """
     robot = inputs.robot
     faults: dict[Event, str] = {}
-    wrong = _not_finite(inputs)
+    wrong = not_finite(robot) if math.isfinite(inputs.stamp) else "time stamps"
     if wrong:
         faults[Event.NOT_FINITE] = wrong
     else:
@@ -60,17 +60,17 @@ def examine(
     if robot.wrench is not None and not np.isfinite(robot.wrench).all():
         robot = replace(robot, wrench=None)
     force_stamp = min(watch.force_stamp, stamp) if robot.wrench is None else stamp
+    if stamp - watch.stamp > params.overrun_s:
+        faults[Event.OVERRUN] = f"{stamp - watch.stamp:.3f} s"
     if stamp - force_stamp > params.force_timeout_s:
         faults[Event.NO_FORCE] = f"{stamp - force_stamp:.2f} s"
     return robot, faults, Watch(stamp, robot, force_stamp)
 
 
-def _not_finite(inputs: Inputs) -> str:
-    """Name the first part of the inputs that is not finite, or ''."""
-    robot = inputs.robot
-    if not (math.isfinite(inputs.stamp) and math.isfinite(robot.stamp)):
-        return "a time stamp"
+def not_finite(robot: RobotState) -> str:
+    """Name the first part of a robot's state that is not finite, or ''."""
     parts = {
+        "time stamps": np.array(robot.stamp),
         "joint positions": robot.q,
         "joint velocities": robot.qd,
         "commanded joint positions": robot.q_commanded,

@@ -44,13 +44,17 @@ def run(
     clock: Clock,
     recorder: Recorder,
     done: Callable[[ControlStep], bool],
+    resume: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Turn the controller until `done` says so of a step. However it ends, the arm is first brought to rest."""
+    """Turn the controller until `done` says so of a step. However it ends, the arm is first brought to rest.
+
+    `resume` says whether a person now asks to leave a latched HOLD.
+    """
     state = controller.init(robot.read())
     try:
         while True:
             now = clock.tick()
-            step, state = controller.step(state, Inputs(now, robot.read(), skin.read()))
+            step, state = controller.step(state, Inputs(now, robot.read(), skin.read(), resume()))
             robot.command(step.command)
             recorder.record(step)
             if done(step):
@@ -60,16 +64,15 @@ def run(
 
 
 def come_to_rest(controller: Controller, robot: Robot, clock: Clock, last: ControllerState) -> None:
-    """Command the arm to rest within its limits, from its last command where its state cannot be believed."""
+    """Command the arm from its last command to rest, within its limits.
+
+    Where the arm is by then is reckoned from the commands: the robot's state may be what ended the loop.
+    """
     q, qd, period = last.watch.robot.q_commanded, last.command, controller.limits.period
     for _ in range(_REST_CYCLES):
-        clock.tick()
-        state = robot.read()
-        if np.isfinite(state.q_commanded).all() and np.isfinite(state.qd_commanded).all():
-            q, qd = state.q_commanded, state.qd_commanded
-        else:
-            q = q + qd * period
-        qd = brake(qd, *joint_box(q, qd, controller.limits), controller.limits)
-        robot.command(qd)
         if not np.any(qd):
             return
+        clock.tick()
+        q = q + qd * period
+        qd = brake(qd, *joint_box(q, qd, controller.limits), controller.limits)
+        robot.command(qd)

@@ -14,6 +14,8 @@ class Event(Enum):
     TIME_BACKWARDS = auto()
     STATE_STALE = auto()
     SOLVER_FAILED = auto()
+    BLOCKED = auto()
+    OVERRUN = auto()
     LATCHED = auto()
     REACTING = auto()
     CONTACT = auto()
@@ -55,16 +57,29 @@ TABLE: tuple[Transition, ...] = (
         Event.SOLVER_FAILED, _ANY, Mode.HOLD,
         "The quadratic program gave no answer ({}): look at the last steps, then resume.", latches=True,
     ),
+    Transition(
+        Event.BLOCKED, frozenset({Mode.TRACK}), Mode.HOLD,
+        "What is near cannot be kept away from within the acceleration limits: braking, and trying again.",
+    ),
+    Transition(
+        Event.BLOCKED, frozenset({Mode.REACT}), Mode.REACT,
+        "Moving with a contact, but what is near leaves no way within the acceleration limits: braking.",
+    ),
     Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "{}", latches=True),
     Transition(Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT, "A contact of {}: moving with it."),
     Transition(Event.REACTING, frozenset({Mode.REACT}), Mode.REACT, "Moving with a contact: {} left."),
     Transition(
         Event.SKIN_SILENT, _ANY, Mode.HOLD,
-        "No reading from {}: check power and radio of the unit; the arm goes on when it is heard again.",
+        "No usable reading from {}: check the unit's power, radio and sensor; the arm goes on when it is heard again.",
     ),
     Transition(
         Event.NO_FORCE, _ANY, Mode.HOLD,
-        "The robot has given no force estimate for {}, as near a singularity: contacts could not be felt.",
+        "The robot has given no force estimate for {}, as near a singularity, and contacts could not be felt: guide"
+        " the arm to another posture.",
+    ),
+    Transition(
+        Event.OVERRUN, _ANY, Mode.HOLD,
+        "The step before this one was {} ago: braking; give the controller a process of its own.",
     ),
     Transition(
         Event.WINDOW_FILLING, _ANY, Mode.HOLD,

@@ -71,9 +71,9 @@ class PerceptionParams(Checked):
     """A reading is taken as the arm or a fixture from this much before its predicted return [m]: twice the
     VL53L1X ranging error of 25 mm, and 10 mm of pose error."""
     slow_after_s: Positive = 0.1
-    """Age of a unit's newest message at which the arm begins to slow [s]."""
+    """Age of a unit's newest telling reading at which the arm begins to slow [s]."""
     silent_after_s: Positive = 0.3
-    """Age of a unit's newest message at which the unit counts as silent and the arm holds [s]."""
+    """Age of a unit's newest telling reading at which it counts as silent and the arm holds [s]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -220,6 +220,8 @@ class FailureParams(Checked):
 
     state_timeout_s: Positive = 0.05
     """Age of the robot state at which the arm holds [s]."""
+    overrun_s: Positive = 0.05
+    """Time between two steps from which the later one brakes [s]: a command is meant to be held for one period."""
     force_timeout_s: Positive = 0.2
     """Time without a force estimate after which the arm holds [s]."""
 

@@ -1,6 +1,6 @@
 """The values that travel along the line from a reading to a joint velocity.
 
-Everything here is a frozen value. Arrays are float64 and read-only once published; see `docs/conventions.md`.
+Everything here is a frozen value; its arrays are float64, to be read and not written to. See `docs/conventions.md`.
 """
 
 from dataclasses import dataclass
@@ -192,8 +192,6 @@ class ControlStep:
     """(3,) end-effector velocity asked of the QP [m/s]."""
     speed_scale: float
     """Factor of eqs. 3 and 4 times that of units falling silent, in [0, 1]."""
-    range_stamp: FloatArray
-    """(K,) stamps of the readings used [s]."""
     range_distance: FloatArray
     """(K,) distances of the readings used [m], NaN where the unit reported no target."""
     obstacles: Obstacles
@@ -208,8 +206,10 @@ class ControlStep:
     """The contact detected in this very step."""
     reaction_velocity: FloatArray
     """(3,) end-effector velocity of the reaction under way, zero otherwise [m/s]."""
+    restricted: IntArray
+    """(K',) which of the obstacles restrict the arm."""
     approach_limit: FloatArray
-    """(K',) approach limits of eq. 7 in the QP [m/s], one for each restricted obstacle."""
+    """(K',) approach limit of eq. 7 for each of them [m/s]."""
     qp: QpSolution
     command: FloatArray
     """(n,) joint velocity command [rad/s]."""

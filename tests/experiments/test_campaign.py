@@ -1,8 +1,12 @@
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -11,7 +15,9 @@ import pytest
 
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.experiments import campaign
-from pretouch.experiments.campaign import Request, finished, open_folder, run_campaign, trial_file
+from pretouch.experiments.campaign import Request, finished, open_folder, run_campaign, trial_file, write_json
+from pretouch.params import PROFILES
+from pretouch.sensing.skin import PAPER_SKIN
 
 SMALL = Request(("static",), seeds=1, profiles=("blind",))
 
@@ -81,10 +87,122 @@ def test_a_folder_of_another_run_is_not_touched(tmp_path, change):
     assert (tmp_path / "run.json").read_text() == before
 
 
-def test_a_damaged_folder_is_named(tmp_path):
-    (tmp_path / "run.json").write_text("{")
+def test_a_changed_skin_file_is_noticed(tmp_path):
+    file, out = tmp_path / "skin.toml", tmp_path / "out"
+    file.write_bytes(PAPER_SKIN.read_bytes())
+    request = replace(SMALL, skin=str(file))
+    open_folder(request, out)
+    open_folder(request, out)
+    file.write_bytes(PAPER_SKIN.read_bytes().replace(b"-0.108", b"-0.109"))
+    with pytest.raises(ExperimentError, match="but the skin file has changed since: give another --out"):
+        open_folder(request, out)
+    file.unlink()
+    with pytest.raises(SkinError, match="cannot be read: No such file"):
+        open_folder(request, out)
+
+
+def test_a_changed_built_in_skin_is_noticed(tmp_path, monkeypatch):
+    open_folder(SMALL, tmp_path / "out")
+    (tmp_path / "skin.toml").write_text("")
+    monkeypatch.setattr(campaign, "PAPER_SKIN", tmp_path / "skin.toml")
+    with pytest.raises(ExperimentError, match="but the skin file has changed since"):
+        open_folder(SMALL, tmp_path / "out")
+
+
+def test_changed_parameters_of_a_profile_are_noticed(tmp_path, monkeypatch):
+    open_folder(SMALL, tmp_path)
+    for name in ("paper", "blind"):
+        task = replace(PROFILES[name].task, control_period_s=0.5 * PROFILES[name].task.control_period_s)
+        monkeypatch.setitem(PROFILES, name, replace(PROFILES[name], task=task))
+        if name == "paper":
+            open_folder(SMALL, tmp_path)  # not one that it asks for
+    with pytest.raises(ExperimentError, match="but the parameters of profile blind have changed since"):
+        open_folder(SMALL, tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"{", b"[]", b"3", b"\xff", b"[" * 100_000, b"9" * 5000])
+def test_a_damaged_folder_is_named(tmp_path, content):
+    (tmp_path / "run.json").write_bytes(content)
     with pytest.raises(ExperimentError, match=r"run\.json is damaged"):
         open_folder(SMALL, tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"{", b"{}", b"[]", b"\xff", b"[" * 100_000, b"", None])
+def test_a_damaged_trial_is_run_again(tmp_path, monkeypatch, content):
+    open_folder(SMALL, tmp_path)
+    first, *others = [trial_file(tmp_path, *task) for task in SMALL.tasks()]
+    for (cell, seed), file in zip(SMALL.tasks()[1:], others, strict=True):
+        write_json({"experiment": cell.experiment, "profile": cell.profile, "seed": seed}, file)
+    _damage(first, content)
+    assert len(finished(SMALL, tmp_path)) == 3
+    again = _play_with(monkeypatch, lambda *task: Future())
+    with pytest.raises(_EnoughError):
+        run_campaign(SMALL, tmp_path, lambda *_: None)
+    assert [trial_file(*args[1:]) for args in again] == [first]
+
+
+def _damage(file, content):
+    if content is None:
+        file.mkdir()
+    else:
+        file.write_bytes(content)
+
+
+class _EnoughError(Exception):
+    """Ends a run in a test."""
+
+
+def _play_with(monkeypatch, result):
+    """Let trials be played by `result`, in this process; return the list of what is asked for."""
+    asked = []
+
+    class Pool:
+        def __init__(self, *_args, **_options):
+            pass
+
+        def submit(self, _work, *args):
+            asked.append(args)
+            return result(*args)
+
+        def shutdown(self, **_options):
+            pass
+
+    def completed(futures):
+        if not any(f.done() for f in futures):
+            raise _EnoughError
+        return futures
+
+    monkeypatch.setattr(campaign, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(campaign, "as_completed", completed)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (BrokenProcessPool("a process ended"), "A worker process was killed.*the same command goes on"),
+        (OSError(28, "No space left on device"), r"failed with results .*\(No space left on device\).* goes on"),
+    ],
+)
+def test_what_ended_a_worker_is_said(tmp_path, monkeypatch, error, words):
+    def failed(*_task):
+        future = Future()
+        future.set_exception(error)
+        return future
+
+    _play_with(monkeypatch, failed)
+    with pytest.raises(ExperimentError, match=words):
+        run_campaign(SMALL, tmp_path, lambda *_: None)
+
+
+def test_a_file_is_written_whole_or_not_at_all_however_long_its_name(tmp_path):
+    path = tmp_path / ("x" * 255)
+    write_json({"a": 1}, path)
+    assert json.loads(path.read_text()) == {"a": 1}
+    (tmp_path / "below").mkdir()
+    with pytest.raises(IsADirectoryError):
+        write_json({}, tmp_path / "below")
+    assert {p.name for p in tmp_path.iterdir()} == {path.name, "below"}
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
@@ -93,29 +211,64 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
         open_folder(SMALL, tmp_path / "file" / "below")
 
 
-@pytest.fixture
-def long_run(tmp_path):
-    """A run of many trials as its own process, some of them finished."""
-    out = tmp_path / "out"
+@contextmanager
+def started(out):
+    """A run of many trials as its own process and group."""
     command = [sys.executable, "-m", "pretouch.cli", "reproduce", "static", "--seeds", "50", "--out", str(out)]
     process = subprocess.Popen(
         command,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
+        process_group=0,
         # a background job of a shell inherits that Ctrl-C is ignored
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     with process:
         try:
-            deadline = time.monotonic() + 200
-            while len(list((out / "trials").glob("[!.]*.json"))) < 3:
-                assert process.poll() is None, process.stderr.read()
-                assert time.monotonic() < deadline
-                wait([process.stderr], 0.1)
-            yield process, out
+            yield process
         finally:
             process.kill()
+
+
+def wait_for(process, happened):
+    deadline = time.monotonic() + 200
+    while not happened():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline
+        wait([process.stderr], 0.02)
+
+
+@pytest.fixture
+def long_run(tmp_path):
+    """A run of many trials, some of them finished."""
+    out = tmp_path / "out"
+    with started(out) as process:
+        wait_for(process, lambda: len(list((out / "trials").glob("[!.]*.json"))) >= 3)
+        yield process, out
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.1, 0.4, 0.8])
+def test_ctrl_c_while_workers_start_leaves_no_traceback(tmp_path, delay):
+    with started(tmp_path) as process:
+        wait_for(process, (tmp_path / "run.json").exists)
+        time.sleep(delay)
+        os.killpg(process.pid, signal.SIGINT)
+        said = process.communicate(timeout=100)[1]
+    assert process.returncode == 130
+    assert "Traceback" not in said
+
+
+def test_a_killed_worker_is_said_in_a_sentence(long_run):
+    process, out = long_run
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    workers = [pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    os.kill(int(workers[-1]), signal.SIGKILL)
+    said = process.communicate(timeout=100)[1]
+    assert process.returncode == 2
+    assert "A worker process was killed" in said
+    assert "Traceback" not in said
+    assert len(json.loads((out / "results.json").read_text())["trials"]) >= 3
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)])

@@ -16,6 +16,7 @@ def trial(context):
 
 def test_three_pushes_are_felt_and_answered_the_way_they_went(trial):
     row, _ = trial
+    assert row["contact"] is True
     assert len(row["contacts"]) == 3
     for contact in row["contacts"]:
         assert set(contact) == CONTACT

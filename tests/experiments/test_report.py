@@ -1,5 +1,7 @@
 import json
 from html.parser import HTMLParser
+from pathlib import Path
+from shutil import copy, copytree
 
 import numpy as np
 import pytest
@@ -61,6 +63,42 @@ def test_a_page_that_cannot_be_written_is_named(tmp_path):
     request = Request(("avoidance",), seeds=1)
     with pytest.raises(ExperimentError, match="page cannot be written"):
         write_report([(request, tmp_path / "none")], {}, tmp_path / "none")
+
+
+def test_a_damaged_trace_leaves_its_picture_out(request_and_folder, tmp_path):
+    request, whole = request_and_folder
+    out = copytree(whole, tmp_path / "out")
+    (file,) = (out / "traces").glob("dynamic*.npz")
+    file.write_bytes(file.read_bytes()[:-1000])
+    links = Links()
+    links.feed(write_report([(request, out)], {}, out).read_text())
+    assert links.images == ["static.png"]
+
+
+def _arrays(path, **changes):
+    with np.load(path) as data:
+        arrays = {**data, **changes}
+    np.savez_compressed(path, **{name: value for name, value in arrays.items() if value is not None})
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_bytes(b"no archive"),
+        lambda path: path.write_bytes(path.read_bytes()[:5000] + b"?" * 100 + path.read_bytes()[5100:]),
+        lambda path: _arrays(path, force=None),
+        lambda path: _arrays(path, force=np.zeros((3, 3))),
+        lambda path: _arrays(path, force=np.array(0.0)),
+    ],
+)
+def test_a_damaged_trace_is_named(request_and_folder, tmp_path, damage):
+    _, out = request_and_folder
+    path = Path(copy(next((out / "traces").glob("dynamic*.npz")), tmp_path))
+    load_trace(path)
+    damage(path)
+    with pytest.raises(ExperimentError, match=r"The trace .*\.npz is damaged \(.*\): remove it"):
+        load_trace(path)
 
 
 def test_a_trace_is_read_back(request_and_folder, tmp_path):

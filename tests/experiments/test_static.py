@@ -9,7 +9,7 @@ from tests.experiments.limits import assert_within_limits
 
 ROW = {
     "experiment", "trajectory", "side", "profile", "restrictions", "stiffness_n_per_m", "seed", "contact",
-    "impact_speed_m_s", "detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n", "peak_estimate_n",
+    "touched_link", "impact_speed_m_s", "detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n", "peak_estimate_n",
     "true_peak_20ms_n", "true_peak_n", "false_detections", "held",
 }  # fmt: skip
 
@@ -56,13 +56,20 @@ def test_no_command_exceeds_a_limit(pair, panda_model):
         assert_within_limits(record, panda_model)
 
 
-def test_the_wall_stands_on_its_side_and_moves_with_the_seed():
-    walls = [static.scene("-y", 25e3, seed).boxes[0] for seed in range(5)]
+def test_the_board_stands_on_its_side_and_moves_with_the_seed():
+    walls = [static.scene("line", "-y", 25e3, seed).boxes[0] for seed in range(5)]
     faces = [wall.center[1] + wall.half_size[1] for wall in walls]
     assert all(-0.27 <= face <= -0.23 for face in faces)
     assert len(set(faces)) == 5
-    mirrored = static.scene("+y", 25e3, 3).boxes[0]
+    mirrored = static.scene("line", "+y", 25e3, 3).boxes[0]
     assert mirrored.center[1] == pytest.approx(-walls[3].center[1])
+
+
+def test_the_impact_speed_is_the_true_one_of_what_touches(pair):
+    row, record = pair["blind"]
+    assert row["touched_link"] == "panda_hand"
+    assert row["impact_speed_m_s"] == pytest.approx(-record.touches[0].velocity[1], abs=1e-4)
+    assert row["impact_speed_m_s"] == pytest.approx(0.3, abs=0.01)
 
 
 @pytest.mark.parametrize("trajectory", static.TRAJECTORIES)
@@ -104,7 +111,7 @@ def test_the_papers_claim_on_ten_arms(context, panda_model, trajectory, side):
             assert_within_limits(record, panda_model)
             found.append(row)
     for found in rows.values():
-        assert all(row["contact"] for row in found)
+        assert all(row["contact"] and row["touched_link"] == "panda_hand" for row in found)
         assert all(row["detection_delay_s"] is not None for row in found)
         assert sum(row["false_detections"] for row in found) == 0
 

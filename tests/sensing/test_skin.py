@@ -10,6 +10,7 @@ from pretouch.errors import SkinError
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.sensing.unit import SensorUnit
 
+PRINTABLE = st.characters(codec="utf-8", exclude_categories=("C", "Z"), include_characters=" ")
 ENTRY = {
     "id": '"left"',
     "link": '"panda_hand"',
@@ -78,6 +79,17 @@ def test_a_link_without_a_body_can_carry_a_unit(panda_model):
     assert len(Skin([_unit("a", "panda_hand_tcp", (0.0, 0.0, 0.01))], panda_model)) == 1
 
 
+@pytest.mark.parametrize("link", ["panda_hand_tcp", "panda_link8"])
+def test_a_unit_far_off_a_link_without_a_body_is_refused(panda_model, link):
+    with pytest.raises(SkinError, match=rf"Unit a lies 0\.6 m off {link}: give its position in metres"):
+        Skin([_unit("a", link, (0.0, 0.6, 0.0))], panda_model)
+
+
+def test_a_unit_on_the_world_is_refused(panda_model):
+    with pytest.raises(SkinError, match="Unit a is mounted on 'world': choose a link of the arm, panda_link0, "):
+        Skin([_unit("a", "world")], panda_model)
+
+
 def test_the_paper_skin_looks_outwards_from_the_surface(panda_model, paper_skin):
     assert len(paper_skin) == 7
     for link, T in zip(paper_skin.link, paper_skin.T_link_sensor, strict=True):
@@ -97,7 +109,7 @@ def test_the_paper_skin_looks_outwards_from_the_surface(panda_model, paper_skin)
 @given(
     turns=st.lists(st.tuples(*[st.floats(-4, 4)] * 3), min_size=1, max_size=3),
     position=st.tuples(st.floats(0.2, 0.4), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)),
-    names=st.lists(st.text(min_size=1, alphabet=st.characters(codec="utf-8")), min_size=3, max_size=3, unique=True),
+    names=st.lists(st.text(min_size=1, alphabet=PRINTABLE), min_size=3, max_size=3, unique=True),
 )
 def test_a_saved_skin_is_read_back(panda_model, tmp_path_factory, turns, position, names):
     units = [
@@ -130,6 +142,8 @@ def test_a_rounded_quaternion_is_taken(panda_model, tmp_path):
     [
         ({"id": None}, "a unit has the id None: give each .* an id in quotes"),
         ({"id": "7"}, "a unit has the id 7: .*in quotes"),
+        ({"id": r'"a\nb"'}, r"a unit has the id 'a\\nb': .*printable throughout"),
+        ({r'"a\nb"': "1"}, r"unit left has the unknown key 'a\\nb'"),
         ({"id": '""'}, "empty id: give each unit a name"),
         ({"link": None}, "unit left has the link None: give the name of a link"),
         ({"link": '"elbow"'}, "unit left .*'elbow'.*choose from panda_link0"),
@@ -144,6 +158,10 @@ def test_a_rounded_quaternion_is_taken(panda_model, tmp_path):
         ({"position_m": f"[1{'0' * 400}, 0, 0]"}, "give 3 finite numbers"),
         ({"position_m": "[0.0, 0.0, 0.045]"}, "unit left lies .* mm inside panda_hand: move it out"),
         ({"position_m": "[0.0, -108.0, 45.0]"}, "unit left lies .* m off panda_hand: give its position in metres"),
+        ({"position_m": "[1e308, 0, 0]"}, r"position_m is \[1e\+308, 0, 0\]: give 3 finite numbers, none beyond 1000"),
+        ({"position_m": "[0, 0, -1001]"}, "give 3 finite numbers, none beyond 1000 or -1000"),
+        ({"position_m": f"[0x{'f' * 5000}, 0, 0]"}, "position_m is too long to show: give 3 finite numbers"),
+        ({"quaternion_wxyz": "[1e200, 0, 0, 0]"}, "give 4 finite numbers, none beyond 10 or -10"),
         ({"quaternion_wxyz": None}, "quaternion_wxyz is none: give 4 finite numbers"),
         ({"quaternion_wxyz": "[1, 0, 0]"}, "give 4 finite numbers"),
         ({"quaternion_wxyz": "[1, 0, 0, nan]"}, "give 4 finite numbers"),
@@ -167,6 +185,8 @@ def test_what_is_wrong_with_a_unit_is_said_with_unit_and_file(panda_model, tmp_p
         ("[unit]\nid = 'a'", "names no unit"),
         ("unit = [3]", r"A unit is 3: write it as a \[\[unit\]\] table"),
         ("[[unit]\n", "is not valid TOML"),
+        ("unit = " + "[" * 100_000, "is not valid TOML: maximum recursion depth exceeded"),
+        ("unit = " + "9" * 5000, "is not valid TOML: Exceeds the limit"),
         (_entry() + _entry(), "unit id left is used more than once: give each unit its own id"),
     ],
 )

@@ -47,6 +47,21 @@ def test_a_unit_without_a_name_is_refused():
         SensorUnit("", "panda_hand", np.eye(4))
 
 
+@pytest.mark.parametrize("name", ["left\nright", "left\x1b[31m", "\ud800"])
+def test_a_name_that_does_not_print_is_refused_in_one_line(name):
+    with pytest.raises(SkinError, match="printable characters only") as caught:
+        SensorUnit(name, "panda_hand", np.eye(4))
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("rotation", [1e200 * np.eye(3), 1001.0 * np.eye(3)])
+def test_absurd_numbers_are_refused_without_being_multiplied(rotation):
+    with pytest.raises(SkinError, match="give a finite 4 x 4 matrix, in metres"):
+        SensorUnit("hand", "panda_hand", _pose(rotation=rotation))
+    with pytest.raises(SkinError, match="give a finite 4 x 4 matrix, in metres"):
+        SensorUnit("hand", "panda_hand", _pose(position=rotation[0]))
+
+
 @pytest.mark.parametrize(("rings", "count"), [(0, 1), (1, 7), (2, 19), (3, 37)])
 def test_cone_rays_are_unit_vectors_from_axis_to_edge(rings, count):
     rays = cone_rays(rings)

@@ -1,4 +1,4 @@
-"""The sliding window of the external force: eq. 8, with mean and standard deviation in O(1)."""
+"""The sliding window of the external force: eq. 8, its mean and standard deviation by running sums, in O(1)."""
 
 from dataclasses import dataclass
 

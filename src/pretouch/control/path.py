@@ -120,11 +120,11 @@ class PathState:
     phase: float = 0.0
     """Arc length travelled [m]."""
     speed: float = 0.0
-    """Speed along the path allowed by now [m/s]; grows with limited acceleration."""
+    """Speed allowed by now [m/s]; grows with limited acceleration from 0 at the start and after each pause."""
 
 
 def follow(path: Path, state: PathState, position: FloatArray, params: TaskParams) -> FloatArray:
-    """Task velocity x_d (3,) [m/s]: along the path, and towards it, no faster than the task's speed.
+    """Task velocity x_d (3,) [m/s]: along the path, and towards it, no faster than the speed allowed by now.
 
     Off the path the forward part shrinks, to nothing at `off_path_m`: the arm first returns to where it left.
     `position` (3,) [m] is the end-effector origin.
@@ -132,7 +132,7 @@ def follow(path: Path, state: PathState, position: FloatArray, params: TaskParam
     error = path.point(state.phase) - position
     velocity = _forward(error, state, params) * path.tangent(state.phase) + params.position_gain_1_s * error
     speed = float(np.sqrt(velocity @ velocity))
-    return velocity if speed <= params.speed_m_s else velocity * (params.speed_m_s / speed)
+    return velocity if speed <= state.speed else velocity * (state.speed / speed)
 
 
 def _forward(error: FloatArray, state: PathState, params: TaskParams) -> float:

@@ -7,12 +7,12 @@ from pretouch.params import ReductionParams
 
 @dataclass(frozen=True, slots=True)
 class ReductionState:
-    """The factor obstacles left behind, and how far it has faded."""
+    """The factor a fading starts from, and how far it has come."""
 
     scale: float = 1.0
-    """Factor d_lowest / d_max when the obstacle was last seen."""
+    """Factor when it last fell or kept pace."""
     cycles: int = 0
-    """Cycles l_obs since it vanished; 0 while it is seen."""
+    """Cycles l_obs since then."""
 
 
 def speed_scale(distance: float, d_max: float) -> float:
@@ -28,17 +28,14 @@ def faded_scale(scale: float, l_obs: int, l_max: int) -> float:
     return scale + (1.0 - scale) * min(1.0, l_obs / l_max)
 
 
-def reduce_speed(state: ReductionState, distance: float, params: ReductionParams) -> tuple[float, ReductionState]:
+def reduce_speed(state: ReductionState, fresh: float, params: ReductionParams) -> tuple[float, ReductionState]:
     """One cycle of eqs. 3 and 4: the factor on the end-effector velocity, and what to remember.
 
-    Once a nearest obstacle within d_max is lost its factor fades. When one is seen again during the fading, the
-    smaller of fading and fresh factor holds, so the speed never jumps up. `distance` [m] is infinite without one.
+    The fresh factor holds at once where it is the smaller one, and rises no faster than eq. 4 lets it: whether the
+    nearest obstacle vanished, was seen again farther away, or left another one in view, the speed never jumps up.
+    `fresh` is the factor of eq. 3 for what is seen now, 1 for nothing.
     """
-    fresh = speed_scale(distance, params.d_max_m)
-    seen = distance < params.d_max_m
-    if seen and state.cycles == 0:
-        return fresh, ReductionState(fresh, 0)
     faded = faded_scale(state.scale, state.cycles + 1, params.l_max_cycles)
-    if faded >= 1.0 or (seen and fresh <= faded):
+    if fresh <= faded:
         return fresh, ReductionState(fresh, 0)
     return faded, ReductionState(state.scale, state.cycles + 1)

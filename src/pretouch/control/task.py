@@ -30,4 +30,5 @@ def task(
 
 def rotation_error(rotation: FloatArray, goal: FloatArray) -> FloatArray:
     """Rotation from one orientation to the other (3,): the unit axis times the sine of the angle, base frame."""
-    return np.asarray(0.5 * np.cross(rotation.T, goal.T).sum(axis=0))
+    turn = goal @ rotation.T
+    return 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])

@@ -1,5 +1,6 @@
-"""Paper IV-B: a person holds a hand beside the circle, on one side and then on the other."""
+"""Paper IV-B: a person holds a hand beside the circle or into it, on one side and then on the other."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -18,22 +19,22 @@ DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
 
 _DURATION_S = 40.0
 _VISITS_S = ((4.0, 14.0), (20.0, 30.0))
-_BESIDE_M = 0.43
-"""Distance of the centre of the person's hand from the plane y = 0 [m]: 3 cm clear of the robot's, whose side comes
-to 0.35 m on the free circle."""
+PLACES_M = {"beside": 0.43, "inside": 0.35}
+"""Distance of the centre of the person's hand from the plane y = 0 [m]. The side of the robot's hand comes to 0.35 m on
+the free circle: beside is 3 cm clear of it, inside half of the person's hand is in its way."""
 _SPREAD_M = 0.03
 
 
 def cells(profiles: tuple[str, ...]) -> list[Cell]:
-    """One cell for each profile."""
-    return [Cell(NAME, profile, {}) for profile in profiles]
+    """A cell for each place of the hand and each profile."""
+    return [Cell(NAME, profile, {"place": place}) for place, profile in product(PLACES_M, profiles)]
 
 
-def visits(seed: int) -> tuple[Visit, ...]:
+def visits(place: str, seed: int) -> tuple[Visit, ...]:
     """One visit on each side of the circle, at a place that the seed varies by a few centimetres."""
     rng = np.random.default_rng([seed, 12])
     return tuple(
-        Visit(arrive, leave, np.array([0.5, side * _BESIDE_M, 0.3]) + _SPREAD_M * rng.uniform(-1, 1, 3))
+        Visit(arrive, leave, np.array([0.5, side * PLACES_M[place], 0.3]) + _SPREAD_M * rng.uniform(-1, 1, 3))
         for (arrive, leave), side in zip(_VISITS_S, (-1.0, 1.0), strict=True)
     )
 
@@ -49,13 +50,14 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=SceneSpec(hand=hand),
         path=Circle(),
         seed=seed,
-        hand=Visitor(context.model, visits(seed)),
+        hand=Visitor(context.model, visits(cell.where["place"], seed)),
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     steps = record.steps
     off = [float(np.linalg.norm(s.ee_position - s.path_position)) for s in steps]
     row = {
         "experiment": NAME,
+        **cell.where,
         "profile": cell.profile,
         "restrictions": profile.restriction.mode,
         "seed": seed,

@@ -3,10 +3,13 @@
 import json
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cache
+from hashlib import sha256
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from threading import Thread
@@ -14,14 +17,14 @@ from types import ModuleType
 from typing import Any, cast, get_args
 
 from pretouch import __version__
-from pretouch.errors import ExperimentError
+from pretouch.errors import ExperimentError, SkinError
 from pretouch.experiments import avoidance, dynamic, static
 from pretouch.experiments.cell import Cell, Context
 from pretouch.experiments.trace import save_trace, trace_of
 from pretouch.params import Orientation, RestrictionMode, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import load_skin, paper_skin
+from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
 
 EXPERIMENTS: dict[str, ModuleType] = {m.NAME: m for m in (static, avoidance, dynamic)}
 
@@ -78,34 +81,74 @@ class Request:
 
 def open_folder(request: Request, out: Path) -> None:
     """Make a folder for the results, or take one up that a run with the same parameters began."""
-    wanted = json.loads(json.dumps({"version": __version__, **asdict(request)}))
+    wanted = json.loads(json.dumps({"version": __version__, **asdict(request), "sha256": _fingerprints(request)}))
     about = out / "run.json"
     try:
         for part in ("trials", "traces"):
             (out / part).mkdir(parents=True, exist_ok=True)
         if about.exists():
-            found = json.loads(about.read_text(encoding="utf-8"))
-            differing = [key for key in wanted if not isinstance(found, dict) or found.get(key) != wanted[key]]
-            if differing:
-                key = differing[0]
-                was = found.get(key) if isinstance(found, dict) else found
-                raise ExperimentError(
-                    f"The folder {out} holds a run with {key} = {was!r}, not {wanted[key]!r}:"
-                    " give another --out, or the parameters of that run."
-                )
+            _check_same(_object(about), wanted, out)
         else:
             write_json(wanted, about)
     except OSError as error:
         raise ExperimentError(f"The folder {out} cannot be used: {error.strerror}: give another --out.") from error
-    except json.JSONDecodeError as error:
+    except _Damaged as error:
         raise ExperimentError(f"The file {about} is damaged ({error}): give another --out.") from error
+
+
+def _fingerprints(request: Request) -> dict[str, str]:
+    """Digests of what a request only names: the skin file, and the parameters of each profile."""
+    path = Path(request.skin) if request.skin else PAPER_SKIN
+    try:
+        digests = {"the skin file has": sha256(path.read_bytes()).hexdigest()}
+    except OSError as error:
+        raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
+    for name in request.profiles:
+        parameters = json.dumps(asdict(profile(name)), sort_keys=True, default=repr)
+        digests[f"the parameters of profile {name} have"] = sha256(parameters.encode()).hexdigest()
+    return digests
+
+
+def _check_same(found: dict[str, Any], wanted: dict[str, Any], out: Path) -> None:
+    """Refuse to go on with a run that other parameters began."""
+    digests: dict[str, str] = wanted["sha256"]
+    for key, value in wanted.items():
+        if key != "sha256" and found.get(key) != value:
+            raise ExperimentError(
+                f"The folder {out} holds a run with {key} = {found.get(key)!r}, not {value!r}:"
+                " give another --out, or the parameters of that run."
+            )
+    before = found.get("sha256")
+    for what, digest in digests.items():
+        if not isinstance(before, dict) or before.get(what) != digest:
+            raise ExperimentError(f"The folder {out} holds a run, but {what} changed since: give another --out.")
+
+
+class _Damaged(Exception):
+    """A JSON file holds something else than an object."""
+
+
+def _object(path: Path) -> dict[str, Any]:
+    """Read a JSON file that holds an object."""
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:  # not UTF-8, not JSON, brackets too deep
+        raise _Damaged(error) from error
+    if not isinstance(value, dict):
+        raise _Damaged("it holds no object")
+    return value
 
 
 def write_json(value: Any, path: Path) -> None:
     """Write a JSON file, whole or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    temporary.write_text(json.dumps(value, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    os.replace(temporary, path)
+    name = sha256(os.fsencode(path.name)).hexdigest()[:16]  # as short for a long name
+    temporary = path.with_name(f".{name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_text(json.dumps(value, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def run_campaign(request: Request, out: Path, progress: Callable[[int, int], None]) -> None:
@@ -116,16 +159,18 @@ def run_campaign(request: Request, out: Path, progress: Callable[[int, int], Non
     request.context()  # a bad skin is refused here, before any process starts
     open_folder(request, out)
     tasks = request.tasks()
-    missing = [task for task in tasks if not trial_file(out, *task).exists()]
+    missing = [task for task in tasks if _row(out, *task) is None]
     progress(len(tasks) - len(missing), len(tasks))
     if not missing:
         return
     workers = min(len(missing), os.cpu_count() or 1)
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
     try:
-        futures = [pool.submit(_work, request, out, cell, seed) for cell, seed in missing]
+        with _interrupt_held_back(), _failure_said(out):
+            futures = [pool.submit(_work, request, out, cell, seed) for cell, seed in missing]
         for done, future in enumerate(as_completed(futures), start=len(tasks) - len(missing) + 1):
-            future.result()
+            with _failure_said(out):
+                future.result()
             progress(done, len(tasks))
     except BaseException:
         for process in active_children():
@@ -133,6 +178,32 @@ def run_campaign(request: Request, out: Path, progress: Callable[[int, int], Non
         pool.shutdown(wait=True, cancel_futures=True)
         raise
     pool.shutdown()
+
+
+@contextmanager
+def _interrupt_held_back() -> Iterator[None]:
+    """Hold Ctrl-C back while processes start; they inherit that, so that it finds none of them half imported."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _failure_said(out: Path) -> Iterator[None]:
+    """Say in a sentence that a worker was killed or could not write."""
+    try:
+        yield
+    except BrokenProcessPool as error:
+        raise ExperimentError(
+            "A worker process was killed, for want of memory perhaps: the same command goes on with what is missing."
+        ) from error
+    except OSError as error:
+        raise ExperimentError(
+            f"A worker process failed with results for {out} ({error.strerror or error}): remove the cause, and the"
+            " same command goes on with what is missing."
+        ) from error
 
 
 def trial_file(out: Path, cell: Cell, seed: int) -> Path:
@@ -147,8 +218,17 @@ def trace_file(out: Path, cell: Cell, seed: int) -> Path:
 
 def finished(request: Request, out: Path) -> list[dict[str, Any]]:
     """Read the rows of all finished trials, in the order of the tasks."""
-    files = [trial_file(out, cell, seed) for cell, seed in request.tasks()]
-    return [json.loads(file.read_text(encoding="utf-8")) for file in files if file.exists()]
+    return [row for task in request.tasks() if (row := _row(out, *task)) is not None]
+
+
+def _row(out: Path, cell: Cell, seed: int) -> dict[str, Any] | None:
+    """Read a trial's row of results; None where there is none, or a damaged one, and the trial is still to run."""
+    try:
+        row = _object(trial_file(out, cell, seed))
+    except (OSError, _Damaged):
+        return None
+    its_own = {"experiment": cell.experiment, "profile": cell.profile, "seed": seed}
+    return row if all(row.get(key) == value for key, value in its_own.items()) else None
 
 
 def _start_worker() -> None:

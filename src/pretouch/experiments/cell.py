@@ -6,6 +6,8 @@ from pretouch.params import Orientation, Profile, RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 
+_SAFE = {"-y": "minus-y", "+y": "plus-y"}
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -19,7 +21,8 @@ class Cell:
     @property
     def name(self) -> str:
         """Name for files: safe characters only."""
-        return "_".join([self.experiment, *self.where.values(), self.profile]).replace("+", "plus-").replace("-y", "y-")
+        safe = [_SAFE.get(value, value) for value in self.where.values()]
+        return "_".join([self.experiment, *safe, self.profile])
 
 
 @dataclass(frozen=True)

@@ -49,37 +49,46 @@ def pushes(seed: int) -> tuple[Push, ...]:
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
     profile = context.profile(cell.profile, DEFAULT_RESTRICTIONS)
-    person = Pusher(context.model, pushes(seed))
+    person, hand = Pusher(context.model, pushes(seed)), HandSpec()
     setup = Setup(
         model=context.model,
         skin=context.skin,
         profile=profile,
-        scene=SceneSpec(hand=HandSpec()),
+        scene=SceneSpec(hand=hand),
         path=Circle(),
         seed=seed,
         hand=person,
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     true = np.linalg.norm(record.true_force, axis=1)
-    reactions = record.reactions()
-    contacts = [
-        _contact(record, reactions, push, touched)
-        for push, touched in zip(person.pushes, person.contacts, strict=False)
-    ]
-    spans = [t for t in person.contacts if t is not None]
+    reactions, spans = record.reactions(), [span for span in person.contacts if span is not None]
+    missing = [None] * (len(person.pushes) - len(person.contacts))
     row = {
         "experiment": NAME,
+        "trajectory": "circle",
         "profile": cell.profile,
         "restrictions": profile.restriction.mode,
+        "stiffness_n_per_m": hand.stiffness,
         "seed": seed,
-        "contacts": contacts,
-        "peak_estimate_n": rounded(peak(np.linalg.norm(record.forces(), axis=1))),
+        "contact": bool(spans),
+        "contacts": [
+            _contact(record, reactions, push, touched)
+            for push, touched in zip(person.pushes, [*person.contacts, *missing], strict=True)
+        ],
+        "peak_estimate_n": rounded(peak(_touched_estimate(record, spans))),
         "true_peak_20ms_n": rounded(peak(mean_over(true, 20))),
         "true_peak_n": rounded(peak(true)),
         "false_detections": sum(not any(a <= s.stamp <= b + _REBOUND_S for a, b in spans) for s in reactions),
         "held": record.held(),
     }
     return row, record
+
+
+def _touched_estimate(record: Record, spans: list[tuple[float, float]]) -> FloatArray:
+    """Norm of the force estimate [N] in the control steps of the pushes, without those that have none."""
+    steps = [s for s in record.steps if any(a <= s.stamp <= b for a, b in spans)]
+    size = np.array([np.linalg.norm(s.force) for s in steps])
+    return size[np.isfinite(size)]
 
 
 def _contact(

@@ -12,7 +12,7 @@ from pretouch.experiments.campaign import Request, trace_file
 from pretouch.experiments.cell import Cell
 from pretouch.experiments.figures import avoidance_figure, dynamic_figure, save, static_figure
 from pretouch.experiments.tables import TextTable, tables
-from pretouch.experiments.trace import load_trace
+from pretouch.experiments.trace import Trace, load_trace
 from pretouch.params import profile
 
 _PAGE = Template(
@@ -80,20 +80,28 @@ def _figures(request: Request, out: Path) -> list[tuple[str, str]]:
             (cell.where["trajectory"], cell.where["side"], cell.profile): trace_file(out, cell, 0)
             for cell in static.cells(request.profiles)
         }
-        traces = {key: load_trace(file) for key, file in files.items() if file.exists()}
+        traces = {key: trace for key, file in files.items() if (trace := _trace(file)) is not None}
         save(static_figure(traces, shown), out / "static.png")
         pictures.append(("static.png", "Force and contact thresholds at the static object"))
-    file = trace_file(out, Cell(avoidance.NAME, shown, {}), 0)
-    if avoidance.NAME in request.experiments and file.exists():
-        save(avoidance_figure(load_trace(file), shown), out / "avoidance.png")
+    trace = _trace(trace_file(out, Cell(avoidance.NAME, shown, {"place": "beside"}), 0))
+    if avoidance.NAME in request.experiments and trace is not None:
+        save(avoidance_figure(trace, shown), out / "avoidance.png")
         pictures.append(("avoidance.png", "End-effector path with a hand beside it"))
-    file = trace_file(out, Cell(dynamic.NAME, shown, {}), 0)
-    if dynamic.NAME in request.experiments and file.exists():
+    trace = _trace(trace_file(out, Cell(dynamic.NAME, shown, {}), 0))
+    if dynamic.NAME in request.experiments and trace is not None:
         units = request.context().skin.ids
-        figure = dynamic_figure(load_trace(file), units, profile(shown).reduction.d_max_m, shown)
+        figure = dynamic_figure(trace, units, profile(shown).reduction.d_max_m, shown)
         save(figure, out / "dynamic.png")
         pictures.append(("dynamic.png", "Distances, force with thresholds, and velocity over thirty seconds"))
     return pictures
+
+
+def _trace(file: Path) -> Trace | None:
+    """Read a trace, if there is one and it is whole."""
+    try:
+        return load_trace(file)
+    except ExperimentError:
+        return None
 
 
 def _table(table: TextTable) -> str:

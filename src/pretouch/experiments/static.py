@@ -1,5 +1,6 @@
 """Paper IV-A: the arm runs into a large static object, on a circle and on a line, from either side."""
 
+from collections.abc import Callable
 from itertools import product
 from typing import Any
 
@@ -25,6 +26,12 @@ _FACE_M = 0.25
 """Distance of the object's face from the plane y = 0 [m]."""
 _FACE_SPREAD_M = 0.02
 """The seed moves the face by up to this [m]."""
+_HALF_SIZE_M = (0.15, 0.02, 0.12)
+"""Half the size of the object [m]."""
+_OUTWARDS_M = 0.12
+"""Its centre is this much farther from the base in x than the hand that meets it [m]."""
+_HAND_HALF_WIDTH_M, _HAND_ABOVE_TCP_M = 0.102, 0.057
+"""Where the side of the robot's hand is from the end-effector's origin, hand upright [m]."""
 _TIME_LIMIT_S = 40.0
 _AFTER_DETECTION_S = 1.0
 
@@ -45,11 +52,19 @@ def path(trajectory: str, side: str) -> Path:
     return line((0.4, -0.5 * sign, 0.5), (0.4, 0.5 * sign, 0.5))
 
 
-def scene(side: str, stiffness: float, seed: int) -> SceneSpec:
-    """Return a wall on one side, its face a little nearer or farther with each seed."""
+def scene(trajectory: str, side: str, stiffness: float, seed: int) -> SceneSpec:
+    """Return a board on one side, 0.3 m by 0.24 m, a little nearer or farther with each seed.
+
+    It stands where the hand meets it, and does not reach inwards to where the forearm, which is wider than the hand,
+    would meet it first.
+    """
     sign = 1.0 if side == "+y" else -1.0
     face = _FACE_M + _FACE_SPREAD_M * np.random.default_rng([seed, 10]).uniform(-1, 1)
-    return SceneSpec(boxes=(Box("object", (0.45, sign * (face + 0.02), 0.3), (0.3, 0.02, 0.45), stiffness),))
+    course = path(trajectory, side)
+    ahead = np.linspace(0.0, course.length, 2000)
+    meeting = next(p for p in map(course.point, ahead) if sign * p[1] >= face - _HAND_HALF_WIDTH_M)
+    center = (meeting[0] + _OUTWARDS_M, sign * (face + _HALF_SIZE_M[1]), meeting[2] + _HAND_ABOVE_TCP_M)
+    return SceneSpec(boxes=(Box("object", center, _HALF_SIZE_M, stiffness),))
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
@@ -60,7 +75,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         model=context.model,
         skin=context.skin,
         profile=profile,
-        scene=scene(side, context.stiffness, seed),
+        scene=scene(cell.where["trajectory"], side, context.stiffness, seed),
         path=path(cell.where["trajectory"], side),
         seed=seed,
     )
@@ -72,20 +87,17 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "restrictions": profile.restriction.mode,
         "stiffness_n_per_m": context.stiffness,
         "seed": seed,
-        **results(record, -1.0 if side == "+y" else 1.0),
+        **results(record, -1.0 if side == "+y" else 1.0, context.model.links),
     }
     return row, record
 
 
-def _done() -> Any:
+def _done() -> Callable[[ControlStep, Plant], bool]:
     """End a while after the first reaction that a true contact caused, or at the time limit."""
-    touched: list[float] = []
     detected: list[float] = []
 
     def done(step: ControlStep, plant: Plant) -> bool:
-        if not touched and np.linalg.norm(plant.true_force) > 1.0:
-            touched.append(step.stamp)
-        if touched and not detected and step.contact is not None:
+        if plant.touches and not detected and step.contact is not None:
             detected.append(step.stamp)
         over = bool(detected) and step.stamp >= detected[0] + _AFTER_DETECTION_S
         return over or step.stamp >= _TIME_LIMIT_S
@@ -93,12 +105,16 @@ def _done() -> Any:
     return done
 
 
-def results(record: Record, push: float) -> dict[str, Any]:
-    """Numbers of one trial; `push` is the sign of the force along y by which the object pushes the arm."""
+def results(record: Record, push: float, links: tuple[str, ...]) -> dict[str, Any]:
+    """Numbers of one trial; `push` is the sign of the force along y by which the object pushes the arm.
+
+    The impact speed is the true closing speed of the point of the arm that touches first.
+    """
     touch = record.first_contact()
     reactions = record.reactions()
     row: dict[str, Any] = {
         "contact": touch is not None,
+        "touched_link": None,
         "impact_speed_m_s": None,
         "detection_delay_s": None,
         "filtered_at_detection_n": None,
@@ -113,9 +129,10 @@ def results(record: Record, push: float) -> dict[str, Any]:
         return row
     times, along = record.times(), push * record.forces()[:, 1]
     true = np.linalg.norm(record.true_force, axis=1)
-    velocity = np.array([s.ee_velocity[1] for s in record.steps])
-    row["impact_speed_m_s"] = rounded(-push * float(np.interp(touch, times, velocity)), 4)
-    row["peak_estimate_n"] = rounded(peak(along[times >= touch]))
+    first = record.touches[0]
+    row["touched_link"] = links[first.link]
+    row["impact_speed_m_s"] = rounded(-push * float(first.velocity[1]), 4)
+    row["peak_estimate_n"] = rounded(peak(along[(times >= touch) & np.isfinite(along)]))
     row["true_peak_n"] = rounded(peak(true))
     row["true_peak_20ms_n"] = rounded(peak(mean_over(true, 20)))
     detection = next((s for s in reactions if s.stamp >= touch), None)

@@ -13,7 +13,7 @@ _MEASURES = {
     "avoidance": ("least_gap_m", "deviation_m", "least_speed_scale", "largest_slack_m_s", "travelled_m", "true_peak_n"),
     "dynamic": ("peak_estimate_n", "true_peak_20ms_n", "true_peak_n"),
 }  # fmt: skip
-_PLACE = ("trajectory", "side")
+_PLACE = ("trajectory", "side", "place")
 
 Row = dict[str, Any]
 

@@ -54,9 +54,10 @@ def _static(part: Row) -> TextTable:
         "Static object: medians; ratios blind/profile with their 10-90 % below",
         ("where", "profile", *(label for _, label, _ in _STATIC), "hit/felt\n[%]", "false"),
         tuple(rows),
-        "Impact: closing speed at first touch. Delay: from the true force passing 1 N. Filtered (eq. 8) and raw: the"
-        " estimate at detection. Peak: of the estimate. True: peak of the true force, 20 ms mean. The paper finds"
-        " forces about two times smaller with proximity; which force is meant decides the number.",
+        "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
+        " (eq. 8) and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, 20 ms"
+        " mean. The paper finds forces about two times smaller with proximity; which force is meant decides the"
+        " number.",
     )
 
 
@@ -78,15 +79,17 @@ def _dynamic(part: Row) -> TextTable:
         ("profile", "felt", "delay\n[ms]", "direction\n[deg]", "peak\n[N]", "towards\nperson", "false"),
         rows,
         "Pushes of 15 to 30 N for 0.2 to 0.5 s. Direction: between reaction and true force. Peak: of the estimate."
-        " Towards person: pushes after which the arm moved against the push.",
+        " Towards person: pushes after which a reaction began against the push.",
     )
 
 
 def _avoidance(part: Row) -> TextTable:
     rows = tuple(
         (
+            cell["place"],
             cell["profile"],
             f"{100 * cell['contact_fraction']:.0f}",
+            _number(cell["true_peak_n"], 1),
             _number(cell["least_gap_m"], 3),
             _number(cell["deviation_m"], 3),
             _number(cell["least_speed_scale"], 2),
@@ -96,11 +99,22 @@ def _avoidance(part: Row) -> TextTable:
         for cell in part["cells"]
     )
     return TextTable(
-        "A person holds a hand beside the path: medians",
-        ("profile", "contact\n[%]", "least\ngap [m]", "off path\n[m]", "least\nspeed", "way\n[m]", "false"),
+        "A person holds a hand beside the path or into it: medians",
+        (
+            "hand",
+            "profile",
+            "contact\n[%]",
+            "true\n[N]",
+            "least\ngap [m]",
+            "off path\n[m]",
+            "least\nspeed",
+            "way\n[m]",
+            "false",
+        ),
         rows,
-        "Gap: between the person's hand and the arm. Least speed: factor of eqs. 3 and 4. Way: travelled along the"
-        " path in 40 s.",
+        "Beside is 3 cm clear of the robot's hand on its free path, inside half of the person's hand is in its way."
+        " True: peak of the true force. Gap: between the person's hand and the arm, negative in contact. Least speed:"
+        " factor of eqs. 3 and 4. Way: travelled along the path in 40 s.",
     )
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pretouch.errors import ExperimentError
 from pretouch.experiments.trial import Record
 from pretouch.types import BoolArray, FloatArray, Mode
 
@@ -74,6 +75,13 @@ def save_trace(trace: Trace, path: Path) -> None:
 
 
 def load_trace(path: Path) -> Trace:
-    """Read a trace that `save_trace` wrote."""
-    with np.load(path) as data:
-        return Trace(**{f.name: data[f.name] for f in fields(Trace)})
+    """Read a trace that `save_trace` wrote; a damaged one is an ExperimentError."""
+    try:
+        with path.open("rb") as file, np.load(file) as data:
+            trace = Trace(**{f.name: data[f.name] for f in fields(Trace)})
+        lengths = {len(getattr(trace, f.name)) for f in fields(Trace)}
+    except Exception as error:  # almost any, from a file that is no archive or has wrong bits in it
+        raise ExperimentError(f"The trace {path} is damaged ({error}): remove it.") from error
+    if len(lengths) != 1 or 0 in lengths:
+        raise ExperimentError(f"The trace {path} is damaged (its arrays differ in length): remove it.")
+    return trace

@@ -13,12 +13,14 @@ from pretouch.params import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, HandScript
-from pretouch.sim.plant import Plant, PlantClock
+from pretouch.sim.plant import Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, fixtures
 from pretouch.types import ControlStep, FloatArray, Mode
 
+TOUCH_N = 1.0
+"""True force above which there is a contact [N]."""
 SETTLE_S = 0.2
 """Time the arm stands before the controller starts [s]: the observer's transient is over."""
 
@@ -47,6 +49,8 @@ class Record:
     """(T,) instants of the physics [s]."""
     true_force: FloatArray
     """(T, 3) sum of the contact forces on the arm [N], base frame."""
+    touches: list[Touch]
+    """Each beginning of a contact of the arm."""
     hand_position: FloatArray
     """(S, 3) centre of the hand at each control step [m], NaN without a hand."""
 
@@ -58,9 +62,9 @@ class Record:
         """Estimated external forces (S, 3) [N]."""
         return np.array([s.force for s in self.steps])
 
-    def first_contact(self, after: float = 0.0, force: float = 1.0) -> float | None:
-        """Instant [s] at which the true force first passes `force` [N] after a time [s], or None."""
-        touching = np.flatnonzero((np.linalg.norm(self.true_force, axis=1) > force) & (self.true_time > after))
+    def first_contact(self, after: float = 0.0) -> float | None:
+        """Instant [s] at which the true force first passes 1 N after a time [s], or None."""
+        touching = np.flatnonzero((np.linalg.norm(self.true_force, axis=1) > TOUCH_N) & (self.true_time > after))
         return float(self.true_time[touching[0]]) if len(touching) else None
 
     def reactions(self) -> list[ControlStep]:
@@ -101,5 +105,6 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),
         np.array([f for _, f in plant.true_log]),
+        plant.touches,
         np.array(recorder.hand_position),
     )

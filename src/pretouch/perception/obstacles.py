@@ -22,6 +22,8 @@ class TrackState:
     """(K,) instant of the measurement that showed it [s]."""
     used: FloatArray
     """(K,) stamp of the newest reading taken into account [s]."""
+    heard: FloatArray
+    """(K,) stamp of the newest reading that told anything [s]."""
     direction: FloatArray
     """(K, 3) last direction from the body to the point."""
 
@@ -30,6 +32,7 @@ def track_init(units: int) -> TrackState:
     """Return the state before any reading."""
     return TrackState(
         np.full((units, 3), np.nan),
+        np.full(units, -np.inf),
         np.full(units, -np.inf),
         np.full(units, -np.inf),
         np.full((units, 3), np.nan),
@@ -71,7 +74,19 @@ def measured_distance(readings: RangeReadings) -> FloatArray:
     return _measured(readings.distance, readings.status)
 
 
-_OK, _NEAR = int(RangeStatus.OK), (int(RangeStatus.MIN_RANGE), int(RangeStatus.MIN_CLIPPED))
+def is_evidence(readings: RangeReadings, distance: FloatArray) -> BoolArray:
+    """Say which readings (K,) tell anything: that a target is there, or that none returns enough light.
+
+    A failure (hardware, synchronisation, cross-talk, no measurement yet, a distance that is no number) tells nothing,
+    and is no more free space than silence is. `distance` is what `measured_distance` makes of the readings.
+    """
+    return np.isfinite(distance) | np.isin(readings.status, _NO_TARGET)
+
+
+_SHOWN = tuple(int(s) for s in (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED))
+_NEAR = (int(RangeStatus.MIN_RANGE), int(RangeStatus.MIN_CLIPPED))
+_NO_TARGET = [int(s) for s in (RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED)]
+"""Statuses of a sensor at work that sees nothing near: too little light, too noisy, or beyond its range."""
 
 
 @njit(cache=True)
@@ -80,7 +95,7 @@ def _measured(distance: FloatArray, status: IntArray) -> FloatArray:
     for k in range(len(distance)):
         if status[k] in _NEAR:
             shown[k] = MIN_DISTANCE
-        elif status[k] == _OK and 0 <= distance[k] <= MAX_DISTANCE:
+        elif status[k] in _SHOWN and 0 <= distance[k] <= MAX_DISTANCE:
             shown[k] = max(distance[k], MIN_DISTANCE)
     return shown
 
@@ -90,6 +105,7 @@ def track(
     readings: RangeReadings,
     points: FloatArray,
     shows: BoolArray,
+    tells: BoolArray,
     now: float,
     persistence: float,
 ) -> TrackState:
@@ -103,6 +119,7 @@ def track(
         readings: the newest reading of each unit.
         points: (K, 3) where the readings are, base frame [m].
         shows: (K,) whether the reading shows an obstacle.
+        tells: (K,) whether it tells anything at all.
         now: instant of this step [s].
         persistence: age at which a point is given up [s].
     """
@@ -112,20 +129,14 @@ def track(
         point=np.where(take[:, None], points, state.point),
         seen=np.where(take, readings.stamp, state.seen),
         used=np.where(fresh, readings.stamp, state.used),
+        heard=np.where(fresh & tells, readings.stamp, state.heard),
         direction=state.direction,
     )
 
 
 def is_fresh(state: TrackState, readings: RangeReadings, now: float) -> BoolArray:
-    """Say which units (K,) have a reading newer than the last one used, and not from the future."""
-    return (readings.stamp > state.used) & (readings.stamp <= now)
+    """Say which units (K,) have a reading newer than the last one used, and not from the future.
 
-
-def silence(readings: RangeReadings, now: float) -> FloatArray:
-    """Age (K,) of each unit's newest message [s].
-
-    Infinite for a unit never heard, and for a stamp that is no number or lies in the future: a unit whose clock is
-    wrong must not pass for one that is well.
+    A unit whose clock is ahead is so never heard: it must not pass for one that is well.
     """
-    age = now - readings.stamp
-    return np.where(np.isfinite(age) & (age >= 0), age, np.inf)
+    return (readings.stamp > state.used) & (readings.stamp <= now)

@@ -8,11 +8,11 @@ from pretouch.params import PerceptionParams
 from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.perception.obstacles import (
     TrackState,
+    is_evidence,
     is_fresh,
     locate,
     measured_distance,
     sensor_poses,
-    silence,
     track,
 )
 from pretouch.perception.scene_filter import Fixtures, expected_range
@@ -42,7 +42,8 @@ def perceive(
         known[fresh] = expected_range(kin, position[fresh], rotation[fresh], skin.link[fresh], model.capsules, fixtures)
         shows = distance < known - params.self_margin_m
         points = locate(position, rotation, np.where(shows, distance, 0.0))
-        state = track(state, readings, points, shows, now, params.persistence_s)
+        tells = is_evidence(readings, distance)
+        state = track(state, readings, points, shows, tells, now, params.persistence_s)
     unit = np.flatnonzero(now - state.seen <= params.persistence_s)
     if len(unit) == 0:
         return no_obstacles(), state
@@ -54,14 +55,15 @@ def perceive(
     return obstacles, replace(state, direction=direction)
 
 
-def silent_units(skin: Skin, readings: RangeReadings, now: float, params: PerceptionParams) -> tuple[float, str]:
+def silent_units(skin: Skin, state: TrackState, now: float, params: PerceptionParams) -> tuple[float, str]:
     """Factor in [0, 1] on the speed for units that fall silent, and the names of those that are.
 
-    Silence is never free space: from `slow_after_s` the arm slows, at `silent_after_s` it stands.
+    Silence is never free space, and neither is a failure: from `slow_after_s` without a reading that tells anything the
+    arm slows, at `silent_after_s` it stands.
     """
     if not params.enabled or len(skin) == 0:
         return 1.0, ""
-    age = silence(readings, now)
+    age = now - state.heard
     oldest = float(age.max())
     if oldest <= params.slow_after_s:
         return 1.0, ""

@@ -12,13 +12,17 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.errors import SkinError
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.unit import SensorUnit
+from pretouch.sensing.unit import LARGEST_NUMBER, SensorUnit
 from pretouch.types import FloatArray, IntArray
 
 _FAR = 0.5
 """Distance from its link beyond which a unit cannot be mounted on it [m]: millimetres taken for metres, most likely."""
 
-_LARGEST = float(np.finfo(np.float64).max)
+_LARGEST_COMPONENT = 10.0
+"""Largest component of a quaternion that is looked at any further."""
+
+PAPER_SKIN = Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.toml"))
+"""The file of `paper_skin`."""
 
 
 class Skin:
@@ -46,20 +50,23 @@ class Skin:
 
 
 def _check_place(unit: SensorUnit, model: RobotModel) -> None:
-    if unit.link not in model.links:
+    links = model.links[1:]
+    if unit.link == model.links[0]:
+        raise SkinError(f"Unit {unit.id} is mounted on {unit.link!r}: choose a link of the arm, {', '.join(links)}.")
+    if unit.link not in links:
         raise SkinError(
             f"Unit {unit.id} is mounted on {unit.link!r}, which {model.description.name} does not have:"
-            f" choose from {', '.join(model.links[1:])}."
+            f" choose from {', '.join(links)}."
         )
     own = model.capsules.of_links(np.array([model.link_index(unit.link)]))
     p = unit.T_link_sensor[:3, 3]
-    height = np.inf
+    height = np.inf if len(own) else float(np.linalg.norm(p))
     for a, b, radius in zip(own.a, own.b, own.radius, strict=True):
         along = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
         height = min(height, float(np.linalg.norm(p - a - along * (b - a)) - radius))
     if height < 0:
         raise SkinError(f"Unit {unit.id} lies {-1000 * height:.1f} mm inside {unit.link}: move it out to the surface.")
-    if len(own) and height > _FAR:
+    if height > _FAR:
         raise SkinError(
             f"Unit {unit.id} lies {height:.4g} m off {unit.link}: give its position in metres, from the link's origin."
         )
@@ -73,7 +80,7 @@ def load_skin(path: Path, model: RobotModel) -> Skin:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
         raise SkinError(f"The skin file {path} is not UTF-8 text: {error.reason} at byte {error.start}.") from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # not of TOML, an integer too long, brackets too deep
         raise SkinError(f"The skin file {path} is not valid TOML: {error}.") from error
     entries = data.get("unit")
     if not isinstance(entries, list) or not entries:
@@ -103,23 +110,24 @@ def paper_skin(model: RobotModel) -> Skin:
 
     The paper does not publish its layout; this one is ours.
     """
-    return load_skin(Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.toml")), model)
+    return load_skin(PAPER_SKIN, model)
 
 
 def _unit_from(entry: Any) -> SensorUnit:
     if not isinstance(entry, dict):
-        raise SkinError(f"A unit is {entry!r}: write it as a [[unit]] table.")
+        raise SkinError(f"A unit is {_shown(entry)}: write it as a [[unit]] table.")
     name = entry.get("id")
-    if not isinstance(name, str):
-        raise SkinError(f"A unit has the id {name!r}: give each [[unit]] an id in quotes.")
+    if not isinstance(name, str) or not name.isprintable():
+        raise SkinError(f"A unit has the id {_shown(name)}: give each [[unit]] an id in quotes, printable throughout.")
     unknown = sorted(set(entry) - {"id", "link", "position_m", "quaternion_wxyz"})
     if unknown:
-        raise SkinError(f"Unit {name} has the unknown key {unknown[0]}: use id, link, position_m, quaternion_wxyz.")
+        key = unknown[0] if unknown[0].isprintable() else repr(unknown[0])
+        raise SkinError(f"Unit {name} has the unknown key {key}: use id, link, position_m, quaternion_wxyz.")
     if not isinstance(entry.get("link"), str):
-        raise SkinError(f"Unit {name} has the link {entry.get('link')!r}: give the name of a link in quotes.")
+        raise SkinError(f"Unit {name} has the link {_shown(entry.get('link'))}: give the name of a link in quotes.")
     T = np.eye(4)
-    T[:3, 3] = _numbers(entry, "position_m", 3)
-    quaternion = _numbers(entry, "quaternion_wxyz", 4)
+    T[:3, 3] = _numbers(entry, "position_m", 3, LARGEST_NUMBER)
+    quaternion = _numbers(entry, "quaternion_wxyz", 4, _LARGEST_COMPONENT)
     if abs(np.linalg.norm(quaternion) - 1) > 1e-3:
         raise SkinError(
             f"Unit {name}: quaternion_wxyz has length {np.linalg.norm(quaternion):.4f}: it must be 1 to be a rotation."
@@ -128,12 +136,23 @@ def _unit_from(entry: Any) -> SensorUnit:
     return SensorUnit(name, entry["link"], T)
 
 
-def _numbers(entry: dict[str, Any], key: str, count: int) -> FloatArray:
+def _numbers(entry: dict[str, Any], key: str, count: int, largest: float) -> FloatArray:
     value = entry.get(key)
     ok = isinstance(value, list) and len(value) == count
-    if not ok or not all(type(v) in (int, float) and abs(v) <= _LARGEST for v in value or []):
-        raise SkinError(f"Unit {entry['id']}: {key} is {value!r}: give {count} finite numbers.")
+    if not ok or not all(type(v) in (int, float) and abs(v) <= largest for v in value or []):
+        raise SkinError(
+            f"Unit {entry['id']}: {key} is {_shown(value)}:"
+            f" give {count} finite numbers, none beyond {largest:g} or -{largest:g}."
+        )
     return np.array(value, dtype=np.float64)
+
+
+def _shown(value: Any) -> str:
+    """Show a value in a message. An integer in hexadecimal may have more digits than Python writes out."""
+    try:
+        return repr(value)
+    except ValueError:
+        return "too long to show"
 
 
 def _quaternion(R: FloatArray) -> list[float]:

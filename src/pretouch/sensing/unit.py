@@ -16,6 +16,9 @@ MIN_DISTANCE = 0.04
 MAX_DISTANCE = 4.0
 """Largest distance the VL53L1X measures [m] (data sheet, paper III-A)."""
 
+LARGEST_NUMBER = 1000.0
+"""Largest number a pose may hold: any larger one is a mistake, and its square may not be finite."""
+
 
 @dataclass(frozen=True)
 class SensorUnit:
@@ -29,9 +32,11 @@ class SensorUnit:
     def __post_init__(self) -> None:
         if not self.id:
             raise SkinError("A sensor unit has an empty id: give each unit a name.")
+        if not self.id.isprintable():
+            raise SkinError(f"A sensor unit has the id {self.id!r}: use printable characters only.")
         T = np.asarray(self.T_link_sensor, dtype=np.float64)
-        if T.shape != (4, 4) or not np.all(np.isfinite(T)):
-            raise SkinError(f"Unit {self.id}: its pose holds {T.tolist()}: give a finite 4 x 4 matrix.")
+        if T.shape != (4, 4) or not np.all(np.abs(T) <= LARGEST_NUMBER):
+            raise SkinError(f"Unit {self.id}: its pose holds {T.tolist()}: give a finite 4 x 4 matrix, in metres.")
         R = T[:3, :3]
         if np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0:
             raise SkinError(

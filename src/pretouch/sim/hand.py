@@ -96,16 +96,3 @@ def point_on_arm(plant: Plant, link: int, offset: FloatArray) -> FloatArray:
     position: FloatArray = plant.mj_data.xpos[link]
     rotation: FloatArray = plant.mj_data.xmat[link].reshape(3, 3)
     return position + rotation @ offset
-
-
-def arm_distance(plant: Plant, position: FloatArray) -> float:
-    """Distance [m] of a point (3,) [m] from the arm's surface, negative inside."""
-    best = np.inf
-    for a, b, radius, link in zip(
-        plant.model.body.a, plant.model.body.b, plant.model.body.radius, plant.model.body.link, strict=True
-    ):
-        start, end = point_on_arm(plant, link, a), point_on_arm(plant, link, b)
-        axis = end - start
-        along = np.clip((position - start) @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0)
-        best = min(best, float(np.linalg.norm(position - start - along * axis)) - radius)
-    return best

@@ -1,6 +1,7 @@
 """The simulated arm behind its joint velocity interface: 1 kHz physics, joint impedance, sensors, observer."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -13,6 +14,18 @@ from pretouch.sim.scene import ArmError, SceneSpec, build
 from pretouch.types import FloatArray, RobotState
 
 _NO_FORCE = np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """The beginning of a contact of the arm, after none."""
+
+    time: float
+    """[s]"""
+    link: int
+    """Index of the link that touches."""
+    velocity: FloatArray
+    """(3,) velocity of the touching point of the link before the contact [m/s], base frame."""
 
 
 class Plant:
@@ -64,10 +77,12 @@ class Plant:
         self._bias = bias
         self._observer: ObserverState = observer_init(mass, self._qd_meas)
         self.time = 0.0
-        self.true_force = np.zeros(3)
+        self.true_force = _NO_FORCE
         """(3,) sum of the contact forces on the arm by everything else, base frame [N], at the last physics step."""
         self.true_log: list[tuple[float, FloatArray]] = []
         """(time, true_force) of every physics step so far."""
+        self.touches: list[Touch] = []
+        """Each beginning of a contact so far."""
         mujoco.mj_forward(self.mj_model, data)
 
     def before_each_step(self, call: Callable[[float], None]) -> None:
@@ -107,6 +122,7 @@ class Plant:
                 self._q, self._qd, self._q_d, self._qd_d, self._qd_set, dt, follow, self._bias, self._k, self._d,
                 tau_max, self._friction, self._applied,
             )  # fmt: skip
+            before = self._qd.copy()
             mujoco.mj_step(self.mj_model, self.mj_data)
             # the state after the step goes with the torques that led to it
             q, qd = self._q.copy(), self._qd + velocity_noise[i]
@@ -118,8 +134,19 @@ class Plant:
             self._observer = observe(self._observer, mass, self._bias, qd, sensed, p.observer_gain_1_s, dt)
             self.time += dt
             self._q_meas, self._qd_meas = q, qd
+            touched = self.true_force is not _NO_FORCE
             self.true_force = self._contact_force() if self.mj_data.ncon else _NO_FORCE
             self.true_log.append((self.time, self.true_force))
+            if self.true_force is not _NO_FORCE and not touched:
+                self.touches.append(self._touch(before))
+
+    def _touch(self, qd: FloatArray) -> Touch:
+        """Describe the first contact there is; `qd` (n,) are the joint velocities before it [rad/s]."""
+        contact = self.mj_data.contact[0]
+        geom = int(contact.geom2) if int(contact.geom2) in self._arm_geoms else int(contact.geom1)
+        link = int(self.mj_model.geom_bodyid[geom])
+        kin = self.model.kinematics(self._q)
+        return Touch(self.time, link, self.model.jacobian(kin, link, contact.pos.copy())[:3] @ qd)
 
     def _contact_force(self) -> FloatArray:
         """Sum of contact forces on the arm (3,) [N], base frame."""
