@@ -202,6 +202,18 @@ def test_a_reaction_decays_for_its_cycles_and_the_path_waits(arm: Arm):
     assert np.linalg.norm(back[-1].ee_position - back[-1].path_position) < 0.01
 
 
+def test_after_a_reaction_the_arm_returns_gently(arm: Arm):
+    arm.run(3, force=(0.0, 0.0, 50.0))
+    arm.run(199)
+    back = arm.run(500)
+    assert {s.mode for s in back} == {Mode.TRACK}
+    assert np.linalg.norm(back[0].ee_position - back[0].path_position) > 0.1
+    # 1 m/s^2 for 0.01 s
+    speeds = [0.0, *(np.linalg.norm(s.desired_velocity) for s in back)]
+    assert np.diff(speeds).max() <= 0.01 + 1e-12
+    assert max(speeds) == pytest.approx(0.3)
+
+
 def test_a_latched_arm_goes_on_only_when_a_person_resumes(arm: Arm):
     held = arm.step(change=lambda robot: replace(robot, q=robot.q * np.nan))
     assert held.mode is Mode.HOLD
@@ -215,19 +227,35 @@ def test_a_latched_arm_goes_on_only_when_a_person_resumes(arm: Arm):
 
 
 def test_a_silent_unit_first_slows_the_arm_then_stops_it_by_name(arm: Arm):
-    fine, slower = arm.step(silent={RIGHT: 0.09}), arm.step(silent={RIGHT: 0.2})
+    steps = arm.run(31, silent={RIGHT: np.inf})
+    fine, slower, held = steps[8], steps[19], steps[30]  # 0.09, 0.2 and 0.31 s after it was last heard
     assert fine.speed_scale == 1.0
     # half way from 0.1 s to 0.3 s
     assert slower.speed_scale == pytest.approx(0.5)
-    np.testing.assert_allclose(slower.desired_velocity, 0.5 * fine.desired_velocity, atol=0.005)
-    held = arm.step(silent={RIGHT: 0.31})
+    np.testing.assert_allclose(slower.desired_velocity, 0.5 * fine.desired_velocity, atol=0.01)
     assert held.mode is Mode.HOLD
+    assert held.speed_scale == 0.0
     assert "hand_right" in held.reason
     assert "hand_left" not in held.reason
     again = arm.step()
     assert again.mode is Mode.TRACK
-    # gently: the speed along the path grows from nothing
+    # gently: the speed along the path grows from nothing, and the factor as after any obstacle
     assert np.linalg.norm(again.desired_velocity) < 0.05
+    np.testing.assert_allclose([s.speed_scale for s in [again, *arm.run(3)]], np.arange(1, 5) / 200)
+
+
+def test_a_unit_heard_again_before_it_was_silent_gives_the_speed_back_slowly(arm: Arm):
+    low = arm.run(20, silent={RIGHT: np.inf})[-1].speed_scale
+    scales = [low, *(s.speed_scale for s in arm.run(210))]
+    # 0.5, then 0.5 / 200 each cycle
+    np.testing.assert_allclose(np.diff(scales)[:200], 0.5 / 200, atol=1e-9)
+    assert scales[-1] == 1.0
+
+
+def test_the_slower_of_silence_and_nearness_counts_not_their_product(arm: Arm):
+    steps = arm.run(20, seen={LEFT: 0.25}, silent={RIGHT: np.inf})
+    near = np.linalg.norm(steps[-1].obstacles.point[0] - steps[-1].ee_position) / 0.8
+    assert steps[-1].speed_scale == pytest.approx(min(near, 0.5))
 
 
 def test_without_a_force_estimate_the_arm_holds_after_a_while(arm: Arm):

@@ -64,6 +64,12 @@ class Arm:
         assert np.all(self.q <= self.limits.q_max + 1e-9)
 
 
+def circle_at_the_hand(model: RobotModel) -> Circle:
+    """A circle that begins where the hand is."""
+    x = model.kinematics(model.description.q_ready).position[model.ee]
+    return Circle((x[0], x[1] - 0.25, x[2]))
+
+
 def spoiled(inputs: Inputs, fault: str, value: float = np.nan) -> Inputs:
     """The same inputs with one thing wrong."""
     robot, readings, now = inputs.robot, inputs.readings, inputs.stamp
@@ -179,6 +185,114 @@ def test_an_arm_whose_units_were_never_heard_stands(panda_model: RobotModel, pap
         assert_at_rest(arm)
     assert step.mode is Mode.HOLD
     assert all(name in step.reason for name in paper_skin.ids)
+
+
+def one_unit_says(arm: Arm, status: RangeStatus, distance: float) -> Inputs:
+    """Unit 1 reports this at every step, the others that there is no target."""
+    inputs = arm.inputs()
+    readings = inputs.readings
+    readings.status[1], readings.distance[1] = status, distance
+    return inputs
+
+
+@pytest.mark.parametrize(
+    ("status", "distance"),
+    [
+        (RangeStatus.HARDWARE, 0.5), (RangeStatus.CROSSTALK, 0.5), (RangeStatus.SYNC, 0.5), (RangeStatus.INVALID, 0.5),
+        (RangeStatus.NONE, 0.0), (RangeStatus.OK, np.nan), (RangeStatus.OK, np.inf), (RangeStatus.OK, -1.0),
+    ],
+)  # fmt: skip
+def test_a_unit_that_only_reports_failures_is_a_silent_one(
+    panda_model: RobotModel, paper_skin: Skin, status: RangeStatus, distance: float
+):
+    arm = Arm(panda_model, paper_skin)
+    for _ in range(60):
+        arm.step(arm.inputs())
+    steps = [arm.step(one_unit_says(arm, status, distance)) for _ in range(60)]
+    # as if nothing came: slower from 0.1 s on, half way at 0.2 s, and standing at 0.3 s
+    assert [s.speed_scale for s in steps[:9]] == [1.0] * 9
+    assert steps[19].speed_scale == pytest.approx(0.5)
+    assert {s.mode for s in steps[:29]} == {Mode.TRACK}
+    assert {s.mode for s in steps[30:]} == {Mode.HOLD}
+    assert "hand_right" in steps[-1].reason
+    assert "hand_left" not in steps[-1].reason
+    assert_at_rest(arm)
+    assert arm.step(arm.inputs()).mode is Mode.TRACK
+
+
+@pytest.mark.parametrize(
+    ("status", "distance"),
+    [
+        (RangeStatus.SIGNAL, 0.5), (RangeStatus.SIGMA, 0.5), (RangeStatus.OUT_OF_BOUNDS, 0.5),
+        (RangeStatus.WRAPPED, 0.5), (RangeStatus.OK, 100.0),
+    ],
+)  # fmt: skip
+def test_a_unit_that_sees_no_target_is_well(
+    panda_model: RobotModel, paper_skin: Skin, status: RangeStatus, distance: float
+):
+    arm = Arm(panda_model, paper_skin)
+    steps = [arm.step(one_unit_says(arm, status, distance)) for _ in range(60)]
+    assert {s.mode for s in steps[10:]} == {Mode.TRACK}
+    assert {s.speed_scale for s in steps} == {1.0}
+
+
+def test_a_late_step_brakes_and_the_next_goes_on(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin)
+    for _ in range(60):
+        arm.step(arm.inputs())
+    before, arm.time = np.linalg.norm(arm.qd), arm.time + 0.06
+    late = arm.step(arm.inputs())
+    assert late.mode is Mode.HOLD
+    assert "0.070 s ago" in late.reason
+    assert np.linalg.norm(arm.qd) < before
+    assert arm.step(arm.inputs()).mode is Mode.TRACK
+
+
+def test_a_blocked_arm_brakes_and_tries_again_at_each_step(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin, HARD, circle_at_the_hand(panda_model))
+    for _ in range(100):
+        arm.step(arm.inputs())
+    steps = [arm.step(arm.inputs(0.1, RangeStatus.OK)) for _ in range(5)]
+    assert steps[0].qp.outcome is QpOutcome.INFEASIBLE
+    assert "trying again" in steps[0].reason
+    for step in steps:
+        assert (step.mode is Mode.HOLD) == (step.qp.outcome is QpOutcome.INFEASIBLE)
+    for _ in range(20):
+        last = arm.step(arm.inputs())
+    assert last.mode is Mode.TRACK
+
+
+def test_a_blocked_reaction_stays_one(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin, replace(HARD, threshold=replace(HARD.threshold, compare="raw")))
+    for _ in range(20):
+        arm.step(arm.inputs())
+    for _ in range(30):
+        step = arm.step(arm.inputs(force=np.array([0.0, 60.0, 0.0])))
+    assert step.mode is Mode.REACT
+    step = arm.step(arm.inputs(0.04, RangeStatus.OK))
+    assert step.qp.outcome is QpOutcome.INFEASIBLE
+    assert step.mode is Mode.REACT
+    assert "leaves no way" in step.reason
+    assert arm.step(arm.inputs()).mode is Mode.REACT
+
+
+def test_only_what_is_within_notice_restricts(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin)
+    inputs = arm.inputs(0.3, RangeStatus.OK)
+    inputs.readings.distance[0] = 1.5
+    step = arm.step(inputs)
+    assert len(step.restricted) == len(step.approach_limit) == len(step.qp.slack) > 0
+    # d_notice is 0.6 m
+    np.testing.assert_array_equal(step.restricted, np.flatnonzero(step.obstacles.body_distance < 0.6))
+    assert 0 in step.obstacles.unit
+    assert 0 not in step.obstacles.unit[step.restricted]
+
+
+def test_a_step_says_where_the_motion_generator_was(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin)
+    inputs = arm.inputs()
+    step = arm.step(replace(inputs, robot=replace(inputs.robot, q_commanded=arm.q + 0.01)))
+    np.testing.assert_allclose(step.q_commanded - step.q, 0.01)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

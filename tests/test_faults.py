@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.faults import Watch, examine, watch_init
+from pretouch.faults import Watch, examine, not_finite, watch_init
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.sensing.unit import MIN_DISTANCE
 from pretouch.types import Inputs, RangeReadings, RobotState
 
-PARAMS = FailureParams()  # state older than 0.05 s, no force for 0.2 s
+PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
 COMMAND = np.array([0.5, -0.2])
 READINGS = RangeReadings(np.zeros(1), np.full(1, MIN_DISTANCE), np.zeros(1, np.int64))
@@ -69,7 +69,7 @@ def test_a_number_that_is_not_finite_is_named_and_not_believed(name: str, called
 def test_a_time_stamp_that_is_not_finite_is_named(value: float):
     for wrong in (replace(inputs(), stamp=value), inputs(stamp=value), replace(inputs(), robot=robot(value))):
         believed, faults, watch = judge(wrong)
-        assert faults == {Event.NOT_FINITE: "a time stamp"}
+        assert faults == {Event.NOT_FINITE: "time stamps"}
         assert_last_state_moved_on(believed)
         assert np.isfinite(watch.stamp)
 
@@ -99,6 +99,26 @@ def test_time_that_goes_backwards_is_a_fault_once():
     # from there on time runs forwards again
     _, faults, _ = judge(inputs(4.91), watch)
     assert faults == {}
+
+
+@pytest.mark.parametrize(("gap", "overrun"), [(0.01, False), (0.049, False), (0.051, True), (0.4, True)])
+def test_a_step_too_long_after_the_last_is_an_overrun(gap: float, overrun: bool):
+    given = inputs(1.0 + gap)
+    believed, faults, watch = judge(given)
+    assert faults == ({Event.OVERRUN: f"{gap:.3f} s"} if overrun else {})
+    # the state itself is good
+    assert believed is given.robot
+    # and with the next step in time all is well
+    assert judge(inputs(1.01 + gap), watch)[1] == {}
+
+
+def test_the_first_part_that_is_not_finite_is_named():
+    wrong = np.array([np.nan, 0.0])
+    assert not_finite(robot()) == ""
+    assert not_finite(robot(np.inf)) == "time stamps"
+    assert not_finite(replace(robot(), qd=wrong, q_commanded=wrong)) == "joint velocities"
+    # a force is judged apart
+    assert not_finite(replace(robot(), wrench=np.full(6, np.nan), tau_ext=wrong)) == ""
 
 
 def test_the_same_instant_twice_is_no_fault():

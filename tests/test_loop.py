@@ -9,11 +9,12 @@ import pytest
 from pretouch import loop
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
+from pretouch.errors import RobotStateError
 from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Mode, RangeReadings, RangeStatus, RobotState
+from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
 
 DT = 0.01
 PAPER = PROFILES["paper"]
@@ -153,6 +154,108 @@ def test_an_error_between_step_and_command_keeps_the_acceleration_limits(
     with pytest.raises(ConnectionError, match="lost"):
         turn(controller, world, FakeRecorder(), never)
     assert_brought_to_rest(world)
+
+
+def test_a_command_that_was_not_sent_is_not_reckoned_with(
+    controller: Controller, world: World, monkeypatch: pytest.MonkeyPatch
+):
+    good, calls = world.read, []
+
+    def command(qd: np.ndarray) -> None:
+        calls.append(qd)
+        if len(calls) == 42:
+            raise ConnectionError("lost")
+        World.command(world, qd)
+
+    # from the 41st step on the controller brakes, and the second braking command is lost
+    monkeypatch.setattr(world, "read", lambda: replace(good(), q=np.full(7, np.nan)) if len(calls) >= 40 else good())
+    monkeypatch.setattr(world, "command", command)
+    with pytest.raises(ConnectionError, match="lost"):
+        turn(controller, world, FakeRecorder(), never)
+    assert np.abs(calls[41]).max() < np.abs(calls[40]).max() < np.abs(calls[39]).max()
+    assert_brought_to_rest(world)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize(
+    ("name", "called"),
+    [
+        ("q", "joint positions"), ("qd", "joint velocities"), ("q_commanded", "commanded joint positions"),
+        ("qd_commanded", "commanded joint velocities"), ("stamp", "time stamps"),
+    ],
+)  # fmt: skip
+def test_no_start_from_a_state_that_is_not_finite(
+    controller: Controller, world: World, monkeypatch: pytest.MonkeyPatch, name: str, called: str, value: float
+):
+    first = replace(world.read(), **{name: value if name == "stamp" else np.array([0, 0, 0, value, 0, 0, 0])})
+    monkeypatch.setattr(world, "read", lambda: first)
+    monkeypatch.setattr(world, "command", lambda qd: pytest.fail("no command is due"))
+    with pytest.raises(RobotStateError, match=f"has {called} that are not finite: check"):
+        turn(controller, world, FakeRecorder(), never)
+
+
+def frozen(robot: RobotState) -> RobotState:
+    return robot
+
+
+def gone(robot: RobotState) -> RobotState:
+    nan = np.full(7, np.nan)
+    return RobotState(np.nan, nan, nan, nan, nan, nan, None)
+
+
+def unreachable(robot: RobotState) -> RobotState:
+    raise ConnectionError("lost")
+
+
+@pytest.mark.parametrize("failure", [frozen, gone, unreachable])
+def test_the_arm_is_brought_to_rest_without_asking_where_it_is(
+    controller: Controller, world: World, monkeypatch: pytest.MonkeyPatch, failure: Callable[[RobotState], RobotState]
+):
+    state = controller.init(world.read())
+    for _ in range(50):
+        now = world.tick()
+        step, state = controller.step(state, Inputs(now, world.read(), world.skin().read()))
+        world.command(step.command)
+    last, sent = world.read(), [step.command]
+    monkeypatch.setattr(world, "read", lambda: failure(last))
+    monkeypatch.setattr(world, "command", lambda qd: (sent.append(qd), World.command(world, qd)))
+    loop.come_to_rest(controller, world, world, last.q_commanded, step.command)
+    assert_brought_to_rest(world)
+    # every command slower than the one before, and none more once the arm stands
+    assert np.all(np.diff(np.linalg.norm(sent, axis=1)) < 0)
+    assert np.any(sent[-2])
+    # again, from rest: nothing to send
+    count = len(sent)
+    loop.come_to_rest(controller, world, world, last.q_commanded, np.zeros(7))
+    assert len(sent) == count
+
+
+def test_a_robot_that_can_no_longer_be_read_is_brought_to_rest(
+    controller: Controller, world: World, monkeypatch: pytest.MonkeyPatch
+):
+    def lose(count: int) -> None:
+        if count == 50:
+            monkeypatch.setattr(world, "read", lambda: unreachable(robot))
+
+    robot = world.read()
+    with pytest.raises(ConnectionError, match="lost"):
+        turn(controller, world, FakeRecorder(on_step=lose), never)
+    assert_brought_to_rest(world)
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_a_latched_hold_goes_on_when_resume_says_so(controller: Controller, world: World, asked: bool):
+    def break_down(count: int) -> None:
+        world.broken = count == 30
+
+    recorder = FakeRecorder(on_step=break_down)
+    loop.run(
+        controller, world, world.skin(), world, recorder, lambda step: step.stamp >= 0.8,
+        resume=lambda: asked and len(recorder.steps) == 60,
+    )  # fmt: skip
+    modes = [step.mode for step in recorder.steps]
+    assert set(modes[30:60]) == {Mode.HOLD}
+    assert set(modes[60:]) == {Mode.TRACK if asked else Mode.HOLD}
 
 
 def test_stopping_in_the_middle_of_braking_keeps_the_acceleration_limits(controller: Controller, world: World):

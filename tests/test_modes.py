@@ -9,8 +9,8 @@ from pretouch.modes import TABLE, Event, ModeState, mode_init, next_mode
 from pretouch.types import Mode
 
 LATCHING = [Event.NOT_FINITE, Event.TIME_BACKWARDS, Event.STATE_STALE, Event.SOLVER_FAILED]
-PASSING = [Event.SKIN_SILENT, Event.NO_FORCE, Event.WINDOW_FILLING]
-REPORTED = [*LATCHING, Event.REACTING, Event.CONTACT, *PASSING]
+PASSING = [Event.SKIN_SILENT, Event.NO_FORCE, Event.OVERRUN, Event.WINDOW_FILLING]
+REPORTED = [*LATCHING, Event.BLOCKED, Event.REACTING, Event.CONTACT, *PASSING]
 STATES = [
     ModeState(Mode.TRACK, "before"), ModeState(Mode.REACT, "before"), ModeState(Mode.HOLD, "before"),
     ModeState(Mode.HOLD, "before", latched=True),
@@ -27,6 +27,8 @@ def expected(state: ModeState, events: dict[Event, str], resume: bool) -> tuple[
     for fault in LATCHING:  # what makes the inputs or the answer unusable comes before everything
         if fault in events:
             return Mode.HOLD, True, fault
+    if Event.BLOCKED in events and state.mode is not Mode.HOLD:  # found by a step that means to move: brakes it
+        return (Mode.HOLD if state.mode is Mode.TRACK else Mode.REACT), False, Event.BLOCKED
     if state.latched and not resume:  # only a person ends a latched hold
         return Mode.HOLD, True, None
     if state.mode is Mode.REACT:  # one reaction at a time, to its end
@@ -48,7 +50,9 @@ def test_every_set_of_events_ends_in_the_mode_the_rules_say(state: ModeState, re
         mode, latched, cause = expected(state, events, resume)
         assert (after.mode, after.latched) == (mode, latched)
         # the sentence carries the detail of its cause and of no other
-        assert [e for e in events if f"<{e.name}>" in after.reason] == ([cause] if cause else [])
+        told = [] if cause in (None, Event.BLOCKED) else [cause]
+        assert [e for e in events if f"<{e.name}>" in after.reason] == told
+        assert ("acceleration limits" in after.reason) == (cause is Event.BLOCKED)
         assert "{" not in after.reason
         if latched and cause is None:
             assert after.reason == "before"
@@ -81,11 +85,25 @@ def test_resuming_while_the_cause_is_there_holds_again(cause: Event):
     assert state.latched
 
 
-@pytest.mark.parametrize("cause", PASSING)
+@pytest.mark.parametrize("cause", [*PASSING, Event.BLOCKED])
 def test_a_passing_cause_clears_by_itself(cause: Event):
     state = next_mode(ModeState(Mode.TRACK, ""), {cause: "why"}, resume=False)
     assert state.mode is Mode.HOLD
     assert next_mode(state, {}, resume=False).mode is Mode.TRACK
+
+
+def test_a_blocked_reaction_goes_on():
+    state = next_mode(ModeState(Mode.REACT, ""), {Event.BLOCKED: "", Event.REACTING: "1.20 s"}, resume=False)
+    assert state.mode is Mode.REACT
+    assert "contact" in state.reason
+    assert "braking" in state.reason
+    state = next_mode(state, {Event.REACTING: "1.19 s"}, resume=False)
+    assert (state.mode, state.reason) == (Mode.REACT, "Moving with a contact: 1.19 s left.")
+
+
+def test_an_overrun_says_how_long_it_was():
+    state = next_mode(ModeState(Mode.TRACK, ""), {Event.OVERRUN: "0.080 s"}, resume=False)
+    assert "The step before this one was 0.080 s ago: braking" in state.reason
 
 
 def test_after_a_reaction_the_arm_follows_its_path_again():

@@ -6,9 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from pretouch.control.joint_box import brake, joint_box
-from pretouch.controller import Controller, ControllerState
+from pretouch.controller import Controller
 from pretouch.ports import Clock, Recorder, Robot, Skin
-from pretouch.types import ControlStep, Inputs
+from pretouch.types import ControlStep, FloatArray, Inputs
 
 _REST_CYCLES = 100
 """Cycles within which any arm comes to rest: a Panda's slowest joint needs 0.29 s, 29 cycles at 100 Hz."""
@@ -51,24 +51,33 @@ def run(
     `resume` says whether a person now asks to leave a latched HOLD.
     """
     state = controller.init(robot.read())
+    sent = state.command
     try:
         while True:
             now = clock.tick()
             step, state = controller.step(state, Inputs(now, robot.read(), skin.read(), resume()))
             robot.command(step.command)
+            sent = step.command
             recorder.record(step)
             if done(step):
                 return
     finally:
-        come_to_rest(controller, robot, clock, state)
+        come_to_rest(controller, robot, clock, state.watch.robot.q_commanded, sent)
 
 
-def come_to_rest(controller: Controller, robot: Robot, clock: Clock, last: ControllerState) -> None:
+def come_to_rest(controller: Controller, robot: Robot, clock: Clock, q: FloatArray, qd: FloatArray) -> None:
     """Command the arm from its last command to rest, within its limits.
 
     Where the arm is by then is reckoned from the commands: the robot's state may be what ended the loop.
+
+    Args:
+        controller: for the limits and the period.
+        robot: to command.
+        clock: one tick for each command.
+        q: (n,) joint positions the motion generator was last known to be at [rad].
+        qd: (n,) joint velocities sent last [rad/s].
     """
-    q, qd, period = last.watch.robot.q_commanded, last.command, controller.limits.period
+    period = controller.limits.period
     for _ in range(_REST_CYCLES):
         if not np.any(qd):
             return

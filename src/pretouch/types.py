@@ -191,7 +191,7 @@ class ControlStep:
     desired_velocity: FloatArray
     """(3,) end-effector velocity asked of the QP [m/s]."""
     speed_scale: float
-    """Factor of eqs. 3 and 4 times that of units falling silent, in [0, 1]."""
+    """Factor on the velocity along the path in [0, 1]: eq. 3 or that of units falling silent, faded by eq. 4."""
     range_distance: FloatArray
     """(K,) distances of the readings used [m], NaN where the unit reported no target."""
     obstacles: Obstacles

@@ -82,6 +82,13 @@ def test_beside_the_path_the_task_returns_by_numbers():
     np.testing.assert_allclose(velocity, [0, -0.1, 0.1], atol=1e-12)
 
 
+def test_the_way_back_is_no_faster_than_the_speed_allowed_by_now():
+    # the same with 0.02 m/s allowed: forward 0.02 * (1 - 0.05 / 0.1) = 0.01, back 0.1; clipped from 0.1005 to 0.02
+    velocity = follow(LINE, PathState(0.25, 0.02), np.array([0.4, 0.25, 0.45]), PARAMS)
+    np.testing.assert_allclose(velocity, np.array([0, -0.01, 0.1]) * 0.02 / np.hypot(0.01, 0.1), atol=1e-12)
+    np.testing.assert_array_equal(follow(LINE, PathState(0.25, 0.0), np.array([0.4, 0.25, 0.45]), PARAMS), 0.0)
+
+
 def test_far_off_the_path_the_arm_only_returns_at_the_task_speed():
     velocity = follow(LINE, PathState(0.25, 0.3), np.array([0.9, 0.25, 0.5]), PARAMS)
     np.testing.assert_allclose(velocity, [-0.3, 0, 0], atol=1e-12)
@@ -89,9 +96,9 @@ def test_far_off_the_path_the_arm_only_returns_at_the_task_speed():
 
 @given(arrays(np.float64, 3, elements=st.floats(-2, 2)), st.floats(0, 10), st.floats(0, 0.3))
 @settings(deadline=None, derandomize=True, max_examples=200)
-def test_the_task_is_never_faster_than_asked(position: np.ndarray, phase: float, speed: float):
+def test_the_task_is_never_faster_than_allowed_by_now(position: np.ndarray, phase: float, speed: float):
     velocity = follow(CIRCLE, PathState(phase, speed), position, PARAMS)
-    assert np.linalg.norm(velocity) <= PARAMS.speed_m_s * (1 + 1e-12)
+    assert np.linalg.norm(velocity) <= speed * (1 + 1e-12)
 
 
 def test_the_phase_moves_by_what_was_achieved_along_the_path():

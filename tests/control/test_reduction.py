@@ -1,4 +1,4 @@
-"""Eqs. 3 and 4 by numbers, and that the speed never jumps up when a reading comes back."""
+"""Eqs. 3 and 4 by numbers, and that the speed never jumps up, whatever is lost from view or seen again."""
 
 from itertools import pairwise
 
@@ -13,13 +13,18 @@ from pretouch.params import ReductionParams
 SHORT = ReductionParams(d_max_m=0.8, l_max_cycles=4)
 
 
-def scales(distances: list[float], params: ReductionParams = SHORT) -> list[float]:
-    """Factor on the speed for a sequence of nearest distances [m], infinite where none is seen."""
+def faded(fresh: list[float], params: ReductionParams = SHORT) -> list[float]:
+    """Factor on the speed for a sequence of fresh factors."""
     state, out = ReductionState(), []
-    for distance in distances:
-        scale, state = reduce_speed(state, distance, params)
+    for factor in fresh:
+        scale, state = reduce_speed(state, factor, params)
         out.append(scale)
     return out
+
+
+def scales(distances: list[float], params: ReductionParams = SHORT) -> list[float]:
+    """Factor on the speed for a sequence of nearest distances [m], infinite where none is seen."""
+    return faded([speed_scale(d, params.d_max_m) for d in distances], params)
 
 
 @pytest.mark.parametrize(
@@ -61,6 +66,25 @@ def test_an_object_leaving_beyond_d_max_fades_too():
     np.testing.assert_allclose(scales([0.4, 0.9, 0.9]), [0.5, 0.625, 0.75])
 
 
+def test_a_farther_object_left_in_view_does_not_speed_up():
+    # 0.2 m is lost while 0.72 m stays: 0.25, then a quarter of the missing 0.75 each cycle, up to 0.72 / 0.8 = 0.9
+    np.testing.assert_allclose(scales([0.2, 0.72, 0.72, 0.72, 0.72, 0.72]), [0.25, 0.4375, 0.625, 0.8125, 0.9, 0.9])
+
+
+def test_a_retreat_faster_than_the_fading_is_followed_by_the_fading():
+    # 0.1 + 0.9 / 4 = 0.325 < 0.5; then 0.55 > 0.5, which holds; from there 0.5 + 0.5 / 4 = 0.625 < 0.75
+    np.testing.assert_allclose(scales([0.08, 0.4, 0.4, 0.4, 0.6]), [0.1, 0.325, 0.5, 0.5, 0.625])
+
+
+def test_a_slow_retreat_is_followed_at_once():
+    # 0.44 / 0.8 = 0.55 is less than the fading 0.625, and 0.48 / 0.8 = 0.6 less than 0.55 + 0.45 / 4
+    np.testing.assert_allclose(scales([0.4, 0.44, 0.48]), [0.5, 0.55, 0.6])
+
+
+def test_a_silent_unit_heard_again_fades_from_nothing():
+    np.testing.assert_allclose(faded([0.5, 0.0, 1.0, 1.0, 1.0, 1.0]), [0.5, 0.0, 0.25, 0.5, 0.75, 1.0])
+
+
 def test_flicker_never_beats_steady_sight():
     # every second reading lost: the factor stays below one fading cycle above the true one
     out = scales([0.4, np.inf] * 20)
@@ -72,12 +96,19 @@ readings = st.lists(st.one_of(st.just(np.inf), st.floats(0.0, 1.2)), min_size=2,
 
 @given(readings)
 @settings(deadline=None, derandomize=True, max_examples=300)
-def test_after_a_loss_the_factor_rises_no_faster_than_the_fading(distances: list[float]):
+def test_the_factor_rises_no_faster_than_the_fading(distances: list[float]):
     out = scales(distances)
     assert all(0.0 <= scale <= 1.0 for scale in out)
-    for (before, after), seen_before in zip(pairwise(out), distances, strict=False):
-        if not seen_before < SHORT.d_max_m:
-            assert after <= before + 1 / SHORT.l_max_cycles + 1e-12
+    for before, after in pairwise([1.0, *out]):
+        assert after <= before + (1 - min(out)) / SHORT.l_max_cycles + 1e-12
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=30))
+@settings(deadline=None, derandomize=True, max_examples=300)
+def test_each_factor_is_the_fresh_one_or_on_its_way_up_to_it(fresh: list[float]):
+    out = faded(fresh)
+    for (before, after), factor in zip(pairwise([1.0, *out]), fresh, strict=True):
+        assert after == factor or before <= after < factor
 
 
 @given(readings)
@@ -95,7 +126,7 @@ def test_fading_is_monotone(distance: float):
     assert out[-1] == 1.0
 
 
-def test_a_distance_that_is_no_number_leaves_a_usable_factor():
+def test_a_factor_that_is_no_number_leaves_a_usable_factor():
     scale, state = reduce_speed(ReductionState(0.5, 2), np.nan, SHORT)
     # 0.5 + 0.5 * 3 / 4: as if nothing were seen
     assert scale == 0.875

@@ -9,8 +9,8 @@ from tests.experiments.limits import assert_within_limits
 
 ROW = {
     "experiment", "trajectory", "side", "profile", "restrictions", "stiffness_n_per_m", "seed", "contact",
-    "touched_link", "impact_speed_m_s", "detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n", "peak_estimate_n",
-    "true_peak_20ms_n", "true_peak_n", "false_detections", "held",
+    "touched_link", "impact_speed_m_s", "detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n",
+    "peak_estimate_n", "true_peak_20ms_n", "true_peak_n", "false_detections", "held",
 }  # fmt: skip
 
 

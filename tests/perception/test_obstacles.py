@@ -6,11 +6,11 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from pretouch.perception.obstacles import (
+    is_evidence,
     is_fresh,
     locate,
     measured_distance,
     sensor_poses,
-    silence,
     track,
     track_init,
 )
@@ -19,6 +19,9 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import RangeReadings, RangeStatus
 
 INF, NAN = np.inf, np.nan
+SHOWN = [RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED]
+NEAR = [RangeStatus.MIN_RANGE, RangeStatus.MIN_CLIPPED]
+NO_TARGET = [RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED]
 anything = st.floats(allow_nan=True, allow_infinity=True)
 
 
@@ -27,9 +30,9 @@ def _readings(stamp, distance=0.5, status=RangeStatus.OK) -> RangeReadings:
     return RangeReadings(stamp, np.full(len(stamp), distance), np.full(len(stamp), status, dtype=np.int64))
 
 
-def _take(state, stamp, now, x=1.0, shows=True):
+def _take(state, stamp, now, x=1.0, shows=True, tells=True):
     """One reading of one unit that shows something at (x, 0, 0)."""
-    return track(state, _readings(stamp), np.array([[x, 0.0, 0.0]]), np.array([shows]), now, 0.06)
+    return track(state, _readings(stamp), np.array([[x, 0.0, 0.0]]), np.array([shows]), np.array([tells]), now, 0.06)
 
 
 # Eq. 1
@@ -86,27 +89,54 @@ def test_an_empty_skin_has_no_poses(panda_model):
 # What a reading stands for
 
 
-@pytest.mark.parametrize("status", [s for s in RangeStatus if s is not RangeStatus.OK])
+@pytest.mark.parametrize("status", [s for s in RangeStatus if s not in SHOWN])
 def test_only_good_and_too_near_readings_show_a_target(status):
-    near = status in (RangeStatus.MIN_RANGE, RangeStatus.MIN_CLIPPED)
     for distance in (0.5, 0.0, NAN, INF, -1.0):
         (shown,) = measured_distance(_readings(0.0, distance, status))
-        np.testing.assert_equal(shown, 0.04 if near else NAN)
+        np.testing.assert_equal(shown, 0.04 if status in NEAR else NAN)
 
 
+@pytest.mark.parametrize("status", SHOWN)
 @pytest.mark.parametrize(
     ("distance", "shown"),
     [(0.5, 0.5), (4.0, 4.0), (0.04, 0.04), (0.01, 0.04), (0.0, 0.04)]
     + [(impossible, NAN) for impossible in (-0.01, 4.1, 65.535, 1e300, INF, NAN)],
 )
-def test_a_good_reading_is_taken_within_what_the_sensor_can_measure(distance, shown):
-    np.testing.assert_equal(measured_distance(_readings(0.0, distance)), [shown])
+def test_a_good_reading_is_taken_within_what_the_sensor_can_measure(distance, shown, status):
+    np.testing.assert_equal(measured_distance(_readings(0.0, distance, status)), [shown])
 
 
 @given(distance=anything, status=st.integers(-1, 300))
 def test_whatever_arrives_is_a_distance_or_nothing(distance, status):
     (shown,) = measured_distance(_readings(0.0, distance, status))
     assert np.isnan(shown) or 0.04 <= shown <= 4.0
+
+
+# Which readings tell anything
+
+
+def _tells(status, distance) -> bool:
+    readings = _readings(0.0, distance, status)
+    (tells,) = is_evidence(readings, measured_distance(readings))
+    return bool(tells)
+
+
+@pytest.mark.parametrize("status", [*RangeStatus, -1, 8, 300])
+def test_a_target_tells_and_so_does_its_absence_but_no_failure(status):
+    assert _tells(status, 0.5) == (status in SHOWN + NEAR + NO_TARGET)
+    assert _tells(status, NAN) == (status in NEAR + NO_TARGET)
+
+
+@given(distance=anything, status=st.integers(-1, 300))
+def test_without_a_distance_only_a_missing_or_far_target_tells(distance, status):
+    (shown,) = measured_distance(_readings(0.0, distance, status))
+    far = status in SHOWN and 4.0 < distance < INF
+    assert _tells(status, distance) == (not np.isnan(shown) or far or status in NO_TARGET)
+
+
+def test_an_open_hall_is_not_a_failure():
+    assert _tells(RangeStatus.OK, 4.1)
+    assert not _tells(RangeStatus.OK, -0.1)
 
 
 # How long a point is kept
@@ -131,7 +161,8 @@ def test_a_reading_that_is_not_newer_changes_nothing(late):
     state = _take(track_init(1), 10.0, now=10.0)
     again = _take(state, late, now=10.01, x=2.0)
     np.testing.assert_array_equal(again.point, state.point)
-    np.testing.assert_array_equal([again.seen, again.used], [state.seen, state.used])
+    for part in ("seen", "used", "heard"):
+        np.testing.assert_array_equal(getattr(again, part), getattr(state, part))
 
 
 def test_an_older_miss_does_not_hide_behind_a_newer_hit():
@@ -142,60 +173,59 @@ def test_an_older_miss_does_not_hide_behind_a_newer_hit():
 
 def test_a_reading_from_the_future_waits_until_its_time():
     state = _take(track_init(1), 10.02, now=10.0)
-    assert state.seen == state.used == -INF
-    assert _take(state, 10.02, now=10.02).seen == 10.02
+    assert state.seen == state.used == state.heard == -INF
+    state = _take(state, 10.02, now=10.02)
+    assert state.seen == state.used == state.heard == 10.02
 
 
 def test_a_reading_that_comes_too_late_is_used_up_but_shows_nothing():
     state = _take(track_init(1), 10.0, now=10.07)
-    assert (state.used, state.seen) == (10.0, -INF)
+    assert (state.used, state.heard, state.seen) == (10.0, 10.0, -INF)
     assert np.isnan(state.point).all()
 
 
 def test_units_are_kept_apart():
-    points = np.array([[1.0, 0, 0], [2.0, 0, 0], [3.0, 0, 0]])
-    shows = np.array([True, False, True])
-    state = track(track_init(3), _readings([1.0, 1.0, -INF]), points, shows, 1.0, 0.06)
-    np.testing.assert_array_equal(state.point, [[1, 0, 0], [NAN] * 3, [NAN] * 3])
-    np.testing.assert_array_equal(state.seen, [1, -INF, -INF])
-    np.testing.assert_array_equal(state.used, [1, 1, -INF])
+    points = np.array([[1.0, 0, 0], [2.0, 0, 0], [3.0, 0, 0], [4.0, 0, 0]])
+    shows, tells = np.array([True, False, False, True]), np.array([True, True, False, True])
+    state = track(track_init(4), _readings([1.0, 1.0, 1.0, -INF]), points, shows, tells, 1.0, 0.06)
+    np.testing.assert_array_equal(state.point, [[1, 0, 0], [NAN] * 3, [NAN] * 3, [NAN] * 3])
+    np.testing.assert_array_equal(state.seen, [1, -INF, -INF, -INF])
+    np.testing.assert_array_equal(state.heard, [1, 1, -INF, -INF])
+    np.testing.assert_array_equal(state.used, [1, 1, 1, -INF])
+
+
+def test_a_failure_is_used_up_but_the_unit_is_not_heard():
+    state = _take(_take(track_init(1), 10.0, now=10.0), 10.02, now=10.02, shows=False, tells=False)
+    assert (state.used, state.heard, state.seen) == (10.02, 10.0, 10.0)
+    state = _take(state, 10.04, now=10.05, shows=False)
+    assert (state.used, state.heard, state.seen) == (10.04, 10.04, 10.0)
 
 
 @given(
     messages=st.lists(
-        st.tuples(st.integers(0, 30) | st.sampled_from([NAN, INF, -INF]), st.booleans()), min_size=1, max_size=12
+        st.tuples(
+            st.integers(0, 30) | st.sampled_from([NAN, INF, -INF]),
+            st.sampled_from([(True, True), (False, True), (False, False)]),
+        ),
+        min_size=1,
+        max_size=12,
     )
 )
 def test_a_track_holds_what_was_really_shown(messages):
     state, before = track_init(1), -INF
-    for tick, (at, shows) in enumerate(messages):
+    for tick, (at, (shows, tells)) in enumerate(messages):
         now, stamp = 0.02 * tick, 0.02 * at
-        state = _take(state, stamp, now, x=stamp, shows=shows)  # the point tells its stamp
+        state = _take(state, stamp, now, x=stamp, shows=shows, tells=tells)  # the point tells its stamp
         assert before <= state.used[0] <= now
-        assert state.seen[0] <= state.used[0]
+        assert state.seen[0] <= state.heard[0] <= state.used[0]
         before = state.used[0]
         if state.seen[0] > -INF:
             assert state.point[0, 0] == state.seen[0]
-            assert any(shown and 0.02 * a == state.seen[0] for a, shown in messages[: tick + 1])
+            assert any(shown and 0.02 * a == state.seen[0] for a, (shown, _) in messages[: tick + 1])
+        if state.heard[0] > -INF:
+            assert any(told and 0.02 * a == state.heard[0] for a, (_, told) in messages[: tick + 1])
 
 
 def test_an_unheard_unit_is_not_fresh():
     state = track_init(4)
     np.testing.assert_array_equal(is_fresh(state, _readings([-INF, NAN, INF, 0.0]), 0.0), [False, False, False, True])
-
-
-# Silence
-
-
-def test_silence_is_the_age_of_the_newest_message():
-    ages = silence(_readings([9.5, 10.0, -INF]), 10.0)
-    np.testing.assert_array_equal(ages, [0.5, 0.0, INF])
-
-
-@pytest.mark.parametrize(("stamp", "now"), [(10.001, 10.0), (NAN, 10.0), (INF, 10.0), (10.0, NAN)])
-def test_a_stamp_that_cannot_be_is_silence(stamp, now):
-    assert silence(_readings(stamp), now) == INF
-
-
-def test_a_status_without_target_is_not_silence():
-    assert silence(_readings(9.9, NAN, RangeStatus.SIGNAL), 10.0) == pytest.approx(0.1)

@@ -227,12 +227,21 @@ def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
 
 # Silent units
 
+FAILURES = [RangeStatus.HARDWARE, RangeStatus.CROSSTALK, RangeStatus.SYNC, RangeStatus.INVALID, RangeStatus.NONE]
+NO_TARGET = [RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED]
 
-def _heard(watcher, age: float) -> RangeReadings:
-    everyone = dict.fromkeys(watcher.skin.ids, 0.5)
-    heard = watcher.readings(10.0, **everyone)
-    heard.stamp[watcher.skin.ids.index("wrist_front")] = 10.0 - age
-    return heard
+
+def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, distance=0.5, ahead=0.0) -> tuple[float, str]:
+    """All units report at 50 Hz after `start`, wrist_front in its own way, its clock ahead by a time [s]."""
+    unit = watcher.skin.ids.index("wrist_front")
+    now = start
+    for tick in range(round(duration / 0.02)):
+        now = start + 0.02 * (tick + 1)
+        readings = watcher.readings(now, **dict.fromkeys(watcher.skin.ids, 0.5))
+        readings.stamp[unit] += ahead
+        readings.distance[unit], readings.status[unit] = distance, status
+        watcher.take(readings, now)
+    return silent_units(watcher.skin, watcher.state, now, PARAMS)
 
 
 @pytest.mark.parametrize(
@@ -241,28 +250,69 @@ def _heard(watcher, age: float) -> RangeReadings:
     + [(age, 0.0, "wrist_front") for age in (np.inf, -0.01, np.nan)],
 )
 def test_a_unit_that_falls_silent_slows_the_arm_and_is_named(watcher, age, factor, names):
-    left, silent = silent_units(watcher.skin, _heard(watcher, age), 10.0, PARAMS)
+    heard = watcher.readings(10.0, **dict.fromkeys(watcher.skin.ids, 0.5))
+    heard.stamp[watcher.skin.ids.index("wrist_front")] = 10.0 - age
+    watcher.take(heard, 10.0)
+    left, silent = silent_units(watcher.skin, watcher.state, 10.0, PARAMS)
     assert left == pytest.approx(factor)
     assert silent == names
 
 
 def test_all_units_never_heard_are_named(watcher):
-    left, silent = silent_units(watcher.skin, watcher.readings(0.0), 10.0, PARAMS)
+    watcher.take(watcher.readings(0.0), 10.0)
+    left, silent = silent_units(watcher.skin, watcher.state, 10.0, PARAMS)
     assert left == 0.0
     assert silent == ", ".join(watcher.skin.ids)
 
 
+@pytest.mark.parametrize(("status", "distance"), [(s, 0.5) for s in [*FAILURES, 8, 300]] + [(RangeStatus.OK, np.nan)])
+def test_a_unit_that_only_fails_slows_the_arm_and_is_named(watcher, status, distance):
+    assert _go_on(watcher, 9.0) == (1.0, "")
+    left, silent = _go_on(watcher, 9.4, 0.2, status, distance)
+    assert left == pytest.approx(0.5)
+    assert silent == ""
+    assert _go_on(watcher, 9.6, 0.2, status, distance) == (0.0, "wrist_front")
+
+
+@pytest.mark.parametrize("status", [s for s in RangeStatus if s not in FAILURES])
+def test_a_unit_that_sees_something_or_nothing_is_well(watcher, status):
+    assert _go_on(watcher, 9.0, status=status, distance=0.5) == (1.0, "")
+
+
+@pytest.mark.parametrize("status", NO_TARGET)
+def test_a_unit_without_target_is_well_whatever_the_distance(watcher, status):
+    assert _go_on(watcher, 9.0, status=status, distance=np.nan) == (1.0, "")
+
+
+@pytest.mark.parametrize("ahead", [0.001, 1.0, np.inf, np.nan])
+def test_a_unit_whose_clock_is_ahead_is_named(watcher, ahead):
+    _go_on(watcher, 9.0)
+    assert _go_on(watcher, 9.4, ahead=ahead) == (0.0, "wrist_front")
+
+
+@pytest.mark.parametrize("status", [RangeStatus.OK, RangeStatus.MIN_RANGE, *NO_TARGET])
+def test_a_unit_recovers_when_it_tells_again(watcher, status):
+    assert _go_on(watcher, 9.0, status=RangeStatus.HARDWARE) == (0.0, "wrist_front")
+    assert _go_on(watcher, 9.4, ahead=0.5) == (0.0, "wrist_front")
+    assert _go_on(watcher, 9.8, 0.02, status) == (1.0, "")
+
+
+def test_a_failure_now_and_then_is_no_silence(watcher):
+    for cycle in range(10):
+        _go_on(watcher, 9.0 + 0.1 * cycle, 0.02)
+        assert _go_on(watcher, 9.02 + 0.1 * cycle, 0.08, RangeStatus.SYNC) == (1.0, "")
+
+
 @given(ages=st.lists(st.floats(-0.1, 0.5), min_size=7, max_size=7))
-def test_the_arm_stands_exactly_when_a_unit_is_named(paper_skin, ages):
-    heard = RangeReadings(10.0 - np.array(ages), np.ones(7), np.zeros(7, np.int64))
-    left, silent = silent_units(paper_skin, heard, 10.0, PARAMS)
+def test_the_arm_stands_exactly_when_a_unit_is_named(panda_model, paper_skin, ages):
+    watcher = _Watcher(panda_model, paper_skin)
+    watcher.take(RangeReadings(10.0 - np.array(ages), np.ones(7), np.zeros(7, np.int64)), 10.0)
+    left, silent = silent_units(paper_skin, watcher.state, 10.0, PARAMS)
     assert 0.0 <= left <= 1.0
     assert (left == 0.0) == bool(silent)
     assert left == 1.0 or max(ages) > 0.0999 or min(ages) < 0.0
 
 
 def test_without_proximity_no_unit_is_missed(panda_model, watcher):
-    nothing = watcher.readings(0.0)
-    assert silent_units(watcher.skin, nothing, 10.0, PerceptionParams(enabled=False)) == (1.0, "")
-    bare = Skin([], panda_model)
-    assert silent_units(bare, RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64)), 10.0, PARAMS) == (1.0, "")
+    assert silent_units(watcher.skin, watcher.state, 10.0, PerceptionParams(enabled=False)) == (1.0, "")
+    assert silent_units(Skin([], panda_model), track_init(0), 10.0, PARAMS) == (1.0, "")

@@ -1,14 +1,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
-import mujoco
 import numpy as np
 import pytest
 
-from pretouch.sim.hand import Hand, HandGoal, arm_distance, point_on_arm
+from pretouch.sim.hand import Hand, HandGoal, point_on_arm
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import FloatArray
 
 FREE = (1.2, 0.0, 0.8)
@@ -158,11 +158,71 @@ def test_a_point_on_the_arm_moves_with_its_link(panda_model, plant_with_hand):
     assert point_on_arm(plant, link, offset) == pytest.approx(expected, abs=1e-5)
 
 
-@pytest.mark.parametrize("start", [FREE, (0.3, 0.2, 0.5), (0.1, -0.2, 0.75), (-0.3, 0.1, 0.6), (0.31, 0.0, 0.72)])
-def test_the_distance_to_the_arm_is_that_of_the_physics(panda_model, plant_with_hand, start):
-    plant = plant_with_hand(start)
-    built, data = plant.mj_model, plant.mj_data
-    ball = built.geom("hand")
-    arm = [g for g, b in enumerate(built.geom_bodyid) if b < len(panda_model.links) and panda_model.moved_by[b].any()]
-    nearest = min(mujoco.mj_geomDistance(built, data, ball.id, g, 5.0, None) for g in arm)
-    assert arm_distance(plant, np.array(start)) == pytest.approx(nearest + ball.size[0], abs=1e-6)
+# Touches
+
+
+def touched(plant: Plant) -> list[str]:
+    return [plant.model.links[touch.link] for touch in plant.touches]
+
+
+def lower(plant: Plant, speed: float) -> None:
+    """Let the end-effector go straight down [m/s]."""
+    model = plant.model
+    J = model.ee_jacobian(model.kinematics(model.description.q_ready))
+    plant.command(np.linalg.pinv(J) @ [0, 0, -speed, 0, 0, 0])
+
+
+def test_a_push_is_one_touch_and_the_next_one_after_letting_go_another(plant_with_hand):
+    plant = plant_with_hand((0.3069, 0.0, 0.4082))
+    up, down = np.array([0.3069, 0.0, 0.5]), np.array([0.3069, 0.0, 0.3])
+    Hand(plant, Script(lambda time: down if 1.0 < time < 2.0 else up, 30.0), speed_max=0.1)
+    plant.advance(0.19)
+    assert plant.touches == []
+    plant.advance(0.81)
+    assert touched(plant) == ["panda_hand"]
+    assert plant.touches[0].time == pytest.approx(0.2, abs=0.02)  # 2 cm at 0.1 m/s
+    assert np.abs(plant.touches[0].velocity).max() < 1e-3  # the arm stood, before the hand came
+    plant.advance(2.0)
+    assert touched(plant) == ["panda_hand", "panda_hand"]
+    forces = [(time, force.any()) for time, force in plant.true_log]
+    begins = [time for (_, before), (time, now) in pairwise(forces) if now and not before]
+    assert [touch.time for touch in plant.touches] == begins
+
+
+def test_an_arm_that_comes_down_on_a_hand_closes_downwards(plant_with_hand):
+    start = (0.3069, 0.0, 0.4082)
+    Hand(plant := plant_with_hand(start), Script(stay(start)), speed_max=0.1)
+    lower(plant, 0.1)
+    plant.advance(0.4)
+    assert touched(plant) == ["panda_hand"]
+    assert plant.touches[0].velocity == pytest.approx([0.0, 0.0, -0.1], abs=0.01)
+    assert plant.true_force[2] > 0.0, "the hand does not push back"
+
+
+def test_an_arm_that_comes_down_on_a_box_closes_downwards(panda_model):
+    table = Box("table", (0.3069, 0.0, 0.4182), (0.1, 0.1, 0.02), 10_000.0)
+    plant = Plant(panda_model, SceneSpec(boxes=(table,)), PlantParams(), panda_model.description.q_ready, 0)
+    lower(plant, 0.1)
+    plant.advance(0.5)
+    assert touched(plant) == ["panda_hand"]
+    assert plant.touches[0].time == pytest.approx(0.4, abs=0.02)
+    assert plant.touches[0].velocity == pytest.approx([0.0, 0.0, -0.1], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("start", "link"), [((0.3069, 0.18, 0.5595), "panda_hand"), ((0.15, 0.15, 0.62), "panda_link5")]
+)
+def test_a_touch_has_the_velocity_of_the_point_that_touches(plant_with_hand, start, link):
+    Hand(plant := plant_with_hand(start), Script(stay(start)))
+    plant.command(0.3 * np.eye(7)[0])
+    plant.advance(0.5)
+    assert touched(plant)[0] == link
+    around = 0.3 * np.array([-start[1], start[0], 0.0])  # at the middle of the hand, 5 cm from its surface
+    assert np.linalg.norm(plant.touches[0].velocity - around) < 0.3 * 0.055
+
+
+def test_without_a_hand_in_the_way_nothing_is_touched(plant_with_hand):
+    Hand(plant := plant_with_hand(FREE), Script(stay(FREE)))
+    lower(plant, 0.1)
+    plant.advance(0.5)
+    assert plant.touches == []

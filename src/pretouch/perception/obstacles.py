@@ -75,12 +75,14 @@ def measured_distance(readings: RangeReadings) -> FloatArray:
 
 
 def is_evidence(readings: RangeReadings, distance: FloatArray) -> BoolArray:
-    """Say which readings (K,) tell anything: that a target is there, or that none returns enough light.
+    """Say which readings (K,) tell anything: that a target is there, or that none near returns enough light.
 
-    A failure (hardware, synchronisation, cross-talk, no measurement yet, a distance that is no number) tells nothing,
-    and is no more free space than silence is. `distance` is what `measured_distance` makes of the readings.
+    A failure (hardware, synchronisation, cross-talk, no measurement yet, a distance that is negative or no number)
+    tells nothing, and is no more free space than silence is. A target beyond what the sensor can measure is far away.
+    `distance` is what `measured_distance` makes of the readings.
     """
-    return np.isfinite(distance) | np.isin(readings.status, _NO_TARGET)
+    far = np.isin(readings.status, _SHOWN) & (readings.distance > MAX_DISTANCE) & np.isfinite(readings.distance)
+    return np.isfinite(distance) | far | np.isin(readings.status, _NO_TARGET)
 
 
 _SHOWN = tuple(int(s) for s in (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED))
