@@ -1,0 +1,57 @@
+"""A simulated Panda with seven sensor units follows a circle, and a board stands in its way. Prints what the arm does.
+
+    python examples/simulated_arm.py
+
+Put in your own skin with `load_skin(Path("my_skin.toml"), model)`, your own path with `WayPoints`, your own parameters
+with `dataclasses.replace`.
+"""
+
+from dataclasses import replace
+
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
+from pretouch.experiments.posture import brought_to
+from pretouch.loop import run
+from pretouch.params import RestrictionParams, profile
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import paper_skin
+from pretouch.sim.plant import Plant, PlantClock
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import Box, SceneSpec, fixtures
+from pretouch.types import ControlStep
+
+
+class Narrator:
+    """A recorder that tells when the arm changes its mode."""
+
+    def __init__(self) -> None:
+        self._told = ""
+
+    def record(self, step: ControlStep) -> None:
+        """Print a step that begins a new mode."""
+        told = step.mode.value
+        if told != self._told:
+            self._told = told
+            print(f"{step.stamp:6.2f} s  {step.mode.value:5}  speed x {step.speed_scale:.2f}  {step.reason}")
+
+
+def main() -> None:
+    """Run twelve seconds."""
+    model = RobotModel(panda())
+    path = Circle()
+    # with its restrictions the arm would never touch the board; take them away to see it anticipate and react
+    settings = replace(profile("paper"), restriction=RestrictionParams(mode="off"))
+    board = Box("board", center=(0.62, -0.27, 0.5), half_size=(0.15, 0.02, 0.12), stiffness=25_000.0)
+    room = SceneSpec(boxes=(board,))
+    arm = Plant(model, room, PlantParams(), brought_to(model, path.point(0.0)), seed=1)
+    skin = paper_skin(model)
+    units = RangeFinders(arm, skin, RangeFinderParams(), seed=1)
+    controller = Controller(model, skin, fixtures(room), path, settings)
+    clock = PlantClock(arm, settings.task.control_period_s)
+    run(controller, arm, units, clock, Narrator(), lambda step: step.stamp > 12.0)
+
+
+if __name__ == "__main__":
+    main()
