@@ -17,6 +17,8 @@ def trial(context):
 def test_three_pushes_are_felt_and_answered_the_way_they_went(trial):
     row, _ = trial
     assert row["contact"] is True
+    assert row["detection_delay_s"] == pytest.approx(np.median([c["delay_s"] for c in row["contacts"]]), abs=2e-4)
+    assert 5 < row["filtered_at_detection_n"] < row["raw_at_detection_n"] < row["peak_estimate_n"] + 5
     assert len(row["contacts"]) == 3
     for contact in row["contacts"]:
         assert set(contact) == CONTACT

@@ -86,7 +86,8 @@ def wrench_from_torques(
     Solves tau_ext = J^T F for F in the frame of the Jacobian (6, n). Returns None where the smallest singular
     value of J is below the given one: there a robot's interface has no estimate.
     """
-    if np.linalg.svd(jacobian, compute_uv=False)[-1] < smallest_singular_value:
+    # the eigenvalues of J J^T are the squared singular values of J; those that vanish may come out below zero
+    squares, vectors = np.linalg.eigh(jacobian @ jacobian.T)
+    if squares[0] < smallest_singular_value**2 or squares[0] <= 0:
         return None
-    gram = jacobian @ jacobian.T + damping**2 * np.eye(6)
-    return np.asarray(np.linalg.solve(gram, jacobian @ tau_ext))
+    return np.asarray(vectors @ ((vectors.T @ (jacobian @ tau_ext)) / (squares + damping**2)))

@@ -66,11 +66,14 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
     row = {
         "experiment": NAME,
         "trajectory": "circle",
+        "side": None,
         "profile": cell.profile,
         "restrictions": profile.restriction.mode,
         "stiffness_n_per_m": hand.stiffness,
         "seed": seed,
         "contact": bool(spans),
+        "impact_speed_m_s": None,
+        **_at_detection(reactions, spans),
         "contacts": [
             _contact(record, reactions, push, touched)
             for push, touched in zip(person.pushes, [*person.contacts, *missing], strict=True)
@@ -82,6 +85,19 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "held": record.held(),
     }
     return row, record
+
+
+def _at_detection(reactions: list[ControlStep], spans: list[tuple[float, float]]) -> dict[str, float | None]:
+    """Medians over the pushes that were felt: delay [s], and norms of the filtered and the raw estimate [N]."""
+    felt = [(s, next((a for a, b in spans if a <= s.stamp <= b + _NOTICE_S), None)) for s in reactions]
+    rows = [
+        (s.stamp - touch, float(np.linalg.norm(s.filtered_force)), float(np.linalg.norm(s.force)))
+        for s, touch in felt
+        if touch is not None
+    ]
+    names = ("detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n")
+    medians = np.median(np.array(rows), axis=0).tolist() if rows else [None] * len(names)
+    return {name: None if v is None else rounded(v, 4) for name, v in zip(names, medians, strict=True)}
 
 
 def _touched_estimate(record: Record, spans: list[tuple[float, float]]) -> FloatArray:

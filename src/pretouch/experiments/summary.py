@@ -90,7 +90,7 @@ def _fraction(flags: Iterable[bool]) -> float:
 
 
 def _key(row: Row) -> tuple[tuple[str, str], ...]:
-    return tuple((name, row[name]) for name in (*_PLACE, "profile", "restrictions") if name in row)
+    return tuple((name, row[name]) for name in (*_PLACE, "profile", "restrictions") if row.get(name) is not None)
 
 
 def _unique(keys: Iterable[Any]) -> list[Any]:

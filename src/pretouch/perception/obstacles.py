@@ -81,14 +81,24 @@ def is_evidence(readings: RangeReadings, distance: FloatArray) -> BoolArray:
     tells nothing, and is no more free space than silence is. A target beyond what the sensor can measure is far away.
     `distance` is what `measured_distance` makes of the readings.
     """
-    far = np.isin(readings.status, _SHOWN) & (readings.distance > MAX_DISTANCE) & np.isfinite(readings.distance)
-    return np.isfinite(distance) | far | np.isin(readings.status, _NO_TARGET)
+    return _tells(readings.distance, readings.status, distance)
 
 
 _SHOWN = tuple(int(s) for s in (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED))
 _NEAR = (int(RangeStatus.MIN_RANGE), int(RangeStatus.MIN_CLIPPED))
-_NO_TARGET = [int(s) for s in (RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED)]
+_NO_TARGET = tuple(
+    int(s) for s in (RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED)
+)
 """Statuses of a sensor at work that sees nothing near: too little light, too noisy, or beyond its range."""
+
+
+@njit(cache=True)
+def _tells(distance: FloatArray, status: IntArray, shown: FloatArray) -> BoolArray:
+    tells = np.isfinite(shown)
+    for k in range(len(status)):
+        far = status[k] in _SHOWN and np.isfinite(distance[k]) and distance[k] > MAX_DISTANCE
+        tells[k] = tells[k] or far or status[k] in _NO_TARGET
+    return tells
 
 
 @njit(cache=True)

@@ -82,14 +82,14 @@ class RangeFinders:
         self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
         count = len(skin)
         self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
-        self._due = self._rng.uniform(0, self._mode.period_s, count)
+        self._due: list[float] = self._rng.uniform(0, self._mode.period_s, count).tolist()
         self._arriving: list[tuple[float, int, float, float, int]] = []
         self._stamp = np.full(count, -np.inf)
         self._distance = np.zeros(count)
         self._status = np.full(count, RangeStatus.NONE, dtype=np.int64)
         self.silenced: set[int] = set()
         """Indices of units that no longer send."""
-        self._next_due = float(self._due.min(initial=np.inf))
+        self._next_due = min(self._due, default=np.inf)
         plant.before_each_step(self._sample)
 
     def read(self) -> RangeReadings:
@@ -104,14 +104,16 @@ class RangeFinders:
         if time < self._next_due:
             return
         p, rng = self._params, self._rng
-        for unit in np.flatnonzero(self._due <= time):
-            self._due[unit] += self._mode.period_s * (1.0 + p.period_jitter * rng.standard_normal())
-            distance, status = self._measure(int(unit))
+        for unit, due in enumerate(self._due):
+            if due > time:
+                continue
+            self._due[unit] = due + self._mode.period_s * (1.0 + p.period_jitter * rng.standard_normal())
+            distance, status = self._measure(unit)
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
-            lost = rng.uniform() < p.dropout
+            lost = rng.random() < p.dropout
             if not lost and unit not in self.silenced:
-                heapq.heappush(self._arriving, (arrival, int(unit), time, distance, status))
-        self._next_due = float(self._due.min())
+                heapq.heappush(self._arriving, (arrival, unit, time, distance, status))
+        self._next_due = min(self._due)
 
     def _measure(self, unit: int) -> tuple[float, int]:
         p, link = self._params, int(self._skin.link[unit])
