@@ -46,7 +46,10 @@ class Hand:
         self._plant, self._script, self._speed = plant, script, speed_max
         self._k, self._d = stiffness, damping
         body = plant.mj_model.body("hand")
-        self._dof = int(plant.mj_model.body_dofadr[body.id])
+        dof, data = int(plant.mj_model.body_dofadr[body.id]), plant.mj_data
+        # views into the simulation's memory, taken once
+        self._offset, self._velocity = data.qpos[dof : dof + 3], data.qvel[dof : dof + 3]
+        self._force = data.qfrc_applied[dof : dof + 3]
         self._home = np.array(body.pos)
         self._goal = self._home.copy()
         plant.before_each_step(self._drive)
@@ -54,20 +57,20 @@ class Hand:
     @property
     def position(self) -> FloatArray:
         """Position of the hand (3,) [m], base frame."""
-        return self._home + self._plant.mj_data.qpos[self._dof : self._dof + 3]
+        return self._home + self._offset
 
     @property
     def velocity(self) -> FloatArray:
         """Velocity of the hand (3,) [m/s]."""
-        return self._plant.mj_data.qvel[self._dof : self._dof + 3].copy()
+        return self._velocity.copy()
 
     def _drive(self, time: float) -> None:
-        goal = self._script.goal(time, self.position, self._plant)
-        self._goal, force = _spring(
-            self._goal, goal.position, self._speed, self.position, self.velocity, self._k, self._d, goal.force_max,
+        position = self.position
+        goal = self._script.goal(time, position, self._plant)
+        self._goal, self._force[:] = _spring(
+            self._goal, goal.position, self._speed, position, self._velocity, self._k, self._d, goal.force_max,
             self._plant.params.period_s,
         )  # fmt: skip
-        self._plant.mj_data.qfrc_applied[self._dof : self._dof + 3] = force
 
 
 @njit(cache=True)
@@ -93,6 +96,4 @@ def _shortened(vector: FloatArray, length: float) -> FloatArray:
 
 def point_on_arm(plant: Plant, link: int, offset: FloatArray) -> FloatArray:
     """Where a point fixed to a link, `offset` (3,) [m] in its frame, is now (3,) [m], base frame."""
-    position: FloatArray = plant.mj_data.xpos[link]
-    rotation: FloatArray = plant.mj_data.xmat[link].reshape(3, 3)
-    return position + rotation @ offset
+    return plant.link_position[link] + plant.link_rotation[link] @ offset

@@ -64,6 +64,8 @@ class Plant:
         # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
         self._q, self._qd, self._qdd = data.qpos[:n], data.qvel[:n], data.qacc[:n]
         self._applied = data.qfrc_applied[:n]
+        self.link_position, self.link_rotation = data.xpos, data.xmat.reshape(-1, 3, 3)
+        """(L', 3) origins [m] and (L', 3, 3) orientations of the links, then of whatever else moves; base frame."""
         self._q[:] = q
         mujoco.mj_forward(self.mj_model, data)
         mass, bias = self.model.mass_matrix_and_bias(q, np.zeros(n), np.zeros(n))
