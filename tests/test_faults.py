@@ -126,7 +126,9 @@ def test_the_same_instant_twice_is_no_fault():
     assert judge(inputs(5.0), watch)[1] == {}
 
 
-@pytest.mark.parametrize("wrench", [None, np.array([0, np.nan, 0, 0, 0, 0]), np.full(6, np.inf)])
+@pytest.mark.parametrize(
+    "wrench", [None, np.array([0, np.nan, 0, 0, 0, 0]), np.full(6, np.inf), np.array([0, 0, -1e150, 0, 0, 0])]
+)
 def test_a_missing_wrench_is_a_fault_only_after_a_while(wrench: np.ndarray | None):
     watch = watch_init(robot())
     for i in range(1, 31):

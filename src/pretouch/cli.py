@@ -149,7 +149,9 @@ def _run(parts: list[tuple["Request", Path]], folder: Path, json_file: Path) -> 
     except BaseException:
         try:
             done = len(_keep(parts, json_file)["trials"])
-            said = f"Stopped: the {done} finished trials are in {json_file}; the same command goes on."
+            said = (
+                f"Stopped: the {done} finished trials are in {json_file}; the same command with --out {folder} goes on."
+            )
         except PretouchError as error:
             said = str(error)
         print(said, file=sys.stderr)

@@ -57,7 +57,8 @@ def examine(
         last = watch.robot
         believed = replace(last, q_commanded=last.q_commanded + command * period, qd_commanded=command, wrench=None)
         return believed, faults, Watch(stamp, believed, min(watch.force_stamp, stamp))
-    if robot.wrench is not None and not np.isfinite(robot.wrench).all():
+    # a comparison with NaN is false, so numbers that are not finite are refused too
+    if robot.wrench is not None and not (np.abs(robot.wrench) < params.force_max_n).all():
         robot = replace(robot, wrench=None)
     force_stamp = min(watch.force_stamp, stamp) if robot.wrench is None else stamp
     if stamp - watch.stamp > params.overrun_s:

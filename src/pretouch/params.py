@@ -222,6 +222,9 @@ class FailureParams(Checked):
     """Age of the robot state at which the arm holds [s]."""
     overrun_s: Positive = 0.05
     """Time between two steps from which the later one brakes [s]: a command is meant to be held for one period."""
+    force_max_n: Positive = 1e5
+    """Wrench component from which an estimate is no estimate [N, Nm]: far more than any arm survives. Let in, it would
+    spoil the window's sums."""
     force_timeout_s: Positive = 0.2
     """Time without a force estimate after which the arm holds [s]."""
 

@@ -180,7 +180,10 @@ def _play_with(monkeypatch, result):
 @pytest.mark.parametrize(
     ("error", "words"),
     [
-        (BrokenProcessPool("a process ended"), "A worker process was killed.*the same command goes on"),
+        (
+            BrokenProcessPool("a process ended"),
+            "A worker process was killed.*the same command with the same --out goes on",
+        ),
         (OSError(28, "No space left on device"), r"failed with results .*\(No space left on device\).* goes on"),
     ],
 )

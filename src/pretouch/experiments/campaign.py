@@ -197,12 +197,12 @@ def _failure_said(out: Path) -> Iterator[None]:
         yield
     except BrokenProcessPool as error:
         raise ExperimentError(
-            "A worker process was killed, for want of memory perhaps: the same command goes on with what is missing."
+            "A worker process was killed, for want of memory perhaps: the same command with the same --out goes on."
         ) from error
     except OSError as error:
         raise ExperimentError(
             f"A worker process failed with results for {out} ({error.strerror or error}): remove the cause, and the"
-            " same command goes on with what is missing."
+            " same command with the same --out goes on."
         ) from error
 
 
