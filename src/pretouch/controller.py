@@ -99,9 +99,8 @@ class Controller:
 
         # how fast: eqs. 3-4 on the path, or eq. 12
         nearest = float(obstacles.ee_distance.min(initial=np.inf))
-        scale, reduction = reduce_speed(
-            state.reduction, min(heard, speed_scale(nearest, p.reduction.d_max_m)), p.reduction
-        )
+        slowed = speed_scale(nearest, p.reduction.d_max_m) if p.reduction.enabled else 1.0
+        scale, reduction = reduce_speed(state.reduction, min(heard, slowed), p.reduction)
         if mode.mode is Mode.REACT:
             desired = reaction.decayed(react, p.reaction)
         else:

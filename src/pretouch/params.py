@@ -4,7 +4,7 @@ A profile is a frozen set of them. `replace(profile, ...)` of the standard libra
 """
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from numbers import Integral, Real
 from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 
@@ -65,6 +65,8 @@ class PerceptionParams(Checked):
 
     enabled: bool = True
     """Whether proximity is used at all; `blind` switches it off."""
+    filter_views: bool = True
+    """Whether readings that show the arm itself or a fixture are left out; off, they count as obstacles."""
     persistence_s: Positive = 0.06
     """How long a sensed point is kept after the measurement that showed it [s]: two missed readings at 50 Hz."""
     self_margin_m: NonNegative = 0.06
@@ -123,6 +125,8 @@ class TaskParams(Checked):
 class ReductionParams(Checked):
     """Slowing the end-effector (eqs. 3-4)."""
 
+    enabled: bool = True
+    """Whether what is near slows the arm. A unit that falls silent slows it in any case."""
     d_max_m: Positive = 0.8
     """Distance from the end-effector origin within which an obstacle slows the arm [m] (Table I)."""
     l_max_cycles: PositiveCount = 200
@@ -244,20 +248,76 @@ class Profile(Checked):
     failure: FailureParams = field(default_factory=FailureParams)
 
 
+_PAPER = Profile()
+
 PROFILES: dict[str, Profile] = {
-    "paper": Profile(),
+    "paper": _PAPER,
     "blind": Profile(
         name="blind",
         perception=PerceptionParams(enabled=False),
         restriction=RestrictionParams(mode="off"),
     ),
+    "slowing-only": replace(_PAPER, name="slowing-only", threshold=ThresholdParams(f_d_n=0.0)),
+    "thresholds-only": replace(_PAPER, name="thresholds-only", reduction=ReductionParams(enabled=False)),
+    "paper-0.5m": replace(
+        _PAPER,
+        name="paper-0.5m",
+        reduction=ReductionParams(d_max_m=0.5),
+        restriction=RestrictionParams(d_notice_m=0.5),
+        threshold=ThresholdParams(d_max_m=0.5),
+    ),
 }
-"""`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0."""
+"""`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0.
+`slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity each (restrictions are apart from
+both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
+text (section V-C)."""
 
 
 def profile(name: str) -> Profile:
-    """Look a profile up by name; an unknown one is a ParameterError that lists those there are."""
+    """Look a profile up: by its name, or as `NAME:GROUP.FIELD=VALUE:...`, that profile with some parameters changed.
+
+    `paper:threshold.window_samples=500:reduction.enabled=no`, for example. Raises ParameterError for a profile, group
+    or field there is not, naming those there are, and for a value the field does not allow.
+    """
+    base, *changes = name.split(":")
     try:
-        return PROFILES[name]
+        found = PROFILES[base]
     except KeyError:
-        raise ParameterError(f"The profile {name!r} is unknown: choose from {', '.join(PROFILES)}.") from None
+        raise ParameterError(f"The profile {base!r} is unknown: choose from {', '.join(PROFILES)}.") from None
+    for change in changes:
+        found = _changed(found, change)
+    return replace(found, name=name)
+
+
+def _changed(profile: Profile, change: str) -> Profile:
+    """Change one parameter, given as GROUP.FIELD=VALUE."""
+    where, given, text = change.partition("=")
+    group, _, name = where.partition(".")
+    if not given:
+        raise ParameterError(f"The change {change!r} has no value: write GROUP.FIELD=VALUE.")
+    groups = [f.name for f in fields(Profile) if f.name != "name"]
+    if group not in groups:
+        raise ParameterError(f"The group {group!r} of {change!r} is unknown: choose from {', '.join(groups)}.")
+    params = getattr(profile, group)
+    known = [f.name for f in fields(params)]
+    if name not in known:
+        raise ParameterError(f"The parameter {where!r} is unknown: choose from {', '.join(known)}.")
+    return replace(profile, **{group: replace(params, **{name: _read(where, text, getattr(params, name))})})
+
+
+_WORDS = {"yes": True, "true": True, "no": False, "false": False}
+
+
+def _read(where: str, text: str, now: object) -> object:
+    """Read a value of the kind the parameter has now."""
+    if isinstance(now, bool):
+        if text not in _WORDS:
+            raise ParameterError(f"{where} is {text!r}: write yes or no.")
+        return _WORDS[text]
+    if not isinstance(now, Real):
+        return text
+    try:
+        return int(text) if isinstance(now, Integral) else float(text)
+    except ValueError:
+        kind = "a whole number" if isinstance(now, Integral) else "a number"
+        raise ParameterError(f"{where} is {text!r}: write {kind}.") from None

@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.experiments.cell import Cell, Context
+from pretouch.experiments.cell import Cell, Context, Grid
+from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import rounded
 from pretouch.experiments.pushes import Visit, Visitor
+from pretouch.experiments.summary import avoidance_summary
+from pretouch.experiments.tables import avoidance_tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.perception.closest import closest_points
@@ -25,9 +28,12 @@ the free circle: beside is 3 cm clear of it, inside half of the person's hand is
 _SPREAD_M = 0.03
 
 
-def cells(profiles: tuple[str, ...]) -> list[Cell]:
-    """A cell for each place of the hand and each profile."""
-    return [Cell(NAME, profile, {"place": place}) for place, profile in product(PLACES_M, profiles)]
+def cells(grid: Grid) -> list[Cell]:
+    """A cell for each place of the hand and each controller."""
+    return [
+        Cell(NAME, profile, {"place": place, "restrictions": restrictions})
+        for place, (profile, restrictions) in product(PLACES_M, grid.controllers(DEFAULT_RESTRICTIONS))
+    ]
 
 
 def visits(place: str, seed: int) -> tuple[Visit, ...]:
@@ -41,16 +47,15 @@ def visits(place: str, seed: int) -> tuple[Visit, ...]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
-    profile = context.profile(cell.profile, DEFAULT_RESTRICTIONS)
     hand = HandSpec()
     setup = Setup(
         model=context.model,
         skin=context.skin,
-        profile=profile,
+        profile=context.profile(cell),
         scene=SceneSpec(hand=hand),
         path=Circle(),
         seed=seed,
-        hand=Visitor(context.model, visits(cell.where["place"], seed)),
+        hand=Visitor(context.model, visits(str(cell.where["place"]), seed)),
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     steps = record.steps
@@ -59,7 +64,6 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "experiment": NAME,
         **cell.where,
         "profile": cell.profile,
-        "restrictions": profile.restriction.mode,
         "seed": seed,
         "contact": record.first_contact() is not None,
         "true_peak_n": rounded(float(np.linalg.norm(record.true_force, axis=1).max())),
@@ -87,3 +91,19 @@ def _least_gap(record: Record, context: Context, radius: float) -> float:
         nearest = closest_points(kin, model.body, step.ee_position, unit, hand[None], aside)
         gaps.append(float(nearest.body_distance[0]) - radius)
     return min(gaps)
+
+
+def _draw(sources: Sources) -> list[Picture]:
+    from pretouch.experiments.figures import avoidance_figure
+
+    for cell in sources.summary["cells"]:
+        if cell["place"] == "beside" and cell["profile"] != "blind":
+            where = {"place": "beside", "restrictions": cell["restrictions"]}
+            trace = sources.trace(Cell(NAME, cell["profile"], where))
+            if trace is not None:
+                figure = avoidance_figure(trace, cell["profile"])
+                return [Picture("avoidance", "End-effector path with a hand beside it", figure)]
+    return []
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, avoidance_summary, avoidance_tables, _draw)

@@ -13,20 +13,17 @@ from hashlib import sha256
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from threading import Thread
-from types import ModuleType
 from typing import Any, cast, get_args
 
 from pretouch import __version__
 from pretouch.errors import ExperimentError, SkinError
-from pretouch.experiments import avoidance, dynamic, static
-from pretouch.experiments.cell import Cell, Context
+from pretouch.experiments.cell import Cell, Context, Grid
+from pretouch.experiments.registry import EXPERIMENTS
 from pretouch.experiments.trace import save_trace, trace_of
 from pretouch.params import Orientation, RestrictionMode, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
-
-EXPERIMENTS: dict[str, ModuleType] = {m.NAME: m for m in (static, avoidance, dynamic)}
 
 
 @dataclass(frozen=True)
@@ -36,12 +33,12 @@ class Request:
     experiments: tuple[str, ...]
     seeds: int
     profiles: tuple[str, ...] = ("blind", "paper")
-    restrictions: str | None = None
-    """Restriction mode, or None for each experiment's own."""
+    restrictions: tuple[str, ...] = ()
+    """Restriction modes; none: each experiment's own."""
     orientation: str | None = None
     """Whether the hand's orientation is free or held, or None for the profile's own."""
-    stiffness: float = 25_000.0
-    """Contact stiffness of static objects [N/m]."""
+    stiffness: tuple[float, ...] = (25_000.0,)
+    """Contact stiffnesses of static objects [N/m]."""
     skin: str | None = None
     """Skin file, or None for the seven units of the paper's experiment."""
 
@@ -56,27 +53,32 @@ class Request:
             raise ExperimentError(f"The profiles are {','.join(self.profiles) or 'none'}: name each wanted one once.")
         for name in self.profiles:
             profile(name)
-        choices: tuple[tuple[str, str | None, tuple[str, ...]], ...] = (
-            ("restriction mode", self.restrictions, get_args(RestrictionMode)),
-            ("orientation", self.orientation, get_args(Orientation)),
-        )
-        for what, choice, allowed in choices:
-            if choice is not None and choice not in allowed:
-                raise ExperimentError(f"The {what} {choice!r} is unknown: choose from {', '.join(allowed)}.")
-        if not 100.0 <= self.stiffness <= 1e6:
-            raise ExperimentError(f"The stiffness is {self.stiffness:g} N/m: give one from 100 to 1000000 N/m.")
+        for mode in self.restrictions:
+            _check_choice("restriction mode", mode, get_args(RestrictionMode))
+        if self.orientation is not None:
+            _check_choice("orientation", self.orientation, get_args(Orientation))
+        for stiffness in self.stiffness:
+            if not 100.0 <= stiffness <= 1e6:
+                raise ExperimentError(f"The stiffness is {stiffness:g} N/m: give one from 100 to 1000000 N/m.")
+        if not self.stiffness:
+            raise ExperimentError("No stiffness is given: name at least one, in N/m.")
 
     def context(self) -> Context:
         """Load what all trials share."""
         model = RobotModel(panda())
         skin = load_skin(Path(self.skin), model) if self.skin else paper_skin(model)
-        restrictions = cast(RestrictionMode | None, self.restrictions)
-        return Context(model, skin, self.stiffness, restrictions, cast(Orientation | None, self.orientation))
+        return Context(model, skin, cast(Orientation | None, self.orientation))
 
     def tasks(self) -> list[tuple[Cell, int]]:
         """Every trial, seed by seed, so that a stopped run has some of each cell."""
-        cells = [cell for name in self.experiments for cell in EXPERIMENTS[name].cells(self.profiles)]
+        grid = Grid(self.profiles, cast(tuple[RestrictionMode, ...], self.restrictions), self.stiffness)
+        cells = [cell for name in self.experiments for cell in EXPERIMENTS[name].cells(grid)]
         return [(cell, seed) for seed in range(self.seeds) for cell in cells]
+
+
+def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:
+    if choice not in allowed:
+        raise ExperimentError(f"The {what} {choice!r} is unknown: choose from {', '.join(allowed)}.")
 
 
 def open_folder(request: Request, out: Path) -> None:
@@ -103,7 +105,7 @@ def _fingerprints(request: Request) -> dict[str, str]:
         digests = {"the skin file has": sha256(path.read_bytes()).hexdigest()}
     except OSError as error:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
-    for name in request.profiles:
+    for name in dict.fromkeys(cell.profile for cell, _ in request.tasks()):
         parameters = json.dumps(asdict(profile(name)), sort_keys=True, default=repr)
         digests[f"the parameters of profile {name} have"] = sha256(parameters.encode()).hexdigest()
     return digests
@@ -151,27 +153,51 @@ def write_json(value: Any, path: Path) -> None:
         raise
 
 
-def run_campaign(request: Request, out: Path, progress: Callable[[int, int], None]) -> None:
-    """Run all trials that have no result yet, on all processors; `progress(done, total)` after each.
+@dataclass(frozen=True)
+class Progress:
+    """How far a campaign is."""
+
+    done: int
+    """Trials that are finished."""
+    total: int
+    cost_done: float
+    """Simulated time of those trials, about [s]."""
+    cost_total: float
+
+
+def progress_of(request: Request, out: Path) -> Progress:
+    """How far a campaign in a folder is."""
+    tasks = request.tasks()
+    missing = [task for task in tasks if _row(out, *task) is None]
+    total = sum(_cost(cell) for cell, _ in tasks)
+    return Progress(len(tasks) - len(missing), len(tasks), total - sum(_cost(cell) for cell, _ in missing), total)
+
+
+def _cost(cell: Cell) -> float:
+    return EXPERIMENTS[cell.experiment].cost(cell)
+
+
+def run_campaign(request: Request, out: Path, progress: Callable[[float], None]) -> None:
+    """Run all trials that have no result yet, on all processors; `progress(cost)` after each, with its cost.
 
     However it ends, the results of finished trials stay.
     """
     request.context()  # a bad skin is refused here, before any process starts
     open_folder(request, out)
-    tasks = request.tasks()
-    missing = [task for task in tasks if _row(out, *task) is None]
-    progress(len(tasks) - len(missing), len(tasks))
+    missing = [task for task in request.tasks() if _row(out, *task) is None]
     if not missing:
         return
+    # the long ones first, so that no processor waits for one at the end
+    missing.sort(key=lambda task: (task[1], -_cost(task[0])))
     workers = min(len(missing), os.cpu_count() or 1)
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
     try:
         with _interrupt_held_back(), _failure_said(out):
-            futures = [pool.submit(_work, request, out, cell, seed) for cell, seed in missing]
-        for done, future in enumerate(as_completed(futures), start=len(tasks) - len(missing) + 1):
+            futures = {pool.submit(_work, request, out, cell, seed): _cost(cell) for cell, seed in missing}
+        for future in as_completed(futures):
             with _failure_said(out):
                 future.result()
-            progress(done, len(tasks))
+            progress(futures[future])
     except BaseException:
         for process in active_children():
             process.terminate()
@@ -227,7 +253,7 @@ def _row(out: Path, cell: Cell, seed: int) -> dict[str, Any] | None:
         row = _object(trial_file(out, cell, seed))
     except (OSError, _Damaged):
         return None
-    its_own = {"experiment": cell.experiment, "profile": cell.profile, "seed": seed}
+    its_own = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
     return row if all(row.get(key) == value for key, value in its_own.items()) else None
 
 
@@ -253,6 +279,6 @@ def _context(request: Request) -> Context:
 def _work(request: Request, out: Path, cell: Cell, seed: int) -> None:
     """Run one trial in a worker process and keep its results; the course of the first seed too, for figures."""
     row, record = EXPERIMENTS[cell.experiment].trial(cell, seed, _context(request))
-    if seed == 0:
+    if seed == 0 and record is not None:
         save_trace(trace_of(record), trace_file(out, cell, seed))
     write_json(row, trial_file(out, cell, seed))

@@ -1,6 +1,8 @@
 """What tells one trial from another, and what all trials of a run share."""
 
-from dataclasses import dataclass, replace
+import re
+from dataclasses import dataclass, field, replace
+from typing import cast
 
 from pretouch.params import Orientation, Profile, RestrictionMode, profile
 from pretouch.robot.model import RobotModel
@@ -10,19 +12,39 @@ _SAFE = {"-y": "minus-y", "+y": "plus-y"}
 
 
 @dataclass(frozen=True)
+class Grid:
+    """What a run varies: each experiment makes its cells of that part of it which concerns it."""
+
+    profiles: tuple[str, ...]
+    restrictions: tuple[RestrictionMode, ...] = ()
+    """Restriction modes; none: each experiment's own."""
+    stiffness: tuple[float, ...] = (25_000.0,)
+    """Contact stiffnesses of static objects [N/m]."""
+
+    def controllers(self, restrictions: RestrictionMode) -> list[tuple[str, str]]:
+        """Profiles with restriction modes; `restrictions` is the experiment's own. Without proximity it is `off`."""
+        pairs = [
+            (name, mode if profile(name).perception.enabled else "off")
+            for name in self.profiles
+            for mode in self.restrictions or (restrictions,)
+        ]
+        return list(dict.fromkeys(pairs))
+
+
+@dataclass(frozen=True)
 class Cell:
     """One cell of an experiment's table: all its trials differ by their seed only."""
 
     experiment: str
     profile: str
-    where: dict[str, str]
+    where: dict[str, str | float] = field(default_factory=dict)
     """What else tells the cell from the others, in the order of the table."""
 
     @property
     def name(self) -> str:
         """Name for files: safe characters only."""
-        safe = [_SAFE.get(value, value) for value in self.where.values()]
-        return "_".join([self.experiment, *safe, self.profile])
+        parts = [f"{value:g}" if isinstance(value, float) else _SAFE.get(value, value) for value in self.where.values()]
+        return "_".join(re.sub(r"[^A-Za-z0-9.]", "-", part) for part in [self.experiment, *parts, self.profile])
 
 
 @dataclass(frozen=True)
@@ -31,19 +53,13 @@ class Context:
 
     model: RobotModel
     skin: Skin
-    stiffness: float
-    """Contact stiffness of static objects [N/m]."""
-    restrictions: RestrictionMode | None
-    """Restriction mode for all experiments, or None for each experiment's own."""
     orientation: Orientation | None = None
     """Whether the hand's orientation is free or held, or None for the profile's own."""
 
-    def profile(self, name: str, restrictions: RestrictionMode) -> Profile:
-        """Return a profile by name, as this run has it; `restrictions` is the experiment's own mode.
-
-        Without proximity there is nothing to restrict.
-        """
-        found = profile(name)
-        if found.perception.enabled:
-            found = replace(found, restriction=replace(found.restriction, mode=self.restrictions or restrictions))
+    def profile(self, cell: Cell) -> Profile:
+        """Return a cell's profile with the restriction mode of the cell, if it names one, as this run has it."""
+        found = profile(cell.profile)
+        if "restrictions" in cell.where:
+            mode = cast(RestrictionMode, cell.where["restrictions"])
+            found = replace(found, restriction=replace(found.restriction, mode=mode))
         return replace(found, task=replace(found.task, orientation=self.orientation or found.task.orientation))

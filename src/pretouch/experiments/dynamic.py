@@ -5,11 +5,14 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.experiments.cell import Cell, Context
+from pretouch.experiments.cell import Cell, Context, Grid
+from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import angle_deg, mean_over, peak, rounded
 from pretouch.experiments.pushes import Push, Pusher
+from pretouch.experiments.summary import dynamic_summary
+from pretouch.experiments.tables import dynamic_tables
 from pretouch.experiments.trial import Record, Setup, play
-from pretouch.params import RestrictionMode
+from pretouch.params import RestrictionMode, profile
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray
 
@@ -30,9 +33,12 @@ _REBOUND_S = 3.0
 """A later reaction up to this long after the release is the push's echo [s]."""
 
 
-def cells(profiles: tuple[str, ...]) -> list[Cell]:
-    """One cell for each profile."""
-    return [Cell(NAME, profile, {}) for profile in profiles]
+def cells(grid: Grid) -> list[Cell]:
+    """One cell for each controller."""
+    return [
+        Cell(NAME, profile, {"restrictions": restrictions})
+        for profile, restrictions in grid.controllers(DEFAULT_RESTRICTIONS)
+    ]
 
 
 def pushes(seed: int) -> tuple[Push, ...]:
@@ -48,12 +54,11 @@ def pushes(seed: int) -> tuple[Push, ...]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
-    profile = context.profile(cell.profile, DEFAULT_RESTRICTIONS)
     person, hand = Pusher(context.model, pushes(seed)), HandSpec()
     setup = Setup(
         model=context.model,
         skin=context.skin,
-        profile=profile,
+        profile=context.profile(cell),
         scene=SceneSpec(hand=hand),
         path=Circle(),
         seed=seed,
@@ -68,7 +73,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "trajectory": "circle",
         "side": None,
         "profile": cell.profile,
-        "restrictions": profile.restriction.mode,
+        **cell.where,
         "stiffness_n_per_m": hand.stiffness,
         "seed": seed,
         "contact": bool(spans),
@@ -139,3 +144,19 @@ def _mean_force(record: Record, start: float, end: float) -> FloatArray:
     """Mean true force (3,) [N] between two instants [s]."""
     during = (record.true_time >= start) & (record.true_time <= end)
     return np.asarray(record.true_force[during].mean(axis=0))
+
+
+def _draw(sources: Sources) -> list[Picture]:
+    from pretouch.experiments.figures import dynamic_figure
+
+    for cell in sources.summary["cells"]:
+        if cell["profile"] != "blind":
+            trace = sources.trace(Cell(NAME, cell["profile"], {"restrictions": cell["restrictions"]}))
+            if trace is not None:
+                activation = profile(cell["profile"]).reduction.d_max_m
+                figure = dynamic_figure(trace, sources.units, activation, cell["profile"])
+                return [Picture("dynamic", "Distances, force with thresholds, velocity over thirty seconds", figure)]
+    return []
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, dynamic_summary, dynamic_tables, _draw)

@@ -1,17 +1,16 @@
 """Figures of the three experiments, in the manner of the paper's, from the traces of single trials."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.experiments.static import SIDES, TRAJECTORIES
 from pretouch.experiments.trace import Trace
 from pretouch.types import BoolArray, FloatArray
 
 _BLIND, _SENSING = "tab:blue", "tab:red"
+_TRAJECTORIES, _SIDES = ("circle", "line"), ("-y", "+y")
 _AXES = "xyz"
 _SLOWED = 0.99
 _OFF_PATH_M = 0.01
@@ -24,8 +23,8 @@ def static_figure(traces: Mapping[tuple[str, str, str], Trace], profile: str) ->
     """
     figure = Figure(figsize=(10, 6.4), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    for row, trajectory in enumerate(TRAJECTORIES):
-        for column, side in enumerate(SIDES):
+    for row, trajectory in enumerate(_TRAJECTORIES):
+        for column, side in enumerate(_SIDES):
             axes: Axes = panels[row, column]
             for name, colour, style in (("blind", _BLIND, "--"), (profile, _SENSING, "-")):
                 trace = traces.get((trajectory, side, name))
@@ -129,8 +128,3 @@ def _shade(axes: Axes, time: FloatArray, flags: BoolArray, colour: str) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     for start, end in zip(edges[::2], edges[1::2], strict=True):
         axes.axvspan(time[start], time[min(end, len(time) - 1)], color=colour, alpha=0.12, lw=0)
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG."""
-    figure.savefig(path, dpi=120)

@@ -7,13 +7,12 @@ from typing import Any
 
 from pretouch import __version__
 from pretouch.errors import ExperimentError
-from pretouch.experiments import avoidance, dynamic, static
 from pretouch.experiments.campaign import Request, trace_file
 from pretouch.experiments.cell import Cell
-from pretouch.experiments.figures import avoidance_figure, dynamic_figure, save, static_figure
-from pretouch.experiments.tables import TextTable, tables
+from pretouch.experiments.experiment import Row, Sources
+from pretouch.experiments.registry import EXPERIMENTS
+from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trace import Trace, load_trace
-from pretouch.params import profile
 
 _PAGE = Template(
     """<!doctype html>
@@ -40,9 +39,9 @@ delays are errors of the size found on real arms. Pretouch $version.</p>
 
 
 def write_report(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: Path) -> Path:
-    """Write figures into the folder of each run and one `index.html` for all into `folder`; return the page's path.
+    """Write figures, one `index.html` and the tables as `tables.md` into `folder`; return the page's path.
 
-    The folders of the runs lie in `folder`, or are it.
+    `parts` are the runs and their folders, `summary` is that of all of them.
     """
     try:
         return _write(parts, summary, folder)
@@ -51,57 +50,52 @@ def write_report(parts: list[tuple[Request, Path]], summary: dict[str, Any], fol
 
 
 def _write(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: Path) -> Path:
-    body = [_table(table) for table in tables(summary)]
-    about = []
-    for request, out in parts:
-        for name, text in _figures(request, out):
-            source = (out / name).relative_to(folder).as_posix()
-            body.append(f'<p><img src="{escape(source)}" alt="{escape(text)}"></p>')
-        about.append(
-            f"{', '.join(request.experiments)}: {request.seeds} seeds, profiles {', '.join(request.profiles)},"
-            f" restrictions {request.restrictions or 'as the experiment has them'},"
-            f" static objects of {request.stiffness / 1000:g} N/mm."
-        )
+    body, words = [], []
+    for name, experiment in EXPERIMENTS.items():
+        if name in summary:
+            made = experiment.tables(summary[name])
+            body += [_table(table) for table in made]
+            words += [_markdown(table) for table in made]
+            body += _pictures(parts, name, summary[name], folder)
     page = folder / "index.html"
-    title = "Contact anticipation in simulation"
     text = _PAGE.substitute(
-        title=title, about="<br>".join(map(escape, about)), body="\n".join(body), version=__version__
+        title="Contact anticipation in simulation",
+        about="<br>".join(escape(_about(request)) for request, _ in parts),
+        body="\n".join(body),
+        version=__version__,
     )
     page.write_text(text, encoding="utf-8")
+    (folder / "tables.md").write_text("\n".join(words), encoding="utf-8")
     return page
 
 
-def _figures(request: Request, out: Path) -> list[tuple[str, str]]:
-    """Draw what the traces of the first seed allow; return file names and descriptions."""
-    pictures = []
-    shown = next((name for name in reversed(request.profiles) if name != "blind"), request.profiles[-1])
-    if static.NAME in request.experiments:
-        files = {
-            (cell.where["trajectory"], cell.where["side"], cell.profile): trace_file(out, cell, 0)
-            for cell in static.cells(request.profiles)
-        }
-        traces = {key: trace for key, file in files.items() if (trace := _trace(file)) is not None}
-        save(static_figure(traces, shown), out / "static.png")
-        pictures.append(("static.png", "Force and contact thresholds at the static object"))
-    trace = _trace(trace_file(out, Cell(avoidance.NAME, shown, {"place": "beside"}), 0))
-    if avoidance.NAME in request.experiments and trace is not None:
-        save(avoidance_figure(trace, shown), out / "avoidance.png")
-        pictures.append(("avoidance.png", "End-effector path with a hand beside it"))
-    trace = _trace(trace_file(out, Cell(dynamic.NAME, shown, {}), 0))
-    if dynamic.NAME in request.experiments and trace is not None:
-        units = request.context().skin.ids
-        figure = dynamic_figure(trace, units, profile(shown).reduction.d_max_m, shown)
-        save(figure, out / "dynamic.png")
-        pictures.append(("dynamic.png", "Distances, force with thresholds, and velocity over thirty seconds"))
-    return pictures
+def _about(request: Request) -> str:
+    return (
+        f"{', '.join(request.experiments)}: {request.seeds} seeds, profiles {', '.join(request.profiles)},"
+        f" restrictions {', '.join(request.restrictions) or 'as the experiment has them'},"
+        f" static objects of {', '.join(f'{k / 1000:g}' for k in request.stiffness)} N/mm."
+    )
 
 
-def _trace(file: Path) -> Trace | None:
-    """Read a trace, if there is one and it is whole."""
-    try:
-        return load_trace(file)
-    except ExperimentError:
-        return None
+def _pictures(parts: list[tuple[Request, Path]], name: str, summary: Row, folder: Path) -> list[str]:
+    """Draw what an experiment's traces of the first seed and its summary allow; return it as HTML."""
+    shown = []
+    sources = Sources(summary, lambda cell: find_trace([out for _, out in parts], cell), parts[0][0].context().skin.ids)
+    for picture in EXPERIMENTS[name].draw(sources):
+        file = f"{picture.name}.png"
+        picture.figure.savefig(folder / file, dpi=120)
+        shown.append(f'<p><img src="{escape(file)}" alt="{escape(picture.text)}"></p>')
+    return shown
+
+
+def find_trace(folders: list[Path], cell: Cell) -> Trace | None:
+    """Read the course of a cell's trial with the first seed from one of some folders, if it is there and whole."""
+    for folder in folders:
+        try:
+            return load_trace(trace_file(folder, cell, 0))
+        except ExperimentError:
+            continue
+    return None
 
 
 def _table(table: TextTable) -> str:
@@ -109,6 +103,15 @@ def _table(table: TextTable) -> str:
     rows = "\n".join("<tr>" + "".join(f"<td>{_lines(text)}</td>" for text in row) + "</tr>" for row in table.rows)
     note = f'<p class="note">{escape(table.note)}</p>'
     return f"<h2>{escape(table.title)}</h2>\n<table><tr>{head}</tr>\n{rows}</table>\n{note}"
+
+
+def _markdown(table: TextTable) -> str:
+    lines = [f"## {table.title}", "", _markdown_row(table.header), _markdown_row(("---",) * len(table.header))]
+    return "\n".join([*lines, *map(_markdown_row, table.rows), "", table.note, ""])
+
+
+def _markdown_row(texts: tuple[str, ...]) -> str:
+    return f"| {' | '.join(text.replace(chr(10), ' ') for text in texts)} |"
 
 
 def _lines(text: str) -> str:

@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle, Path, line
-from pretouch.experiments.cell import Cell, Context
+from pretouch.experiments.cell import Cell, Context, Grid
+from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import mean_over, peak, rounded
+from pretouch.experiments.summary import static_summary
+from pretouch.experiments.tables import shown_controllers, static_tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.sim.plant import Plant
@@ -24,8 +27,10 @@ SIDES = ("-y", "+y")
 
 _FACE_M = 0.25
 """Distance of the object's face from the plane y = 0 [m]."""
-_FACE_SPREAD_M = 0.02
+_FACE_SPREAD_M = 0.05
 """The seed moves the face by up to this [m]."""
+_CENTER_SPREAD_M = 0.02
+"""The seed moves the object along x and z by up to this [m]."""
 _HALF_SIZE_M = (0.15, 0.02, 0.12)
 """Half the size of the object [m]."""
 _OUTWARDS_M = 0.12
@@ -36,11 +41,17 @@ _TIME_LIMIT_S = 40.0
 _AFTER_DETECTION_S = 1.0
 
 
-def cells(profiles: tuple[str, ...]) -> list[Cell]:
-    """All combinations of trajectory, side and profile."""
+def cells(grid: Grid) -> list[Cell]:
+    """All combinations of stiffness, trajectory, side and controller."""
     return [
-        Cell(NAME, profile, {"trajectory": trajectory, "side": side})
-        for trajectory, side, profile in product(TRAJECTORIES, SIDES, profiles)
+        Cell(
+            NAME,
+            profile,
+            {"trajectory": trajectory, "side": side, "stiffness_n_per_m": stiffness, "restrictions": restrictions},
+        )
+        for stiffness, trajectory, side, (profile, restrictions) in product(
+            grid.stiffness, TRAJECTORIES, SIDES, grid.controllers(DEFAULT_RESTRICTIONS)
+        )
     ]
 
 
@@ -53,30 +64,35 @@ def path(trajectory: str, side: str) -> Path:
 
 
 def scene(trajectory: str, side: str, stiffness: float, seed: int) -> SceneSpec:
-    """Return a board on one side, 0.3 m by 0.24 m, a little nearer or farther with each seed.
+    """Return a board on one side, 0.3 m by 0.24 m, at another place with each seed.
 
     It stands where the hand meets it, and does not reach inwards to where the forearm, which is wider than the hand,
     would meet it first.
     """
     sign = 1.0 if side == "+y" else -1.0
-    face = _FACE_M + _FACE_SPREAD_M * np.random.default_rng([seed, 10]).uniform(-1, 1)
+    rng = np.random.default_rng([seed, 10])
+    face = _FACE_M + _FACE_SPREAD_M * rng.uniform(-1, 1)
+    aside, above = _CENTER_SPREAD_M * rng.uniform(-1, 1, 2)
     course = path(trajectory, side)
     ahead = np.linspace(0.0, course.length, 2000)
     meeting = next(p for p in map(course.point, ahead) if sign * p[1] >= face - _HAND_HALF_WIDTH_M)
-    center = (meeting[0] + _OUTWARDS_M, sign * (face + _HALF_SIZE_M[1]), meeting[2] + _HAND_ABOVE_TCP_M)
+    center = (
+        meeting[0] + _OUTWARDS_M + aside,
+        sign * (face + _HALF_SIZE_M[1]),
+        meeting[2] + _HAND_ABOVE_TCP_M + above,
+    )
     return SceneSpec(boxes=(Box("object", center, _HALF_SIZE_M, stiffness),))
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
-    profile = context.profile(cell.profile, DEFAULT_RESTRICTIONS)
-    side = cell.where["side"]
+    trajectory, side = str(cell.where["trajectory"]), str(cell.where["side"])
     setup = Setup(
         model=context.model,
         skin=context.skin,
-        profile=profile,
-        scene=scene(cell.where["trajectory"], side, context.stiffness, seed),
-        path=path(cell.where["trajectory"], side),
+        profile=context.profile(cell),
+        scene=scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
+        path=path(trajectory, side),
         seed=seed,
     )
     record = play(setup, _done())
@@ -84,8 +100,6 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "experiment": NAME,
         **cell.where,
         "profile": cell.profile,
-        "restrictions": profile.restriction.mode,
-        "stiffness_n_per_m": context.stiffness,
         "seed": seed,
         **results(record, -1.0 if side == "+y" else 1.0, context.model.links),
     }
@@ -122,6 +136,7 @@ def results(record: Record, push: float, links: tuple[str, ...]) -> dict[str, An
         "peak_estimate_n": None,
         "true_peak_20ms_n": None,
         "true_peak_n": None,
+        "least_sensed_m": least_sensed(record),
         "false_detections": sum(touch is None or s.stamp < touch for s in reactions),
         "held": record.held(),
     }
@@ -141,3 +156,34 @@ def results(record: Record, push: float, links: tuple[str, ...]) -> dict[str, An
         row["filtered_at_detection_n"] = rounded(push * float(detection.filtered_force[1]))
         row["raw_at_detection_n"] = rounded(push * float(detection.force[1]))
     return row
+
+
+def least_sensed(record: Record) -> float | None:
+    """Least distance [m] of the arm's surface from anything it sensed, None if it sensed nothing."""
+    least = min((float(s.obstacles.body_distance.min(initial=np.inf)) for s in record.steps), default=np.inf)
+    return rounded(least, 4) if np.isfinite(least) else None
+
+
+def _cost(cell: Cell) -> float:
+    return _TIME_LIMIT_S if cell.where["restrictions"] in ("hard", "slack") else 7.0
+
+
+def _draw(sources: Sources) -> list[Picture]:
+    from pretouch.experiments.figures import static_figure
+
+    stiffness, mode, profiles = shown_controllers(sources.summary["cells"])
+    traces = {}
+    for trajectory, side, profile in product(TRAJECTORIES, SIDES, profiles):
+        where: dict[str, str | float] = {
+            "trajectory": trajectory, "side": side, "stiffness_n_per_m": stiffness, "restrictions": mode[profile],
+        }  # fmt: skip
+        trace = sources.trace(Cell(NAME, profile, where))
+        if trace is not None:
+            traces[trajectory, side, profile] = trace
+    if not traces:
+        return []
+    figure = static_figure(traces, profiles[-1])
+    return [Picture("static", "Force and contact thresholds at the static object", figure)]
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, _cost, static_summary, static_tables, _draw)

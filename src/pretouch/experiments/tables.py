@@ -1,4 +1,4 @@
-"""The summaries as tables, for the terminal and for the page."""
+"""The summaries of the three experiments as tables, for the terminal and for the page."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,18 +16,6 @@ class TextTable:
     note: str
 
 
-def tables(summary: dict[str, Any]) -> list[TextTable]:
-    """All tables of a summary."""
-    made = []
-    if "static" in summary:
-        made.append(_static(summary["static"]))
-    if "avoidance" in summary:
-        made.append(_avoidance(summary["avoidance"]))
-    if "dynamic" in summary:
-        made.append(_dynamic(summary["dynamic"]))
-    return made
-
-
 _STATIC = (
     ("impact_speed_m_s", "impact\n[m/s]", 3),
     ("detection_delay_s", "delay\n[ms]", 0),
@@ -38,20 +26,44 @@ _STATIC = (
 )
 
 
-def _static(part: Row) -> TextTable:
+_SHOWN_STIFFNESS = 25_000.0
+
+
+def static_tables(part: Row) -> list[TextTable]:
+    """Show each place at one stiffness, then what stiffness, profile and restrictions change, places together."""
+    cells = part["cells"]
+    stiffness, mode, shown = shown_controllers(cells)
+    made = [_places(part, stiffness, mode)]
+    if len(_values(cells, "stiffness_n_per_m")) > 1 or len(_values(cells, "profile")) > 2:
+        made.append(_stiffnesses(part, mode[shown[-1]]))
+    if len({cell["restrictions"] for cell in cells if cell["profile"] != "blind"}) > 1:
+        made.append(_restrictions(part, stiffness))
+    return made
+
+
+def shown_controllers(cells: list[Row]) -> tuple[float, dict[str, str], list[str]]:
+    """Choose of many cells what to show in detail: a stiffness [N/m], and two profiles with their restriction mode."""
+    stiffnesses, profiles = _values(cells, "stiffness_n_per_m"), _values(cells, "profile")
+    shown = [name for name in dict.fromkeys(("blind", *profiles)) if name in profiles][:2]
+    modes = {name: next(cell["restrictions"] for cell in cells if cell["profile"] == name) for name in shown}
+    return _SHOWN_STIFFNESS if _SHOWN_STIFFNESS in stiffnesses else stiffnesses[0], modes, shown
+
+
+def _values(cells: list[Row], name: str) -> list[Any]:
+    return list(dict.fromkeys(cell[name] for cell in cells))
+
+
+def _places(part: Row, stiffness: float, modes: dict[str, str]) -> TextTable:
     rows: list[tuple[str, ...]] = []
     for cell in part["cells"]:
-        place = {key: cell[key] for key in ("trajectory", "side", "profile")}
-        numbers = [_number(cell[key], digits, 1000 if "delay" in key else 1) for key, _, digits in _STATIC]
+        if cell["stiffness_n_per_m"] != stiffness or cell["restrictions"] != modes.get(cell["profile"]):
+            continue
         felt = f"{100 * cell['contact_fraction']:.0f}/{100 * cell['detected_fraction']:.0f}"
         where = f"{cell['trajectory']} {cell['side']}"
-        rows.append((where, cell["profile"], *numbers, felt, str(cell["false_detections"])))
-        for ratio in part["ratios"]:
-            if all(ratio[key] == value for key, value in place.items()):
-                ratios = ["" if "delay" in key else _ratio(ratio[key]) for key, _, _ in _STATIC]
-                rows.append(("", "ratio", *ratios, "", ""))
+        rows.append((where, cell["profile"], *_forces(cell), felt, str(cell["false_detections"])))
+        rows += [("", "ratio", *_force_ratios(ratio), "", "") for ratio in _its_ratio(part["ratios"], cell)]
     return TextTable(
-        "Static object: medians; ratios blind/profile with their 10-90 % below",
+        f"Static object, {stiffness / 1000:g} N/mm: medians; ratios blind/profile with their 10-90 % below",
         ("where", "profile", *(label for _, label, _ in _STATIC), "hit/felt\n[%]", "false"),
         tuple(rows),
         "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
@@ -61,44 +73,97 @@ def _static(part: Row) -> TextTable:
     )
 
 
-def _dynamic(part: Row) -> TextTable:
+def _stiffnesses(part: Row, mode: str) -> TextTable:
+    rows: list[tuple[str, ...]] = []
+    for cell in part["pooled_cells"]:
+        if cell["restrictions"] in (mode, "off"):
+            rows.append((f"{cell['stiffness_n_per_m'] / 1000:g} N/mm", cell["profile"], *_forces(cell)))
+            rows += [("", "ratio", *_force_ratios(r)) for r in _its_ratio(part["pooled_ratios"], cell)]
+    return TextTable(
+        "Static object, by stiffness and by what proximity is used for: medians of all four places, and ratios",
+        ("object", "profile", *(label for _, label, _ in _STATIC)),
+        tuple(rows),
+        "slowing-only: eqs. 3-4 without F_obs. thresholds-only: F_obs without eqs. 3-4. paper-0.5m: objects count"
+        " within the 0.5 m of the paper's text instead of Table I's 0.8 m.",
+    )
+
+
+def _restrictions(part: Row, stiffness: float) -> TextTable:
+    rows = [
+        (
+            cell["restrictions"],
+            cell["profile"],
+            str(cell["trials"]),
+            f"{100 * cell['contact_fraction']:.0f}",
+            number(cell["least_sensed_m"], 3),
+            *_forces(cell),
+        )
+        for cell in part["pooled_cells"]
+        if cell["profile"] != "blind" and cell["stiffness_n_per_m"] == stiffness
+    ]
+    return TextTable(
+        f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: medians of all four places",
+        ("mode", "profile", "n", "hit\n[%]", "least\n[m]", *(label for _, label, _ in _STATIC)),
+        tuple(rows),
+        "Least: nearest that anything sensed came to the arm's surface in 40 s or until contact, by what was sensed.",
+    )
+
+
+def _forces(cell: Row) -> list[str]:
+    return [number(cell[key], digits, 1000 if "delay" in key else 1) for key, _, digits in _STATIC]
+
+
+def _force_ratios(ratio: Row) -> list[str]:
+    return ["" if "delay" in key else _ratio(ratio[key]) for key, _, _ in _STATIC]
+
+
+def _its_ratio(ratios: list[Row], cell: Row) -> list[Row]:
+    """Return the ratio to a cell, if there is one."""
+    key = ("trajectory", "side", "stiffness_n_per_m", "profile", "restrictions")
+    return [ratio for ratio in ratios if all(ratio.get(k) == cell.get(k) for k in key)]
+
+
+def dynamic_tables(part: Row) -> list[TextTable]:
+    """How the arm answered the pushes."""
     rows = tuple(
         (
             cell["profile"],
             f"{cell['detected']} of {cell['pushes']}",
-            _number(cell["delay_s"], 0, 1000),
-            _number(cell["direction_error_deg"], 1),
-            _number(cell["peak_estimate_n"], 1),
+            number(cell["delay_s"], 0, 1000),
+            number(cell["direction_error_deg"], 1),
+            number(cell["peak_estimate_n"], 1),
             str(cell["reactions_towards_person"]),
             str(cell["false_detections"]),
         )
         for cell in part["cells"]
     )
-    return TextTable(
+    table = TextTable(
         "A person pushes the moving arm: medians",
         ("profile", "felt", "delay\n[ms]", "direction\n[deg]", "peak\n[N]", "towards\nperson", "false"),
         rows,
         "Pushes of 15 to 30 N for 0.2 to 0.5 s. Direction: between reaction and true force. Peak: of the estimate."
         " Towards person: pushes after which a reaction began against the push.",
     )
+    return [table]
 
 
-def _avoidance(part: Row) -> TextTable:
+def avoidance_tables(part: Row) -> list[TextTable]:
+    """What a hand beside the path or in it changes."""
     rows = tuple(
         (
             cell["place"],
             cell["profile"],
             f"{100 * cell['contact_fraction']:.0f}",
-            _number(cell["true_peak_n"], 1),
-            _number(cell["least_gap_m"], 3),
-            _number(cell["deviation_m"], 3),
-            _number(cell["least_speed_scale"], 2),
-            _number(cell["travelled_m"], 2),
+            number(cell["true_peak_n"], 1),
+            number(cell["least_gap_m"], 3),
+            number(cell["deviation_m"], 3),
+            number(cell["least_speed_scale"], 2),
+            number(cell["travelled_m"], 2),
             str(cell["false_detections"]),
         )
         for cell in part["cells"]
     )
-    return TextTable(
+    table = TextTable(
         "A person holds a hand beside the path or into it: medians",
         (
             "hand",
@@ -116,9 +181,11 @@ def _avoidance(part: Row) -> TextTable:
         " True: peak of the true force. Gap: between the person's hand and the arm, negative in contact. Least speed:"
         " factor of eqs. 3 and 4. Way: travelled along the path in 40 s.",
     )
+    return [table]
 
 
-def _number(value: Row | None, digits: int, factor: float = 1.0) -> str:
+def number(value: Row | None, digits: int, factor: float = 1.0) -> str:
+    """Write the median of a spread, or a dash where there is none."""
     return "-" if value is None else f"{factor * value['median']:.{digits}f}"
 
 

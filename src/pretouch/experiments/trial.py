@@ -38,6 +38,8 @@ class Setup:
     hand: HandScript | None = None
     plant: PlantParams = field(default_factory=PlantParams)
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    prepare: Callable[[Plant, RangeFinders], None] | None = None
+    """What else is to happen: may have things done before each physics step, to the arm or to its units."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,8 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
     units = RangeFinders(plant, setup.skin, setup.ranging, setup.seed)
     hand = Hand(plant, setup.hand) if setup.hand else None
+    if setup.prepare:
+        setup.prepare(plant, units)
     recorder = _Recorder(hand)
     controller = Controller(model, setup.skin, fixtures(scene), setup.path, profile)
     clock = PlantClock(plant, profile.task.control_period_s)

@@ -38,8 +38,11 @@ def perceive(
     fresh = np.flatnonzero(is_fresh(state, readings, now))
     if len(fresh):
         distance = measured_distance(readings)
-        known = np.zeros(len(skin))
-        known[fresh] = expected_range(kin, position[fresh], rotation[fresh], skin.link[fresh], model.capsules, fixtures)
+        known = np.full(len(skin), np.inf)
+        if params.filter_views:
+            known[fresh] = expected_range(
+                kin, position[fresh], rotation[fresh], skin.link[fresh], model.capsules, fixtures
+            )
         shows = distance < known - params.self_margin_m
         points = locate(position, rotation, np.where(shows, distance, 0.0))
         tells = is_evidence(readings, distance)

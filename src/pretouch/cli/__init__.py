@@ -1,0 +1,141 @@
+"""The command `pretouch`."""
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from pretouch.errors import ParameterError, PretouchError
+
+# the rest of the package takes a second to import: only the functions that run something do
+
+_USAGE, _INTERRUPTED = 2, 130
+_TERMINATED = 143
+
+
+@dataclass(frozen=True)
+class Demo:
+    """Play a small part of the paper's three experiments, blind and with proximity, and show what came out."""
+
+    seeds: int = 4
+    """Trials of each cell of the static experiment; the other two take one."""
+    out: str = ""
+    """Folder for results, figures and page; by default a new one under runs/."""
+
+
+@dataclass(frozen=True)
+class Reproduce:
+    """Run the paper's experiments in full. A run that was stopped goes on where it was, with the same parameters."""
+
+    experiment: tyro.conf.Positional[str] = "all"
+    """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), one of the studies of its claims and weaknesses, or all of
+    them, which takes about three quarters of an hour on two processors."""
+    seeds: int = 12
+    """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
+    profiles: str = "blind,paper"
+    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. The studies of
+    claims and weaknesses have their own."""
+    restrictions: str = ""
+    """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
+    orientation: str = ""
+    """free or hold: whether the task keeps the hand's orientation; by default the profile's own, hold."""
+    stiffness: str = "25000"
+    """Contact stiffness of the static object [N/m], or several, separated by commas."""
+    skin: str = ""
+    """Skin file; by default the seven units that come with the package."""
+    out: str = ""
+    """Folder for results, figures and page; by default runs/reproduce-EXPERIMENT."""
+    json: str = ""
+    """File for all trials and their summary; by default results.json in the folder."""
+
+
+Command = Annotated[Demo, tyro.conf.subcommand("demo")] | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+
+
+class _Terminated(BaseException):
+    """SIGTERM, turned into an exception so that what is under way can end in order."""
+
+
+@contextmanager
+def _sigterm_raises() -> Iterator[None]:
+    def handle(_number: int, _frame: FrameType | None) -> None:
+        raise _Terminated
+
+    before = signal.signal(signal.SIGTERM, handle)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the command; return its exit code: 2 for bad input, 130 or 143 after Ctrl-C or SIGTERM."""
+    errors = Console(stderr=True, soft_wrap=True, highlight=False)
+    try:
+        with _sigterm_raises():
+            command = tyro.cli(Command, prog="pretouch", description="Contact-anticipating robot arms.", args=args)
+            if isinstance(command, Demo):
+                _demo(command)
+            else:
+                _reproduce(command)
+    except PretouchError as error:
+        errors.print(str(error), markup=False)
+        return _USAGE
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+    except _Terminated:
+        return _TERMINATED
+    return 0
+
+
+def _demo(command: Demo) -> None:
+    from pretouch.cli.campaigns import run_all
+    from pretouch.experiments.campaign import Request
+
+    out = Path(command.out) if command.out else _new_folder("demo")
+    few = Request(("avoidance", "dynamic"), seeds=1)
+    many = Request(("static",), seeds=command.seeds)
+    run_all([(many, out / "static"), (few, out / "people")], out, out / "results.json")
+
+
+def _new_folder(name: str) -> Path:
+    return next(path for n in count(1) if not (path := Path("runs") / f"{name}-{n}").exists())
+
+
+def _reproduce(command: Reproduce) -> None:
+    from pretouch.cli.campaigns import run_all
+    from pretouch.experiments.campaign import Request
+    from pretouch.experiments.paper import whole_paper
+    from pretouch.experiments.registry import EXPERIMENTS
+
+    everything = command.experiment == "all"
+    request = Request(
+        experiments=tuple(EXPERIMENTS) if everything else (command.experiment,),
+        seeds=command.seeds,
+        profiles=_words(command.profiles),
+        restrictions=_words(command.restrictions),
+        orientation=command.orientation or None,
+        stiffness=tuple(map(_number, _words(command.stiffness))),
+        skin=command.skin or None,
+    )
+    out = Path(command.out or f"runs/reproduce-{command.experiment}")
+    runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
+    run_all(runs, out, Path(command.json) if command.json else out / "results.json")
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError(f"The stiffness is {text!r}: give numbers in N/m, separated by commas.") from None

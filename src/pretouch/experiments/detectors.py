@@ -1,0 +1,89 @@
+"""Contact detectors held against a recorded course of the force estimate: nothing reacts, all see the same."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pretouch.contact.thresholds import noise_force
+from pretouch.contact.window import add, window_init
+from pretouch.params import ThresholdParams
+from pretouch.types import BoolArray, FloatArray
+
+TABLE_I = ThresholdParams()
+
+
+@dataclass(frozen=True)
+class Windowed:
+    """A course of S force estimates and what the window of eq. 8 makes of it. All (S, 3) [N]."""
+
+    force: FloatArray
+    filtered: FloatArray
+    """Value that entered the window, eq. 8."""
+    mean: FloatArray
+    sigma: FloatArray
+    """Sample standard deviation of the window."""
+
+
+def windowed(force: FloatArray, params: ThresholdParams = TABLE_I) -> Windowed:
+    """Send forces (S, 3) [N] through the window of eq. 8, and leave out the samples that only fill it."""
+    state, course = window_init(params.window_samples), []
+    for sample in force:
+        armed = state.full
+        state = add(state, sample, params.alpha, params.lambda_)
+        if armed:
+            course.append((state.newest, state.mean(), state.std()))
+    filtered, mean, sigma = np.array(course).reshape(-1, 3, 3).swapaxes(0, 1)
+    return Windowed(force[params.window_samples :], filtered, mean, sigma)
+
+
+def smooth(force: FloatArray, alpha: float) -> Windowed:
+    """As `windowed`, with another influence of outliers than Table I's."""
+    return windowed(force, replace(TABLE_I, alpha=alpha))
+
+
+def band(course: Windowed, f_base: float, f_obs: float = 0.0) -> FloatArray:
+    """Width F_b + F_sigma - F_obs (S, 3) [N] of eq. 9, with an object of F_obs [N] on both sides of each axis."""
+    return f_base + noise_force(course.sigma, TABLE_I.f_std_n, TABLE_I.sigma_max_n) - f_obs
+
+
+Detector = Callable[[Windowed, float, float], BoolArray]
+"""Says of each of S samples whether a contact is felt, given F_b and F_obs [N]."""
+
+
+def filtered(course: Windowed, f_base: float, f_obs: float = 0.0) -> BoolArray:
+    """Hold the newest value in the window against the thresholds, as the paper does."""
+    return np.any(np.abs(course.filtered - course.mean) > band(course, f_base, f_obs), axis=1)
+
+
+def raw(course: Windowed, f_base: float, f_obs: float = 0.0) -> BoolArray:
+    """Hold the estimate itself against the thresholds, as the authors' code does."""
+    return np.any(np.abs(course.force - course.mean) > band(course, f_base, f_obs), axis=1)
+
+
+def raw_twice(course: Windowed, f_base: float, f_obs: float = 0.0) -> BoolArray:
+    """Hold the estimate against the thresholds, and believe it the second time in a row."""
+    over = raw(course, f_base, f_obs)
+    return over & np.concatenate([[False], over[:-1]])
+
+
+def fixed(course: Windowed, threshold: float, _f_obs: float = 0.0) -> BoolArray:
+    """Hold the estimate against a fixed force [N] on each axis, without a window: no thresholding of the paper's."""
+    return np.any(np.abs(course.force) > threshold, axis=1)
+
+
+def onsets(felt: BoolArray, rest: int) -> list[int]:
+    """Samples at which a contact is felt anew: while one is answered, for `rest` samples, none is looked for."""
+    found: list[int] = []
+    for i in np.flatnonzero(felt).tolist():
+        if not found or i >= found[-1] + rest:
+            found.append(i)
+    return found
+
+
+def rate_bounds(events: int, hours: float) -> tuple[float, float]:
+    """95 % bounds on a rate [1/h] of which `events` were counted in some hours (exact, Poisson)."""
+    from scipy.stats import chi2
+
+    low = chi2.ppf(0.025, 2 * events) / 2 if events else 0.0
+    return float(low / hours), float(chi2.ppf(0.975, 2 * events + 2) / 2 / hours)

@@ -1,0 +1,35 @@
+"""All experiments by name, and what is made of the trials of several."""
+
+from typing import Any
+
+from pretouch.experiments import avoidance, dynamic, static
+from pretouch.experiments.experiment import Experiment, Row
+from pretouch.experiments.tables import TextTable
+
+EXPERIMENTS: dict[str, Experiment] = {
+    e.name: e
+    for e in (
+        static.EXPERIMENT,
+        avoidance.EXPERIMENT,
+        dynamic.EXPERIMENT,
+    )
+}
+
+
+def summarise(trials: list[Row]) -> dict[str, Any]:
+    """Summaries of the experiments in a list of trials, by name."""
+    return {
+        name: experiment.summarise(rows)
+        for name, experiment in EXPERIMENTS.items()
+        if (rows := [t for t in trials if t["experiment"] == name])
+    }
+
+
+def tables(summary: dict[str, Any]) -> list[TextTable]:
+    """All tables of such summaries."""
+    return [
+        table
+        for name, experiment in EXPERIMENTS.items()
+        if name in summary
+        for table in experiment.tables(summary[name])
+    ]
