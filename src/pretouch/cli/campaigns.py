@@ -97,7 +97,8 @@ def _play(parts: list[tuple[Request, Path]]) -> None:
     with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True)) as bar:
         so_far = [progress_of(request, out) for request, out in parts]
         done, total = sum(p.cost_done for p in so_far), sum(p.cost_total for p in so_far)
-        task = bar.add_task("", total=total, completed=done)
+        task = bar.add_task("", total=total)
+        bar.update(task, completed=done)
         left = sum(p.total - p.done for p in so_far)
 
         def advance(cost: float) -> None:
