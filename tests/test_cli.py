@@ -19,6 +19,8 @@ def run(capsys, *args):
         (("reproduce", "statik"), "The experiment 'statik' is unknown"),
         (("reproduce", "static", "--profiles", "paper,brave"), "The profile 'brave' is unknown"),
         (("reproduce", "static", "--restrictions", "firm"), "The restriction mode 'firm' is unknown"),
+        (("reproduce", "static", "--stiffness", "25,soft"), "The stiffness is 'soft': give numbers in N/m"),
+        (("reproduce", "static", "--profiles", "paper:reaction.decay=3"), "The parameter 'reaction.decay' is unknown"),
         (("reproduce", "static", "--orientation", "up"), "The orientation 'up' is unknown: choose from free, hold"),
         (("reproduce", "static", "--seeds", "-1"), "The number of seeds is -1"),
         (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
@@ -52,7 +54,7 @@ def _row(request, out):
     from pretouch.experiments.campaign import trial_file, write_json
 
     cell, seed = request.tasks()[0]
-    row = {"experiment": cell.experiment, "profile": cell.profile, "seed": seed}
+    row = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
     write_json(row, trial_file(out, cell, seed))
 
 
@@ -62,8 +64,8 @@ def test_finished_trials_are_kept_whatever_ends_a_run(capsys, tmp_path, monkeypa
         _row(request, out)
         raise error
 
-    monkeypatch.setattr("pretouch.experiments.campaign.run_campaign", play)
-    monkeypatch.setattr("pretouch.experiments.summary.summarise", len)
+    monkeypatch.setattr("pretouch.cli.campaigns.run_campaign", play)
+    monkeypatch.setattr("pretouch.cli.campaigns.summarise", len)
     args = ("reproduce", "static", "--out", str(tmp_path))
     if isinstance(error, RuntimeError):
         with pytest.raises(RuntimeError, match="crash"):
@@ -80,9 +82,9 @@ def test_results_that_cannot_be_written_at_the_end_are_said(capsys, tmp_path, mo
         raise OSError(28, "No space left on device")
 
     def play(request, out, _progress):
-        monkeypatch.setattr("pretouch.experiments.campaign.write_json", full)
+        monkeypatch.setattr("pretouch.cli.campaigns.write_json", full)
 
-    monkeypatch.setattr("pretouch.experiments.campaign.run_campaign", play)
+    monkeypatch.setattr("pretouch.cli.campaigns.run_campaign", play)
     code, said = run(capsys, "reproduce", "static", "--out", str(tmp_path))
     assert code == 2
     assert "results.json cannot be written: No space left on device" in said.err
@@ -134,7 +136,7 @@ def test_a_run_writes_what_it_says(capsys, tmp_path):
     assert max(len(line) for line in said.out.splitlines() if str(tmp_path) not in line) <= 80
     code, said = run(capsys, *args[:-4], "--out", str(out), "--stiffness", "2000")
     assert code == 2
-    assert "holds a run with stiffness = 25000.0" in said.err
+    assert "holds a run with stiffness = [25000.0], not [2000.0]" in said.err
 
 
 def test_a_new_demo_gets_a_new_folder(tmp_path, monkeypatch):

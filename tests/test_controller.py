@@ -276,6 +276,23 @@ def test_blind_neither_slows_nor_needs_its_units(panda_model: RobotModel, paper_
     np.testing.assert_array_equal(step.thresholds.obstacle_positive, 0.0)
 
 
+def test_each_use_of_proximity_can_be_taken_away(panda_model: RobotModel, paper_skin: Skin):
+    first = {}
+    for name in ("paper", "slowing-only", "thresholds-only"):
+        arm = Arm(panda_model, paper_skin, PROFILES[name])
+        arm.run(150)
+        first[name] = arm.step(seen={LEFT: 0.25})
+    slowed, moved = first["slowing-only"], first["thresholds-only"]
+    assert slowed.speed_scale == first["paper"].speed_scale < 0.6
+    assert not np.any(slowed.thresholds.obstacle_positive)
+    assert moved.speed_scale == 1.0
+    np.testing.assert_array_equal(moved.thresholds.obstacle_positive, first["paper"].thresholds.obstacle_positive)
+    assert moved.thresholds.obstacle_positive[1] > 2.0
+    arm = Arm(panda_model, paper_skin, PROFILES["thresholds-only"])
+    arm.run(150)
+    assert arm.run(15, silent={LEFT: 0.2})[-1].speed_scale < 1.0  # a silent unit slows in any case
+
+
 def test_a_failing_solver_brakes_and_holds(arm: Arm, monkeypatch: pytest.MonkeyPatch):
     def fail(cost: object, lower: object, upper: object, rows: object, weight: float, stop: np.ndarray) -> QpSolution:
         return QpSolution(stop, np.zeros(0), np.zeros(7), QpOutcome.FAILED, "the moon was full")

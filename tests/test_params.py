@@ -133,3 +133,44 @@ def test_a_bad_value_is_a_value_error_and_one_of_ours():
     with pytest.raises(ValueError, match="speed_m_s") as caught:
         TaskParams(speed_m_s=0.0)
     assert isinstance(caught.value, PretouchError)
+
+
+def test_ablations_take_one_use_of_proximity_away():
+    paper = profile("paper")
+    slowing, moving = profile("slowing-only"), profile("thresholds-only")
+    assert slowing.threshold.f_d_n == 0.0
+    assert replace(slowing, name="paper", threshold=paper.threshold) == paper
+    assert moving.reduction.enabled is False
+    assert replace(moving, name="paper", reduction=paper.reduction) == paper
+
+
+def test_a_profile_is_varied_by_its_name():
+    name = "paper:threshold.window_samples=500:reduction.enabled=no:threshold.compare=raw:restriction.beta=-20"
+    varied = profile(name)
+    assert varied.name == name
+    assert varied.threshold == ThresholdParams(window_samples=500, compare="raw")
+    assert varied.reduction == ReductionParams(enabled=False)
+    assert varied.restriction == RestrictionParams(beta=-20.0)
+    assert varied.task == profile("paper").task
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("papre:task.speed_m_s=0.1", "The profile 'papre' is unknown"),
+        ("paper:speed=0.1", "The group 'speed' of 'speed=0.1' is unknown: choose from perception, task, reduction,"),
+        ("paper:task.sped=0.1", "The parameter 'task.sped' is unknown: choose from speed_m_s,"),
+        ("paper:task.speed_m_s", "has no value: write GROUP.FIELD=VALUE"),
+        ("paper:", "has no value"),
+        ("paper:name=x", "The group 'name' of 'name=x' is unknown"),
+        ("paper:task.speed_m_s=fast", "task.speed_m_s is 'fast': write a number"),
+        ("paper:task.speed_m_s=-1", "TaskParams.speed_m_s is -1.0: it must be greater than 0"),
+        ("paper:threshold.window_samples=10.5", "threshold.window_samples is '10.5': write a whole number"),
+        ("paper:reduction.enabled=0", "reduction.enabled is '0': write yes or no"),
+        ("paper:restriction.mode=firm", "RestrictionParams.mode is 'firm': choose one of off, hard, slack, floor"),
+        ("paper:threshold.d_max_m=nan", "ThresholdParams.d_max_m is nan: it must be finite"),
+    ],
+)
+def test_a_variation_that_cannot_be_is_refused(name, words):
+    with pytest.raises(ParameterError, match=words):
+        profile(name)

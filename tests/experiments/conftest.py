@@ -5,4 +5,4 @@ from pretouch.experiments.cell import Context
 
 @pytest.fixture(scope="session")
 def context(panda_model, paper_skin):
-    return Context(panda_model, paper_skin, 25_000.0, None)
+    return Context(panda_model, paper_skin)

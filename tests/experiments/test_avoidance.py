@@ -2,13 +2,16 @@ import numpy as np
 import pytest
 
 from pretouch.experiments import avoidance
-from pretouch.experiments.cell import Cell
+from pretouch.experiments.cell import Cell, Grid
 from tests.experiments.limits import assert_within_limits
+
+
+MODES = {"blind": "off", "paper": "slack"}
 
 
 @pytest.fixture(scope="module")
 def trials(context):
-    cell = {name: Cell(avoidance.NAME, name, {"place": "beside"}) for name in ("blind", "paper")}
+    cell = {name: Cell(avoidance.NAME, name, {"place": "beside", "restrictions": mode}) for name, mode in MODES.items()}
     return {name: avoidance.trial(cell[name], 400, context) for name in cell}
 
 
@@ -46,10 +49,10 @@ def test_a_hand_comes_once_on_each_side_beside_the_path_or_into_it():
 
 
 def test_cells_are_both_places_and_all_profiles():
-    cells = avoidance.cells(("blind", "paper"))
-    assert [(c.where["place"], c.profile) for c in cells] == [
-        ("beside", "blind"),
-        ("beside", "paper"),
-        ("inside", "blind"),
-        ("inside", "paper"),
+    cells = avoidance.cells(Grid(("blind", "paper")))
+    assert [(c.where["place"], c.profile, c.where["restrictions"]) for c in cells] == [
+        ("beside", "blind", "off"),
+        ("beside", "paper", "slack"),
+        ("inside", "blind", "off"),
+        ("inside", "paper", "slack"),
     ]

@@ -15,7 +15,18 @@ import pytest
 
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.experiments import campaign
-from pretouch.experiments.campaign import Request, finished, open_folder, run_campaign, trial_file, write_json
+from pretouch.experiments.campaign import (
+    Request,
+    finished,
+    open_folder,
+    progress_of,
+    run_campaign,
+    trial_file,
+    write_json,
+)
+from pretouch.experiments.cell import Cell, Grid
+from pretouch.experiments.paper import whole_paper
+from pretouch.experiments.registry import EXPERIMENTS
 from pretouch.params import PROFILES
 from pretouch.sensing.skin import PAPER_SKIN
 
@@ -25,14 +36,15 @@ SMALL = Request(("static",), seeds=1, profiles=("blind",))
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"experiments": ("statik",)}, "'statik' is unknown: choose from static, avoidance, dynamic, all"),
+        ({"experiments": ("statik",)}, "'statik' is unknown: choose from static, avoidance, dynamic,"),
         ({"seeds": 0}, "number of seeds is 0: give at least 1"),
         ({"seeds": -3}, "number of seeds is -3"),
         ({"profiles": ()}, "profiles are none"),
         ({"profiles": ("paper", "paper")}, "name each wanted one once"),
-        ({"restrictions": "firm"}, "'firm' is unknown: choose from off, hard, slack, floor"),
-        ({"stiffness": 0.0}, "stiffness is 0 N/m"),
-        ({"stiffness": float("nan")}, "stiffness is nan N/m"),
+        ({"restrictions": ("off", "firm")}, "'firm' is unknown: choose from off, hard, slack, floor"),
+        ({"stiffness": (0.0,)}, "stiffness is 0 N/m"),
+        ({"stiffness": (25e3, float("nan"))}, "stiffness is nan N/m"),
+        ({"stiffness": ()}, "No stiffness is given"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_sentence(change, words):
@@ -61,23 +73,29 @@ def test_tasks_take_all_cells_seed_by_seed():
 def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
     one = replace(SMALL, seeds=1)
     seen = []
-    run_campaign(one, tmp_path, lambda *counts: seen.append(counts))
-    assert seen == [(0, 4), (1, 4), (2, 4), (3, 4), (4, 4)]
+    open_folder(one, tmp_path)
+    before = progress_of(one, tmp_path)
+    assert (before.done, before.total, before.cost_done) == (0, 4, 0.0)
+    run_campaign(one, tmp_path, seen.append)
+    assert sum(seen) == pytest.approx(before.cost_total)
+    assert progress_of(one, tmp_path).done == len(seen) == 4
     rows = finished(one, tmp_path)
     assert [row["seed"] for row in rows] == [0, 0, 0, 0]
     files = sorted((tmp_path / "trials").iterdir())
     files[2].unlink()
     kept = {file: file.stat().st_mtime_ns for file in files if file.exists()}
     seen.clear()
-    run_campaign(one, tmp_path, lambda *counts: seen.append(counts))
-    assert seen == [(3, 4), (4, 4)]
+    assert progress_of(one, tmp_path).done == 3
+    run_campaign(one, tmp_path, seen.append)
+    assert len(seen) == 1
     assert {file: file.stat().st_mtime_ns for file in kept} == kept
     assert finished(one, tmp_path) == rows
     monkeypatch.setattr(campaign, "ProcessPoolExecutor", None)
-    run_campaign(one, tmp_path, lambda *counts: None)
+    run_campaign(one, tmp_path, seen.append)
+    assert len(seen) == 1
 
 
-@pytest.mark.parametrize("change", [{"seeds": 5}, {"stiffness": 2000.0}, {"restrictions": "floor"}])
+@pytest.mark.parametrize("change", [{"seeds": 5}, {"stiffness": (2000.0,)}, {"restrictions": ("floor",)}])
 def test_a_folder_of_another_run_is_not_touched(tmp_path, change):
     open_folder(SMALL, tmp_path)
     before = (tmp_path / "run.json").read_text()
@@ -120,6 +138,42 @@ def test_changed_parameters_of_a_profile_are_noticed(tmp_path, monkeypatch):
         open_folder(SMALL, tmp_path)
 
 
+def test_files_of_different_cells_differ():
+    modes = ("off", "hard", "slack", "floor")
+    names = ("blind", "paper", "paper:restriction.beta=-10", "paper:restriction.beta=10", "paper:threshold.alpha=0.3")
+    grid = Grid(names[:3] + names[4:], modes, (2e3, 25e3))
+    cells = [cell for experiment in EXPERIMENTS.values() for cell in experiment.cells(grid)]
+    assert len({cell.name for cell in cells}) == len(cells)
+    assert all(
+        set(cell.name) <= set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_") for cell in cells
+    )
+    assert Cell("static", names[2]).name != Cell("static", names[3]).name
+
+
+def test_a_grid_gives_each_profile_its_modes():
+    grid = Grid(("blind", "paper", "paper:restriction.mode=floor"), ("slack", "hard"))
+    assert grid.controllers("off") == [
+        ("blind", "off"), ("paper", "slack"), ("paper", "hard"), ("paper:restriction.mode=floor", "floor"),
+    ]  # fmt: skip
+    assert Grid(("paper",)).controllers("slack") == [("paper", "slack")]
+
+
+def test_the_whole_paper_runs_every_experiment_and_no_trial_twice():
+    runs = whole_paper(Request(tuple(EXPERIMENTS), seeds=2))
+    cells = [(cell.name, seed) for _, request in runs for cell, seed in request.tasks()]
+    assert len(cells) == len(set(cells))
+    assert {cell.experiment for _, request in runs for cell, _ in request.tasks()} == set(EXPERIMENTS)
+    assert len({name for name, _ in runs}) == len(runs)
+
+
+def test_the_whole_paper_with_less_is_less():
+    asked = Request(tuple(EXPERIMENTS), 1, profiles=("paper",), restrictions=("slack",), stiffness=(2e3,))
+    cells = [c for _, request in whole_paper(asked) for c, _ in request.tasks() if c.experiment == "static"]
+    assert [(c.profile, c.where["restrictions"], c.where["stiffness_n_per_m"]) for c in cells] == [
+        ("paper", "slack", 2e3)
+    ] * 4
+
+
 @pytest.mark.parametrize("content", [b"{", b"[]", b"3", b"\xff", b"[" * 100_000, b"9" * 5000])
 def test_a_damaged_folder_is_named(tmp_path, content):
     (tmp_path / "run.json").write_bytes(content)
@@ -132,7 +186,7 @@ def test_a_damaged_trial_is_run_again(tmp_path, monkeypatch, content):
     open_folder(SMALL, tmp_path)
     first, *others = [trial_file(tmp_path, *task) for task in SMALL.tasks()]
     for (cell, seed), file in zip(SMALL.tasks()[1:], others, strict=True):
-        write_json({"experiment": cell.experiment, "profile": cell.profile, "seed": seed}, file)
+        write_json({"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}, file)
     _damage(first, content)
     assert len(finished(SMALL, tmp_path)) == 3
     again = _play_with(monkeypatch, lambda *task: Future())

@@ -5,7 +5,7 @@ from pretouch.experiments import dynamic
 from pretouch.experiments.cell import Cell
 from tests.experiments.limits import assert_within_limits
 
-PAPER = Cell(dynamic.NAME, "paper", {})
+PAPER = Cell(dynamic.NAME, "paper", {"restrictions": "slack"})
 CONTACT = {"detected", "delay_s", "direction_error_deg", "push_n", "push_s", "reaction_towards_person"}
 
 

@@ -1,5 +1,4 @@
-from pretouch.experiments.summary import summarise
-from pretouch.experiments.tables import tables
+from pretouch.experiments.registry import summarise, tables
 
 
 def static_row(profile, seed, peak, **changes):
@@ -7,7 +6,7 @@ def static_row(profile, seed, peak, **changes):
         "experiment": "static", "trajectory": "circle", "side": "-y", "profile": profile, "restrictions": "off",
         "stiffness_n_per_m": 25e3, "seed": seed, "contact": True, "impact_speed_m_s": 0.2, "detection_delay_s": 0.05,
         "filtered_at_detection_n": 12.0, "raw_at_detection_n": 30.0, "peak_estimate_n": peak, "true_peak_20ms_n": 40.0,
-        "true_peak_n": 41.0, "false_detections": 0, "held": False,
+        "true_peak_n": 41.0, "least_sensed_m": 0.05, "false_detections": 0, "held": False,
     } | changes  # fmt: skip
 
 
@@ -63,4 +62,31 @@ def test_tables_show_medians_and_ratios():
     assert static.rows[2][6] == "4.00\n4.0-4.0"
     assert dynamic.rows[0][:3] == ("paper", "1 of 1", "60")
     for table in (static, dynamic):
+        assert all(len(row) == len(table.header) for row in table.rows)
+
+
+def test_ratios_pair_trials_at_the_same_place_and_stiffness():
+    places = [("circle", "-y", 2e3), ("circle", "-y", 25e3), ("line", "-y", 25e3)]
+    rows = []
+    for i, (trajectory, side, stiffness) in enumerate(places):
+        where = {"trajectory": trajectory, "side": side, "stiffness_n_per_m": stiffness}
+        rows += [static_row("blind", 0, 20.0 * (i + 2), **where), static_row("paper", 0, 20.0, **where)]
+    part = summarise(rows)["static"]
+    assert [r["peak_estimate_n"]["median"] for r in part["ratios"]] == [2.0, 3.0, 4.0]
+    pooled = {r["stiffness_n_per_m"]: r["peak_estimate_n"] for r in part["pooled_ratios"]}
+    assert pooled[2e3]["n"] == 1
+    assert pooled[25e3]["median"] == 3.5
+    assert [c["trials"] for c in part["pooled_cells"]] == [1, 1, 2, 2]
+
+
+def test_more_of_a_grid_is_shown_in_more_tables():
+    rows = [static_row(name, 0, 20.0) for name in ("blind", "paper", "slowing-only")]
+    rows.append(static_row("paper", 0, None, restrictions="hard", contact=False, detection_delay_s=None))
+    places, by_use, by_mode = tables(summarise(rows))
+    assert [row[1] for row in places.rows] == ["blind", "paper", "ratio"]
+    assert [row[1] for row in by_use.rows] == ["blind", "paper", "ratio", "slowing-only", "ratio"]
+    assert [row[:4] for row in by_mode.rows] == [
+        ("off", "paper", "1", "100"), ("off", "slowing-only", "1", "100"), ("hard", "paper", "1", "0"),
+    ]  # fmt: skip
+    for table in (places, by_use, by_mode):
         assert all(len(row) == len(table.header) for row in table.rows)

@@ -160,6 +160,14 @@ def test_the_forearm_is_no_obstacle_but_what_is_before_it_is(watcher, distance, 
     assert len(watcher.see(1.0, hand_back=distance).unit) == shown
 
 
+def test_unfiltered_the_floor_is_an_obstacle(looking_down, panda_model):
+    distance = 0.48688 - 0.03 + 0.2
+    assert len(looking_down.see(1.0, down=distance).unit) == 0
+    seeing_all = _Watcher(panda_model, looking_down.skin, params=replace(PARAMS, filter_views=False))
+    (height,) = seeing_all.see(1.0, down=distance).point[:, 2]
+    assert height == pytest.approx(-0.2, abs=1e-4)
+
+
 def test_only_the_unit_that_sees_the_arm_is_silenced(watcher):
     watcher.see(1.0, hand_left=0.35)
     found = watcher.take(watcher.readings(1.02, hand_back=0.35, wrist_front=0.35), 1.02)

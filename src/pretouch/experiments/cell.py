@@ -22,12 +22,16 @@ class Grid:
     """Contact stiffnesses of static objects [N/m]."""
 
     def controllers(self, restrictions: RestrictionMode) -> list[tuple[str, str]]:
-        """Profiles with restriction modes; `restrictions` is the experiment's own. Without proximity it is `off`."""
-        pairs = [
-            (name, mode if profile(name).perception.enabled else "off")
-            for name in self.profiles
-            for mode in self.restrictions or (restrictions,)
-        ]
+        """Profiles with restriction modes; `restrictions` is the experiment's own.
+
+        Without proximity the mode is `off`; a profile that is named with a mode keeps it.
+        """
+        pairs = []
+        for name in self.profiles:
+            found = profile(name)
+            fixed = not found.perception.enabled or ":restriction.mode=" in name
+            modes = (found.restriction.mode,) if fixed else self.restrictions or (restrictions,)
+            pairs += [(name, mode) for mode in modes]
         return list(dict.fromkeys(pairs))
 
 
