@@ -5,7 +5,6 @@ from pretouch.experiments import avoidance
 from pretouch.experiments.cell import Cell, Grid
 from tests.experiments.limits import assert_within_limits
 
-
 MODES = {"blind": "off", "paper": "slack"}
 
 

@@ -1,4 +1,5 @@
 import json
+from dataclasses import fields
 from html.parser import HTMLParser
 from pathlib import Path
 from shutil import copy, copytree
@@ -10,10 +11,12 @@ from PIL import Image
 from pretouch.errors import ExperimentError
 from pretouch.experiments import dynamic, static
 from pretouch.experiments.campaign import Request, open_folder, trace_file, trial_file, write_json
-from pretouch.experiments.cell import Cell
+from pretouch.experiments.cell import Cell, Grid
+from pretouch.experiments.registry import summarise
 from pretouch.experiments.report import write_report
-from pretouch.experiments.summary import summarise
-from pretouch.experiments.trace import load_trace, save_trace, trace_of
+from pretouch.experiments.trace import Trace, load_trace, save_trace, trace_of
+
+LINE = ("line", "-y")
 
 
 class Links(HTMLParser):
@@ -31,8 +34,8 @@ class Links(HTMLParser):
 def request_and_folder(context, tmp_path_factory):
     request, out = Request(("static", "dynamic"), seeds=1), tmp_path_factory.mktemp("run")
     open_folder(request, out)
-    cells = [c for c in static.cells(request.profiles) if c.where == {"trajectory": "line", "side": "-y"}]
-    for cell in [*cells, Cell(dynamic.NAME, "paper", {})]:
+    cells = [c for c in static.cells(Grid(("blind", "paper"))) if (c.where["trajectory"], c.where["side"]) == LINE]
+    for cell in [*cells, Cell(dynamic.NAME, "paper", {"restrictions": "slack"})]:
         row, record = (static if cell.experiment == "static" else dynamic).trial(cell, 0, context)
         save_trace(trace_of(record), trace_file(out, cell, 0))
         write_json(row, trial_file(out, cell, 0))
@@ -56,7 +59,9 @@ def test_the_page_shows_each_table_and_picture(request_and_folder):
 def test_a_run_without_trials_still_has_a_page(tmp_path):
     request = Request(("static",), seeds=1)
     open_folder(request, tmp_path)
-    assert "<table" not in write_report([(request, tmp_path)], {}, tmp_path).read_text()
+    text = write_report([(request, tmp_path)], {}, tmp_path).read_text()
+    assert "<table" not in text
+    assert "static: 1 seeds, profiles blind, paper" in text
 
 
 def test_a_page_that_cannot_be_written_is_named(tmp_path):
@@ -70,8 +75,9 @@ def test_a_damaged_trace_leaves_its_picture_out(request_and_folder, tmp_path):
     out = copytree(whole, tmp_path / "out")
     (file,) = (out / "traces").glob("dynamic*.npz")
     file.write_bytes(file.read_bytes()[:-1000])
+    rows = [json.loads(file.read_text()) for file in (out / "trials").iterdir()]
     links = Links()
-    links.feed(write_report([(request, out)], {}, out).read_text())
+    links.feed(write_report([(request, out)], summarise(rows), out).read_text())
     assert links.images == ["static.png"]
 
 
@@ -90,6 +96,9 @@ def _arrays(path, **changes):
         lambda path: _arrays(path, force=None),
         lambda path: _arrays(path, force=np.zeros((3, 3))),
         lambda path: _arrays(path, force=np.array(0.0)),
+        lambda path: _arrays(path, sensed_point=None),
+        lambda path: _arrays(path, sensed_point=np.load(path)["sensed_point"][:, :2]),
+        lambda path: _arrays(path, sensed_point=np.load(path)["sensed_point"][:, :, :2]),
     ],
 )
 def test_a_damaged_trace_is_named(request_and_folder, tmp_path, damage):
@@ -106,12 +115,14 @@ def test_a_trace_is_read_back(request_and_folder, tmp_path):
     trace = load_trace(next((out / "traces").glob("dynamic*.npz")))
     save_trace(trace, tmp_path / "again.npz")
     again = load_trace(tmp_path / "again.npz")
-    np.testing.assert_array_equal(again.force, trace.force)
+    for field in fields(Trace):
+        np.testing.assert_array_equal(getattr(again, field.name), getattr(trace, field.name))
     assert [p.name for p in tmp_path.iterdir()] == ["again.npz"]
 
 
 def test_a_trace_has_the_mean_true_force_of_each_step(context):
-    _, record = static.trial(Cell(static.NAME, "blind", {"trajectory": "line", "side": "+y"}), 1, context)
+    where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
+    _, record = static.trial(Cell(static.NAME, "blind", where), 101, context)
     trace = trace_of(record)
     i = int(np.abs(trace.true_force[:, 1]).argmax())
     since = (record.true_time > trace.time[i - 1] + 1e-9) & (record.true_time <= trace.time[i] + 1e-9)

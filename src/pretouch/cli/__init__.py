@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 from rich.console import Console
@@ -56,7 +56,42 @@ class Reproduce:
     """File for all trials and their summary; by default results.json in the folder."""
 
 
-Command = Annotated[Demo, tyro.conf.subcommand("demo")] | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+@dataclass(frozen=True)
+class Figure:
+    """Draw one figure of the paper, from a run that is there or from trials played for it."""
+
+    name: tyro.conf.Positional[str]
+    """circle (Fig. 4), interaction (Fig. 5), close-up (Fig. 6), force-difference (Fig. 7) or framework (Fig. 2)."""
+    run: str = ""
+    """Folder of a run of `reproduce` or `demo` to draw it from; by default what is needed is played first."""
+    out: str = ""
+    """File to write, ending in .png, .pdf or .svg; by default NAME.png."""
+    profile: str = "paper"
+    """Profile that is shown."""
+    seed: int = 0
+    """Seed of the trials that are played; runs keep the course of seed 0."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measure something on many simulated arms."""
+
+    what: tyro.conf.Positional[Literal["free-motion"]]
+    """free-motion: how far the force estimate is off, and which detectors take that for a contact."""
+    seeds: int = 10
+    """Simulated arms; each moves for twenty minutes."""
+    out: str = ""
+    """Folder for results, figures and page; by default runs/bench-WHAT."""
+    json: str = ""
+    """File for all trials and their summary; by default results.json in the folder."""
+
+
+Command = (
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Figure, tyro.conf.subcommand("figure")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
+)
 
 
 class _Terminated(BaseException):
@@ -81,10 +116,15 @@ def main(args: list[str] | None = None) -> int:
     try:
         with _sigterm_raises():
             command = tyro.cli(Command, prog="pretouch", description="Contact-anticipating robot arms.", args=args)
-            if isinstance(command, Demo):
-                _demo(command)
-            else:
-                _reproduce(command)
+            match command:
+                case Demo():
+                    _demo(command)
+                case Reproduce():
+                    _reproduce(command)
+                case Figure():
+                    _figure(command)
+                case Bench():
+                    _bench(command)
     except PretouchError as error:
         errors.print(str(error), markup=False)
         return _USAGE
@@ -128,6 +168,23 @@ def _reproduce(command: Reproduce) -> None:
     out = Path(command.out or f"runs/reproduce-{command.experiment}")
     runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
     run_all(runs, out, Path(command.json) if command.json else out / "results.json")
+
+
+def _figure(command: Figure) -> None:
+    from pretouch.cli.figure import draw_figure
+
+    run = Path(command.run) if command.run else None
+    out = Path(command.out or f"{command.name}.png")
+    print(f"Figure: {draw_figure(command.name, run, out, command.profile, command.seed)}")
+
+
+def _bench(command: Bench) -> None:
+    from pretouch.cli.campaigns import run_all
+    from pretouch.experiments.campaign import Request
+
+    out = Path(command.out or f"runs/bench-{command.what}")
+    request = Request((command.what,), command.seeds)
+    run_all([(request, out)], out, Path(command.json) if command.json else out / "results.json")
 
 
 def _words(text: str) -> tuple[str, ...]:

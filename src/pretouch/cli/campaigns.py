@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -117,9 +118,9 @@ def _show(console: Console, summary: dict[str, Any]) -> None:
         console.print(table.title, style="bold", markup=False)
         drawn = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
         for i, text in enumerate(table.header):
-            drawn.add_column(text, justify="left" if i < 2 else "right")
+            drawn.add_column(escape(text), justify="left" if i < 2 else "right")
         for row in table.rows:
-            drawn.add_row(*row)
+            drawn.add_row(*map(escape, row))
         console.print(drawn)
         console.print(table.note, style="dim", markup=False)
     console.print()

@@ -13,7 +13,7 @@ from pretouch.experiments.pushes import Visit, Visitor
 from pretouch.experiments.summary import avoidance_summary
 from pretouch.experiments.tables import avoidance_tables
 from pretouch.experiments.trial import Record, Setup, play
-from pretouch.params import RestrictionMode
+from pretouch.params import RestrictionMode, profile
 from pretouch.perception.closest import closest_points
 from pretouch.sim.scene import HandSpec, SceneSpec
 
@@ -94,14 +94,14 @@ def _least_gap(record: Record, context: Context, radius: float) -> float:
 
 
 def _draw(sources: Sources) -> list[Picture]:
-    from pretouch.experiments.figures import avoidance_figure
+    from pretouch.experiments.figures.circle import circle_figure
 
     for cell in sources.summary["cells"]:
         if cell["place"] == "beside" and cell["profile"] != "blind":
             where = {"place": "beside", "restrictions": cell["restrictions"]}
             trace = sources.trace(Cell(NAME, cell["profile"], where))
             if trace is not None:
-                figure = avoidance_figure(trace, cell["profile"])
+                figure = circle_figure(trace, profile(cell["profile"]))
                 return [Picture("avoidance", "End-effector path with a hand beside it", figure)]
     return []
 

@@ -147,14 +147,13 @@ def _mean_force(record: Record, start: float, end: float) -> FloatArray:
 
 
 def _draw(sources: Sources) -> list[Picture]:
-    from pretouch.experiments.figures import dynamic_figure
+    from pretouch.experiments.figures.interaction import interaction_figure
 
     for cell in sources.summary["cells"]:
         if cell["profile"] != "blind":
             trace = sources.trace(Cell(NAME, cell["profile"], {"restrictions": cell["restrictions"]}))
             if trace is not None:
-                activation = profile(cell["profile"]).reduction.d_max_m
-                figure = dynamic_figure(trace, sources.units, activation, cell["profile"])
+                figure = interaction_figure(trace, sources.units, profile(cell["profile"]))
                 return [Picture("dynamic", "Distances, force with thresholds, velocity over thirty seconds", figure)]
     return []
 

@@ -6,21 +6,31 @@ from pretouch.experiments.campaign import Request
 
 _PROFILES = ("blind", "paper", "slowing-only", "thresholds-only", "paper-0.5m")
 _STIFFNESS = (2_000.0, 25_000.0, 75_000.0, 300_000.0)
+_MODES = ("hard", "slack", "floor")
+_STUDIES = {
+    "between": 12, "anticipation": 12, "free-motion": 10, "noise": 6, "detectable": 3,
+    "tuned": 4, "release": 10, "endless": 4, "dropout": 12, "creeping": 6, "retreating": 6, "views": 4, "infeasible": 6,
+}  # fmt: skip
+"""Claims and weaknesses, each with its number of seeds: all of them together take an hour at most."""
 
 
 def whole_paper(asked: Request) -> list[tuple[str, Request]]:
     """All runs of `pretouch reproduce all`, each with the name of its folder.
 
-    `asked` gives seeds, skin and orientation of all of them. Profiles, restrictions and stiffnesses it names replace
-    those of the three experiments of the paper; where it has the defaults of a Request, these are varied as well.
+    `asked` gives skin, orientation and the number of seeds; a study has no more seeds than that, nor than its own
+    number. Profiles, restrictions and stiffnesses that it names replace those of the paper's three experiments; where
+    it has the defaults of a Request, these are varied as well.
     """
     plain = Request(asked.experiments, asked.seeds)
     profiles = _PROFILES if asked.profiles == plain.profiles else asked.profiles
     stiffness = _STIFFNESS if asked.stiffness == plain.stiffness else asked.stiffness
-    people = replace(asked, experiments=("avoidance", "dynamic"), profiles=profiles)
-    static = replace(asked, experiments=("static",), profiles=profiles, stiffness=stiffness)
-    runs = [("people", people), ("static", static)]
+    runs = [
+        ("static", replace(asked, experiments=("static",), profiles=profiles, stiffness=stiffness)),
+        ("people", replace(asked, experiments=("avoidance", "dynamic"), profiles=profiles)),
+    ]
     if not asked.restrictions:
-        modes = ("hard", "slack", "floor")
-        runs.append(("restrictions", replace(asked, experiments=("static",), profiles=("paper",), restrictions=modes)))
-    return runs
+        runs.append(("restrictions", replace(asked, experiments=("static",), profiles=("paper",), restrictions=_MODES)))
+    study = Request(("static",), asked.seeds, orientation=asked.orientation, skin=asked.skin)
+    return runs + [
+        (name, replace(study, experiments=(name,), seeds=min(asked.seeds, seeds))) for name, seeds in _STUDIES.items()
+    ]

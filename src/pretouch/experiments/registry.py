@@ -3,17 +3,40 @@
 from typing import Any
 
 from pretouch.experiments import avoidance, dynamic, static
+from pretouch.experiments.claims import anticipation, between, detectable, free_motion, noise
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.tables import TextTable
+from pretouch.experiments.weaknesses import (
+    creeping,
+    dropout,
+    endless,
+    infeasible,
+    release,
+    retreating,
+    tuned,
+    views,
+)
 
-EXPERIMENTS: dict[str, Experiment] = {
-    e.name: e
-    for e in (
-        static.EXPERIMENT,
-        avoidance.EXPERIMENT,
-        dynamic.EXPERIMENT,
-    )
-}
+PAPER = (static.EXPERIMENT, avoidance.EXPERIMENT, dynamic.EXPERIMENT)
+CLAIMS = (
+    between.EXPERIMENT,
+    anticipation.EXPERIMENT,
+    free_motion.EXPERIMENT,
+    noise.EXPERIMENT,
+    detectable.EXPERIMENT,
+)
+WEAKNESSES = (
+    tuned.EXPERIMENT,
+    release.EXPERIMENT,
+    endless.EXPERIMENT,
+    dropout.EXPERIMENT,
+    creeping.EXPERIMENT,
+    retreating.EXPERIMENT,
+    views.EXPERIMENT,
+    infeasible.EXPERIMENT,
+)
+
+EXPERIMENTS: dict[str, Experiment] = {e.name: e for e in (*PAPER, *CLAIMS, *WEAKNESSES)}
 
 
 def summarise(trials: list[Row]) -> dict[str, Any]:

@@ -169,7 +169,7 @@ def _cost(cell: Cell) -> float:
 
 
 def _draw(sources: Sources) -> list[Picture]:
-    from pretouch.experiments.figures import static_figure
+    from pretouch.experiments.figures.force_difference import force_difference_figure
 
     stiffness, mode, profiles = shown_controllers(sources.summary["cells"])
     traces = {}
@@ -182,7 +182,7 @@ def _draw(sources: Sources) -> list[Picture]:
             traces[trajectory, side, profile] = trace
     if not traces:
         return []
-    figure = static_figure(traces, profiles[-1])
+    figure = force_difference_figure(traces, profiles[-1])
     return [Picture("static", "Force and contact thresholds at the static object", figure)]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pretouch.errors import ExperimentError
 from pretouch.experiments.trial import Record
-from pretouch.types import BoolArray, FloatArray, Mode
+from pretouch.types import BoolArray, ControlStep, FloatArray, Mode
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,10 @@ class Trace:
     """(S,)"""
     range_distance: FloatArray
     """(S, K) [m], NaN for no target"""
+    sensed_point: FloatArray
+    """(S, K, 3) obstacle each unit showed (eq. 1) [m], NaN for none"""
+    approach_limit: FloatArray
+    """(S,) approach limit of the nearest obstacle that restricts the arm (eq. 7) [m/s], NaN for none"""
     force: FloatArray
     """(S, 3) [N]"""
     filtered_force: FloatArray
@@ -35,6 +39,12 @@ class Trace:
     """(S, 3) [N]"""
     lower: FloatArray
     """(S, 3) [N]"""
+    mean: FloatArray
+    """(S, 3) of the window [N]"""
+    obstacle_positive: FloatArray
+    """(S, 3) F_obs+ of eq. 11, by which the lower threshold is raised [N]"""
+    obstacle_negative: FloatArray
+    """(S, 3) F_obs-, by which the upper threshold is lowered [N]"""
     true_force: FloatArray
     """(S, 3) mean true force since the last step [N]"""
     reacting: BoolArray
@@ -57,14 +67,33 @@ def trace_of(record: Record) -> Trace:
         path_position=np.array([s.path_position for s in steps]),
         speed_scale=np.array([s.speed_scale for s in steps]),
         range_distance=np.array([s.range_distance for s in steps]),
+        sensed_point=np.array([sensed_points(s) for s in steps]),
+        approach_limit=np.array([_nearest_limit(s) for s in steps]),
         force=record.forces(),
         filtered_force=np.array([s.filtered_force for s in steps]),
         upper=np.array([s.thresholds.upper for s in steps]),
         lower=np.array([s.thresholds.lower for s in steps]),
+        mean=np.array([s.thresholds.mean for s in steps]),
+        obstacle_positive=np.array([s.thresholds.obstacle_positive for s in steps]),
+        obstacle_negative=np.array([s.thresholds.obstacle_negative for s in steps]),
         true_force=true,
         reacting=np.array([s.mode is Mode.REACT for s in steps]),
         detected=np.array([s.contact is not None for s in steps]),
     )
+
+
+def sensed_points(step: ControlStep) -> FloatArray:
+    """Obstacle of each unit (K, 3) [m], NaN where it showed none."""
+    points = np.full((len(step.range_distance), 3), np.nan)
+    points[step.obstacles.unit] = step.obstacles.point
+    return points
+
+
+def _nearest_limit(step: ControlStep) -> float:
+    """Approach limit [m/s] of the obstacle nearest to the body, NaN where none restricts the arm."""
+    if len(step.restricted) == 0:
+        return np.nan
+    return float(step.approach_limit[np.argmin(step.obstacles.body_distance[step.restricted])])
 
 
 def save_trace(trace: Trace, path: Path) -> None:
@@ -84,4 +113,6 @@ def load_trace(path: Path) -> Trace:
         raise ExperimentError(f"The trace {path} is damaged ({error}): remove it.") from error
     if len(lengths) != 1 or 0 in lengths:
         raise ExperimentError(f"The trace {path} is damaged (its arrays differ in length): remove it.")
+    if trace.sensed_point.shape != (*trace.range_distance.shape, 3):
+        raise ExperimentError(f"The trace {path} is damaged (its units differ in number): remove it.")
     return trace

@@ -56,6 +56,11 @@ def filtered(course: Windowed, f_base: float, f_obs: float = 0.0) -> BoolArray:
     return np.any(np.abs(course.filtered - course.mean) > band(course, f_base, f_obs), axis=1)
 
 
+def steady(course: Windowed, f_base: float, f_obs: float = 0.0) -> BoolArray:
+    """As `filtered`, but without F_sigma: thresholds that stay equally far from the mean whatever the noise."""
+    return np.any(np.abs(course.filtered - course.mean) > f_base - f_obs, axis=1)
+
+
 def raw(course: Windowed, f_base: float, f_obs: float = 0.0) -> BoolArray:
     """Hold the estimate itself against the thresholds, as the authors' code does."""
     return np.any(np.abs(course.force - course.mean) > band(course, f_base, f_obs), axis=1)

@@ -1,0 +1,56 @@
+"""Force at contact without and with proximity (paper, Fig. contact_differences)."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pretouch.experiments.figures.marks import BLIND, SENSING, Y, touching
+from pretouch.experiments.trace import Trace
+
+_TRAJECTORIES, _SIDES = ("circle", "line"), ("-y", "+y")
+
+
+def force_difference_figure(traces: Mapping[tuple[str, str, str], Trace], profile: str) -> Figure:
+    """Force along y with the band between the thresholds, before and after contact: blind blue, sensing red.
+
+    `traces` by (trajectory, side, profile); `profile` is the one to show beside `blind`.
+    """
+    figure = Figure(figsize=(10, 6.8), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    for row, trajectory in enumerate(_TRAJECTORIES):
+        for column, side in enumerate(_SIDES):
+            axes: Axes = panels[row, column]
+            for name, colour, hatch in (("blind", BLIND, "...."), (profile, SENSING, "")):
+                trace = traces.get((trajectory, side, name))
+                if trace is not None:
+                    _force(axes, trace, -1.0 if side == "+y" else 1.0, name, colour, hatch)
+            axes.set_title(f"{trajectory}, object at {side}")
+            axes.set_xlim(-1.0, 0.6)
+            axes.grid(alpha=0.3)
+    if panels[0, 0].lines:
+        panels[0, 0].legend(loc="upper left", fontsize="small")
+    figure.supxlabel("time from first touch [s]")
+    figure.supylabel("force along y, away from the object [N]")
+    figure.suptitle(f"Contact with a static object: force estimate and contact thresholds, blind and {profile}")
+    return figure
+
+
+def _force(axes: Axes, trace: Trace, push: float, name: str, colour: str, hatch: str) -> None:
+    """Draw the estimate, the value of eq. 8, the band until the detection, and the detection itself."""
+    style, filtered, marker = ("--", ":", "o") if hatch else ("-", "-.", "s")
+    touched = np.flatnonzero(touching(trace))
+    if len(touched) == 0:
+        return
+    time = trace.time - trace.time[touched[0]]
+    found = np.flatnonzero(trace.detected & (time >= 0))
+    before = time <= (time[found[0]] if len(found) else time[-1])
+    bounds = push * trace.lower[before, Y], push * trace.upper[before, Y]
+    axes.fill_between(
+        time[before], *bounds, facecolor=(colour, 0.15), edgecolor=(colour, 0.5), lw=0.8, ls=style, hatch=hatch,
+        label=f"{name}: between thresholds",
+    )  # fmt: skip
+    axes.plot(time, push * trace.force[:, Y], color=colour, ls=style, label=f"{name}: estimate")
+    axes.plot(time, push * trace.filtered_force[:, Y], color=colour, ls=filtered, lw=1.2, label=f"{name}: eq. 8")
+    axes.plot(time[found], push * trace.force[found, Y], marker, color=colour, mec="black", label=f"{name}: detected")

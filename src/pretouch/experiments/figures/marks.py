@@ -1,0 +1,78 @@
+"""What several figures draw alike."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from pretouch.experiments.trace import Trace
+from pretouch.types import BoolArray, FloatArray
+
+BLIND, SENSING = "tab:blue", "tab:red"
+AXES = "xyz"
+Y = 1
+"""The axis the paper's figures show."""
+TOUCH_N = 1.0
+_SLOWED = 0.99
+_UNITS = (
+    ("black", "-", ""), ("tab:blue", "--", ""), ("tab:orange", "-", "o"), ("tab:green", ":", "s"),
+    ("tab:red", "-.", ""), ("tab:purple", "--", "^"), ("tab:gray", "-", ""),
+)  # fmt: skip
+"""Colour, line and marker of each unit; more units than these begin again."""
+_MARKS = 60
+"""Markers along a line over the whole of a trace."""
+
+
+def spans(flags: BoolArray) -> list[tuple[int, int]]:
+    """First and one past the last index of each run of true flags."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def shade(axes: Axes, time: FloatArray, flags: BoolArray, colour: str, hatch: str = "", label: str = "") -> None:
+    """Shade the spans of time (S,) [s] in which flags (S,) hold; a hatch tells it from others in grey."""
+    for i, (start, end) in enumerate(spans(flags)):
+        axes.axvspan(
+            time[start], time[min(end, len(time) - 1)], facecolor=(colour, 0.15), edgecolor=(colour, 0.4), lw=0,
+            hatch=hatch, label=label if i == 0 else None, zorder=0,
+        )  # fmt: skip
+
+
+def near(trace: Trace, d_max: float) -> BoolArray:
+    """Whether anything sensed in each step (S,) is within d_max [m] of the end-effector's origin."""
+    distance = np.linalg.norm(trace.sensed_point - trace.ee_position[:, None], axis=2)
+    return np.any(distance < d_max, axis=1)
+
+
+def slowed(trace: Trace) -> BoolArray:
+    """Whether the arm is slowed in each step (S,)."""
+    return trace.speed_scale < _SLOWED
+
+
+def touching(trace: Trace) -> BoolArray:
+    """Whether something truly touches the arm in each step (S,)."""
+    return np.linalg.norm(trace.true_force, axis=1) > TOUCH_N
+
+
+def distances(axes: Axes, trace: Trace, units: tuple[str, ...]) -> None:
+    """Draw the distance each unit reads."""
+    for k, unit in enumerate(units):
+        colour, style, marker = _UNITS[k % len(_UNITS)]
+        axes.plot(
+            trace.time, trace.range_distance[:, k], style, color=colour, lw=1.2, marker=marker, ms=4,
+            markevery=max(1, len(trace.time) // _MARKS), label=unit.replace("_", " "),
+        )  # fmt: skip
+    axes.set_ylabel("distance read [m]")
+
+
+def force_with_thresholds(axes: Axes, trace: Trace, axis: int) -> None:
+    """Draw the force estimate along an axis, the value of eq. 8 and the moving thresholds."""
+    axes.plot(trace.time, trace.upper[:, axis], color="black", lw=1, label="thresholds")
+    axes.plot(trace.time, trace.lower[:, axis], color="black", lw=1)
+    axes.plot(trace.time, trace.force[:, axis], color="0.7", lw=0.8, label="estimate")
+    axes.plot(
+        trace.time, trace.filtered_force[:, axis], color="tab:blue", lw=1.8, ls=(0, (4, 1)), label="value of eq. 8"
+    )
+    found = trace.detected
+    axes.plot(
+        trace.time[found], trace.filtered_force[found, axis], "v", color="tab:red", mec="black", ms=8, label="detected"
+    )
+    axes.set_ylabel(f"force along {AXES[axis]} [N]")

@@ -1,0 +1,1 @@
+"""The paper's weaknesses, each with its run and its number."""
