@@ -204,7 +204,7 @@ def test_a_row_says_where_it_is_from_and_all_that_was_found(rows):
     row = rows[1]
     assert list(row) == ["experiment", "motion", "shape", "size", "profile", "seed", "answers", "held"]
     assert (row["motion"], row["shape"], row["size"], row["seed"], row["held"]) == ("rest", "push", 30.0, 100, False)
-    assert len(row["answers"]) == 2 * len(detectable.JUDGES) == 18
+    assert len(row["answers"]) == 2 * len(detectable.JUDGES) == 20
     assert {a["events"] for a in row["answers"]} == {6}
     assert json.loads(json.dumps(row, allow_nan=False)) == row
 
