@@ -125,7 +125,7 @@ def test_a_run_writes_what_it_says(capsys, tmp_path):
     args = ("reproduce", "static", "--seeds", "1", "--out", str(out), "--json", str(numbers))
     code, said = run(capsys, *args)
     assert code == 0
-    for words in ("Static object", "circle -y", "line +y", "ratio", str(out / "index.html"), str(numbers)):
+    for words in ("Static object", "circle", "line", "ratio", str(out / "index.html"), str(numbers)):
         assert words in said.out
     results = json.loads(numbers.read_text())
     assert len(results["trials"]) == 8

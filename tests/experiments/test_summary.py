@@ -1,4 +1,5 @@
 from pretouch.experiments.registry import summarise, tables
+from tests.experiments.width import width
 
 
 def static_row(profile, seed, peak, **changes):
@@ -57,9 +58,11 @@ def test_only_experiments_that_ran_are_summarised():
 def test_tables_show_medians_and_ratios():
     rows = [static_row("blind", 0, 80.0), static_row("paper", 0, 20.0), dynamic_row([contact()])]
     static, dynamic = tables(summarise(rows))
-    assert [row[:2] for row in static.rows] == [("circle -y", "blind"), ("circle -y", "paper"), ("", "ratio")]
-    assert static.rows[0][6] == "80.0"
+    assert [row[:2] for row in static.rows] == [("circle\n-y", "blind"), ("circle\n-y", "paper"), ("", "ratio")]
+    assert static.rows[0][6] == "80.0\n80-80"
+    assert static.rows[0][2] == "0.200\n0.200-0.200"
     assert static.rows[2][6] == "4.00\n4.0-4.0"
+    assert static.rows[0][-1] == "1/1"
     assert dynamic.rows[0][:3] == ("paper", "1 of 1", "60")
     for table in (static, dynamic):
         assert all(len(row) == len(table.header) for row in table.rows)
@@ -84,9 +87,11 @@ def test_more_of_a_grid_is_shown_in_more_tables():
     rows.append(static_row("paper", 0, None, restrictions="hard", contact=False, detection_delay_s=None))
     places, by_use, by_mode = tables(summarise(rows))
     assert [row[1] for row in places.rows] == ["blind", "paper", "ratio"]
-    assert [row[1] for row in by_use.rows] == ["blind", "paper", "ratio", "slowing-only", "ratio"]
-    assert [row[:4] for row in by_mode.rows] == [
-        ("off", "paper", "1", "100"), ("off", "slowing-only", "1", "100"), ("hard", "paper", "1", "0"),
+    names = [row[0].split("\n")[0] for row in by_use.rows]
+    assert names == ["blind", "paper", "ratio", "slowing-only", "ratio"]
+    assert [row[:2] for row in by_mode.rows] == [
+        ("paper\noff", "1/1"), ("slowing-only\noff", "1/1"), ("paper\nhard", "0/1"),
     ]  # fmt: skip
     for table in (places, by_use, by_mode):
+        assert width(table) <= 80
         assert all(len(row) == len(table.header) for row in table.rows)

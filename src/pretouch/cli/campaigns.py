@@ -2,9 +2,7 @@
 
 import os
 import sys
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError, PretouchError
 from pretouch.experiments.campaign import (
     Request,
@@ -33,7 +32,7 @@ def run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) ->
     for request, out in parts:
         request.context()
         open_folder(request, out)
-    _check_writable(json_file)
+    check_writable("file", json_file)
     try:
         _play(parts)
     except PretouchError:
@@ -61,7 +60,7 @@ def _keep(parts: list[tuple[Request, Path]], json_file: Path) -> dict[str, Any]:
     """Write all finished trials and their summary, and return them."""
     trials = [row for request, out in parts for row in finished(request, out)]
     results = {"trials": trials, "summary": summarise(trials)}
-    with _unwritable_said(json_file):
+    with unwritable_said("file", json_file):
         write_json(results, json_file)
     return results
 
@@ -72,25 +71,6 @@ def _check_apart(json_file: Path, out: Path) -> None:
     for name in ("run.json", "trials", "traces"):
         if wanted.is_relative_to(os.path.realpath(out / name)):
             raise ExperimentError(f"The file {json_file} would take the place of the run's own {name}: give another.")
-
-
-@contextmanager
-def _unwritable_said(json_file: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise ExperimentError(f"The file {json_file} cannot be written: {error.strerror}: give another.") from error
-
-
-def _check_writable(json_file: Path) -> None:
-    with _unwritable_said(json_file):
-        json_file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=json_file.parent):
-            pass
-        with suppress(FileNotFoundError):
-            os.stat(json_file)  # a name too long, for one
-        if json_file.is_dir():
-            raise IsADirectoryError(21, "Is a directory")
 
 
 def _play(parts: list[tuple[Request, Path]]) -> None:
@@ -118,7 +98,7 @@ def _show(console: Console, summary: dict[str, Any]) -> None:
         console.print(table.title, style="bold", markup=False)
         drawn = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
         for i, text in enumerate(table.header):
-            drawn.add_column(escape(text), justify="left" if i < 2 else "right")
+            drawn.add_column(escape(text), justify="left" if i < table.names else "right")
         for row in table.rows:
             drawn.add_row(*map(escape, row))
         console.print(drawn)

@@ -2,14 +2,12 @@
 
 import json
 import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 
 from rich.console import Console
 
+from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError
 from pretouch.experiments.campaign import trace_file
 from pretouch.experiments.cell import Cell, Context
@@ -46,30 +44,13 @@ def draw_figure(
     cells = wanted.cells(profile)
     if place.suffix not in _ENDINGS:
         raise ExperimentError(f"The figure {place} has no ending that says its format: use {', '.join(_ENDINGS)}.")
-    _check_writable(place)
+    check_writable("figure", place)
     played, units = _recorded(cells, run, seed) if run and cells else _played(cells, seed)
     image = BytesIO()
     wanted.draw(played, units, used).savefig(image, format=place.suffix[1:], dpi=_DOTS_PER_INCH)
-    with _unwritable_said(place):
+    with unwritable_said("figure", place):
         place.write_bytes(image.getvalue())
     return place
-
-
-@contextmanager
-def _unwritable_said(place: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise ExperimentError(f"The figure {place} cannot be written: {error.strerror}: give another.") from error
-
-
-def _check_writable(place: Path) -> None:
-    with _unwritable_said(place):
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=place.parent):
-            pass
-        if place.is_dir():
-            raise IsADirectoryError(21, "Is a directory")
 
 
 def _recorded(cells: list[Cell], run: Path, seed: int) -> tuple[Played, tuple[str, ...]]:

@@ -8,7 +8,7 @@ from pretouch.control.path import Circle
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import angle_deg, mean_over, peak, rounded
-from pretouch.experiments.pushes import Push, Pusher
+from pretouch.experiments.pushes import FACES, Push, Pusher, against
 from pretouch.experiments.summary import dynamic_summary
 from pretouch.experiments.tables import dynamic_tables
 from pretouch.experiments.trial import Record, Setup, play
@@ -21,10 +21,6 @@ DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
 
 _DURATION_S = 30.0
 _STARTS_S = (4.0, 13.0, 22.0)
-_FACES = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
-"""Outward normals of the faces that are pushed, in the frame of the robot's hand: right, left, front."""
-_TILT = 0.25
-"""The push leaves the normal by up to this in each component."""
 _FORCE_N = (15.0, 30.0)
 _LASTING_S = (0.2, 0.5)
 _NOTICE_S = 0.3
@@ -45,9 +41,8 @@ def pushes(seed: int) -> tuple[Push, ...]:
     """Three pushes against different faces, in an order, direction, size and length the seed decides."""
     rng = np.random.default_rng([seed, 11])
     planned = []
-    for start, which in zip(_STARTS_S, rng.permutation(len(_FACES)), strict=True):
-        inwards = _TILT * rng.uniform(-1, 1, 3) - _FACES[which]
-        inwards /= np.linalg.norm(inwards)
+    for start, which in zip(_STARTS_S, rng.permutation(len(FACES)), strict=True):
+        inwards = against(FACES[which], rng)
         planned.append(Push(start + rng.uniform(0, 2), inwards, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S)))
     return tuple(planned)
 

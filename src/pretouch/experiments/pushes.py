@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.sim.hand import HandGoal, point_on_arm
+from pretouch.sim.hand import ARM_STIFFNESS_N_M, HandGoal, point_on_arm
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
 
@@ -18,7 +18,7 @@ _SPEED_M_S = 0.35
 _FREE_N = 60.0
 """Force a person moves the free hand with [N]."""
 _TOUCH_N = 1.0
-_PALM = np.array([0.0, 0.0, 0.045])
+PALM = np.array([0.0, 0.0, 0.045])
 """Point of the robot's hand the person aims at, in its frame [m]."""
 _LEAD_S = 4.0
 """Time before a push or visit in which the person brings the hand to the side it will come from [s]."""
@@ -53,6 +53,16 @@ class Push:
     """[s]"""
 
 
+FACES = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+"""Outward normals of the faces of the robot's hand that are pushed, in its frame: right, left, front."""
+
+
+def against(face: FloatArray, rng: np.random.Generator, tilt: float = 0.25) -> FloatArray:
+    """Draw the direction (3,) of a push against a face: its normal, each component off by up to `tilt`."""
+    inwards = tilt * rng.uniform(-1, 1, 3) - face
+    return np.asarray(inwards / np.linalg.norm(inwards))
+
+
 @dataclass
 class Pusher:
     """Brings the hand before a face of the robot's hand, follows it, pushes as planned, and goes home in between."""
@@ -73,7 +83,7 @@ class Pusher:
 
         The direction follows the robot's hand as it turns until the touch, and stays from then on.
         """
-        palm = point_on_arm(plant, self._link, _PALM)
+        palm = point_on_arm(plant, self._link, PALM)
         number = len(self.contacts)
         if time < self._release + 1.0:
             return HandGoal(palm - _STAND_OFF_M * self._direction, _FREE_N)
@@ -81,7 +91,7 @@ class Pusher:
             return HandGoal(way_round(hand, _HOME), _FREE_N)
         push = self.pushes[number]
         if self._touch is None:
-            self._direction = point_on_arm(plant, self._link, _PALM + push.inwards) - palm
+            self._direction = point_on_arm(plant, self._link, PALM + push.inwards) - palm
         if time < push.start:
             return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction), _FREE_N)
         self._watch(time, push, plant)
@@ -98,6 +108,20 @@ class Pusher:
         elif self._touch is None and time > push.start + _PATIENCE_S:
             self.contacts.append(None)
             self._release = time
+
+
+class Holder(Pusher):
+    """A person who keeps pushing at one place, with one force: a hand that only pushes on slides past the arm's."""
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        """Reach, push and withdraw as planned, but from the touch on stay on the line of the push through the palm."""
+        planned = super().goal(time, hand, plant)
+        if self._touch is None:
+            return planned
+        palm = point_on_arm(plant, self._link, PALM)
+        # ahead by what stretches the person's arm to the planned force; what it takes to stay on the line comes on top
+        ahead = (hand - palm) @ self._direction + planned.force_max / ARM_STIFFNESS_N_M
+        return HandGoal(palm + ahead * self._direction, _FREE_N)
 
 
 @dataclass(frozen=True)
@@ -128,7 +152,7 @@ class Visitor:
         for visit in self.visits:
             if visit.arrive - _LEAD_S <= time < visit.leave + 1.0:
                 outside = visit.place + np.array([0.0, np.sign(visit.place[1]) * 0.4, 0.0])
-                clear = np.linalg.norm(point_on_arm(plant, self._link, _PALM) - visit.place) > _CLEAR_M
+                clear = np.linalg.norm(point_on_arm(plant, self._link, PALM) - visit.place) > _CLEAR_M
                 wanted = visit.arrive <= time < visit.leave
                 self._inside = wanted and (self._inside or bool(clear))
                 return HandGoal(visit.place if self._inside else way_round(hand, outside), _FREE_N)

@@ -24,7 +24,7 @@ _PAGE = Template(
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
 table { border-collapse: collapse; margin: 1rem 0; font-size: .85rem; }
 th, td { border-bottom: 1px solid #ccc; padding: .3rem .6rem; text-align: right; }
-th:first-child, td:first-child, th:nth-child(2), td:nth-child(2) { text-align: left; }
+th:first-child, td:first-child, .two th:nth-child(2), .two td:nth-child(2) { text-align: left; }
 img { max-width: 100%; }
 .note { color: #555; }
 </style>
@@ -102,7 +102,8 @@ def _table(table: TextTable) -> str:
     head = "".join(f"<th>{_lines(text)}</th>" for text in table.header)
     rows = "\n".join("<tr>" + "".join(f"<td>{_lines(text)}</td>" for text in row) + "</tr>" for row in table.rows)
     note = f'<p class="note">{escape(table.note)}</p>'
-    return f"<h2>{escape(table.title)}</h2>\n<table><tr>{head}</tr>\n{rows}</table>\n{note}"
+    kind = ' class="two"' if table.names > 1 else ""
+    return f"<h2>{escape(table.title)}</h2>\n<table{kind}><tr>{head}</tr>\n{rows}</table>\n{note}"
 
 
 def _markdown(table: TextTable) -> str:

@@ -14,6 +14,8 @@ class TextTable:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str
+    names: int = 2
+    """How many columns at the left hold names, not numbers."""
 
 
 _STATIC = (
@@ -22,7 +24,8 @@ _STATIC = (
     ("filtered_at_detection_n", "filtered\n[N]", 1),
     ("raw_at_detection_n", "raw\n[N]", 1),
     ("peak_estimate_n", "peak\n[N]", 1),
-    ("true_peak_20ms_n", "true\n[N]", 1),
+    ("true_peak_20ms_n", "true\n20 ms", 1),
+    ("true_peak_n", "true\n[N]", 1),
 )
 
 
@@ -55,21 +58,23 @@ def _values(cells: list[Row], name: str) -> list[Any]:
 
 def _places(part: Row, stiffness: float, modes: dict[str, str]) -> TextTable:
     rows: list[tuple[str, ...]] = []
+    false = 0
     for cell in part["cells"]:
         if cell["stiffness_n_per_m"] != stiffness or cell["restrictions"] != modes.get(cell["profile"]):
             continue
-        felt = f"{100 * cell['contact_fraction']:.0f}/{100 * cell['detected_fraction']:.0f}"
-        where = f"{cell['trajectory']} {cell['side']}"
-        rows.append((where, cell["profile"], *_forces(cell), felt, str(cell["false_detections"])))
-        rows += [("", "ratio", *_force_ratios(ratio), "", "") for ratio in _its_ratio(part["ratios"], cell)]
+        felt = f"{cell['detected_fraction'] * cell['trials']:.0f}/{cell['contact_fraction'] * cell['trials']:.0f}"
+        false += cell["false_detections"]
+        where = f"{cell['trajectory']}\n{cell['side']}"
+        rows.append((where, cell["profile"], *_forces(cell), felt))
+        rows += [("", "ratio", *_force_ratios(ratio), "") for ratio in _its_ratio(part["ratios"], cell)]
     return TextTable(
-        f"Static object, {stiffness / 1000:g} N/mm: medians; ratios blind/profile with their 10-90 % below",
-        ("where", "profile", *(label for _, label, _ in _STATIC), "hit/felt\n[%]", "false"),
+        f"Static object, {stiffness / 1000:g} N/mm: medians and ratios blind/profile, with their 10-90 % below",
+        ("where", "profile", *(label for _, label, _ in _STATIC), "felt"),
         tuple(rows),
         "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
-        " (eq. 8) and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, 20 ms"
-        " mean. The paper finds forces about two times smaller with proximity; which force is meant decides the"
-        " number.",
+        " (eq. 8) and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, of its 20 ms"
+        " mean and of itself. Felt: contacts detected, of all contacts. The paper finds forces about two times smaller"
+        f" with proximity; which force is meant decides the number. False detections: {false}.",
     )
 
 
@@ -77,40 +82,42 @@ def _stiffnesses(part: Row, mode: str) -> TextTable:
     rows: list[tuple[str, ...]] = []
     for cell in part["pooled_cells"]:
         if cell["restrictions"] in (mode, "off"):
-            rows.append((f"{cell['stiffness_n_per_m'] / 1000:g} N/mm", cell["profile"], *_forces(cell)))
-            rows += [("", "ratio", *_force_ratios(r)) for r in _its_ratio(part["pooled_ratios"], cell)]
+            name = f"{cell['profile']}\n{cell['stiffness_n_per_m'] / 1000:g} N/mm"
+            rows.append((name, *_forces(cell)))
+            rows += [("ratio", *_force_ratios(r)) for r in _its_ratio(part["pooled_ratios"], cell)]
     return TextTable(
-        "Static object, by stiffness and by what proximity is used for: medians of all four places, and ratios",
-        ("object", "profile", *(label for _, label, _ in _STATIC)),
+        "Static object, by stiffness and by what proximity is used for: all four places together",
+        ("profile\nobject", *(label for _, label, _ in _STATIC)),
         tuple(rows),
         "slowing-only: eqs. 3-4 without F_obs. thresholds-only: F_obs without eqs. 3-4. paper-0.5m: objects count"
         " within the 0.5 m of the paper's text instead of Table I's 0.8 m.",
+        names=1,
     )
 
 
 def _restrictions(part: Row, stiffness: float) -> TextTable:
     rows = [
         (
-            cell["restrictions"],
-            cell["profile"],
-            str(cell["trials"]),
-            f"{100 * cell['contact_fraction']:.0f}",
-            number(cell["least_sensed_m"], 3),
-            *_forces(cell),
+            f"{cell['profile']}\n{cell['restrictions']}",
+            f"{cell['contact_fraction'] * cell['trials']:.0f}/{cell['trials']}",
+            with_spread(cell["least_sensed_m"], 3),
+            *_forces(cell)[:-2],
         )
         for cell in part["pooled_cells"]
         if cell["profile"] != "blind" and cell["stiffness_n_per_m"] == stiffness
     ]
     return TextTable(
-        f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: medians of all four places",
-        ("mode", "profile", "n", "hit\n[%]", "least\n[m]", *(label for _, label, _ in _STATIC)),
+        f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: all four places together",
+        ("profile\nmode", "hit", "least\n[m]", *(label for _, label, _ in _STATIC[:-2])),
         tuple(rows),
-        "Least: nearest that anything sensed came to the arm's surface in 40 s or until contact, by what was sensed.",
+        "Hit: trials with contact. Least: nearest that anything sensed came to the arm's surface in 40 s or until"
+        " contact, by what was sensed.",
+        names=1,
     )
 
 
 def _forces(cell: Row) -> list[str]:
-    return [number(cell[key], digits, 1000 if "delay" in key else 1) for key, _, digits in _STATIC]
+    return [with_spread(cell[key], digits, 1000 if "delay" in key else 1) for key, _, digits in _STATIC]
 
 
 def _force_ratios(ratio: Row) -> list[str]:
@@ -143,6 +150,7 @@ def dynamic_tables(part: Row) -> list[TextTable]:
         rows,
         "Pushes of 15 to 30 N for 0.2 to 0.5 s. Direction: between reaction and true force. Peak: of the estimate."
         " Towards person: pushes after which a reaction began against the push.",
+        names=1,
     )
     return [table]
 
@@ -187,6 +195,14 @@ def avoidance_tables(part: Row) -> list[TextTable]:
 def number(value: Row | None, digits: int, factor: float = 1.0) -> str:
     """Write the median of a spread, or a dash where there is none."""
     return "-" if value is None else f"{factor * value['median']:.{digits}f}"
+
+
+def with_spread(value: Row | None, digits: int, factor: float = 1.0) -> str:
+    """Write the median of a spread with its 10-90 % below, these with fewer digits where they are large."""
+    if value is None:
+        return "-"
+    few = 0 if factor * value["p90"] >= 10 else digits
+    return f"{factor * value['median']:.{digits}f}\n{factor * value['p10']:.{few}f}-{factor * value['p90']:.{few}f}"
 
 
 def _ratio(value: Row | None) -> str:

@@ -9,6 +9,9 @@ from numba import njit
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
 
+ARM_STIFFNESS_N_M = 2000.0
+"""Stiffness of a person's arm behind the hand, unless another is given [N/m]."""
+
 
 @dataclass(frozen=True, slots=True)
 class HandGoal:
@@ -36,7 +39,7 @@ class Hand:
         plant: Plant,
         script: HandScript,
         speed_max: float = 0.8,
-        stiffness: float = 2000.0,
+        stiffness: float = ARM_STIFFNESS_N_M,
         damping: float = 60.0,
     ) -> None:
         """Attach to a plant whose scene has a hand.

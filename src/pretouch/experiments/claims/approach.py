@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.experiments.posture import brought_to
+from pretouch.experiments.pushes import PALM
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import HandGoal
@@ -16,8 +17,6 @@ DIRECTIONS = {"plus-x": "+x", "minus-x": "-x", "plus-y": "+y", "minus-y": "-y", 
 """Where the hand comes from, seen from the robot's hand, base frame: as files are named, and as it is shown."""
 PLACE_M = (0.4, 0.0, 0.5)
 """Where the arm stands: the middle of the paper's line [m]."""
-_PALM_M = np.array([0.0, 0.0, 0.045])
-"""Point of the robot's hand that is aimed at, in its frame [m]."""
 _AIM_SPREAD_M = 0.02
 """The seed moves the aim by up to this across the way in [m]."""
 _FAR_M = 1.0
@@ -68,7 +67,7 @@ def approach(model: RobotModel, direction: str, seed: int) -> Approach:
     aside = _AIM_SPREAD_M * np.random.default_rng([seed, 62]).uniform(-1, 1, 3) * across
     kin = model.kinematics(brought_to(model, np.array(PLACE_M)))
     link = model.link_index("panda_hand")
-    aim = kin.position[link] + kin.rotation[link] @ _PALM_M + aside
+    aim = kin.position[link] + kin.rotation[link] @ PALM + aside
     distances = np.arange(0.0, _FAR_M + _GRID_M / 2, _GRID_M)
     places = aim + distances[:, None] * outwards(direction)
     count = len(places)

@@ -8,7 +8,7 @@ from pretouch.control.path import Circle
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import rounded, spread
-from pretouch.experiments.pushes import Push, Pusher
+from pretouch.experiments.pushes import FACES, Push, Pusher, against
 from pretouch.experiments.tables import TextTable, number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
@@ -31,10 +31,8 @@ _ASIDE_M = 0.05
 """The seed moves the body along x by up to this [m]."""
 _START_S = (5.0, 7.0)
 """When the person reaches for the arm [s]."""
-_INWARDS = np.array([0.0, -1.0, 0.0])
-"""Push against the robot hand's right face, in its frame: along +y of the base."""
-_TILT = 0.25
-"""The push leaves that by up to this in each component."""
+_FACE = FACES[0]
+"""The right face of the robot's hand is pushed: along +y of the base."""
 _FORCE_N = (15.0, 30.0)
 _LASTING_S = (0.2, 0.5)
 _NOTICE_S = 0.3
@@ -63,10 +61,8 @@ def interaction(seed: int) -> tuple[Box, Push]:
         face + _BODY_HALF_SIZE_M[1],
         SceneSpec.floor_height + _BODY_HALF_SIZE_M[2],
     )
-    inwards = _INWARDS + _TILT * rng.uniform(-1, 1, 3)
-    push = Push(
-        rng.uniform(*_START_S), inwards / np.linalg.norm(inwards), rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S)
-    )
+    inwards = against(_FACE, rng)
+    push = Push(rng.uniform(*_START_S), inwards, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S))
     return Box("body", center, _BODY_HALF_SIZE_M, _BODY_STIFFNESS_N_PER_M), push
 
 

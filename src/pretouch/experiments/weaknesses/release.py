@@ -10,12 +10,10 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.groups import grouped
 from pretouch.experiments.metrics import peak, rounded, spread
-from pretouch.experiments.pushes import Push, Pusher
+from pretouch.experiments.pushes import FACES, Holder, Push, Pusher, against
 from pretouch.experiments.tables import TextTable, number
 from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
 from pretouch.params import RestrictionMode, profile
-from pretouch.sim.hand import HandGoal, point_on_arm
-from pretouch.sim.plant import Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray, Mode
 
@@ -36,17 +34,7 @@ _PAUSE_S = 5.5
 """From the end of one push to the reach for the next: the arm is watched, and returns to its path [s]."""
 _REACH_S = 1.2
 """About how long the person reaches for the arm [s]."""
-_FACES = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
-"""Outward normals of the faces that are pushed, in the frame of the robot's hand: right, left, front."""
-_TILT = 0.25
-"""The push leaves the normal by up to this in each component."""
 _FORCE_N = (15.0, 30.0)
-_PALM = np.array([0.0, 0.0, 0.045])
-"""Point of the robot's hand that the person pushes towards, in its frame [m]."""
-_ARM_N_M = 2000.0
-"""Stiffness of the person's arm, as `Hand` has it [N/m]."""
-_FIRM_N = 60.0
-"""Largest force with which the person's hand is kept where it pushes [N]."""
 _KEPT_FRACTION = 0.9
 """A push that touches, or is estimated, for less of its time is not counted: it slipped, or met a singularity."""
 _NOTICE_S = 0.3
@@ -69,27 +57,12 @@ def cells(grid: Grid) -> list[Cell]:
 def pushes(held_s: float, seed: int) -> tuple[Push, ...]:
     """Three pushes against one face of the robot's hand; the seed decides the face, the directions and the forces."""
     rng = np.random.default_rng([seed, 31])
-    face = _FACES[rng.integers(len(_FACES))]
+    face = FACES[rng.integers(len(FACES))]
     planned = []
     for i in range(_PUSHES):
-        inwards = _TILT * rng.uniform(-1, 1, 3) - face
-        inwards /= np.linalg.norm(inwards)
+        inwards = against(face, rng)
         planned.append(Push(_FIRST_S + i * (held_s + _PAUSE_S), inwards, rng.uniform(*_FORCE_N), held_s))
     return tuple(planned)
-
-
-class Holder(Pusher):
-    """A person who keeps pushing at one place, with one force: a hand that only pushes on slides past the arm's."""
-
-    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Reach, push and withdraw as planned, but from the touch on stay on the line of the push through the palm."""
-        planned = super().goal(time, hand, plant)
-        if self._touch is None:
-            return planned
-        palm = point_on_arm(plant, self._link, _PALM)
-        # ahead by what stretches the person's arm to the planned force; what it takes to stay on the line comes on top
-        ahead = (hand - palm) @ self._direction + planned.force_max / _ARM_N_M
-        return HandGoal(palm + ahead * self._direction, _FIRM_N)
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:

@@ -13,7 +13,7 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.groups import cells_of, grouped
 from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.pushes import Push, Pusher, way_round
+from pretouch.experiments.pushes import PALM, Push, Pusher, way_round
 from pretouch.experiments.static import least_sensed
 from pretouch.experiments.tables import TextTable, number
 from pretouch.experiments.trial import Record, Setup, play
@@ -49,8 +49,6 @@ _TILT = 0.1
 """The hand leaves the axis of the unit it comes along by up to this in each component."""
 _STAND_OFF_M, _SPEED_M_S, _FREE_N = 0.5, 0.35, 60.0
 """Where the hand sets off [m], how fast it comes [m/s], and the force a free hand is moved with [N]."""
-_PALM = np.array([0.0, 0.0, 0.045])
-"""Point of the robot's hand the person aims at, in its frame [m]; on either side a unit looks out from it."""
 
 
 def cells(grid: Grid) -> list[Cell]:
@@ -130,8 +128,8 @@ class Reach:
         """Wait before a side of the robot's hand, then come straight."""
         if time < self.touch.start:
             link = self.model.link_index("panda_hand")
-            self._aim = point_on_arm(plant, link, _PALM)
-            self._direction = point_on_arm(plant, link, _PALM + self.touch.inwards) - self._aim
+            self._aim = point_on_arm(plant, link, PALM)
+            self._direction = point_on_arm(plant, link, PALM + self.touch.inwards) - self._aim
             return HandGoal(way_round(hand, self._aim - _STAND_OFF_M * self._direction), _FREE_N)
         ahead = min(0.0, _SPEED_M_S * (time - self.touch.start) - _STAND_OFF_M)
         return HandGoal(self._aim + ahead * self._direction, self.touch.force)
