@@ -154,6 +154,12 @@ def test_a_profile_is_varied_by_its_name():
     assert varied.task == profile("paper").task
 
 
+def test_the_order_of_changes_does_not_matter():
+    one = profile("paper:threshold.f_base_n=3:threshold.f_d_n=2")
+    other = profile("paper:threshold.f_d_n=2:threshold.f_base_n=3")
+    assert one.threshold == other.threshold == ThresholdParams(f_base_n=3.0, f_d_n=2.0)
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [

@@ -284,13 +284,16 @@ def profile(name: str) -> Profile:
         found = PROFILES[base]
     except KeyError:
         raise ParameterError(f"The profile {base!r} is unknown: choose from {', '.join(PROFILES)}.") from None
+    values: dict[str, dict[str, object]] = {}
     for change in changes:
-        found = _changed(found, change)
-    return replace(found, name=name)
+        group, field_name, value = _change(found, change)
+        values.setdefault(group, {})[field_name] = value
+    # all of a group at once, for some are only allowed together
+    return replace(found, name=name, **{g: replace(getattr(found, g), **changed) for g, changed in values.items()})
 
 
-def _changed(profile: Profile, change: str) -> Profile:
-    """Change one parameter, given as GROUP.FIELD=VALUE."""
+def _change(profile: Profile, change: str) -> tuple[str, str, object]:
+    """Read the change of one parameter, given as GROUP.FIELD=VALUE: its group, its name and its value."""
     where, given, text = change.partition("=")
     group, _, name = where.partition(".")
     if not given:
@@ -302,7 +305,7 @@ def _changed(profile: Profile, change: str) -> Profile:
     known = [f.name for f in fields(params)]
     if name not in known:
         raise ParameterError(f"The parameter {where!r} is unknown: choose from {', '.join(known)}.")
-    return replace(profile, **{group: replace(params, **{name: _read(where, text, getattr(params, name))})})
+    return group, name, _read(where, text, getattr(params, name))
 
 
 _WORDS = {"yes": True, "true": True, "no": False, "false": False}

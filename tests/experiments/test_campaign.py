@@ -44,7 +44,9 @@ SMALL = Request(("static",), seeds=1, profiles=("blind",))
         ({"restrictions": ("off", "firm")}, "'firm' is unknown: choose from off, hard, slack, floor"),
         ({"stiffness": (0.0,)}, "stiffness is 0 N/m"),
         ({"stiffness": (25e3, float("nan"))}, "stiffness is nan N/m"),
-        ({"stiffness": ()}, "No stiffness is given"),
+        ({"stiffness": ()}, "stiffnesses are none N/m: name each"),
+        ({"stiffness": (25e3, 25000.0)}, "name each wanted one once"),
+        ({"experiments": ("release",)}, "nothing to run: release is about proximity"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_sentence(change, words):
@@ -148,6 +150,14 @@ def test_files_of_different_cells_differ():
         set(cell.name) <= set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_") for cell in cells
     )
     assert Cell("static", names[2]).name != Cell("static", names[3]).name
+    odd = ("paper:restriction.slack_weight=1e-3", "paper:restriction.slack_weight=1e+3")
+    assert Cell("static", odd[0]).name != Cell("static", odd[1]).name
+
+
+def test_a_cell_that_is_named_twice_runs_once():
+    tasks = Request(("release",), 1, profiles=("paper", "paper:reaction.decay_cycles=50")).tasks()
+    names = [cell.name for cell, _ in tasks]
+    assert len(names) == len(set(names))
 
 
 def test_a_grid_gives_each_profile_its_modes():

@@ -236,7 +236,7 @@ def test_a_figure_is_written_here_by_its_name(tmp_path, monkeypatch):
         ({"out": "/dev/null/x.png"}, "The figure /dev/null/x.png cannot be written: File exists"),
         ({"out": "FOLDER.png"}, "FOLDER.png cannot be written: Is a directory"),
         ({"out": "x" * 300 + ".png"}, "cannot be written: File name too long"),
-        ({"run": "/nowhere"}, "The run /nowhere is no folder"),
+        ({"run": "/nowhere"}, r"The run /nowhere cannot be read \(No such file or directory\)"),
         (
             {"run": "EMPTY"},
             "has no trace of avoidance_beside_slack_paper with seed 0 .*`pretouch reproduce avoidance --seeds 1",

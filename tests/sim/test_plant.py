@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.contact.observer import wrench_from_torques
+from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -266,3 +267,10 @@ def test_the_clock_lets_one_period_pass(panda_model):
     plant.before_each_step(called.append)
     assert [clock.tick() for _ in range(3)] == pytest.approx([0.01, 0.02, 0.03])
     assert called == pytest.approx(np.arange(30) * 0.001)
+
+
+@pytest.mark.parametrize("period", [0.0004, 0.0015, -0.01])
+def test_a_clock_that_the_physics_cannot_keep_is_refused(panda_model, period):
+    plant = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0)
+    with pytest.raises(ParameterError, match=rf"control period is {period:g} s: give a multiple of .* 0.001 s"):
+        PlantClock(plant, period)

@@ -40,8 +40,8 @@ class Reproduce:
     seeds: int = 12
     """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
     profiles: str = "blind,paper"
-    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. The studies of
-    claims and weaknesses have their own."""
+    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. With `all`,
+    and where only the force estimate is studied, the studies have their own."""
     restrictions: str = ""
     """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
     orientation: str = ""
@@ -79,7 +79,7 @@ class Bench:
     what: tyro.conf.Positional[Literal["free-motion"]]
     """free-motion: how far the force estimate is off, and which detectors take that for a contact."""
     seeds: int = 10
-    """Simulated arms; each moves for twenty minutes."""
+    """Simulated arms; each is left alone for twenty minutes, a quarter of them standing."""
     out: str = ""
     """Folder for results, figures and page; by default runs/bench-WHAT."""
     json: str = ""

@@ -55,9 +55,12 @@ def draw_figure(
 
 def _recorded(cells: list[Cell], run: Path, seed: int) -> tuple[Played, tuple[str, ...]]:
     """Read the traces of some cells from a run's folder or the folders in it, and the names of the skin's units."""
-    if not run.is_dir():
-        raise ExperimentError(f"The run {run} is no folder: give one of pretouch reproduce or pretouch demo.")
-    folders = [run, *sorted(folder for folder in run.iterdir() if folder.is_dir())]
+    try:
+        folders = [run, *sorted(folder for folder in run.iterdir() if folder.is_dir())]
+    except OSError as error:
+        raise ExperimentError(
+            f"The run {run} cannot be read ({error.strerror}): give a folder of pretouch reproduce or pretouch demo."
+        ) from error
     homes = [next((f for f in folders if os.path.isfile(trace_file(f, cell, seed))), None) for cell in cells]
     played: Played = []
     for cell, home in zip(cells, homes, strict=True):

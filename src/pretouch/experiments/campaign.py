@@ -60,8 +60,14 @@ class Request:
         for stiffness in self.stiffness:
             if not 100.0 <= stiffness <= 1e6:
                 raise ExperimentError(f"The stiffness is {stiffness:g} N/m: give one from 100 to 1000000 N/m.")
-        if not self.stiffness:
-            raise ExperimentError("No stiffness is given: name at least one, in N/m.")
+        if not self.stiffness or len(set(self.stiffness)) < len(self.stiffness):
+            listed = ", ".join(f"{k:g}" for k in self.stiffness) or "none"
+            raise ExperimentError(f"The stiffnesses are {listed} N/m: name each wanted one once.")
+        if not self.tasks():
+            raise ExperimentError(
+                f"There is nothing to run: {', '.join(self.experiments)} is about proximity, and none of the profiles"
+                f" {', '.join(self.profiles)} has it."
+            )
 
     def context(self) -> Context:
         """Load what all trials share."""
@@ -70,10 +76,11 @@ class Request:
         return Context(model, skin, cast(Orientation | None, self.orientation))
 
     def tasks(self) -> list[tuple[Cell, int]]:
-        """Every trial, seed by seed, so that a stopped run has some of each cell."""
+        """Every trial once, seed by seed, so that a stopped run has some of each cell."""
         grid = Grid(self.profiles, cast(tuple[RestrictionMode, ...], self.restrictions), self.stiffness)
         cells = [cell for name in self.experiments for cell in EXPERIMENTS[name].cells(grid)]
-        return [(cell, seed) for seed in range(self.seeds) for cell in cells]
+        once = list({cell.name: cell for cell in cells}.values())
+        return [(cell, seed) for seed in range(self.seeds) for cell in once]
 
 
 def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from typing import cast
 
 from pretouch.params import Orientation, Profile, RestrictionMode, profile
@@ -46,9 +47,14 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """Name for files: safe characters only."""
-        parts = [f"{value:g}" if isinstance(value, float) else _SAFE.get(value, value) for value in self.where.values()]
-        return "_".join(re.sub(r"[^A-Za-z0-9.]", "-", part) for part in [self.experiment, *parts, self.profile])
+        """Name for files: safe characters only. Where two names could become one, a digest tells them apart."""
+        parts = [
+            f"{value:.12g}" if isinstance(value, float) else _SAFE.get(value, value) for value in self.where.values()
+        ]
+        exact = "_".join([self.experiment, *parts, self.profile])
+        safe = re.sub(r"[^A-Za-z0-9._-]", "-", exact)
+        plain = safe == re.sub(r"[:=]", "-", exact)
+        return safe if plain else f"{safe}-{sha256(exact.encode()).hexdigest()[:8]}"
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ def whole_paper(asked: Request) -> list[tuple[str, Request]]:
         ("static", replace(asked, experiments=("static",), profiles=profiles, stiffness=stiffness)),
         ("people", replace(asked, experiments=("avoidance", "dynamic"), profiles=profiles)),
     ]
-    if not asked.restrictions:
+    if not asked.restrictions and "paper" in profiles:
         runs.append(("restrictions", replace(asked, experiments=("static",), profiles=("paper",), restrictions=_MODES)))
     study = Request(("static",), asked.seeds, orientation=asked.orientation, skin=asked.skin)
     return runs + [

@@ -70,11 +70,11 @@ def _write(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: P
 
 
 def _about(request: Request) -> str:
-    return (
-        f"{', '.join(request.experiments)}: {request.seeds} seeds, profiles {', '.join(request.profiles)},"
-        f" restrictions {', '.join(request.restrictions) or 'as the experiment has them'},"
-        f" static objects of {', '.join(f'{k / 1000:g}' for k in request.stiffness)} N/mm."
-    )
+    cells = [cell for cell, _ in request.tasks()]
+    profiles = dict.fromkeys(cell.profile for cell in cells)
+    modes = dict.fromkeys(str(cell.where["restrictions"]) for cell in cells if "restrictions" in cell.where)
+    said = f"{', '.join(request.experiments)}: {request.seeds} seeds, profiles {', '.join(profiles)}"
+    return said + (f", restrictions {', '.join(modes)}." if modes else ".")
 
 
 def _pictures(parts: list[tuple[Request, Path]], name: str, summary: Row, folder: Path) -> list[str]:
@@ -112,7 +112,8 @@ def _markdown(table: TextTable) -> str:
 
 
 def _markdown_row(texts: tuple[str, ...]) -> str:
-    return f"| {' | '.join(text.replace(chr(10), ' ') for text in texts)} |"
+    cells = (text.replace("|", "\\|").replace("\n", "<br>") for text in texts)
+    return f"| {' | '.join(cells)} |"
 
 
 def _lines(text: str) -> str:

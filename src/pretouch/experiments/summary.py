@@ -39,7 +39,7 @@ def avoidance_summary(rows: list[Row]) -> Row:
     """Cells and ratios of the avoidance experiment."""
     return {
         "cells": [_cell(*item, _AVOIDANCE) for item in _groups(rows, _PLACE)],
-        "ratios": _ratios(rows, _PLACE, _AVOIDANCE),
+        "ratios": _ratios(rows, _PLACE, ("deviation_m", "travelled_m")),
     }
 
 

@@ -35,20 +35,28 @@ _SHOWN_STIFFNESS = 25_000.0
 def static_tables(part: Row) -> list[TextTable]:
     """Show each place at one stiffness, then what stiffness, profile and restrictions change, places together."""
     cells = part["cells"]
-    stiffness, mode, shown = shown_controllers(cells)
-    made = [_places(part, stiffness, mode)]
+    stiffness, modes, shown = shown_controllers(cells)
+    made = [_places(part, stiffness, {name: modes[name] for name in shown})]
     if len(_values(cells, "stiffness_n_per_m")) > 1 or len(_values(cells, "profile")) > 2:
-        made.append(_stiffnesses(part, mode[shown[-1]]))
+        made.append(_stiffnesses(part, modes))
     if len({cell["restrictions"] for cell in cells if cell["profile"] != "blind"}) > 1:
         made.append(_restrictions(part, stiffness))
     return made
 
 
 def shown_controllers(cells: list[Row]) -> tuple[float, dict[str, str], list[str]]:
-    """Choose of many cells what to show in detail: a stiffness [N/m], and two profiles with their restriction mode."""
+    """Choose of many cells what to show in detail.
+
+    Returns:
+        A stiffness [N/m], the restriction mode of each profile (`off` if it has cells with that), and the names of one
+        or two profiles, `blind` first.
+    """
     stiffnesses, profiles = _values(cells, "stiffness_n_per_m"), _values(cells, "profile")
-    shown = [name for name in dict.fromkeys(("blind", *profiles)) if name in profiles][:2]
-    modes = {name: next(cell["restrictions"] for cell in cells if cell["profile"] == name) for name in shown}
+    shown = ["blind", *(name for name in profiles if name != "blind")][:2] if "blind" in profiles else profiles[:1]
+    modes: dict[str, str] = {}
+    for cell in cells:
+        if cell["restrictions"] == "off" or cell["profile"] not in modes:
+            modes[cell["profile"]] = cell["restrictions"]
     return _SHOWN_STIFFNESS if _SHOWN_STIFFNESS in stiffnesses else stiffnesses[0], modes, shown
 
 
@@ -59,6 +67,7 @@ def _values(cells: list[Row], name: str) -> list[Any]:
 def _places(part: Row, stiffness: float, modes: dict[str, str]) -> TextTable:
     rows: list[tuple[str, ...]] = []
     false = 0
+    with_mode = "".join(f", {mode} restrictions" for mode in dict.fromkeys(modes.values()) if mode != "off")
     for cell in part["cells"]:
         if cell["stiffness_n_per_m"] != stiffness or cell["restrictions"] != modes.get(cell["profile"]):
             continue
@@ -68,7 +77,7 @@ def _places(part: Row, stiffness: float, modes: dict[str, str]) -> TextTable:
         rows.append((where, cell["profile"], *_forces(cell), felt))
         rows += [("", "ratio", *_force_ratios(ratio), "") for ratio in _its_ratio(part["ratios"], cell)]
     return TextTable(
-        f"Static object, {stiffness / 1000:g} N/mm: medians and ratios blind/profile, with their 10-90 % below",
+        f"Static object, {stiffness / 1000:g} N/mm{with_mode}: medians and ratios blind/profile, 10-90 % below",
         ("where", "profile", *(label for _, label, _ in _STATIC), "felt"),
         tuple(rows),
         "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
@@ -78,10 +87,10 @@ def _places(part: Row, stiffness: float, modes: dict[str, str]) -> TextTable:
     )
 
 
-def _stiffnesses(part: Row, mode: str) -> TextTable:
+def _stiffnesses(part: Row, modes: dict[str, str]) -> TextTable:
     rows: list[tuple[str, ...]] = []
     for cell in part["pooled_cells"]:
-        if cell["restrictions"] in (mode, "off"):
+        if cell["restrictions"] == modes[cell["profile"]]:
             name = f"{cell['profile']}\n{cell['stiffness_n_per_m'] / 1000:g} N/mm"
             rows.append((name, *_forces(cell)))
             rows += [("ratio", *_force_ratios(r)) for r in _its_ratio(part["pooled_ratios"], cell)]
@@ -134,7 +143,7 @@ def dynamic_tables(part: Row) -> list[TextTable]:
     """How the arm answered the pushes."""
     rows = tuple(
         (
-            cell["profile"],
+            controller(cell, part["cells"]),
             f"{cell['detected']} of {cell['pushes']}",
             number(cell["delay_s"], 0, 1000),
             number(cell["direction_error_deg"], 1),
@@ -160,7 +169,7 @@ def avoidance_tables(part: Row) -> list[TextTable]:
     rows = tuple(
         (
             cell["place"],
-            cell["profile"],
+            controller(cell, part["cells"]),
             f"{100 * cell['contact_fraction']:.0f}",
             number(cell["true_peak_n"], 1),
             number(cell["least_gap_m"], 3),
@@ -190,6 +199,12 @@ def avoidance_tables(part: Row) -> list[TextTable]:
         " factor of eqs. 3 and 4. Way: travelled along the path in 40 s.",
     )
     return [table]
+
+
+def controller(cell: Row, cells: list[Row]) -> str:
+    """Name a cell's profile, and its restriction mode where the profile has cells with several."""
+    modes = {c["restrictions"] for c in cells if c["profile"] == cell["profile"]}
+    return f"{cell['profile']}\n{cell['restrictions']}" if len(modes) > 1 else str(cell["profile"])
 
 
 def number(value: Row | None, digits: int, factor: float = 1.0) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from pretouch.contact.observer import ObserverState, observe, observer_init, wrench_from_torques
+from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import ArmError, SceneSpec, build
@@ -198,7 +199,12 @@ class PlantClock:
     """The port `Clock` of a simulated arm: each tick lets one control period pass."""
 
     def __init__(self, plant: Plant, period: float) -> None:
-        """Take the arm and the control period [s]."""
+        """Take the arm and the control period [s]; one that is no whole number of physics steps is a ParameterError."""
+        step = plant.params.period_s
+        if round(period / step) < 1 or abs(period / step - round(period / step)) > 1e-6:
+            raise ParameterError(
+                f"The control period is {period:g} s: give a multiple of the physics step of {step:g} s."
+            )
         self._plant, self._period = plant, period
 
     def tick(self) -> float:

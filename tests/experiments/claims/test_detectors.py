@@ -4,7 +4,7 @@ import pytest
 from pretouch.contact.detect import detect
 from pretouch.contact.window import window_init
 from pretouch.experiments.claims import detectors
-from pretouch.experiments.claims.detectors import TABLE_I, Windowed
+from pretouch.experiments.claims.detectors import TABLE_I, Windowed, dispersion_of, rate_bounds
 from pretouch.params import ThresholdParams
 from pretouch.types import Obstacles
 
@@ -110,3 +110,13 @@ def test_bounds_of_a_rate_are_those_of_the_poisson_table():
     assert detectors.rate_bounds(0, 2.0) == pytest.approx((0.0, 3.6889 / 2), abs=1e-4)
     assert detectors.rate_bounds(1, 1.0) == pytest.approx((0.0253, 5.5716), abs=1e-4)
     assert detectors.rate_bounds(3, 2.0) == pytest.approx((0.6187 / 2, 8.7673 / 2), abs=1e-4)
+
+
+def test_counts_that_scatter_more_tell_less():
+    assert dispersion_of([3, 3, 3, 3]) == 1.0  # less than Poisson counts scatter
+    assert dispersion_of([0, 0]) == dispersion_of([5]) == dispersion_of([]) == 1.0
+    assert dispersion_of([0, 10]) == pytest.approx(50 / 5)
+    plain, wide = rate_bounds(40, 2.0), rate_bounds(40, 2.0, 10.0)
+    assert wide[0] < plain[0] < 20 < plain[1] < wide[1]
+    # forty events that come in tens tell as much as four in a tenth of the time
+    assert wide == pytest.approx(rate_bounds(4, 0.2))

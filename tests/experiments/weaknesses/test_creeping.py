@@ -19,10 +19,34 @@ def test_with_restrictions_the_arm_creeps_up_to_the_hand_but_does_not_touch(slac
     row, record = slack
     assert row["contact"] is False
     assert row["contacts"] == 0
-    assert 0.1 < row["distance_20s_m"] <= row["distance_10s_m"] <= row["distance_5s_m"] < row["distance_2s_m"] < 0.6
+    assert (
+        0.1
+        < row["distance_30s_m"]
+        <= row["distance_20s_m"]
+        <= row["distance_10s_m"]
+        <= row["distance_5s_m"]
+        < row["distance_2s_m"]
+        < 0.6
+    )
     assert 0.0 < row["creep_m_s"] < 0.02
     assert 0.5 < row["recovery_s"] < 4.0
     assert_within_limits(record, panda_model)
+
+
+def test_in_mode_floor_the_arm_has_the_time_to_reach_the_hand(context, panda_model):
+    row, record = creeping.trial(Cell(creeping.NAME, "paper", {"restrictions": "floor"}), 140, context)
+    touch = record.first_contact()
+    assert row["contact"] is True
+    assert row["least_distance_m"] < 0.001
+    # 0.02 m/s is the floor: from where it is the limit on, 0.2 m take 10 s
+    assert row["distance_10s_m"] - row["distance_20s_m"] == pytest.approx(0.2, abs=0.02)
+    assert touch == pytest.approx(creeping.visit(140).arrive + 20 + row["distance_20s_m"] / 0.02, abs=0.5)
+    assert_within_limits(record, panda_model)
+
+
+def test_the_hand_stays_for_thirty_seconds():
+    visit = creeping.visit(140)
+    assert visit.leave - visit.arrive == 30.0
 
 
 def test_without_proximity_the_arm_runs_into_the_hand(context):
@@ -49,18 +73,18 @@ def test_distances_are_from_the_arms_surface_to_the_hands(context, panda_model):
 
 
 def test_the_numbers_of_a_made_up_trial():
-    times = np.arange(2.0, 26.0, 0.5)
-    gap = 30.0 - times
-    towards = np.where(times < 13.0, 0.2, 0.01)
+    times = np.arange(2.0, 36.0, 0.5)
+    gap = 40.0 - times
+    towards = np.where(times < 23.0, 0.2, 0.01)
     touches = [Touch(t, 1, np.zeros(3)) for t in (5.0, 5.3, 9.0)]
     force = np.zeros((len(times), 3))
     force[10] = [0.0, 3.0, 4.0]
-    velocity = [np.array([0.28 if t >= 25.0 else 0.0, 0.0, 0.0]) for t in times]
-    mode = [Mode.REACT if t == 25.0 else Mode.TRACK for t in times]
+    velocity = [np.array([0.28 if t >= 35.0 else 0.0, 0.0, 0.0]) for t in times]
+    mode = [Mode.REACT if t == 35.0 else Mode.TRACK for t in times]
     record = made_up(times, force, touches, ee_velocity=velocity, mode=mode)
     row = creeping.results(record, gap, towards, 0.3)
-    assert [row[f"distance_{k}s_m"] for k in (2, 5, 10, 20)] == [25.0, 22.0, 17.0, 7.0]
-    assert (row["course_m"][0], row["course_m"][1], row["course_m"][-1]) == (27.0, 26.5, 7.0)
+    assert [row[f"distance_{k}s_m"] for k in (2, 5, 10, 20, 30)] == [35.0, 32.0, 27.0, 17.0, 7.0]
+    assert (row["course_m"][0], row["course_m"][1], row["course_m"][-1]) == (37.0, 36.5, 7.0)
     assert row["least_distance_m"] == 7.0
     assert row["creep_m_s"] == 0.01
     assert row["contacts"] == 2
@@ -97,4 +121,4 @@ def test_a_summary_of_any_rows_makes_a_table_that_fits(slack):
     assert cell["creep_m_s"]["median"] == pytest.approx(row["creep_m_s"] + 0.01)
     (table,) = creeping.tables(part)
     assert width(table) <= 80
-    assert table.rows[0][8:10] == ("50", "1.5")
+    assert table.rows[0][9:11] == ("50", "1.5")

@@ -94,8 +94,8 @@ def test_a_long_loss_is_silence_and_ends_in_a_hold(trials):
 def test_the_largest_steps_are_those_of_the_record(trials):
     row, rec = trials[3]
     watched = [s for s in rec.steps if s.stamp > 1.99]
-    upper = np.abs(np.diff([s.thresholds.upper for s in watched], axis=0)).max()
-    lower = np.abs(np.diff([s.thresholds.lower for s in watched], axis=0)).max()
+    upper = np.abs(np.diff([s.thresholds.upper[1] for s in watched])).max()
+    lower = np.abs(np.diff([s.thresholds.lower[1] for s in watched])).max()
     assert row["threshold_step_n"] == pytest.approx(max(upper, lower), abs=1e-3)
     assert row["scale_rise"] == pytest.approx(max(np.diff([s.speed_scale for s in watched])), abs=1e-4)
     assert row["towards_most_m_s"] > row["towards_before_m_s"]
@@ -137,3 +137,12 @@ def test_the_figure_has_a_line_for_each_persistence():
     first, free, _ = picture.figure.axes
     assert [c.get_label() for c in first.containers] == ["paper, points kept 60 ms", "paper, points kept 40 ms"]
     assert free.containers[0].lines[0].get_xdata().tolist() == [0.0, 3.0]
+
+
+def test_a_unit_that_sees_the_board_now_and_then_counts_for_no_row():
+    def seeing(stamp, *units):
+        found = SimpleNamespace(unit=np.array(units, dtype=np.int64))
+        return SimpleNamespace(stamp=stamp, obstacles=found, restricted=np.arange(len(units)))
+
+    before = [seeing(1.75, 3), seeing(1.85, 1, 3, 4), seeing(1.9, 3, 1), seeing(1.95, 3, 4)]
+    assert dropout.steady(before, SimpleNamespace(begin=2.0, facing=[1, 3])) == [3]

@@ -9,7 +9,7 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import rounded, spread
 from pretouch.experiments.pushes import FACES, Push, Pusher, against
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import TextTable, controller, number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
@@ -109,7 +109,7 @@ def results(record: Record, touched: tuple[float, float] | None) -> dict[str, An
         **widths(before),
         "both_lowered": bool(lowered),
         "both_lowered_s": rounded(period * len(lowered)),
-        "both_lowered_at_touch": None if touched is None else lowered_on_both_sides(before[-1]),
+        "both_lowered_at_touch": lowered_on_both_sides(before[-1]) if touched and before else None,
         "felt": answer is not None,
         "detection_delay_s": None if answer is None else rounded(answer.stamp - touch, 4),
         "filtered_at_detection_n": None if answer is None else rounded(float(answer.filtered_force[_Y])),
@@ -171,7 +171,7 @@ def tables(part: dict[str, Any]) -> list[TextTable]:
     """How far the band was narrowed from both sides, and what was felt of the push."""
     rows = tuple(
         (
-            cell["profile"],
+            controller(cell, part["cells"]),
             *(number(cell[f"{name}_y"], 1) for name in _WIDTHS),
             f"{cell['both_lowered']}/{cell['trials']}",
             f"{cell['both_lowered_at_touch']}/{cell['contacts']}",

@@ -93,7 +93,7 @@ def _ramps(cells: dict[Key, Row]) -> TextTable:
         " go, - if those of 60 N/s are not. The mean of the window follows a slow ramp, so to all but the fixed"
         " thresholds it is never a contact, however large it grows; what fires by chance now and then seems to feel"
         f" the slowest ramps, which take long. Force: true force when a ramp of {_RAMP_N_S:g} N/s along an axis is"
-        " felt, median of those that are.",
+        " felt: of each trial the median of those that are, and of the trials the median.",
     )
 
 
@@ -117,6 +117,8 @@ def draw_detectable(sources: Sources) -> list[Picture]:
     """Draw the fraction felt of pushes and steps along the axes against their size, at rest and moving."""
     from matplotlib.figure import Figure
 
+    from pretouch.experiments.figures.marks import labels
+
     cells = {_key(cell): cell for cell in sources.summary["cells"]}
     shapes, motions = _PANELS
     if not any((motion, shape, *_CURVES[0][:2], "axis") in cells for shape, _ in shapes for motion, _ in motions):
@@ -128,7 +130,7 @@ def draw_detectable(sources: Sources) -> list[Picture]:
             _curves(axes, cells, motion, shape)
             axes.set_title(f"{what}, arm {how}")
             axes.grid(alpha=0.3)
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(_CURVES))
+    figure.legend(*labels(panels.ravel()), loc="outside lower center", ncols=len(_CURVES))
     for axes in panels[-1]:
         axes.set_xlabel("largest true force, along an axis [N]")
     for axes in panels[:, 0]:

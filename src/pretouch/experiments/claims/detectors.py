@@ -86,9 +86,19 @@ def onsets(felt: BoolArray, rest: int) -> list[int]:
     return found
 
 
-def rate_bounds(events: int, hours: float) -> tuple[float, float]:
-    """95 % bounds on a rate [1/h] of which `events` were counted in some hours (exact, Poisson)."""
+def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[float, float]:
+    """95 % bounds on a rate [1/h] of which `events` were counted in some hours: exact for a Poisson count.
+
+    Where counts scatter `dispersion` times as much as Poisson counts do, so many events tell as much as one.
+    """
     from scipy.stats import chi2
 
-    low = chi2.ppf(0.025, 2 * events) / 2 if events else 0.0
-    return float(low / hours), float(chi2.ppf(0.975, 2 * events + 2) / 2 / hours)
+    told, time = events / dispersion, hours / dispersion
+    low = chi2.ppf(0.025, 2 * told) / 2 if told else 0.0
+    return float(low / time), float(chi2.ppf(0.975, 2 * told + 2) / 2 / time)
+
+
+def dispersion_of(counts: list[int]) -> float:
+    """Variance of counts by their mean, 1 for Poisson counts and taken as 1 where it is less or cannot be told."""
+    mean = float(np.mean(counts)) if counts else 0.0
+    return max(1.0, float(np.var(counts, ddof=1)) / mean) if len(counts) > 1 and mean > 0 else 1.0

@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.contact.thresholds import noise_force
 from pretouch.control.path import Path
 from pretouch.experiments.cell import Cell, Context
-from pretouch.experiments.claims.detectors import TABLE_I, Windowed, band, onsets, rate_bounds
+from pretouch.experiments.claims.detectors import TABLE_I, Windowed, band, dispersion_of, onsets, rate_bounds
 from pretouch.experiments.experiment import Row
 from pretouch.experiments.metrics import rounded
 from pretouch.experiments.trial import SETTLE_S, Record, Setup, play
@@ -108,10 +108,10 @@ def tally(detector: str, felt: BoolArray, force_n: float, near: bool) -> Row:
 
 
 def false_rates(rows: list[Row]) -> list[Row]:
-    """False detections per hour, of each detector in all trials together, with exact Poisson bounds of 95 %.
+    """False detections per hour, of each detector in all trials together, with bounds of 95 %.
 
-    `arms` says how many seeds had any: counts that come from few of them are not independent, and the bounds are
-    then too narrow.
+    The bounds are Poisson's, wider by how much more the counts of the arms scatter than such counts do: an arm that
+    has any has many. `arms` says how many seeds had any.
     """
     hours = sum(row["hours"] for row in rows)
     counts: dict[tuple[str, float, bool], list[tuple[int, int]]] = {}
@@ -121,16 +121,19 @@ def false_rates(rows: list[Row]) -> list[Row]:
             counts.setdefault(key, []).append((row["seed"], found["count"]))
     rates = []
     for (detector, force_n, near), found in counts.items():
-        count = sum(n for _, n in found)
-        low, high = rate_bounds(count, hours)
+        by_arm: dict[int, int] = {}
+        for seed, n in found:
+            by_arm[seed] = by_arm.get(seed, 0) + n
+        count = sum(by_arm.values())
+        low, high = rate_bounds(count, hours, dispersion_of(list(by_arm.values())))
         rates.append(
             {
                 "detector": detector,
                 "force_n": force_n,
                 "near": near,
                 "count": count,
-                "arms": len({seed for seed, n in found if n}),
-                "of_arms": len({seed for seed, _ in found}),
+                "arms": sum(n > 0 for n in by_arm.values()),
+                "of_arms": len(by_arm),
                 "hours": rounded(hours, 4),
                 "per_hour": rounded(count / hours),
                 "low_per_hour": rounded(low),

@@ -69,7 +69,7 @@ def _moving(rates: list[Row]) -> TextTable:
         f"False detections per hour in {hours:.2g} hours of motion, by F_b",
         ("detector", "objects", *(f"{force:g} N" for force in forces)),
         rows,
-        "With 95 % bounds (Poisson, exact) below. Filtered: the value of eq. 8 is compared, as in the paper. Alpha"
+        "With 95 % bounds below, which count the arms' differences. Filtered: the value of eq. 8 is compared. Alpha"
         " 0.3: the same with a quicker filter than Table I's 0.1. Raw: the estimate itself, as in the authors' code;"
         " raw twice: two samples in a row. Far: F_obs is 0. Near: it is F_d = 4 N on both sides of each axis, so that"
         " near is far with 4 N less. Each detection is answered for 2 s: 1800 an hour is the most there can be.",
@@ -142,7 +142,7 @@ def _noise_rates(part: Row) -> TextTable:
         "Robustness to noise: false detections per hour",
         ("noise\nfactor", *(_heading(*kind) for kind in kinds)),
         rows,
-        "With 95 % bounds (Poisson, exact) below. Filtered: the paper's, F_b 10 N. No F_sigma: the same with F_std 0."
+        "With 95 % bounds below, which count the arms' differences. Filtered: the paper's. No F_sigma: with F_std 0."
         " Raw: the estimate itself against the paper's thresholds. Far: F_obs is 0. Near: it is F_d = 4 N on both"
         " sides of each axis. Fixed: the estimate of each axis against a force, without a window. Each detection"
         " is answered for 2 s: 1800 an hour is the most there can be.",

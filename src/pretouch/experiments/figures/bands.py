@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pretouch.experiments.claims.approach import DIRECTIONS
-from pretouch.experiments.figures.marks import AXES
+from pretouch.experiments.figures.marks import AXES, labels
 
 _STYLES = {"upper": ("-", "tab:red"), "lower": ("--", "tab:blue")}
 _MARKERS = "osd"
@@ -27,9 +27,9 @@ def band_figure(cells: list[dict[str, Any]]) -> Figure:
         axes.grid(alpha=0.3)
         if direction in by_direction:
             _panel(axes, by_direction[direction])
-    lines, labels = next((axes.get_legend_handles_labels() for axes in panels if axes.lines), ([], []))
-    if lines:
-        figure.legend(lines, labels, loc="outside lower center", ncols=8, fontsize="small")
+    handles, names = labels(panels)
+    if handles:
+        figure.legend(handles, names, loc="outside lower center", ncols=8, fontsize="small")
     figure.supylabel("threshold from the mean [N]")
     figure.suptitle("Filled markers: the threshold on the hand's side. Dashed black: eq. 11", fontsize="medium")
     return figure

@@ -17,15 +17,17 @@ def force_difference_figure(traces: Mapping[tuple[str, str, str], Trace], profil
 
     `traces` by (trajectory, side, profile); `profile` is the one to show beside `blind`.
     """
+    shown = [name for name in dict.fromkeys(("blind", profile)) if any(key[2] == name for key in traces)]
+    styles = {profile: (SENSING, ""), "blind": (BLIND, "....")}
     figure = Figure(figsize=(10, 6.8), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
     for row, trajectory in enumerate(_TRAJECTORIES):
         for column, side in enumerate(_SIDES):
             axes: Axes = panels[row, column]
-            for name, colour, hatch in (("blind", BLIND, "...."), (profile, SENSING, "")):
+            for name in shown:
                 trace = traces.get((trajectory, side, name))
                 if trace is not None:
-                    _force(axes, trace, -1.0 if side == "+y" else 1.0, name, colour, hatch)
+                    _force(axes, trace, -1.0 if side == "+y" else 1.0, name, *styles[name])
             axes.set_title(f"{trajectory}, object at {side}")
             axes.set_xlim(-1.0, 0.6)
             axes.grid(alpha=0.3)
@@ -33,7 +35,7 @@ def force_difference_figure(traces: Mapping[tuple[str, str, str], Trace], profil
         panels[0, 0].legend(loc="upper left", fontsize="small")
     figure.supxlabel("time from first touch [s]")
     figure.supylabel("force along y, away from the object [N]")
-    figure.suptitle(f"Contact with a static object: force estimate and contact thresholds, blind and {profile}")
+    figure.suptitle(f"Contact with a static object: force estimate and contact thresholds, {' and '.join(shown)}")
     return figure
 
 

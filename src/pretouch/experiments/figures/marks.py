@@ -1,5 +1,8 @@
 """What several figures draw alike."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 
@@ -19,6 +22,12 @@ _UNITS = (
 """Colour, line and marker of each unit; more units than these begin again."""
 _MARKS = 60
 """Markers along a line over the whole of a trace."""
+
+
+def labels(panels: Iterable[Axes]) -> tuple[list[Any], list[str]]:
+    """Handles and labels of all panels, each label once: not every panel has all of them."""
+    found = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    return list(found.values()), list(found)
 
 
 def spans(flags: BoolArray) -> list[tuple[int, int]]:

@@ -49,6 +49,10 @@ WATCHED_S = 0.5
 """For how long from the beginning of the loss the arm is watched [s]."""
 _BEFORE_S = 0.05
 """Speeds are compared with the mean over this time before the loss [s]."""
+_STEADY_S = 0.2
+"""A unit whose row was there all this time before the loss sees the board, and not its edge now and then [s]."""
+_Y = 1
+"""The axis on which the board stands."""
 _PERIOD_S = MODES["short"].period_s
 
 
@@ -150,18 +154,22 @@ def _path(sign: float, start: float) -> Path:
 
 
 def results(record: Record, loss: Loss, sign: float, params: Profile, model: RobotModel) -> Row:
-    """Largest changes between successive steps in the 0.5 s after the loss begins, and speeds towards the board."""
+    """Largest changes between successive steps in the 0.5 s after the loss begins, and speeds towards the board.
+
+    Thresholds are those along y. Rows are those of units that had one all the time before: one that sees the board's
+    edge now and then flickers without a loss, too.
+    """
     first = next(i for i, s in enumerate(record.steps) if s.stamp >= loss.begin)
     steps = record.steps[first - 1 :]  # changes count from the last step before
     before = record.steps[first - 1 - round(_BEFORE_S / params.task.control_period_s) : first]
     scale = np.array([s.speed_scale for s in steps])
     reach = model.description.qdd_max * params.task.control_period_s
-    known = [_limits(s, loss.facing) for s in steps]
+    known = [_limits(s, steady(record.steps[:first], loss)) for s in steps]
     shared = [abs(now[unit] - last[unit]) for last, now in pairwise(known) for unit in now.keys() & last.keys()]
     start = float(np.mean(_towards(before, sign)))
     return {
         "threshold_step_n": rounded(
-            peak(np.abs(np.diff([[*s.thresholds.upper, *s.thresholds.lower] for s in steps], axis=0)))
+            peak(np.abs(np.diff([[s.thresholds.upper[_Y], s.thresholds.lower[_Y]] for s in steps], axis=0)))
         ),
         "limit_step_m_s": rounded(max(shared), 4) if shared else None,
         "rows_vanished": sum(not last.keys() <= now.keys() for last, now in pairwise(known)),
@@ -175,6 +183,12 @@ def results(record: Record, loss: Loss, sign: float, params: Profile, model: Rob
         "holds": sum(a.mode is not Mode.HOLD and b.mode is Mode.HOLD for a, b in pairwise(steps)),
         "reactions": sum(s.contact is not None for s in steps[1:]),
     }
+
+
+def steady(before: list[ControlStep], loss: Loss) -> list[int]:
+    """Units that saw the board when the loss began and had a row in all steps shortly before."""
+    recent = [s for s in before if s.stamp > loss.begin - _STEADY_S]
+    return [unit for unit in loss.facing if all(unit in s.obstacles.unit[s.restricted] for s in recent)]
 
 
 def _limits(step: ControlStep, units: list[int]) -> dict[int, float]:
@@ -239,11 +253,17 @@ def _base(name: str) -> str:
     return name.split(":perception.persistence_s=")[0]
 
 
+def _label(cell: Row, with_mode: bool) -> str:
+    kept = f"{_base(cell['profile'])}\n{1000 * _kept_s(cell['profile']):.0f} ms"
+    return f"{kept}\n{cell['restrictions']}" if with_mode else kept
+
+
 def tables(part: Row) -> list[TextTable]:
     """What lost readings change from one step to the next."""
+    several = len({cell["restrictions"] for cell in part["cells"]}) > 1
     rows = tuple(
         (
-            f"{_base(cell['profile'])}\n{1000 * _kept_s(cell['profile']):.0f} ms" if cell is shown[0] else "",
+            _label(cell, several) if cell is shown[0] else "",
             f"{cell['readings']:g}",
             number(cell["lost"], 0),
             number(cell["threshold_step_n"], 2),
@@ -270,9 +290,10 @@ def tables(part: Row) -> list[TextTable]:
 
 _NOTE = (
     "Kept: how long a point outlives its measurement. n: readings silenced; lost: those really lost, by each unit that"
-    " saw the board. Bound and limit: largest change of a contact threshold and of an approach limit from one step to"
-    " the next. Rows gone: trials in which an approach limit vanished. Command: largest change of a joint's command in"
-    " a step, free QP: of what the QP would answer without acceleration limits; both of what those limits allow."
+    " saw the board. Bound: largest change of a contact threshold along y from one step to the next; limit: of an"
+    " approach limit that is there before and after. Rows gone: trials in which an approach limit vanished. Command:"
+    " largest change of a joint's command in a step, free QP: of what the QP would answer without acceleration limits;"
+    " both of what those limits allow."
     " Factor: least one on the speed, rise: its largest in a step. Before, most: speed towards the board before the"
     " loss, and the most after it. Hold: changes to HOLD."
 )

@@ -36,7 +36,8 @@ _REACH_S = 1.2
 """About how long the person reaches for the arm [s]."""
 _FORCE_N = (15.0, 30.0)
 _KEPT_FRACTION = 0.9
-"""A push that touches, or is estimated, for less of its time is not counted: it slipped, or met a singularity."""
+"""A push that touches, or is estimated, for less of its time is not counted: it slipped, or met a singularity.
+Nor is one whose watch an arm cuts short that is stuck."""
 _NOTICE_S = 0.3
 """A reaction up to this long after the release still answers the push [s]."""
 WATCHED_S = 3.0
@@ -124,6 +125,7 @@ def _judge(record: Record, force_n: float, touch: float, release: float, end: fl
     opposed = np.array([bool(s.reaction_velocity @ along < 0) for s in steps[1:]])
     return {
         "push_n": rounded(force_n),
+        "watched": record.steps[-1].stamp >= end - 1e-9,
         "touching_fraction": rounded(float((np.linalg.norm(record.true_force[pushed], axis=1) > TOUCH_N).mean())),
         "estimated_fraction": rounded(
             float(np.mean([np.isfinite(s.force).all() for s in steps if s.stamp <= release]))
@@ -149,23 +151,24 @@ def towards(steps: list[ControlStep], along: FloatArray) -> FloatArray:
 
 def summarise(rows: list[Row]) -> Row:
     """Pool the pushes of all trials of a cell."""
-    return {
-        "cells": [
-            key
-            | {"trials": len(group), "stuck": sum(row["stuck"] for row in group)}
-            | _pooled([push for row in group for push in row["pushes"]])
-            for key, group in grouped(rows, ("held_s", "restrictions", "profile"))
-        ]
-    }
+    cells = []
+    for key, group in grouped(rows, ("held_s", "restrictions", "profile")):
+        pooled = _pooled([push for row in group for push in row["pushes"]])
+        out = _PUSHES * len(group) - pooled["pushes"]
+        cells.append(key | {"trials": len(group), "stuck": sum(row["stuck"] for row in group), "out": out} | pooled)
+    return {"cells": cells}
 
 
 def _pooled(pushed: list[Row]) -> Row:
-    """Counts and spreads of the pushes that were held as planned."""
+    """Counts and spreads of the pushes that were held as planned and watched to the end."""
     measures = ("reactions", "mean_peak_n", "speed_towards_m_s", "reaction_speed_towards_m_s")
-    done = [push for push in pushed if min(push["touching_fraction"], push["estimated_fraction"]) >= _KEPT_FRACTION]
+    done = [
+        push
+        for push in pushed
+        if push["watched"] and min(push["touching_fraction"], push["estimated_fraction"]) >= _KEPT_FRACTION
+    ]
     return {
         "pushes": len(done),
-        "left_out": len(pushed) - len(done),
         "felt": sum(push["felt"] for push in done),
         "against_while_held": sum(push["against_while_held"] > 0 for push in done),
         "against_after_release": sum(push["against_after_release"] > 0 for push in done),
@@ -186,12 +189,14 @@ def _base(name: str) -> str:
 
 def tables(part: Row) -> list[TextTable]:
     """How often a release was taken for a push towards the person."""
+    several = len({cell["restrictions"] for cell in part["cells"]}) > 1
     rows = tuple(
         (
             f"{cell['held_s']:g}",
-            _base(cell["profile"]),
+            _base(cell["profile"]) + (f"\n{cell['restrictions']}" if several else ""),
             f"{_decay_s(cell['profile']):g}",
             f"{cell['felt']}/{cell['pushes']}",
+            str(cell["out"]),
             number(cell["reactions"], 0),
             str(cell["against_while_held"]),
             str(cell["against_after_release"]),
@@ -209,6 +214,7 @@ def tables(part: Row) -> list[TextTable]:
             "profile",
             "decay\n[s]",
             "felt",
+            "out",
             "reac-\ntions",
             "against\nwhile",
             "against\nafter",
@@ -218,11 +224,12 @@ def tables(part: Row) -> list[TextTable]:
             "stuck",
         ),
         rows,
-        "Pushes of 15 to 30 N, touching and estimated while they lasted. Decay: length of a reaction. Reactions: for"
-        " each push, until 3 s after its release. Against: pushes with a reaction towards the person, while it was"
-        " held and after its release. Mean: the most the window's mean had along the push. Back: fastest motion towards"
-        " the person in the 3 s after the release, the way back to the path included. Reacting: the same in reactions"
-        " against the push alone. Stuck: trials ended by an arm pushed to where it has no force estimate.",
+        "Pushes of 15 to 30 N. Decay: length of a reaction. Out: planned pushes that are not counted, for they slipped"
+        " off, met a singularity, or an arm that got stuck cut them short; so the rows hold different pushes."
+        " Reactions: for each push, until 3 s after its release. Against: pushes with a reaction towards the person,"
+        " while it was held and after its release. Mean: the most the window's mean had along the push. Back: fastest"
+        " motion towards the person in the 3 s after the release, the way back to the path included. Reacting: the same"
+        " in reactions against the push alone. Stuck: trials ended by an arm pushed to where it has no force estimate.",
     )
     return [table]
 
@@ -249,7 +256,8 @@ def _figure(found: list[Row]) -> "Figure":
     left.set(xlabel="push held [s]", ylabel="reaction towards the person [% of pushes]", ylim=(-5, 105))
     right.set(xlabel="push held [s]", ylabel="largest mean along the push [N]")
     right.set_ylim(bottom=0)
-    left.legend(fontsize="small", loc="lower right")
+    if left.lines:
+        left.legend(fontsize="small", loc="lower right")
     for axes in (left, right):
         axes.grid(alpha=0.3)
     figure.suptitle("What the arm does when a held push is released")

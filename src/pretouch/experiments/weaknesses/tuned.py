@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.groups import cells_of, grouped
 from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.pushes import PALM, Push, Pusher, way_round
+from pretouch.experiments.pushes import PALM, Push, way_round
 from pretouch.experiments.static import least_sensed
 from pretouch.experiments.tables import TextTable, number
 from pretouch.experiments.trial import Record, Setup, play
@@ -26,19 +27,22 @@ from pretouch.types import ControlStep, FloatArray
 
 NAME = "tuned"
 V_MAX_M_S = (0.04, 0.1, 0.2, 0.4)
-SLACK_WEIGHTS = (1, 1000)
-SCENES = ("circle", "line", "reach", "follow")
-"""The static object on circle and line; a hand that reaches for where the arm stands; one that follows the arm."""
+SLACK_WEIGHTS = (1.0, 1000.0)
+SCENES = ("circle", "line", "reach")
+"""The static object on circle and line; a hand that reaches for where the arm stands."""
 
 _STATIC_S, _HAND_S = 25.0, 11.0
 _AFTER_TOUCH_S = 0.5
 _STIFFNESS_N_PER_M = 25_000.0
-_REST_M_S = 0.005
-_SMOOTH_STEPS = 50
-"""Half a second of control steps, over which the end-effector's velocity is averaged."""
+_WINDOW_S = 2.0
+"""Time over which the end-effector's displacement is taken for its speed [s]: the noise of a velocity is no motion."""
+_REST_M_S = 0.002
+"""Below this the arm is at rest [m/s]: the jitter of an arm that stands comes to 0.1 mm/s or less over the window."""
 
 _LOOK_BACK_STEPS = 3
 """Control steps over which the speed of the person's hand before a touch is taken."""
+_WAY_M = 0.01
+"""Last piece of its way that shows where the hand comes from [m]; a hand that stands has come from there before."""
 
 _STANDS_M = (0.5, 0.0, 0.4)
 """Where the arm stands by [m]."""
@@ -52,20 +56,36 @@ _STAND_OFF_M, _SPEED_M_S, _FREE_N = 0.5, 0.35, 60.0
 
 
 def cells(grid: Grid) -> list[Cell]:
-    """A cell for each scene and each tuning of each profile with proximity: slack at all values, hard and off."""
-    sensing = [name for name in grid.profiles if profile(name).perception.enabled]
+    """A cell for each scene and each tuning of each profile with proximity: slack at all values, hard and off.
+
+    A profile that is named with a mode is taken as it is, once.
+    """
     tunings: list[tuple[str, RestrictionMode]] = []
-    for name in sensing:
+    for name in grid.profiles:
+        found = profile(name)
+        if not found.perception.enabled:
+            continue
+        if ":restriction.mode=" in name:
+            tunings.append((name, found.restriction.mode))
+            continue
         values = product(SLACK_WEIGHTS, V_MAX_M_S)
-        tunings += [(_tuned(name, v_max, weight), "slack") for weight, v_max in values]
+        tunings += [(name + _tuning(v_max, weight), "slack") for weight, v_max in values]
         tunings += [(name, "hard"), (name, "off")]
     return [
-        Cell(NAME, name, {"scene": where, "restrictions": mode}) for where, (name, mode) in product(SCENES, tunings)
+        Cell(NAME, name, {"scene": where, "restrictions": mode})
+        for where, (name, mode) in product(SCENES, dict.fromkeys(tunings))
     ]
 
 
-def _tuned(name: str, v_max: float, weight: int) -> str:
-    return f"{name}:restriction.v_max_m_s={v_max:g}:restriction.slack_weight={weight}"
+def _tuning(v_max: float, weight: float) -> str:
+    return f":restriction.v_max_m_s={v_max:g}:restriction.slack_weight={weight:g}"
+
+
+def base(cell: dict[str, Any]) -> str:
+    """Return the name of the profile that a cell tunes."""
+    name = str(cell["profile"])
+    tuned = cell["restrictions"] == "slack"
+    return name.removesuffix(_tuning(cell["v_max_m_s"], cell["slack_weight"])) if tuned else name
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
@@ -80,7 +100,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=static.scene(where, side, _STIFFNESS_N_PER_M, seed) if still else SceneSpec(hand=HandSpec()),
         path=static.path(where, side) if still else standing(),
         seed=seed,
-        hand=None if still else person(where, seed, context.model),
+        hand=None if still else person(seed, context.model),
     )
     record = play(setup, _done(_STATIC_S if still else _HAND_S))
     tuning = setup.profile.restriction
@@ -102,17 +122,17 @@ def standing() -> Path:
     return line((x, y + 0.02, z), _STANDS_M)
 
 
-def person(where: str, seed: int, model: RobotModel) -> HandScript:
+def person(seed: int, model: RobotModel) -> HandScript:
     """Return a person whose hand comes at the standing arm along one of its side units.
 
     The visitor of the avoidance experiment does not come near an arm that stands in its place, and is met where no unit
-    looks. So here one hand goes to where the arm stood and no farther, whether it gives way or not; the other goes on
-    until it touches, as the pushes do.
+    looks. So here the hand goes to where the arm stood and no farther, whether it gives way or not. A hand that went on
+    until it touched would touch in any case, and as fast as it chose to follow.
     """
     rng = np.random.default_rng([seed, 44])
     inwards = np.array([0.0, 1.0 if seed % 2 else -1.0, 0.0]) + _TILT * rng.uniform(-1, 1, 3)
     touch = Push(_STARTS_S + rng.uniform(0, 0.5), inwards / np.linalg.norm(inwards), _FORCE_N, 0.2)
-    return Reach(model, touch) if where == "reach" else Pusher(model, (touch,))
+    return Reach(model, touch)
 
 
 @dataclass
@@ -148,8 +168,9 @@ def _done(limit: float) -> Callable[[ControlStep, Plant], bool]:
 def results(record: Record, still: bool) -> dict[str, Any]:
     """Numbers of one trial; `still`: the object is static, so that the arm has to come to rest by itself."""
     true, touch = np.linalg.norm(record.true_force, axis=1), record.first_contact()
-    speed = smooth_speed(record)
-    rest = rest_time(record.times(), speed) if still and touch is None else None
+    times, speed = displacement_speed(record)
+    stopping = still and touch is None
+    rest = rest_time(times, speed) if stopping else None
     until = np.inf if touch is None else touch
     ready = [s.ee_position for s in record.steps if _STARTS_S - 1.0 <= s.stamp <= until]
     away = max((float(np.linalg.norm(x - ready[0])) for x in ready), default=0.0)
@@ -159,34 +180,44 @@ def results(record: Record, still: bool) -> dict[str, Any]:
         "true_peak_20ms_n": rounded(peak(mean_over(true, 20))) if touch else None,
         "least_sensed_m": least_sensed(record),
         "rest_s": None if rest is None else rounded(rest),
-        "speed_left_m_s": rounded(speed[-1], 4) if still and touch is None else None,
+        "speed_left_m_s": rounded(speed[-1], 4) if stopping and len(speed) else None,
         "gave_way_m": None if still else rounded(away, 4),
         "held": record.held(),
     }
 
 
 def closing_speed(record: Record, still: bool) -> float:
-    """Speed [m/s] of the point of the arm that touches first relative to what it touches, just before."""
+    """Closing speed [m/s] of the point of the arm that touches first and what it touches, just before.
+
+    With the static object: across its face. With the hand: along the hand's own way, so that sliding past is left out.
+    """
     first = record.touches[0]
     if still:
-        return float(np.linalg.norm(first.velocity))
+        return abs(float(first.velocity[1]))
     before = int(np.searchsorted(record.times(), first.time)) - 1
     start = before - _LOOK_BACK_STEPS
     span = record.steps[before].stamp - record.steps[start].stamp
     hand = (record.hand_position[before] - record.hand_position[start]) / span
-    return float(np.linalg.norm(first.velocity - hand))
+    ways = record.hand_position[before] - record.hand_position[:before]
+    sizes = np.linalg.norm(ways, axis=1)
+    last = np.flatnonzero(sizes >= _WAY_M)[-1]
+    return float((hand - first.velocity) @ ways[last] / sizes[last])
 
 
-def smooth_speed(record: Record) -> FloatArray:
-    """Speed (S,) [m/s] of the end-effector from its mean velocity over half a second: noise is no motion."""
-    velocity = np.array([s.ee_velocity for s in record.steps])
-    before = np.vstack([np.zeros((_SMOOTH_STEPS - 1, 3)), velocity])
-    means = np.array([mean_over(axis, _SMOOTH_STEPS) for axis in before.T])
-    return np.linalg.norm(means, axis=0)
+def displacement_speed(record: Record) -> tuple[FloatArray, FloatArray]:
+    """Instants (T,) [s] and the end-effector's speed (T,) [m/s] over the 2 s after each.
+
+    The speed is the displacement over the 2 s, divided by them. The last instant is 2 s before the record's end.
+    """
+    times, position = record.times(), np.array([s.ee_position for s in record.steps])
+    end = np.searchsorted(times, times + _WINDOW_S - 1e-9)
+    start = np.flatnonzero(end < len(times))
+    way = np.linalg.norm(position[end[start]] - position[start], axis=1)
+    return times[start], way / _WINDOW_S
 
 
 def rest_time(times: FloatArray, speed: FloatArray) -> float | None:
-    """Instant [s] from which an arm that once moved stays below 5 mm/s to the end, or None."""
+    """Instant [s] from which an arm that once moved stays below 2 mm/s to the end, or None."""
     moving = np.flatnonzero(speed >= _REST_M_S)
     if len(moving) == 0 or moving[-1] + 1 >= len(speed):
         return None
@@ -208,16 +239,19 @@ def tables(part: dict[str, Any]) -> list[TextTable]:
     """One table for the static object, one for the hand that comes."""
     still = [cell for cell in part["cells"] if cell["scene"] in static.TRAJECTORIES]
     moving = [cell for cell in part["cells"] if cell["scene"] not in static.TRAJECTORIES]
-    return [table for table, cells in ((_still(still), still), (_moving(moving), moving)) if cells]
+    many = len({base(cell) for cell in part["cells"]}) > 1
+    return [table(cells, many) for table, cells in ((_still, still), (_moving, moving)) if cells]
 
 
 _HEADER = ("scene", "mode", "V_max\n[m/s]", "weight", "n", "hit\n[%]", "impact\n[m/s]", "true\n[N]", "least\n[m]")
+_NAME_WIDTH = 24
+"""Characters of the first column at most: the table keeps to 80."""
 
 
-def _common(cell: dict[str, Any]) -> tuple[str, ...]:
+def _common(cell: dict[str, Any], many: bool) -> tuple[str, ...]:
     off, soft = cell["restrictions"] == "off", cell["restrictions"] in ("slack", "floor")
     return (
-        cell["scene"],
+        f"{cell['scene']}\n{fill(base(cell).replace(':', ' '), _NAME_WIDTH)}" if many else cell["scene"],
         cell["restrictions"],
         "-" if off else f"{cell['v_max_m_s']:g}",
         f"{cell['slack_weight']:g}" if soft else "-",
@@ -229,30 +263,33 @@ def _common(cell: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _still(cells: list[dict[str, Any]]) -> TextTable:
+def _still(cells: list[dict[str, Any]], many: bool) -> TextTable:
     return TextTable(
         "Restrictions tuned: a static object on the path, 25 N/mm, medians",
-        (*_HEADER, "rest\n[s]", "left\n[m/s]"),
-        tuple((*_common(cell), number(cell["rest_s"], 1), number(cell["speed_left_m_s"], 3)) for cell in cells),
+        (*_HEADER, "rest\n[s]", "left\n[mm/s]"),
+        tuple(
+            (*_common(cell, many), number(cell["rest_s"], 1), number(cell["speed_left_m_s"], 2, 1000)) for cell in cells
+        ),
         "Weight: of a row's squared violation against the squared task error. Hit: trials with contact in 25 s. Impact:"
-        " closing speed at the touch. True: peak of the true force, 20 ms mean. Least: nearest that the units showed"
-        " something to the arm's surface; they show none nearer than 4 cm. Rest: when the arm is below 5 mm/s for good."
-        " Left: speed after 25 s without contact.",
+        " closing speed at the touch, across the object's face. True: peak of the true force, 20 ms mean. Least:"
+        " nearest that the units showed something to the arm's surface; they show none nearer than 4 cm. Without"
+        " contact the end-effector's speed is its displacement over 2 s. Rest: when that falls below 2 mm/s for good."
+        " Left: that of the last 2 s.",
     )
 
 
-def _moving(cells: list[dict[str, Any]]) -> TextTable:
+def _moving(cells: list[dict[str, Any]], many: bool) -> TextTable:
     return TextTable(
         "Restrictions tuned: a hand comes at the standing arm with 0.35 m/s, medians",
         (*_HEADER, "away\n[m]"),
-        tuple((*_common(cell), number(cell["gave_way_m"], 3)) for cell in cells),
-        "Reach: the hand goes to where the robot's hand stood, and no farther. Follow: it goes on until it touches. It"
-        " comes along the beam of a unit, with 10 N at most. Away: how far the end-effector moved from its"
-        " place, up to the touch if there is one. Other columns as above.",
+        tuple((*_common(cell, many), number(cell["gave_way_m"], 3)) for cell in cells),
+        "The hand reaches for where the robot's hand stood, and goes no farther. It comes along the beam of a unit,"
+        " with 10 N at most. Impact: closing speed at the touch, along the way of the person's hand. Away: how far the"
+        " end-effector moved from its place, up to the touch if there is one. Other columns as for a static object.",
     )
 
 
-_STYLES = {1.0: ("--", "s"), 1000.0: ("-", "o")}
+_MARKERS = "so^vD<>p"
 
 
 def _draw(sources: Sources) -> list[Picture]:
@@ -260,19 +297,21 @@ def _draw(sources: Sources) -> list[Picture]:
 
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True)
-    slack = [cell for cell in sources.summary["cells"] if cell["restrictions"] == "slack"]
-    for key, group in grouped(slack, ("scene", "slack_weight")):
-        ls, marker = _STYLES.get(key["slack_weight"], (":", "^"))
-        first = key["scene"] in ("circle", "reach")
-        colour, size = ("black", 9) if first else ("tab:gray", 5)
+    slack = [cell | {"base": base(cell)} for cell in sources.summary["cells"] if cell["restrictions"] == "slack"]
+    curves = list(dict.fromkeys((cell["base"], cell["slack_weight"]) for cell in slack))
+    many = len({name for name, _ in curves}) > 1
+    for key, group in grouped(slack, ("scene", "base", "slack_weight")):
+        name, weight = key["base"], key["slack_weight"]
         still = key["scene"] in static.TRAJECTORIES
+        colour, size = ("tab:gray", 5) if key["scene"] == "line" else ("black", 9)
         values = [
             100 * cell["contact_fraction"] if still else (cell["impact_speed_m_s"] or {}).get("median", np.nan)
             for cell in group
         ]
         (left if still else right).plot(
-            [cell["v_max_m_s"] for cell in group], values, ls=ls, marker=marker, ms=size, color=colour,
-            label=f"{key['scene']}, weight {key['slack_weight']:g}",
+            [cell["v_max_m_s"] for cell in group], values, ls={1.0: "--", 1000.0: "-"}.get(weight, ":"),
+            marker=_MARKERS[curves.index((name, weight)) % len(_MARKERS)], ms=size, color=colour,
+            label=f"{key['scene']}, weight {weight:g}" + (f",\n{fill(name, 2 * _NAME_WIDTH)}" if many else ""),
         )  # fmt: skip
     left.set(title="A static object on the path", ylabel="trials with contact [%]", ylim=(-5, 105))
     right.set(title="A hand comes at the standing arm", ylabel="closing speed at the touch [m/s]", ylim=(0, 0.4))
@@ -280,7 +319,7 @@ def _draw(sources: Sources) -> list[Picture]:
         axes.set_xlabel("V_max [m/s]")
         axes.grid(alpha=0.3)
         if axes.lines:
-            axes.legend()
+            axes.legend(fontsize="small")
     return [Picture("tuned", "Contact with a static object and with a hand by V_max and weight", figure)]
 
 
