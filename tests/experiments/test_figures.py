@@ -134,6 +134,9 @@ def test_the_force_difference_counts_from_the_touch_away_from_the_object():
         assert estimate.get_ydata()[300] == sign * 20.0
         assert line(axes, "paper: detected").get_xdata() == pytest.approx([0.05])
     assert force_difference_figure({}, "paper").axes[0].lines[:] == []
+    alone = force_difference_figure({("circle", "-y", "blind"): made_trace()}, "blind")
+    assert alone.get_suptitle().endswith("thresholds, blind")
+    assert len(alone.axes[0].get_legend_handles_labels()[1]) <= 4
 
 
 @pytest.mark.parametrize("function", [function for block in framework.BLOCKS for _, function in block.steps])

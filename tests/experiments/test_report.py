@@ -1,5 +1,5 @@
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from html.parser import HTMLParser
 from pathlib import Path
 from shutil import copy, copytree
@@ -12,8 +12,9 @@ from pretouch.errors import ExperimentError
 from pretouch.experiments import dynamic, static
 from pretouch.experiments.campaign import Request, open_folder, trace_file, trial_file, write_json
 from pretouch.experiments.cell import Cell, Grid
-from pretouch.experiments.registry import summarise
+from pretouch.experiments.registry import EXPERIMENTS, summarise
 from pretouch.experiments.report import write_report
+from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trace import Trace, load_trace, save_trace, trace_of
 
 LINE = ("line", "-y")
@@ -128,3 +129,22 @@ def test_a_trace_has_the_mean_true_force_of_each_step(context):
     since = (record.true_time > trace.time[i - 1] + 1e-9) & (record.true_time <= trace.time[i] + 1e-9)
     assert since.sum() == 10
     np.testing.assert_allclose(trace.true_force[i], record.true_force[since].mean(axis=0))
+
+
+def test_the_tables_are_written_in_markdown_too(request_and_folder, tmp_path, monkeypatch):
+    request, out = request_and_folder
+    table = TextTable("Title", ("|a|", "b\n[m]"), (("x|y", "1\n2"),), "A note.")
+    static_only = replace(EXPERIMENTS["static"], tables=lambda _: [table])
+    monkeypatch.setitem(EXPERIMENTS, "static", static_only)
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("static*")]
+    write_report([(request, out)], summarise(rows), tmp_path)
+    assert (tmp_path / "tables.md").read_text().splitlines()[:5] == [
+        "## Title", "", r"| \|a\| | b<br>[m] |", "| --- | --- |", r"| x\|y | 1<br>2 |",
+    ]  # fmt: skip
+
+
+def test_the_page_says_what_was_run(request_and_folder):
+    request, out = request_and_folder
+    page = write_report([(request, out), (Request(("noise",), 1), out)], {}, out).read_text()
+    assert "static, dynamic: 1 seeds, profiles blind, paper, restrictions off, slack." in page
+    assert "noise: 1 seeds, profiles blind:threshold.f_base_n=1000." in page

@@ -1,4 +1,5 @@
 from pretouch.experiments.registry import summarise, tables
+from pretouch.experiments.tables import controller, shown_controllers
 from tests.experiments.width import width
 
 
@@ -60,7 +61,7 @@ def test_tables_show_medians_and_ratios():
     static, dynamic = tables(summarise(rows))
     assert [row[:2] for row in static.rows] == [("circle\n-y", "blind"), ("circle\n-y", "paper"), ("", "ratio")]
     assert static.rows[0][6] == "80.0\n80-80"
-    assert static.rows[0][2] == "0.200\n0.200-0.200"
+    assert static.rows[0][2] == "0.200\n0.20-0.20"
     assert static.rows[2][6] == "4.00\n4.0-4.0"
     assert static.rows[0][-1] == "1/1"
     assert dynamic.rows[0][:3] == ("paper", "1 of 1", "60")
@@ -95,3 +96,28 @@ def test_more_of_a_grid_is_shown_in_more_tables():
     for table in (places, by_use, by_mode):
         assert width(table) <= 80
         assert all(len(row) == len(table.header) for row in table.rows)
+
+
+def test_what_is_shown_in_detail_is_blind_and_one_other_with_restrictions_off():
+    def cell(profile, restrictions, stiffness=25e3):
+        return {"profile": profile, "restrictions": restrictions, "stiffness_n_per_m": stiffness}
+
+    many = [cell("paper", "hard"), cell("paper", "off"), cell("slowing-only", "off"), cell("blind", "off")]
+    assert shown_controllers(many) == (
+        25e3, {"paper": "off", "slowing-only": "off", "blind": "off"}, ["blind", "paper"],
+    )  # fmt: skip
+    assert shown_controllers([cell("blind", "off", 2e3)])[::2] == (2e3, ["blind"])
+    assert shown_controllers([cell("paper", "slack"), cell("paper", "hard")])[1:] == ({"paper": "slack"}, ["paper"])
+
+
+def test_the_mode_is_named_where_a_profile_has_several():
+    cells = [{"profile": "paper", "restrictions": mode} for mode in ("hard", "slack")]
+    cells.append({"profile": "blind", "restrictions": "off"})
+    assert [controller(cell, cells) for cell in cells] == ["paper\nhard", "paper\nslack", "blind"]
+
+
+def test_a_table_without_the_default_mode_says_so():
+    rows = [static_row("paper", 0, None, restrictions="hard", contact=False, detection_delay_s=None)]
+    (table,) = tables(summarise(rows))
+    assert "hard restrictions" in table.title
+    assert table.rows[0][-1] == "0/0"

@@ -216,7 +216,7 @@ def with_spread(value: Row | None, digits: int, factor: float = 1.0) -> str:
     """Write the median of a spread with its 10-90 % below, these with fewer digits where they are large."""
     if value is None:
         return "-"
-    few = 0 if factor * value["p90"] >= 10 else digits
+    few = 0 if factor * value["p90"] >= 10 else min(digits, 2)
     return f"{factor * value['median']:.{digits}f}\n{factor * value['p10']:.{few}f}-{factor * value['p90']:.{few}f}"
 
 
