@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from pretouch.experiments.registry import EXPERIMENTS
+
 ROOT = Path(__file__).parents[1]
 ROWS = re.findall(
     r"^\| (?:(\d+) \| )?.*? \| `(pretouch[\w.]+)` \| `(tests/[\w/]+\.py)::(\w+)` \|$",
@@ -43,6 +45,21 @@ def test_links_between_documents_lead_somewhere():
     for document in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", document.read_text()):
             assert (document.parent / target).exists(), f"{document.name}: {target}"
+
+
+def test_the_paper_page_names_experiments_there_are():
+    text = (ROOT / "docs" / "paper.md").read_text()
+    claims, weaknesses = (part.split("\n## ")[0] for part in text.split("\n## ")[1:3])
+    named = [row.rstrip(" |").split(" | ")[-1] for row in claims.splitlines() if row.startswith("| ")]
+    named += [row.split(" | ")[1] for row in weaknesses.splitlines() if row.startswith("| ")]
+    found = set(re.findall(r"`([\w-]+)`", " ".join(named))) - {"reproduce"}
+    assert len(found) > 10
+    assert found <= set(EXPERIMENTS)
+
+
+def test_every_experiment_is_described():
+    text = (ROOT / "docs" / "experiments.md").read_text()
+    assert [name for name in EXPERIMENTS if f"**{name}**" not in text] == []
 
 
 def test_names_in_the_notation_exist():

@@ -164,7 +164,8 @@ def results(record: Record, loss: Loss, sign: float, params: Profile, model: Rob
     before = record.steps[first - 1 - round(_BEFORE_S / params.task.control_period_s) : first]
     scale = np.array([s.speed_scale for s in steps])
     reach = model.description.qdd_max * params.task.control_period_s
-    known = [_limits(s, steady(record.steps[:first], loss)) for s in steps]
+    watched = steady(record.steps[:first], loss)
+    known = [_limits(s, watched) for s in steps]
     shared = [abs(now[unit] - last[unit]) for last, now in pairwise(known) for unit in now.keys() & last.keys()]
     start = float(np.mean(_towards(before, sign)))
     return {
@@ -172,7 +173,7 @@ def results(record: Record, loss: Loss, sign: float, params: Profile, model: Rob
             peak(np.abs(np.diff([[s.thresholds.upper[_Y], s.thresholds.lower[_Y]] for s in steps], axis=0)))
         ),
         "limit_step_m_s": rounded(max(shared), 4) if shared else None,
-        "rows_vanished": sum(not last.keys() <= now.keys() for last, now in pairwise(known)),
+        "rows_vanished": sum(not last.keys() <= now.keys() for last, now in pairwise(known)) if watched else None,
         "command_step": rounded(peak(np.abs(np.diff([s.command for s in steps], axis=0)) / reach)),
         "free_step": _free_step(steps, record.steps[0].q, params, model, reach),
         "least_scale": rounded(float(scale.min())),
@@ -239,7 +240,8 @@ def summarise(rows: list[Row]) -> Row:
     found = cells_of(rows, _KEYS, _MEASURES, totals=("holds", "reactions"))
     for cell, (_, group) in zip(found, grouped(rows, _KEYS), strict=True):
         cell["lost"] = spread([count for row in group for count in row["lost"]])
-        cell["trials_without_rows"] = sum(row["rows_vanished"] > 0 for row in group)
+        steadily = [row["rows_vanished"] for row in group if row["rows_vanished"] is not None]
+        cell["trials_with_rows"], cell["trials_without_rows"] = len(steadily), sum(count > 0 for count in steadily)
     return {"cells": found}
 
 
@@ -268,7 +270,7 @@ def tables(part: Row) -> list[TextTable]:
             number(cell["lost"], 0),
             number(cell["threshold_step_n"], 2),
             number(cell["limit_step_m_s"], 3),
-            f"{cell['trials_without_rows']}/{cell['trials']}",
+            f"{cell['trials_without_rows']}/{cell['trials_with_rows']}",
             number(cell["command_step"], 2),
             number(cell["free_step"], 2),
             number(cell["least_scale"], 2),
@@ -291,7 +293,8 @@ def tables(part: Row) -> list[TextTable]:
 _NOTE = (
     "Kept: how long a point outlives its measurement. n: readings silenced; lost: those really lost, by each unit that"
     " saw the board. Bound: largest change of a contact threshold along y from one step to the next; limit: of an"
-    " approach limit that is there before and after. Rows gone: trials in which an approach limit vanished. Command:"
+    " approach limit that is there before and after. Rows gone: trials in which an approach limit vanished,"
+    " of those in which a unit had one all of the 0.2 s before. Command:"
     " largest change of a joint's command in a step, free QP: of what the QP would answer without acceleration limits;"
     " both of what those limits allow."
     " Factor: least one on the speed, rise: its largest in a step. Before, most: speed towards the board before the"
