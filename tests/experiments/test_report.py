@@ -23,12 +23,14 @@ LINE = ("line", "-y")
 class Links(HTMLParser):
     def __init__(self):
         super().__init__()
-        self.images, self.tables = [], 0
+        self.images, self.tables, self.anchors, self.ids = [], 0, [], set()
 
     def handle_starttag(self, tag, attrs):
         if tag == "img":
             self.images.append(dict(attrs)["src"])
         self.tables += tag == "table"
+        self.anchors += [dict(attrs)["href"][1:]] if tag == "a" else []
+        self.ids |= {dict(attrs).get("id")}
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +52,9 @@ def test_the_page_shows_each_table_and_picture(request_and_folder):
     links = Links()
     links.feed(page.read_text())
     assert links.tables == 2
-    assert links.images == ["static.png", "dynamic.png"]
+    assert links.images == ["static.png", "dynamic.png", "framework.png"]
+    assert links.anchors == ["static", "dynamic"]
+    assert set(links.anchors) <= links.ids
     for name in links.images:
         with Image.open(out / name) as picture:
             assert picture.width >= 1000
@@ -79,7 +83,7 @@ def test_a_damaged_trace_leaves_its_picture_out(request_and_folder, tmp_path):
     rows = [json.loads(file.read_text()) for file in (out / "trials").iterdir()]
     links = Links()
     links.feed(write_report([(request, out)], summarise(rows), out).read_text())
-    assert links.images == ["static.png"]
+    assert links.images == ["static.png", "framework.png"]
 
 
 def _arrays(path, **changes):
@@ -135,7 +139,7 @@ def test_the_tables_are_written_in_markdown_too(request_and_folder, tmp_path, mo
     request, out = request_and_folder
     table = TextTable("Title", ("|a|", "b\n[m]"), (("x|y", "1\n2"),), "A note.")
     static_only = replace(EXPERIMENTS["static"], tables=lambda _: [table])
-    monkeypatch.setitem(EXPERIMENTS, "static", static_only)
+    monkeypatch.setattr("pretouch.experiments.report.GROUPS", {"Group": (static_only,)})
     rows = [json.loads(file.read_text()) for file in (out / "trials").glob("static*")]
     write_report([(request, out)], summarise(rows), tmp_path)
     assert (tmp_path / "tables.md").read_text().splitlines()[:5] == [

@@ -36,7 +36,13 @@ WEAKNESSES = (
     infeasible.EXPERIMENT,
 )
 
-EXPERIMENTS: dict[str, Experiment] = {e.name: e for e in (*PAPER, *CLAIMS, *WEAKNESSES)}
+GROUPS = {
+    "The paper's experiments": PAPER,
+    "What the paper says of its method": CLAIMS,
+    "Its weaknesses": WEAKNESSES,
+}
+"""All experiments by what they are for, in the order of the page."""
+EXPERIMENTS: dict[str, Experiment] = {e.name: e for group in GROUPS.values() for e in group}
 
 
 def summarise(trials: list[Row]) -> dict[str, Any]:

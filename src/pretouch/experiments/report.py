@@ -9,8 +9,8 @@ from pretouch import __version__
 from pretouch.errors import ExperimentError
 from pretouch.experiments.campaign import Request, trace_file
 from pretouch.experiments.cell import Cell
-from pretouch.experiments.experiment import Row, Sources
-from pretouch.experiments.registry import EXPERIMENTS
+from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
+from pretouch.experiments.registry import GROUPS
 from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trace import Trace, load_trace
 
@@ -29,7 +29,10 @@ img { max-width: 100%; }
 .note { color: #555; }
 </style>
 <h1>$title</h1>
-<p>$about</p>
+<details><summary>What was run</summary><p>$about</p></details>
+<ul>
+$contents
+</ul>
 $body
 <p class="note">Simulation is not hardware: all of this ran on a simulated Panda whose masses, friction, noise and
 delays are errors of the size found on real arms. Pretouch $version.</p>
@@ -50,17 +53,25 @@ def write_report(parts: list[tuple[Request, Path]], summary: dict[str, Any], fol
 
 
 def _write(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: Path) -> Path:
-    body, words = [], []
-    for name, experiment in EXPERIMENTS.items():
-        if name in summary:
-            made = experiment.tables(summary[name])
+    contents, body, words = [], [], []
+    for title, group in GROUPS.items():
+        shown = [experiment for experiment in group if experiment.name in summary]
+        if shown:
+            links = ", ".join(f'<a href="#{e.name}">{e.name}</a>' for e in shown)
+            contents.append(f"<li>{escape(title)}: {links}</li>")
+            body.append(f"<h2>{escape(title)}</h2>")
+        for experiment in shown:
+            made = experiment.tables(summary[experiment.name])
+            body.append(f'<div id="{experiment.name}">')
             body += [_table(table) for table in made]
             words += [_markdown(table) for table in made]
-            body += _pictures(parts, name, summary[name], folder)
+            body += [*_pictures(parts, experiment, summary[experiment.name], folder), "</div>"]
+    body += ["<h2>This implementation</h2>", _picture(_framework(), folder)]
     page = folder / "index.html"
     text = _PAGE.substitute(
         title="Contact anticipation in simulation",
         about="<br>".join(escape(_about(request)) for request, _ in parts),
+        contents="\n".join(contents),
         body="\n".join(body),
         version=__version__,
     )
@@ -77,15 +88,23 @@ def _about(request: Request) -> str:
     return said + (f", restrictions {', '.join(modes)}." if modes else ".")
 
 
-def _pictures(parts: list[tuple[Request, Path]], name: str, summary: Row, folder: Path) -> list[str]:
+def _framework() -> Picture:
+    """Draw the framework diagram."""
+    from pretouch.experiments.figures.framework import framework_figure
+
+    return Picture("framework", "One control step, block by block", framework_figure())
+
+
+def _picture(picture: Picture, folder: Path) -> str:
+    file = f"{picture.name}.png"
+    picture.figure.savefig(folder / file, dpi=120)
+    return f'<p><img src="{escape(file)}" alt="{escape(picture.text)}"></p>'
+
+
+def _pictures(parts: list[tuple[Request, Path]], experiment: Experiment, summary: Row, folder: Path) -> list[str]:
     """Draw what an experiment's traces of the first seed and its summary allow; return it as HTML."""
-    shown = []
     sources = Sources(summary, lambda cell: find_trace([out for _, out in parts], cell), parts[0][0].context().skin.ids)
-    for picture in EXPERIMENTS[name].draw(sources):
-        file = f"{picture.name}.png"
-        picture.figure.savefig(folder / file, dpi=120)
-        shown.append(f'<p><img src="{escape(file)}" alt="{escape(picture.text)}"></p>')
-    return shown
+    return [_picture(picture, folder) for picture in experiment.draw(sources)]
 
 
 def find_trace(folders: list[Path], cell: Cell) -> Trace | None:
@@ -103,7 +122,7 @@ def _table(table: TextTable) -> str:
     rows = "\n".join("<tr>" + "".join(f"<td>{_lines(text)}</td>" for text in row) + "</tr>" for row in table.rows)
     note = f'<p class="note">{escape(table.note)}</p>'
     kind = ' class="two"' if table.names > 1 else ""
-    return f"<h2>{escape(table.title)}</h2>\n<table{kind}><tr>{head}</tr>\n{rows}</table>\n{note}"
+    return f"<h3>{escape(table.title)}</h3>\n<table{kind}><tr>{head}</tr>\n{rows}</table>\n{note}"
 
 
 def _markdown(table: TextTable) -> str:
