@@ -1,68 +1,18 @@
 """The line from readings to a joint velocity, closed over an arm that follows its commands exactly."""
 
-from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 import pytest
 
-from pretouch.control.path import line
 from pretouch.control.qp import QpSolution
-from pretouch.controller import Controller
-from pretouch.params import PROFILES, Profile
-from pretouch.perception.scene_filter import no_fixtures
+from pretouch.params import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, RangeStatus, RobotState
+from pretouch.types import ControlStep, Inputs, Mode, QpOutcome
+from tests.following_arm import PAPER, Arm
 
-DT = 0.01
-PAPER = PROFILES["paper"]
 LEFT, RIGHT = 0, 1  # units of the paper's skin that look along +y and -y in the ready posture
-
-
-class Arm:
-    """An arm that does exactly what it is told, its controller, and what both are given."""
-
-    def __init__(self, model: RobotModel, skin: Skin, profile: Profile = PAPER) -> None:
-        self.model, self.skin = model, skin
-        self.q, self.qd, self.time = model.description.q_ready.copy(), np.zeros(7), 0.0
-        x = self.ee()
-        path = line(tuple(x), (x[0], x[1] + 0.4, x[2]))
-        self.controller = Controller(model, skin, no_fixtures(), path, profile)
-        self.state = self.controller.init(self.robot())
-
-    def ee(self) -> np.ndarray:
-        return self.model.kinematics(self.q).position[self.model.ee]
-
-    def robot(self, force: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> RobotState:
-        wrench = np.array([*force, 0.0, 0.0, 0.0])
-        return RobotState(self.time, self.q, self.qd, self.q, self.qd, np.zeros(7), wrench)
-
-    def readings(self, seen: dict[int, float] | None = None, silent: dict[int, float] | None = None) -> RangeReadings:
-        """Fresh readings without a target, but for the distances `seen` and the ages `silent` of some units."""
-        k = len(self.skin)
-        stamp, distance, status = np.full(k, self.time), np.zeros(k), np.full(k, int(RangeStatus.SIGNAL))
-        for unit, d in (seen or {}).items():
-            distance[unit], status[unit] = d, RangeStatus.OK
-        for unit, age in (silent or {}).items():
-            stamp[unit] = self.time - age
-        return RangeReadings(stamp, distance, status)
-
-    def step(
-        self,
-        force: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        seen: dict[int, float] | None = None,
-        silent: dict[int, float] | None = None,
-        resume: bool = False,
-        change: Callable[[RobotState], RobotState] = lambda robot: robot,
-    ) -> ControlStep:
-        inputs = Inputs(self.time, change(self.robot(force)), self.readings(seen, silent), resume)
-        step, self.state = self.controller.step(self.state, inputs)
-        self.qd, self.q, self.time = step.command, self.q + step.command * DT, self.time + DT
-        return step
-
-    def run(self, cycles: int, **given: object) -> list[ControlStep]:
-        return [self.step(**given) for _ in range(cycles)]
 
 
 @pytest.fixture
