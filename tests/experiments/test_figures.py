@@ -20,6 +20,7 @@ from pretouch.experiments.figures.circle import circle_figure
 from pretouch.experiments.figures.close_up import close_up_figure
 from pretouch.experiments.figures.force_difference import force_difference_figure
 from pretouch.experiments.figures.interaction import interaction_figure
+from pretouch.experiments.registry import EXPERIMENTS
 from pretouch.experiments.trace import Trace, save_trace, sensed_points, trace_of
 from pretouch.params import profile
 
@@ -201,7 +202,8 @@ def refuse(*_args):
 
 @pytest.fixture
 def nothing_played(monkeypatch):
-    monkeypatch.setattr(cli_figure, "TRIALS", dict.fromkeys(cli_figure.TRIALS, refuse))
+    refusing = {name: replace(experiment, trial=refuse) for name, experiment in EXPERIMENTS.items()}
+    monkeypatch.setattr(cli_figure, "EXPERIMENTS", refusing)
 
 
 @pytest.mark.usefixtures("nothing_played")
@@ -286,7 +288,7 @@ def test_without_a_run_the_trials_are_played_and_told(step_and_trace, tmp_path, 
         seeds.append((cell.name, seed))
         return {}, step_and_trace[0]
 
-    monkeypatch.setitem(cli_figure.TRIALS, "between", play)
+    monkeypatch.setitem(EXPERIMENTS, "between", replace(EXPERIMENTS["between"], trial=play))
     made = draw_figure("close-up", out=tmp_path / "x.svg", profile="paper-0.5m", seed=4)
     assert made.stat().st_size > 10_000
     assert seeds == [("between_slack_paper-0.5m", 4)]

@@ -4,6 +4,7 @@ import json
 import os
 from io import BytesIO
 from pathlib import Path
+from typing import cast
 
 from rich.console import Console
 
@@ -11,8 +12,10 @@ from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError
 from pretouch.experiments.campaign import trace_file
 from pretouch.experiments.cell import Cell, Context
-from pretouch.experiments.figures.catalogue import CATALOGUE, COSTS, TRIALS, Played
+from pretouch.experiments.figures.catalogue import CATALOGUE, Played
+from pretouch.experiments.registry import EXPERIMENTS
 from pretouch.experiments.trace import load_trace, trace_of
+from pretouch.experiments.trial import Record
 from pretouch.params import profile as find_profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -96,8 +99,10 @@ def _played(cells: list[Cell], seed: int) -> tuple[Played, tuple[str, ...]]:
     context = Context(model, paper_skin(model))
     played: Played = []
     for cell in cells:
-        cost = COSTS[cell.experiment](cell)
+        experiment = EXPERIMENTS[cell.experiment]
+        cost = experiment.cost(cell)
         console.print(f"Playing {cell.name} with seed {seed}: about {cost:g} s of simulated time.", markup=False)
-        _, record = TRIALS[cell.experiment](cell, seed, context)
-        played.append((cell, trace_of(record)))
+        _, record = experiment.trial(cell, seed, context)
+        # every experiment with a figure of the paper keeps its course
+        played.append((cell, trace_of(cast(Record, record))))
     return played, context.skin.ids

@@ -15,7 +15,9 @@ from pretouch.experiments.tables import avoidance_tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
 from pretouch.perception.closest import closest_points
+from pretouch.robot.model import RobotModel
 from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.types import FloatArray
 
 NAME = "avoidance"
 DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
@@ -67,7 +69,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "seed": seed,
         "contact": record.first_contact() is not None,
         "true_peak_n": rounded(float(np.linalg.norm(record.true_force, axis=1).max())),
-        "least_gap_m": rounded(_least_gap(record, context, hand.radius), 4),
+        "least_gap_m": rounded(float(gaps(record, context.model, hand.radius).min()), 4),
         "deviation_m": rounded(max(off), 4),
         "least_speed_scale": rounded(min(s.speed_scale for s in steps)),
         "largest_slack_m_s": rounded(max(float(s.qp.slack.max(initial=0.0)) for s in steps), 4),
@@ -82,15 +84,14 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
     return row, record
 
 
-def _least_gap(record: Record, context: Context, radius: float) -> float:
-    """Least distance [m] between the person's hand and the arm."""
-    model, unit, aside = context.model, np.zeros(1, np.int64), np.array([[0.0, 0.0, 1.0]])
-    gaps = []
+def gaps(record: Record, model: RobotModel, radius: float) -> FloatArray:
+    """Distance (S,) [m] between the person's hand, a ball of a radius [m], and the arm at each control step."""
+    unit, aside, found = np.zeros(1, np.int64), np.array([[0.0, 0.0, 1.0]]), []
     for step, hand in zip(record.steps, record.hand_position, strict=True):
         kin = model.kinematics(step.q)
         nearest = closest_points(kin, model.body, step.ee_position, unit, hand[None], aside)
-        gaps.append(float(nearest.body_distance[0]) - radius)
-    return min(gaps)
+        found.append(float(nearest.body_distance[0]) - radius)
+    return np.array(found)
 
 
 def _draw(sources: Sources) -> list[Picture]:

@@ -110,14 +110,14 @@ def _restrictions(part: Row, stiffness: float) -> TextTable:
             f"{cell['profile']}\n{cell['restrictions']}",
             f"{cell['contact_fraction'] * cell['trials']:.0f}/{cell['trials']}",
             with_spread(cell["least_sensed_m"], 3),
-            *_forces(cell)[:-2],
+            *_forces(cell)[:-1],
         )
         for cell in part["pooled_cells"]
         if cell["profile"] != "blind" and cell["stiffness_n_per_m"] == stiffness
     ]
     return TextTable(
         f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: all four places together",
-        ("profile\nmode", "hit", "least\n[m]", *(label for _, label, _ in _STATIC[:-2])),
+        ("profile\nmode", "hit", "least\n[m]", *(label for _, label, _ in _STATIC[:-1])),
         tuple(rows),
         "Hit: trials with contact. Least: nearest that anything sensed came to the arm's surface in 40 s or until"
         " contact, by what was sensed.",

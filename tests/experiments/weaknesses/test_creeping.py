@@ -4,6 +4,7 @@ from tests.experiments.limits import assert_within_limits
 from tests.experiments.rows import made_up
 from tests.experiments.width import width
 
+from pretouch.experiments.avoidance import gaps
 from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.weaknesses import creeping
 from pretouch.sim.plant import Touch
@@ -67,9 +68,8 @@ def test_distances_are_from_the_arms_surface_to_the_hands(context, panda_model):
     # the capsule of the fingers ends at 0.1006 m with a radius of 0.0115 m; the fist has one of 0.05 m
     hand = end + (0.0115 + 0.2 + 0.05) * down
     record = made_up([0.0], hand=[hand], q=[q], ee_position=[ee], ee_velocity=[0.1 * down])
-    gap, towards = creeping.approach(record, context, 0.05)
-    assert gap == pytest.approx([0.2], abs=1e-4)
-    assert towards == pytest.approx([0.1])
+    assert gaps(record, context.model, 0.05) == pytest.approx([0.2], abs=1e-4)
+    assert creeping.speed_towards(record) == pytest.approx([0.1])
 
 
 def test_the_numbers_of_a_made_up_trial():

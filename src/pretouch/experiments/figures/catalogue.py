@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pretouch.errors import ExperimentError
 from pretouch.experiments import avoidance, dynamic, static
-from pretouch.experiments.cell import Cell, Context, Grid
+from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.claims import between
 from pretouch.experiments.trace import Trace
-from pretouch.experiments.trial import Record
 from pretouch.params import Profile, profile
 
 if TYPE_CHECKING:
@@ -26,20 +25,6 @@ class PaperFigure:
     """Trials it needs for a profile of a name."""
     draw: Callable[[Played, tuple[str, ...], Profile], "Figure"]
     """Draws it of these trials, for a skin with units of some names and the profile."""
-
-
-TRIALS: dict[str, Callable[[Cell, int, Context], tuple[dict[str, Any], Record]]] = {
-    static.NAME: static.trial,
-    avoidance.NAME: avoidance.trial,
-    dynamic.NAME: dynamic.trial,
-    between.NAME: between.trial,
-}
-"""What plays a trial, by the experiment of its cell."""
-
-COSTS: dict[str, Callable[[Cell], float]] = {e.name: e.cost for e in (
-    static.EXPERIMENT, avoidance.EXPERIMENT, dynamic.EXPERIMENT, between.EXPERIMENT,
-)}  # fmt: skip
-"""About how much simulated time a trial takes [s], by the experiment of its cell."""
 
 
 def _beside(name: str) -> list[Cell]:

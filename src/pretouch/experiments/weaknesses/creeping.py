@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import WayPoints
+from pretouch.experiments.avoidance import gaps
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.groups import cells_of, grouped
@@ -15,7 +16,6 @@ from pretouch.experiments.pushes import Visit, Visitor
 from pretouch.experiments.tables import TextTable, number
 from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
 from pretouch.params import RestrictionMode
-from pretouch.perception.closest import closest_points
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray, Mode
@@ -71,7 +71,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
     )
     full_speed = setup.profile.task.speed_m_s
     record = play(setup, _done(full_speed))
-    gap, towards = approach(record, context, hand.radius)
+    gap, towards = gaps(record, context.model, hand.radius), speed_towards(record)
     row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
     return row | results(record, gap, towards, full_speed), record
 
@@ -86,17 +86,11 @@ def _recovered(step: ControlStep, full_speed: float) -> bool:
     return step.mode is Mode.TRACK and bool(np.linalg.norm(step.ee_velocity) >= _RECOVERED * full_speed)
 
 
-def approach(record: Record, context: Context, radius: float) -> tuple[FloatArray, FloatArray]:
-    """Distance (S,) [m] of the arm's surface from the person's hand, and the end-effector's speed towards it [m/s]."""
-    model, unit, aside = context.model, np.zeros(1, np.int64), np.array([[0.0, 0.0, 1.0]])
-    gap, towards = [], []
-    for step, hand in zip(record.steps, record.hand_position, strict=True):
-        kin = model.kinematics(step.q)
-        nearest = closest_points(kin, model.body, step.ee_position, unit, hand[None], aside)
-        ahead = hand - step.ee_position
-        gap.append(float(nearest.body_distance[0]) - radius)
-        towards.append(float(step.ee_velocity @ ahead / np.linalg.norm(ahead)))
-    return np.array(gap), np.array(towards)
+def speed_towards(record: Record) -> FloatArray:
+    """Speed (S,) [m/s] of the end-effector towards the person's hand at each control step."""
+    ahead = record.hand_position - np.array([s.ee_position for s in record.steps])
+    velocity = np.array([s.ee_velocity for s in record.steps])
+    return np.asarray((velocity * ahead).sum(axis=1) / np.linalg.norm(ahead, axis=1))
 
 
 def results(record: Record, gap: FloatArray, towards: FloatArray, full_speed: float) -> dict[str, Any]:
