@@ -1,4 +1,5 @@
 import json
+import os
 import subprocess
 import sys
 
@@ -29,6 +30,16 @@ def run(capsys, *args):
         (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "cannot be written: Is a directory"),
         (("reproduce", "static", "--out", "OUT", "--json", "x" * 256), "cannot be written: File name too long"),
         (("demo", "--seeds", "0"), "The number of seeds is 0"),
+        (("bench", "cycle", "--points", "7,x"), "The numbers of points are '7,x': give whole numbers"),
+        (("bench", "cycle", "--points", ""), "The numbers of points are '': give whole numbers"),
+        (("bench", "cycle", "--points", "7,0"), "The number of points is 0: give 1 to 10000"),
+        (("bench", "cycle", "--rate", "10"), "The rate is 10 Hz: it must be more than 20 Hz"),
+        (("bench", "cycle", "--rate", "nan"), "The rate is nan Hz"),
+        (("bench", "cycle", "--cycles", "0"), "The number of cycles is 0"),
+        (("bench", "cycle", "--profile", "brave"), "The profile 'brave' is unknown"),
+        (("bench", "cycle", "--priority", "100"), "The real-time priority is 100: give 1 to 99"),
+        (("bench", "cycle", "--cpu", "-1"), "Processor -1 is none this process may use: choose from"),
+        (("bench", "cycle", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
     ],
 )
 def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, args, words):
@@ -143,3 +154,73 @@ def test_a_new_demo_gets_a_new_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs" / "demo-1").mkdir(parents=True)
     assert str(cli._new_folder("demo")) == "runs/demo-2"
+
+
+def test_bench_free_motion_is_a_campaign(monkeypatch):
+    runs = []
+    monkeypatch.setattr("pretouch.cli.campaigns.run_all", lambda *given: runs.append(given))
+    assert cli.main(["bench", "free-motion", "--seeds", "3"]) == 0
+    (((request, out),), folder, numbers) = runs[0]
+    assert (request.experiments, request.seeds) == (("free-motion",), 3)
+    assert str(out) == str(folder) == "runs/bench-free-motion"
+    assert str(numbers) == "runs/bench-free-motion/results.json"
+
+
+def test_bench_cycle_shows_and_writes_what_it_measured(capsys, tmp_path):
+    file = tmp_path / "cycle.json"
+    code, said = run(capsys, "bench", "cycle", "--points", "3,5", "--cycles", "20", "--json", str(file))
+    assert code == 0
+    for words in ("Time of a control step at 1000 Hz, 20 cycles [us]", "overruns", "[%]", str(file)):
+        assert words in said.out
+    assert max(len(line) for line in said.out.splitlines() if str(tmp_path) not in line) <= 80
+    written = json.loads(file.read_text())
+    assert written["about"]["rate_hz"] == 1000
+    assert written["about"]["versions"]["numba"]
+    assert [row["points"] for row in written["rows"]] == [3, 5]
+    asked = ["points", "median_us", "p99_us", "p999_us", "max_us", "overruns", "stages"]
+    assert all(list(row)[: len(asked)] == asked for row in written["rows"])
+
+
+def test_what_bench_cycle_measured_before_it_was_stopped_is_kept(capsys, tmp_path, monkeypatch):
+    from pretouch.cli import cycle
+
+    measure = cycle.measure
+
+    def once(points, request, tell):
+        if points == 5:
+            raise KeyboardInterrupt
+        tell("No priority.")
+        return measure(points, request, tell)
+
+    monkeypatch.setattr(cycle, "measure", once)
+    file = tmp_path / "cycle.json"
+    code, said = run(capsys, "bench", "cycle", "--points", "3,5", "--cycles", "20", "--json", str(file))
+    assert code == 130
+    assert "No priority." in said.out
+    written = json.loads(file.read_text())
+    assert [row["points"] for row in written["rows"]] == [3]
+    assert written["about"]["missing"] == ["No priority."]
+
+
+def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
+    from pretouch.cli.writing import check_writable
+    from pretouch.experiments.campaign import write_json
+
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    check_writable("file", pipe)
+    write_json([1, 2], pipe)
+    assert pipe.is_fifo()
+    assert json.loads(os.read(reader, 100)) == [1, 2]
+    os.close(reader)
+    assert list(tmp_path.iterdir()) == [pipe]
+
+
+def test_a_link_is_followed(tmp_path):
+    from pretouch.experiments.campaign import write_json
+
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    write_json([1], tmp_path / "link")
+    assert (tmp_path / "link").is_symlink()
+    assert json.loads((tmp_path / "real").read_text()) == [1]

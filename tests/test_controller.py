@@ -5,8 +5,8 @@ from dataclasses import fields, is_dataclass, replace
 import numpy as np
 import pytest
 
-from pretouch.control.qp import QpSolution
-from pretouch.params import PROFILES
+from pretouch.controller import Controller
+from pretouch.params import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome
@@ -243,19 +243,27 @@ def test_each_use_of_proximity_can_be_taken_away(panda_model: RobotModel, paper_
     assert arm.run(15, silent={LEFT: 0.2})[-1].speed_scale < 1.0  # a silent unit slows in any case
 
 
-def test_a_failing_solver_brakes_and_holds(arm: Arm, monkeypatch: pytest.MonkeyPatch):
-    def fail(cost: object, lower: object, upper: object, rows: object, weight: float, stop: np.ndarray) -> QpSolution:
-        return QpSolution(stop, np.zeros(0), np.zeros(7), QpOutcome.FAILED, "the moon was full")
-
+def test_a_solver_that_exceeds_its_budget_brakes_and_holds(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin)
+    arm.run(150)
     before = arm.step()
-    with monkeypatch.context() as patched:
-        patched.setattr("pretouch.controller.solve", fail)
-        held = arm.step()
+    well = arm.controller
+    arm.controller = replace_profile(well, replace(PAPER, failure=replace(PAPER.failure, solver_iterations=1)))
+    held = arm.step()
+    arm.controller = well
+    assert held.qp.outcome is QpOutcome.FAILED
     assert held.mode is Mode.HOLD
-    assert "the moon was full" in held.reason
-    assert np.linalg.norm(held.command) < np.linalg.norm(before.command)
+    assert "iteration limit" in held.reason
+    # the braking command: every joint slower by the same factor
+    slower = np.linalg.norm(held.command) / np.linalg.norm(before.command)
+    assert 0 <= slower < 1
+    np.testing.assert_allclose(held.command, slower * before.command, atol=1e-12)
     # latched, though the solver is well again
     assert arm.step().reason == held.reason
+
+
+def replace_profile(controller: Controller, profile: Profile) -> Controller:
+    return Controller(controller.model, controller.skin, controller.fixtures, controller.path, profile)
 
 
 def test_the_hand_keeps_its_orientation_if_asked(panda_model: RobotModel, paper_skin: Skin):

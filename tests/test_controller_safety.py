@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from pretouch.control.path import Circle, Path, line
 from pretouch.controller import Controller
@@ -18,7 +16,6 @@ from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, 
 DT = 0.01
 SHORT = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=5))
 HARD = replace(SHORT, restriction=replace(SHORT.restriction, mode="hard"))
-STATUS = [int(s) for s in RangeStatus]
 FAULTS = [
     "q", "qd", "q_commanded", "qd_commanded", "wrench", "no wrench", "robot stamp", "step stamp", "stale", "backwards",
     "jump", "distance", "range stamp", "dead",
@@ -115,58 +112,52 @@ def test_one_fault_that_lasts(panda_model: RobotModel, paper_skin: Skin, fault: 
     assert arm.step(replace(arm.inputs(), resume=True)).mode is Mode.TRACK
 
 
-events = st.tuples(
-    st.sampled_from([None, None, None, *FAULTS]),
-    st.sampled_from([np.nan, np.inf, -np.inf, 1e4, -1e4]),
-    st.floats(0.0, 4.0),
-    st.sampled_from([RangeStatus.OK, RangeStatus.OK, *STATUS]),
-    st.tuples(*[st.floats(-80, 80)] * 3),
-    st.booleans(),
-)
-
-
-@given(st.lists(events, min_size=5, max_size=40), st.sampled_from([SHORT, HARD]))
-@settings(deadline=None, derandomize=True, max_examples=60)
-def test_any_sequence_of_faults_pushes_and_readings(panda_model, paper_skin, sequence, profile):
-    arm = Arm(panda_model, paper_skin, profile)
-    for _ in range(20):
-        arm.step(arm.inputs())
-    for fault, value, distance, status, force, resume in sequence:
-        inputs = replace(arm.inputs(distance, status, np.array(force)), resume=resume)
-        # a wrong but finite posture is what the arm would go by, so only a finite answer can be asked of it
-        lies = fault in ("q_commanded", "qd_commanded") and np.isfinite(value)
-        step = arm.step(spoiled(inputs, fault, value) if fault and not lies else inputs)
-        arm.check_position_and_velocity()
-        assert np.isfinite(step.speed_scale)
-
-
-@pytest.mark.parametrize("profile", [SHORT, HARD, replace(SHORT, threshold=replace(SHORT.threshold, compare="raw"))])
-@pytest.mark.parametrize("seed", range(2))
-def test_long_wild_run(panda_model: RobotModel, paper_skin: Skin, profile: Profile, seed: int):
-    rng = np.random.default_rng(seed)
-    arm, modes, outcomes = Arm(panda_model, paper_skin, profile), set(), set()
-    force, distance, status = np.zeros(3), 1.0, RangeStatus.OK
-    for i in range(1500):
-        if i % 20 == 0:
-            force = rng.normal(scale=80, size=3) * (rng.random() < 0.3)
-            distance, status = rng.uniform(0.0, 1.0), rng.choice(STATUS) if rng.random() < 0.5 else RangeStatus.OK
-        inputs = replace(arm.inputs(distance, status, force + rng.normal(scale=0.5, size=3)), resume=i % 50 == 0)
-        step = arm.step(spoiled(inputs, rng.choice(FAULTS)) if rng.random() < 0.02 else inputs)
-        arm.check_position_and_velocity()
-        modes.add(step.mode)
-        outcomes.add(step.qp.outcome)
-    assert modes == set(Mode)
-    assert QpOutcome.FAILED not in outcomes
-    assert (QpOutcome.INFEASIBLE in outcomes) == (profile is HARD)
-
-
+@pytest.mark.parametrize("value", [1e3, -1e9, 1e306, -1.7e308])
 @pytest.mark.parametrize("name", ["q", "qd", "q_commanded", "qd_commanded"])
-def test_a_finite_lie_gets_a_finite_answer(panda_model: RobotModel, paper_skin: Skin, name: str):
+def test_a_number_no_arm_has_is_not_believed(panda_model: RobotModel, paper_skin: Skin, name: str, value: float):
     arm = Arm(panda_model, paper_skin)
-    for value in (1e3, -1e3, 1e9):
-        inputs = spoiled(arm.inputs(0.3, RangeStatus.OK), name, value)
-        step, arm.state = arm.controller.step(arm.state, inputs)
-        assert np.all(np.isfinite(step.command))
+    for _ in range(60):
+        arm.step(arm.inputs())
+    before = np.linalg.norm(arm.qd)
+    step = arm.step(spoiled(arm.inputs(), name, value))
+    assert step.mode is Mode.HOLD
+    assert arm.state.mode.latched
+    assert np.linalg.norm(arm.qd) < before
+    assert {"q": "positions", "qd": "velocities"}[name.split("_")[0]] in step.reason
+
+
+@pytest.mark.parametrize("value", [5.0, -20.0, 999.0])
+def test_no_reported_velocity_makes_a_command_no_arm_can_follow(
+    panda_model: RobotModel, paper_skin: Skin, value: float
+):
+    arm = Arm(panda_model, paper_skin)
+    for _ in range(60):
+        arm.step(arm.inputs())
+    step, _ = arm.controller.step(arm.state, spoiled(arm.inputs(), "qd_commanded", value))
+    assert np.all(np.abs(step.command) <= arm.limits.qd_max + arm.limits.qdd_max * DT)
+
+
+@pytest.mark.parametrize("goal", [(0.0, 0.0, 3.0), (0.0, 0.0, 0.4), (0.3, 1.5, 0.3)])
+@pytest.mark.parametrize("cycles", [1, 2, 4])
+def test_reports_that_come_late_cost_no_limit(panda_model: RobotModel, cycles: int, goal: tuple[float, float, float]):
+    # a report that is 40 ms old is still believed; braking only for where the arm was by then is too late
+    start = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
+    arm = Arm(panda_model, Skin([], panda_model), path=line(tuple(start), goal))
+    reports = [arm.robot()] * (cycles + 1)
+    for _ in range(800):
+        reports.append(arm.robot())
+        step = arm.step(replace(arm.inputs(), robot=reports[-1 - cycles]))
+        arm.check_position_and_velocity()
+    assert step.mode is Mode.TRACK
+
+
+def test_a_report_from_the_future_is_called_so(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin)
+    inputs = arm.inputs()
+    step = arm.step(replace(inputs, robot=replace(inputs.robot, stamp=inputs.stamp + 0.1)))
+    assert step.mode is Mode.HOLD
+    assert "0.100 s in the future" in step.reason
+    assert "-0.100" not in step.reason
 
 
 def test_an_arm_without_units_follows_its_path(panda_model: RobotModel):

@@ -1,20 +1,27 @@
-"""Faults in the robot's state: each is named, and nothing wrong is believed."""
+"""Faults in what comes from outside: each is named, and nothing wrong is believed."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pretouch.faults import Watch, examine, not_finite, watch_init
+from pretouch.faults import Watch, examine, sound_readings, sound_robot, watch_init
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.sensing.unit import MIN_DISTANCE
-from pretouch.types import Inputs, RangeReadings, RobotState
+from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
+QD_MAX = np.array([2.0, 2.0])
 COMMAND = np.array([0.5, -0.2])
 READINGS = RangeReadings(np.zeros(1), np.full(1, MIN_DISTANCE), np.zeros(1, np.int64))
+PARTS = [
+    ("q", "joint positions"),
+    ("qd", "joint velocities"),
+    ("q_commanded", "commanded joint positions"),
+    ("qd_commanded", "commanded joint velocities"),
+]
 
 
 def robot(stamp: float = 1.0) -> RobotState:
@@ -25,11 +32,16 @@ def robot(stamp: float = 1.0) -> RobotState:
 
 
 def judge(inputs: Inputs, watch: Watch | None = None) -> tuple[RobotState, dict[Event, str], Watch]:
-    return examine(watch or watch_init(robot()), inputs, COMMAND, PERIOD, PARAMS)
+    return examine(watch or watch_init(robot()), inputs, COMMAND, PERIOD, QD_MAX, PARAMS)
 
 
 def inputs(stamp: float = 1.01, **change: object) -> Inputs:
     return Inputs(stamp, replace(robot(stamp), **change), READINGS)
+
+
+def assert_same(believed: RobotState, given: RobotState) -> None:
+    for name in ("stamp", "q", "qd", "q_commanded", "qd_commanded", "wrench"):
+        np.testing.assert_array_equal(getattr(believed, name), getattr(given, name))
 
 
 def assert_last_state_moved_on(believed: RobotState) -> None:
@@ -43,33 +55,86 @@ def assert_last_state_moved_on(believed: RobotState) -> None:
 def test_a_good_state_is_believed():
     given = inputs()
     believed, faults, watch = judge(given)
-    assert believed is given.robot
+    assert_same(believed, given.robot)
     assert faults == {}
     assert (watch.stamp, watch.force_stamp) == (1.01, 1.01)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize(
-    ("name", "called"),
-    [
-        ("q", "joint positions"),
-        ("qd", "joint velocities"),
-        ("q_commanded", "commanded joint positions"),
-        ("qd_commanded", "commanded joint velocities"),
-    ],
-)
-def test_a_number_that_is_not_finite_is_named_and_not_believed(name: str, called: str, value: float):
+def test_a_state_from_before_the_last_command_is_moved_on_by_it():
+    # taken 8 ms before the last step, 18 ms before this one, in which the last command is taken to have held
+    _, _, watch = judge(inputs(1.0))
+    for stamp in (0.992, 1.0):
+        given = inputs(1.01)
+        believed, faults, _ = judge(replace(given, robot=replace(given.robot, stamp=stamp)), watch)
+        assert faults == {}
+        np.testing.assert_array_equal(believed.qd_commanded, COMMAND)
+        np.testing.assert_allclose(believed.q_commanded, np.array([0.11, 0.21]) + COMMAND * (1.01 - stamp))
+        np.testing.assert_array_equal(believed.q, robot().q)
+    # one taken after the last step knows it
+    given = inputs(1.01)
+    believed, _, _ = judge(replace(given, robot=replace(given.robot, stamp=1.0001)), watch)
+    np.testing.assert_array_equal(believed.qd_commanded, robot().qd_commanded)
+
+
+def test_what_is_believed_does_not_change_with_the_callers_arrays():
+    given = inputs()
+    believed, _, watch = judge(given)
+    for name in ("q", "qd", "q_commanded", "qd_commanded", "wrench"):
+        getattr(given.robot, name)[:] = 99.0
+        assert not np.any(getattr(believed, name) == 99.0)
+        assert not np.any(getattr(watch.robot, name) == 99.0)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e3, -1e3, 1e300])
+@pytest.mark.parametrize(("name", "called"), PARTS)
+def test_a_number_no_joint_can_have_is_named_and_not_believed(name: str, called: str, value: float):
     believed, faults, watch = judge(inputs(**{name: np.array([0.0, value])}))
-    assert faults == {Event.NOT_FINITE: called}
+    assert faults == {Event.UNUSABLE: f"{called} hold {value:g}"}
     assert_last_state_moved_on(believed)
     assert watch.robot is believed
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        (np.zeros(3), "have the shape (3,), not (2,)"),
+        (np.zeros((1, 2)), "have the shape (1, 2), not (2,)"),
+        (0.5, "have the shape (), not (2,)"),
+        (["a", "b"], "are no array of numbers"),
+        ([[1.0], [1.0, 2.0]], "are no array of numbers"),
+        (None, "have the shape (), not (2,)"),
+    ],
+)
+@pytest.mark.parametrize(("name", "called"), PARTS)
+def test_a_part_that_does_not_fit_the_arm_is_named_and_not_believed(name: str, called: str, part: object, said: str):
+    believed, faults, _ = judge(inputs(**{name: part}))
+    assert faults == {Event.UNUSABLE: f"{called} {said}"}
+    assert_last_state_moved_on(believed)
+
+
+@pytest.mark.parametrize("wrench", [np.zeros(3), np.zeros((6, 1)), "none", [1.0, "x"]])
+def test_a_force_estimate_that_is_none_is_named(wrench: object):
+    believed, faults, _ = judge(inputs(wrench=wrench))
+    assert "its force estimate" in faults[Event.UNUSABLE]
+    assert_last_state_moved_on(believed)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int64, list])
+def test_numbers_of_another_kind_are_taken_as_they_are(kind: type):
+    given = [1, 2]
+    part = given if kind is list else np.array(given, dtype=kind)
+    believed, faults, _ = judge(inputs(q=part, wrench=[0, 0, 0, 0, 0, 0]))
+    assert faults == {}
+    assert believed.q.dtype == believed.wrench.dtype == np.float64
+    np.testing.assert_array_equal(believed.q, given)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_time_stamp_that_is_not_finite_is_named(value: float):
     for wrong in (replace(inputs(), stamp=value), inputs(stamp=value), replace(inputs(), robot=robot(value))):
         believed, faults, watch = judge(wrong)
-        assert faults == {Event.NOT_FINITE: "time stamps"}
+        assert list(faults) == [Event.UNUSABLE]
+        assert f"time stamp is {value}" in faults[Event.UNUSABLE]
         assert_last_state_moved_on(believed)
         assert np.isfinite(watch.stamp)
 
@@ -87,7 +152,7 @@ def test_a_state_from_too_long_ago_or_from_the_future_is_stale(age: float, stale
     believed, faults, _ = judge(replace(given, robot=replace(given.robot, stamp=2.0 - age)))
     assert (Event.STATE_STALE in faults) == stale
     if stale:
-        assert faults[Event.STATE_STALE] == f"{age:.3f} s"
+        assert faults[Event.STATE_STALE] == ("0.060 s old" if age > 0 else "0.060 s in the future")
         assert_last_state_moved_on(believed)
 
 
@@ -107,18 +172,19 @@ def test_a_step_too_long_after_the_last_is_an_overrun(gap: float, overrun: bool)
     believed, faults, watch = judge(given)
     assert faults == ({Event.OVERRUN: f"{gap:.3f} s"} if overrun else {})
     # the state itself is good
-    assert believed is given.robot
+    assert_same(believed, given.robot)
     # and with the next step in time all is well
     assert judge(inputs(1.01 + gap), watch)[1] == {}
 
 
-def test_the_first_part_that_is_not_finite_is_named():
+def test_the_first_part_that_cannot_be_used_is_named():
     wrong = np.array([np.nan, 0.0])
-    assert not_finite(robot()) == ""
-    assert not_finite(robot(np.inf)) == "time stamps"
-    assert not_finite(replace(robot(), qd=wrong, q_commanded=wrong)) == "joint velocities"
+    assert sound_robot(robot(), QD_MAX)[1] == ""
+    assert sound_robot(robot(np.inf), QD_MAX) == (None, "its time stamp is inf")
+    found, said = sound_robot(replace(robot(), qd=wrong, q_commanded=wrong), QD_MAX)
+    assert (found, said) == (None, "joint velocities hold nan")
     # a force is judged apart
-    assert not_finite(replace(robot(), wrench=np.full(6, np.nan), tau_ext=wrong)) == ""
+    assert sound_robot(replace(robot(), wrench=np.full(6, np.nan), tau_ext=wrong), QD_MAX)[1] == ""
 
 
 def test_the_same_instant_twice_is_no_fault():
@@ -145,3 +211,44 @@ def test_a_clock_set_back_does_not_hide_a_missing_wrench():
     _, _, watch = judge(inputs(50.0, wrench=None), watch)
     _, faults, _ = judge(inputs(50.3, wrench=None), watch)
     assert Event.NO_FORCE in faults
+
+
+# readings
+
+
+def readings(stamp: object = (1.0, 2.0), distance: object = (0.5, 0.6), status: object = (0, 7)) -> RangeReadings:
+    return RangeReadings(*(np.array(part) if isinstance(part, tuple) else part for part in (stamp, distance, status)))
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.int32, np.uint8, np.int16])
+def test_readings_that_fit_are_copied(kind: type):
+    given = RangeReadings(np.array([1.0, 2.0]), np.array([0.5, 0.6], np.float32), np.array([0, 7], kind))
+    sound, unfit = sound_readings(given, 2)
+    assert unfit == ""
+    assert sound.distance.dtype == np.float64
+    assert sound.status.dtype == np.int64
+    np.testing.assert_array_equal(sound.status, [0, 7])
+    given.stamp[:] = 99.0
+    given.status[:] = 9
+    np.testing.assert_array_equal(sound.stamp, [1.0, 2.0])
+    np.testing.assert_array_equal(sound.status, [0, 7])
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (readings(stamp=(1.0,)), "have the shapes (1,), (2,) and (2,), not (2,)"),
+        (readings(distance=(0.5, 0.6, 0.7)), "have the shapes (2,), (3,) and (2,), not (2,)"),
+        (readings(status=()), "have the shapes (2,), (2,) and (0,), not (2,)"),
+        (readings(distance=np.zeros((2, 1))), "have the shapes (2,), (2, 1) and (2,), not (2,)"),
+        (readings(status=(0.0, np.nan)), "statuses are of type float64"),
+        (readings(status=("ok", "ok")), "statuses are of type <U2"),
+        (readings(stamp=("a", "b")), "no arrays of numbers"),
+        (readings(distance=[[1.0], [1.0, 2.0]]), "no arrays of numbers"),
+    ],
+)
+def test_of_readings_that_do_not_fit_none_is_taken(given: RangeReadings, said: str):
+    sound, unfit = sound_readings(given, 2)
+    assert said in unfit
+    np.testing.assert_array_equal(sound.stamp, [-np.inf, -np.inf])
+    np.testing.assert_array_equal(sound.status, int(RangeStatus.NONE))

@@ -8,8 +8,8 @@ import pytest
 from pretouch.modes import TABLE, Event, ModeState, mode_init, next_mode
 from pretouch.types import Mode
 
-LATCHING = [Event.NOT_FINITE, Event.TIME_BACKWARDS, Event.STATE_STALE, Event.SOLVER_FAILED]
-PASSING = [Event.SKIN_SILENT, Event.NO_FORCE, Event.OVERRUN, Event.WINDOW_FILLING]
+LATCHING = [Event.UNUSABLE, Event.TIME_BACKWARDS, Event.STATE_STALE, Event.SOLVER_FAILED]
+PASSING = [Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.NO_FORCE, Event.OVERRUN, Event.WINDOW_FILLING]
 REPORTED = [*LATCHING, Event.BLOCKED, Event.REACTING, Event.CONTACT, *PASSING]
 STATES = [
     ModeState(Mode.TRACK, "before"), ModeState(Mode.REACT, "before"), ModeState(Mode.HOLD, "before"),

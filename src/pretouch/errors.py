@@ -24,6 +24,10 @@ class SkinError(PretouchError, ValueError):
     """A skin, or the file that describes it, is not usable."""
 
 
+class FixtureError(PretouchError, ValueError):
+    """What is said to stand around the arm is not well defined."""
+
+
 class PathError(PretouchError, ValueError):
     """A path to follow is not well defined."""
 

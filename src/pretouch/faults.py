@@ -1,16 +1,28 @@
-"""Which inputs to believe: faults in the robot's state, told apart before anything is computed from them."""
+"""Which inputs to believe: faults in what comes from outside, told apart before anything is computed from it."""
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.types import FloatArray, Inputs, RobotState
+from pretouch.types import FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.values import value
+
+_LARGEST = 1e3
+"""A joint position or velocity [rad, rad/s] from here on is none: another unit, or a broken message."""
+
+_FASTEST = 2.0
+"""Times the arm's limit: a commanded joint velocity from here on is none that any arm was ever given."""
+
+_LATEST = 1e12
+"""A time stamp [s] from here on is none, whatever the clock began with."""
+
+_PARTS = ("joint positions", "joint velocities", "commanded joint positions", "commanded joint velocities")
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Watch:
     """What is remembered to judge the next inputs."""
 
@@ -20,6 +32,8 @@ class Watch:
     """The last state that was believed."""
     force_stamp: float
     """When the robot last gave a force estimate [s]."""
+    sent: tuple[tuple[float, FloatArray], ...] = ()
+    """Instants [s] and joint velocities (n,) [rad/s] of the commands that the last state may not know yet."""
 
 
 def watch_init(robot: RobotState) -> Watch:
@@ -28,53 +42,152 @@ def watch_init(robot: RobotState) -> Watch:
 
 
 def examine(
-    watch: Watch, inputs: Inputs, command: FloatArray, period: float, params: FailureParams
+    watch: Watch, inputs: Inputs, command: FloatArray, period: float, qd_max: FloatArray, params: FailureParams
 ) -> tuple[RobotState, dict[Event, str], Watch]:
     """Return the robot state to go by, the faults found, and what to remember.
 
-    In place of a state that cannot be believed stands the last one that could, moved on by the last command.
+    In place of a state that cannot be believed stands the last one that could, moved on by the last command. One from
+    before the last command, lost or late, is moved on by the commands it cannot know of: the next one may differ from
+    the last one sent by so much only. What is returned shares no memory with the inputs.
 
     Args:
         watch: memory.
         inputs: of this step.
         command: (n,) last joint velocity command [rad/s].
         period: time that command was held [s].
+        qd_max: (n,) joint velocity limits [rad/s].
         params: time limits.
     """
-    robot = inputs.robot
     faults: dict[Event, str] = {}
-    wrong = not_finite(robot) if math.isfinite(inputs.stamp) else "time stamps"
-    if wrong:
-        faults[Event.NOT_FINITE] = wrong
+    robot, wrong = sound_robot(inputs.robot, qd_max)
+    stamp = _time(inputs.stamp)
+    if robot is None:
+        faults[Event.UNUSABLE] = wrong
+    elif stamp is None:
+        faults[Event.UNUSABLE] = f"the step's time stamp is {inputs.stamp}"
     else:
-        if inputs.stamp < watch.stamp:
-            faults[Event.TIME_BACKWARDS] = f"from {watch.stamp:.3f} s to {inputs.stamp:.3f} s"
-        age = inputs.stamp - robot.stamp
+        if stamp < watch.stamp:
+            faults[Event.TIME_BACKWARDS] = f"from {watch.stamp:.3f} s to {stamp:.3f} s"
+        age = stamp - robot.stamp
         if abs(age) > params.state_timeout_s:
-            faults[Event.STATE_STALE] = f"{age:.3f} s"
-    stamp = inputs.stamp if math.isfinite(inputs.stamp) else watch.stamp
-    if faults:
+            faults[Event.STATE_STALE] = f"{age:.3f} s old" if age > 0 else f"{-age:.3f} s in the future"
+    now = watch.stamp if stamp is None else stamp
+    if robot is None or faults:
         last = watch.robot
         believed = replace(last, q_commanded=last.q_commanded + command * period, qd_commanded=command, wrench=None)
-        return believed, faults, Watch(stamp, believed, min(watch.force_stamp, stamp))
-    # a comparison with NaN is false, so numbers that are not finite are refused too
-    if robot.wrench is not None and not (np.abs(robot.wrench) < params.force_max_n).all():
+        return believed, faults, Watch(now, believed, min(watch.force_stamp, now))
+    sent = (*watch.sent[-int(params.state_timeout_s / period) - 1 :], (watch.stamp, command))
+    if robot.stamp <= watch.stamp:
+        robot = replace(robot, q_commanded=_moved_on(robot, now, sent), qd_commanded=command)
+    if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
         robot = replace(robot, wrench=None)
-    force_stamp = min(watch.force_stamp, stamp) if robot.wrench is None else stamp
-    if stamp - watch.stamp > params.overrun_s:
-        faults[Event.OVERRUN] = f"{stamp - watch.stamp:.3f} s"
-    if stamp - force_stamp > params.force_timeout_s:
-        faults[Event.NO_FORCE] = f"{stamp - force_stamp:.2f} s"
-    return robot, faults, Watch(stamp, robot, force_stamp)
+    force_stamp = min(watch.force_stamp, now) if robot.wrench is None else now
+    if now - watch.stamp > params.overrun_s:
+        faults[Event.OVERRUN] = f"{now - watch.stamp:.3f} s"
+    if now - force_stamp > params.force_timeout_s:
+        faults[Event.NO_FORCE] = f"{now - force_stamp:.2f} s"
+    return robot, faults, Watch(now, robot, force_stamp, sent)
 
 
-def not_finite(robot: RobotState) -> str:
-    """Name the first part of a robot's state that is not finite, or ''."""
-    parts = {
-        "time stamps": np.array(robot.stamp),
-        "joint positions": robot.q,
-        "joint velocities": robot.qd,
-        "commanded joint positions": robot.q_commanded,
-        "commanded joint velocities": robot.qd_commanded,
-    }
-    return next((name for name, value in parts.items() if not np.isfinite(value).all()), "")
+def _moved_on(robot: RobotState, now: float, sent: tuple[tuple[float, FloatArray], ...]) -> FloatArray:
+    """Commanded joint positions (n,) [rad] by now of an arm that was sent these commands after its report."""
+    q, ends = robot.q_commanded, [start for start, _ in sent[1:]]
+    for i, (end, (start, command)) in enumerate(zip([*ends, now], sent, strict=True)):
+        # what came before the first of them is not known, and taken to be the same
+        held = end - (max(start, robot.stamp) if i else robot.stamp)
+        if held > 0:
+            q = q + command * held
+    return q
+
+
+def _time(stamp: float) -> float | None:
+    """Return a time stamp, or None if it is none."""
+    try:
+        return stamp if abs(stamp) < _LATEST else None
+    except TypeError:
+        return None
+
+
+def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | None, str]:
+    """Copy a robot's state as arrays of float64, or say what keeps it from being that of an arm with these limits."""
+    try:
+        stamp, given = robot.stamp, (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
+        wrench = None if robot.wrench is None else np.array(robot.wrench, dtype=np.float64)
+    except AttributeError:
+        return None, f"it is {robot!r}"
+    except (TypeError, ValueError, OverflowError):
+        return None, "its force estimate is no array of numbers"
+    if _time(stamp) is None:
+        return None, f"its time stamp is {stamp}"
+    try:
+        numbers = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return None, _misfit(given, len(qd_max))
+    if numbers.shape != (4, len(qd_max)):
+        return None, _misfit(given, len(qd_max))
+    if wrench is not None and wrench.shape != (6,):
+        return None, f"its force estimate has the shape {wrench.shape}, not (6,)"
+    if not _plausible(numbers, qd_max):
+        bounds = np.vstack([np.full((3, len(qd_max)), _LARGEST), _FASTEST * qd_max])
+        i, j = np.argwhere(~(np.abs(numbers) < bounds))[0]
+        return None, f"{_PARTS[i]} hold {numbers[i, j]:g}"
+    q, qd, q_commanded, qd_commanded = numbers
+    return RobotState(stamp, q, qd, q_commanded, qd_commanded, robot.tau_ext, wrench), ""
+
+
+@compiled
+def _plausible(numbers: FloatArray, qd_max: FloatArray) -> bool:
+    """Whether an arm can have these (4, n) positions, velocities, and commanded ones; not if one is NaN."""
+    for j in range(len(qd_max)):
+        for i in range(3):
+            if not abs(numbers[i, j]) < _LARGEST:
+                return False
+        if not abs(numbers[3, j]) < _FASTEST * qd_max[j]:
+            return False
+    return True
+
+
+def _misfit(given: tuple[FloatArray, ...], joints: int) -> str:
+    """Name the first part of a robot's state that is no array of a number a joint, or ''."""
+    for name, part in zip(_PARTS, given, strict=True):
+        try:
+            shape = np.array(part, dtype=np.float64).shape
+        except (TypeError, ValueError, OverflowError):
+            return f"{name} are no array of numbers"
+        if shape != (joints,):
+            return f"{name} have the shape {shape}, not ({joints},)"
+    return ""
+
+
+def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, str]:
+    """Copy readings as arrays of float64 and int64; of those that do not fit so many units, take none and say why."""
+    try:
+        stamp = np.array(readings.stamp, dtype=np.float64)
+        distance = np.array(readings.distance, dtype=np.float64)
+        status = np.array(readings.status)
+    except AttributeError:
+        return _nothing(units), f"they are {readings!r}"
+    except (TypeError, ValueError, OverflowError):
+        return _nothing(units), "they are no arrays of numbers"
+    if not stamp.shape == distance.shape == status.shape == (units,):
+        shapes = f"{stamp.shape}, {distance.shape} and {status.shape}"
+        return _nothing(units), f"stamps, distances and statuses have the shapes {shapes}, not ({units},)"
+    if status.dtype != np.int64:
+        if status.dtype.kind not in "iu":
+            return _nothing(units), f"statuses are of type {status.dtype}, not whole numbers"
+        status = status.astype(np.int64)
+    return RangeReadings(stamp, distance, status), ""
+
+
+def _nothing(units: int) -> RangeReadings:
+    """Return what units report that were never heard."""
+    return RangeReadings(np.full(units, -np.inf), np.zeros(units), np.full(units, int(RangeStatus.NONE)))
+
+
+@compiled
+def below(numbers: FloatArray, bound: float) -> bool:
+    """Whether all numbers (k,) are smaller than a bound in size; one that is NaN is not."""
+    for number in numbers:  # noqa: SIM110  compiled code knows no generators
+        if not abs(number) < bound:
+            return False
+    return True

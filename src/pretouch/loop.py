@@ -1,40 +1,148 @@
 """The only clock of the package, and the loop that turns the controller: read, step, command, record."""
 
+import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.control.joint_box import brake, joint_box
+from pretouch.control.joint_box import box_and_brake
 from pretouch.controller import Controller
+from pretouch.errors import ParameterError
 from pretouch.ports import Clock, Recorder, Robot, Skin
 from pretouch.types import ControlStep, FloatArray, Inputs
 
-_REST_CYCLES = 100
-"""Cycles within which any arm comes to rest: a Panda's slowest joint needs 0.29 s, 29 cycles at 100 Hz."""
+_FINEST = 1e-7
+"""Shortest time `Durations` tells apart [s]."""
+_BINS_PER_E = 1.0 / math.log(1.01)
+_BINS = 2316
+"""Bins one per cent wide from a tenth of a microsecond to a thousand seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How some durations are spread [s], each within half a per cent but the largest, which is exact."""
+
+    median: float
+    p99: float
+    p999: float
+    max: float
+
+
+class Durations:
+    """Any number of durations in fixed memory: a loop may run for days."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * _BINS
+        self._largest = 0.0
+        self.count = 0
+        """How many were added."""
+
+    def add(self, duration: float) -> None:
+        """Take one in [s]."""
+        place = int(math.log(duration / _FINEST) * _BINS_PER_E) if duration > _FINEST else 0
+        self._counts[min(place, _BINS - 1)] += 1
+        self.count += 1
+        if duration > self._largest:
+            self._largest = duration
+
+    def spread(self) -> Spread:
+        """Median, 99 %, 99.9 % and the largest so far; zeros of none."""
+        below = np.cumsum(self._counts)
+        places = np.searchsorted(below, np.array([0.5, 0.99, 0.999]) * self.count)
+        middle = _FINEST * np.exp((places + 0.5) / _BINS_PER_E)
+        median, p99, p999 = np.minimum(middle, self._largest).tolist()
+        return Spread(median, p99, p999, self._largest)
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """How a loop kept its time."""
+
+    period: float
+    """Period it was asked to keep [s]."""
+    cycles: int
+    """Ticks given."""
+    measured: Spread
+    """Time from one tick to the next [s]."""
+    wake_up: Spread
+    """How late the machine woke the loop for a tick it waited for [s]."""
+    busy: Spread
+    """Time from a tick until the next one was asked for [s]."""
+    cpu: Spread
+    """Processor time of the loop's thread in that time [s]."""
+    overruns: int
+    """Cycles that were busy for longer than a period."""
+    missed: int
+    """Ticks left out, because the loop was late by a period or more."""
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.cycles} cycles at {1 / self.period:g} Hz: {self.overruns} overruns, {self.missed} ticks missed.",
+            f"{'[us]':14}{'median':>10}{'99 %':>10}{'99.9 %':>10}{'largest':>10}",
+        ]
+        rows = {"period": self.measured, "late wake-up": self.wake_up, "busy": self.busy, "busy, CPU": self.cpu}
+        for name, s in rows.items():
+            lines.append(f"{name:14}" + "".join(f"{1e6 * value:10.0f}" for value in (s.median, s.p99, s.p999, s.max)))
+        return "\n".join(lines)
 
 
 class MonotonicClock:
-    """The machine's monotonic clock, ticking at a fixed period. A late caller gets the next tick, not a burst."""
+    """The machine's monotonic clock, ticking at a fixed period, and how well the caller kept up with it.
+
+    The first tick is at once, the others a whole number of periods after it. A late caller gets the next tick, not a
+    burst.
+    """
 
     def __init__(self, period: float) -> None:
         """Take the period [s]."""
+        if not (math.isfinite(period) and period > 0):
+            raise ParameterError(f"The period of the clock is {period} s: it must be greater than 0.")
         self.period = period
         self.missed = 0
         """Ticks that went by unused because the caller was late."""
-        self._next = time.monotonic()
+        self.overruns = 0
+        """Cycles of the caller that took longer than a period."""
+        self._next = self._given = -math.inf
+        self._cpu_given = 0.0
+        self._cycles = 0
+        self._measured, self._wake_up, self._busy, self._cpu = Durations(), Durations(), Durations(), Durations()
 
     def tick(self) -> float:
         """Wait for the next tick and return the time [s]."""
         now = time.monotonic()
-        late = int((now - self._next) / self.period)
-        if late > 0:
-            self.missed += late
-            self._next += late * self.period
+        if self._cycles:
+            self._account(now - self._given, time.thread_time() - self._cpu_given)
+            late = int((now - self._next) / self.period)
+            if late > 0:
+                self.missed += late
+                self._next += late * self.period
+        else:
+            self._next = now
         if self._next > now:
             time.sleep(self._next - now)
+            now = time.monotonic()
+            self._wake_up.add(now - self._next)
+        if self._cycles:
+            self._measured.add(now - self._given)
         self._next += self.period
-        return time.monotonic()
+        self._cycles += 1
+        self._given, self._cpu_given = now, time.thread_time()
+        return now
+
+    def _account(self, busy: float, cpu: float) -> None:
+        self._busy.add(busy)
+        self._cpu.add(cpu)
+        if busy > self.period:
+            self.overruns += 1
+
+    def timing(self) -> Timing:
+        """Report on all ticks so far; what the caller does since the last one is not in it."""
+        return Timing(
+            period=self.period, cycles=self._cycles, measured=self._measured.spread(), wake_up=self._wake_up.spread(),
+            busy=self._busy.spread(), cpu=self._cpu.spread(), overruns=self.overruns, missed=self.missed,
+        )  # fmt: skip
 
 
 def run(
@@ -77,11 +185,13 @@ def come_to_rest(controller: Controller, robot: Robot, clock: Clock, q: FloatArr
         q: (n,) joint positions the motion generator was last known to be at [rad].
         qd: (n,) joint velocities sent last [rad/s].
     """
-    period = controller.limits.period
-    for _ in range(_REST_CYCLES):
+    limits = controller.limits
+    # each cycle takes one period's worth of acceleration from the joint that needs longest; one more for rounding
+    longest = math.ceil(float((limits.qd_max / limits.qdd_max).max()) / limits.period) + 1
+    for _ in range(longest):
         if not np.any(qd):
             return
         clock.tick()
-        q = q + qd * period
-        qd = brake(qd, *joint_box(q, qd, controller.limits), controller.limits)
+        q = q + qd * limits.period
+        _, _, qd = box_and_brake(q, qd, limits.table)
         robot.command(qd)

@@ -10,7 +10,7 @@ from pretouch.types import Mode
 class Event(Enum):
     """What can make the mode change, seen in one control step."""
 
-    NOT_FINITE = auto()
+    UNUSABLE = auto()
     TIME_BACKWARDS = auto()
     STATE_STALE = auto()
     SOLVER_FAILED = auto()
@@ -19,6 +19,7 @@ class Event(Enum):
     LATCHED = auto()
     REACTING = auto()
     CONTACT = auto()
+    SKIN_UNFIT = auto()
     SKIN_SILENT = auto()
     NO_FORCE = auto()
     WINDOW_FILLING = auto()
@@ -41,8 +42,8 @@ _ANY = frozenset(Mode)
 
 TABLE: tuple[Transition, ...] = (
     Transition(
-        Event.NOT_FINITE, _ANY, Mode.HOLD,
-        "The robot's state holds numbers that are not finite ({}): check the connection to the arm, then resume.",
+        Event.UNUSABLE, _ANY, Mode.HOLD,
+        "The robot's state cannot be used ({}): check the connection to the arm, then resume.",
         latches=True,
     ),
     Transition(
@@ -51,7 +52,7 @@ TABLE: tuple[Transition, ...] = (
     ),
     Transition(
         Event.STATE_STALE, _ANY, Mode.HOLD,
-        "The robot's state is {} old: check the connection to the arm, then resume.", latches=True,
+        "The robot's state is {}: check the connection to the arm, then resume.", latches=True,
     ),
     Transition(
         Event.SOLVER_FAILED, _ANY, Mode.HOLD,
@@ -68,6 +69,10 @@ TABLE: tuple[Transition, ...] = (
     Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "{}", latches=True),
     Transition(Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT, "A contact of {}: moving with it."),
     Transition(Event.REACTING, frozenset({Mode.REACT}), Mode.REACT, "Moving with a contact: {} left."),
+    Transition(
+        Event.SKIN_UNFIT, _ANY, Mode.HOLD,
+        "The readings do not fit the skin ({}): give one of each unit, in the order of the skin.",
+    ),
     Transition(
         Event.SKIN_SILENT, _ANY, Mode.HOLD,
         "No usable reading from {}: check the unit's power, radio and sensor; the arm goes on when it is heard again.",
@@ -99,6 +104,9 @@ class ModeState:
     latched: bool = False
 
 
+_CLEAR = ModeState(Mode.TRACK, TABLE[-1].sentence)
+
+
 def mode_init() -> ModeState:
     """Return the mode before the first step."""
     return ModeState(Mode.HOLD, "The controller has not run yet.")
@@ -112,6 +120,8 @@ def next_mode(state: ModeState, events: Mapping[Event, str], resume: bool) -> Mo
         events: what this step saw, each with the detail its sentence needs.
         resume: whether a person asks to leave a latched HOLD; a cause that is still there latches again.
     """
+    if not events and not state.latched:
+        return _CLEAR
     seen = {**events, Event.CLEAR: ""}
     if state.latched and not resume:
         seen[Event.LATCHED] = state.reason

@@ -6,57 +6,10 @@ A profile is a frozen set of them. `replace(profile, ...)` of the standard libra
 import math
 from dataclasses import dataclass, field, fields, replace
 from numbers import Integral, Real
-from typing import Annotated, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Literal
 
+from pretouch.checks import Check, Checked, Fraction, Negative, NonNegative, Positive, PositiveCount
 from pretouch.errors import ParameterError
-
-
-@dataclass(frozen=True)
-class Check:
-    """Allowed range of a finite number, ends included unless they are open."""
-
-    low: float = -math.inf
-    high: float = math.inf
-    open_low: bool = False
-    open_high: bool = False
-
-    def problem(self, value: float) -> str | None:
-        """Say what is wrong with the value, or None."""
-        if not math.isfinite(value):
-            return "must be finite"
-        if value < self.low or (self.open_low and value == self.low):
-            return f"must be {'greater than' if self.open_low else 'at least'} {self.low:g}"
-        if value > self.high or (self.open_high and value == self.high):
-            return f"must be {'less than' if self.open_high else 'at most'} {self.high:g}"
-        return None
-
-
-Negative = Annotated[float, Check(high=0.0, open_high=True)]
-Positive = Annotated[float, Check(low=0.0, open_low=True)]
-NonNegative = Annotated[float, Check(low=0.0)]
-Fraction = Annotated[float, Check(low=0.0, high=1.0)]
-PositiveCount = Annotated[int, Check(low=1)]
-
-
-class Checked:
-    """Base of parameter sets: checks every field when it is made."""
-
-    def __post_init__(self) -> None:
-        hints = get_type_hints(type(self), include_extras=True)
-        for item in fields(self):  # type: ignore[arg-type]
-            _check_field(type(self).__name__, item.name, hints[item.name], getattr(self, item.name))
-
-
-def _check_field(owner: str, name: str, hint: object, value: object) -> None:
-    if get_origin(hint) is Literal and value not in get_args(hint):
-        raise ParameterError(f"{owner}.{name} is {value!r}: choose one of {', '.join(map(str, get_args(hint)))}.")
-    whole = getattr(hint, "__origin__", None) is int
-    for check in getattr(hint, "__metadata__", ()):
-        if whole and not isinstance(value, Integral):
-            raise ParameterError(f"{owner}.{name} is {value}: it must be a whole number.")
-        problem = check.problem(float(value)) if isinstance(value, Real) else "must be a number"
-        if problem:
-            raise ParameterError(f"{owner}.{name} is {value}: it {problem}.")
 
 
 @dataclass(frozen=True)
@@ -115,7 +68,7 @@ class TaskParams(Checked):
     Hessian positive definite."""
     mid_joint_time_s: Positive = 5.0
     """Time t in which the mid-joint velocity would bring the joints to their middle [s]."""
-    control_period_s: Positive = 0.01
+    control_period_s: Annotated[float, Check(low=1e-4, high=1.0)] = 0.01
     """Period of the controller [s] (paper: 100 Hz)."""
     position_margin_rad: NonNegative = 0.01
     """Distance the commanded joint positions keep from the joint limits [rad]."""
@@ -231,6 +184,9 @@ class FailureParams(Checked):
     spoil the window's sums."""
     force_timeout_s: Positive = 0.2
     """Time without a force estimate after which the arm holds [s]."""
+    solver_iterations: PositiveCount = 500
+    """Iterations of the QP solver after which the arm brakes. A bound on its time that is the same in each replay; most
+    steps need less than 10."""
 
 
 @dataclass(frozen=True)
@@ -306,6 +262,26 @@ def _change(profile: Profile, change: str) -> tuple[str, str, object]:
     if name not in known:
         raise ParameterError(f"The parameter {where!r} is unknown: choose from {', '.join(known)}.")
     return group, name, _read(where, text, getattr(params, name))
+
+
+def at_rate(profile: Profile, rate: float) -> Profile:
+    """Return a profile for a controller at another rate [Hz]: what it counts in cycles lasts as long as before.
+
+    That is the fading of eq. 4, the force window, and the decay of a reaction; alpha of eq. 8, the weight of one
+    sample, changes so that a lasting push enters the window as fast as before.
+    """
+    p, more = profile, rate * profile.task.control_period_s
+    if not (math.isfinite(rate) and rate * p.failure.overrun_s > 1):
+        least = 1 / p.failure.overrun_s
+        raise ParameterError(f"The rate is {rate:g} Hz: it must be more than {least:g} Hz, or each step would be late.")
+    samples, alpha = max(2, round(p.threshold.window_samples * more)), 1 - (1 - p.threshold.alpha) ** (1 / more)
+    return p if more == 1 else replace(
+        p,
+        task=replace(p.task, control_period_s=1 / rate),
+        reduction=replace(p.reduction, l_max_cycles=max(1, round(p.reduction.l_max_cycles * more))),
+        threshold=replace(p.threshold, window_samples=samples, alpha=alpha),
+        reaction=replace(p.reaction, decay_cycles=max(1, round(p.reaction.decay_cycles * more))),
+    )  # fmt: skip
 
 
 _WORDS = {"yes": True, "true": True, "no": False, "false": False}

@@ -1,13 +1,15 @@
 """The values that travel along the line from a reading to a joint velocity.
 
-Everything here is a frozen value; its arrays are float64, to be read and not written to. See `docs/conventions.md`.
+Everything here is a value, set once when it is made; its arrays are to be read and not written to. See
+`docs/conventions.md`.
 """
 
-from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pretouch.values import value
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -33,7 +35,7 @@ class RangeStatus(IntEnum):
     NONE = 255
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class RangeReadings:
     """The newest reading of each of K sensor units, in the order of the skin.
 
@@ -48,7 +50,7 @@ class RangeReadings:
     """(K,) `RangeStatus` codes."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class RobotState:
     """What the robot's own interface reports at one instant, n joints."""
 
@@ -71,7 +73,7 @@ class RobotState:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Inputs:
     """All that one control step is given."""
 
@@ -94,7 +96,7 @@ class Mode(Enum):
     """Brake within limits, stand still, and say why."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Obstacles:
     """K sensed points, each with its closest point on the robot's body. Base frame."""
 
@@ -114,21 +116,45 @@ class Obstacles:
     """(K,) signed distance from the body's surface [m] (eqs. 5-7)."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Thresholds:
     """Contact thresholds of the three axes (eq. 9) and what they are made of. All (3,) [N], base frame."""
 
-    upper: FloatArray
-    lower: FloatArray
-    mean: FloatArray
-    sigma: FloatArray
-    obstacle_positive: FloatArray
-    """F_obs+ of eq. 11: an object at greater coordinate raises the lower threshold by this."""
-    obstacle_negative: FloatArray
-    """F_obs- of eq. 11: an object at smaller coordinate lowers the upper threshold by this."""
+    parts: FloatArray
+    """(6, 3) all of them, in the order in which they follow."""
+
+    @property
+    def upper(self) -> FloatArray:
+        """T_u."""
+        return self.parts[0]
+
+    @property
+    def lower(self) -> FloatArray:
+        """T_l."""
+        return self.parts[1]
+
+    @property
+    def mean(self) -> FloatArray:
+        """Mean of the window."""
+        return self.parts[2]
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviation of the window."""
+        return self.parts[3]
+
+    @property
+    def obstacle_positive(self) -> FloatArray:
+        """F_obs+ of eq. 11: an object at greater coordinate raises the lower threshold by this."""
+        return self.parts[4]
+
+    @property
+    def obstacle_negative(self) -> FloatArray:
+        """F_obs- of eq. 11: an object at smaller coordinate lowers the upper threshold by this."""
+        return self.parts[5]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Contact:
     """A contact found in one step."""
 
@@ -150,7 +176,7 @@ class QpOutcome(Enum):
     """No problem was posed, because the arm holds: the answer is the braking command."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class QpSolution:
     """The answer to one quadratic program (eq. 2)."""
 
@@ -165,7 +191,7 @@ class QpSolution:
     """What happened, as a sentence."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ControlStep:
     """All that one step of the controller saw and decided.
 

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pretouch.control.path import Circle, Path, PathState, WayPoints, advance, follow, line, pause
+from pretouch.control import path as paths
+from pretouch.control.path import Circle, Path, PathState, WayPoints, follow, line, pause
 from pretouch.errors import PathError
 from pretouch.params import TaskParams
 
@@ -14,6 +15,10 @@ CIRCLE = Circle()  # paper, IV-A: radius 0.25 m round (0.5, 0, 0.25)
 LINE = line((0.4, 0.5, 0.5), (0.4, -0.5, 0.5))  # paper, IV-A
 SQUARE = WayPoints(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), closed=True)
 PARAMS = TaskParams()
+
+
+def advance(path: Path, state: PathState, position: np.ndarray, velocity: np.ndarray) -> PathState:
+    return paths.advance(path, state, follow(path, state, position, PARAMS), velocity, PARAMS)
 
 
 def test_circle_starts_at_its_left_and_rises():
@@ -72,69 +77,69 @@ def test_unusable_circles_are_refused(bad: dict):
 
 
 def test_on_the_path_the_task_runs_along_it():
-    velocity = follow(LINE, PathState(0.25, 0.2), np.array([0.4, 0.25, 0.5]), PARAMS)
+    velocity = follow(LINE, PathState(0.25, 0.2), np.array([0.4, 0.25, 0.5]), PARAMS).velocity
     np.testing.assert_allclose(velocity, [0, -0.2, 0], atol=1e-12)
 
 
 def test_beside_the_path_the_task_returns_by_numbers():
     # 0.05 m off in z: forward 0.2 * (1 - 0.05 / 0.1) = 0.1, back 2 * 0.05 = 0.1
-    velocity = follow(LINE, PathState(0.25, 0.2), np.array([0.4, 0.25, 0.45]), PARAMS)
+    velocity = follow(LINE, PathState(0.25, 0.2), np.array([0.4, 0.25, 0.45]), PARAMS).velocity
     np.testing.assert_allclose(velocity, [0, -0.1, 0.1], atol=1e-12)
 
 
 def test_the_way_back_is_no_faster_than_the_speed_allowed_by_now():
     # the same with 0.02 m/s allowed: forward 0.02 * (1 - 0.05 / 0.1) = 0.01, back 0.1; clipped from 0.1005 to 0.02
-    velocity = follow(LINE, PathState(0.25, 0.02), np.array([0.4, 0.25, 0.45]), PARAMS)
+    velocity = follow(LINE, PathState(0.25, 0.02), np.array([0.4, 0.25, 0.45]), PARAMS).velocity
     np.testing.assert_allclose(velocity, np.array([0, -0.01, 0.1]) * 0.02 / np.hypot(0.01, 0.1), atol=1e-12)
-    np.testing.assert_array_equal(follow(LINE, PathState(0.25, 0.0), np.array([0.4, 0.25, 0.45]), PARAMS), 0.0)
+    np.testing.assert_array_equal(follow(LINE, PathState(0.25, 0.0), np.array([0.4, 0.25, 0.45]), PARAMS).velocity, 0.0)
 
 
 def test_far_off_the_path_the_arm_only_returns_at_the_task_speed():
-    velocity = follow(LINE, PathState(0.25, 0.3), np.array([0.9, 0.25, 0.5]), PARAMS)
+    velocity = follow(LINE, PathState(0.25, 0.3), np.array([0.9, 0.25, 0.5]), PARAMS).velocity
     np.testing.assert_allclose(velocity, [-0.3, 0, 0], atol=1e-12)
 
 
 @given(arrays(np.float64, 3, elements=st.floats(-2, 2)), st.floats(0, 10), st.floats(0, 0.3))
 @settings(deadline=None, derandomize=True, max_examples=200)
 def test_the_task_is_never_faster_than_allowed_by_now(position: np.ndarray, phase: float, speed: float):
-    velocity = follow(CIRCLE, PathState(phase, speed), position, PARAMS)
+    velocity = follow(CIRCLE, PathState(phase, speed), position, PARAMS).velocity
     assert np.linalg.norm(velocity) <= speed * (1 + 1e-12)
 
 
 def test_the_phase_moves_by_what_was_achieved_along_the_path():
     # asked for 0.3 m/s along -y, the arm does 0.2 m/s for 0.01 s; the 0.5 m/s across do not count
-    after = advance(LINE, PathState(0.25, 0.3), LINE.point(0.25), np.array([0.5, -0.2, 0]), PARAMS)
+    after = advance(LINE, PathState(0.25, 0.3), LINE.point(0.25), np.array([0.5, -0.2, 0]))
     np.testing.assert_allclose(after.phase, 0.252)
 
 
 def test_the_speed_grows_by_the_task_acceleration():
     # 1 m/s^2 for 0.01 s
-    after = advance(LINE, PathState(0.25, 0.1), LINE.point(0.25), np.zeros(3), PARAMS)
+    after = advance(LINE, PathState(0.25, 0.1), LINE.point(0.25), np.zeros(3))
     np.testing.assert_allclose(after.speed, 0.11)
 
 
 def test_a_blocked_arm_stops_the_phase_and_never_turns_it_back():
     for velocity in (np.zeros(3), np.array([0, 0.2, 0])):
-        assert advance(LINE, PathState(0.25, 0.1), LINE.point(0.25), velocity, PARAMS).phase == 0.25
+        assert advance(LINE, PathState(0.25, 0.1), LINE.point(0.25), velocity).phase == 0.25
 
 
 def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
     # 0.05 m behind: asked for 0.2 * 0.5 + 2 * 0.05 = 0.2 m/s, and does it; 0.1 of it is progress, 0.1 catches up
     state, behind = PathState(0.25, 0.2), LINE.point(0.2)
-    np.testing.assert_allclose(follow(LINE, state, behind, PARAMS), [0, -0.2, 0], atol=1e-12)
-    np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.2, 0]), PARAMS).phase, 0.251)
+    np.testing.assert_allclose(follow(LINE, state, behind, PARAMS).velocity, [0, -0.2, 0], atol=1e-12)
+    np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.2, 0])).phase, 0.251)
     # slowed to a half it does 0.1 m/s, 0.1 less than asked: all of that is catching up
-    np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.1, 0]), PARAMS).phase, 0.25)
+    np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.1, 0])).phase, 0.25)
 
 
 def test_the_phase_of_an_open_path_stops_at_its_end():
-    after = advance(LINE, PathState(0.9999, 0.3), LINE.point(0.9999), np.array([0, -0.3, 0]), PARAMS)
+    after = advance(LINE, PathState(0.9999, 0.3), LINE.point(0.9999), np.array([0, -0.3, 0]))
     assert after.phase == 1.0
 
 
 def test_the_phase_of_a_closed_path_goes_on():
     start = CIRCLE.point(0.0)
-    after = advance(CIRCLE, PathState(CIRCLE.length, 0.3), start, np.array([0, 0, 0.3]), PARAMS)
+    after = advance(CIRCLE, PathState(CIRCLE.length, 0.3), start, np.array([0, 0, 0.3]))
     np.testing.assert_allclose(after.phase, CIRCLE.length + 0.003)
 
 
@@ -144,8 +149,8 @@ def test_the_phase_of_a_closed_path_goes_on():
 def test_wherever_it_was_pushed_the_arm_comes_back_and_goes_on(path: Path, away: np.ndarray, slowed: float):
     state, position = PathState(), path.point(0.0) + away
     for _ in range(2500):  # 0.5 m at a fifth of 0.3 m/s is 8 s, and then as long again
-        velocity = slowed * follow(path, state, position, PARAMS)
-        state = advance(path, state, position, velocity, PARAMS)
+        velocity = follow(path, state, position, PARAMS).scaled(slowed)
+        state = advance(path, state, position, velocity)
         position = position + 0.01 * velocity
     assert np.linalg.norm(path.point(state.phase) - position) < 0.005
     assert np.linalg.norm(velocity) > 0.95 * slowed * PARAMS.speed_m_s
@@ -155,9 +160,9 @@ def test_wherever_it_was_pushed_the_arm_comes_back_and_goes_on(path: Path, away:
 def test_the_speed_grows_to_the_task_speed_and_starts_again_after_a_pause():
     state = PathState()
     for _ in range(29):
-        state = advance(LINE, state, LINE.point(0), np.zeros(3), PARAMS)
+        state = advance(LINE, state, LINE.point(0), np.zeros(3))
     np.testing.assert_allclose(state.speed, 0.29)
     for _ in range(5):
-        state = advance(LINE, state, LINE.point(0), np.zeros(3), PARAMS)
+        state = advance(LINE, state, LINE.point(0), np.zeros(3))
     assert state.speed == 0.3
     assert pause(PathState(0.7, 0.3)) == PathState(0.7, 0.0)

@@ -44,10 +44,10 @@ class _Watcher:
         )
 
     def take(self, readings: RangeReadings, now: float):
-        obstacles, self.state = perceive(
+        self.seen, self.state = perceive(
             self.state, self.model, self.skin, self.fixtures, self.kin, readings, now, self.params
         )
-        return obstacles
+        return self.seen.obstacles
 
     def see(self, now: float, status=RangeStatus.OK, **distance: float):
         return self.take(self.readings(now, status, **distance), now)
@@ -239,6 +239,10 @@ FAILURES = [RangeStatus.HARDWARE, RangeStatus.CROSSTALK, RangeStatus.SYNC, Range
 NO_TARGET = [RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED]
 
 
+def _silent(watcher, now: float) -> tuple[float, str]:
+    return silent_units(watcher.skin, watcher.state, watcher.seen.longest_silence, now, PARAMS)
+
+
 def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, distance=0.5, ahead=0.0) -> tuple[float, str]:
     """All units report at 50 Hz after `start`, wrist_front in its own way, its clock ahead by a time [s]."""
     unit = watcher.skin.ids.index("wrist_front")
@@ -249,7 +253,7 @@ def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, distance=0.5, ah
         readings.stamp[unit] += ahead
         readings.distance[unit], readings.status[unit] = distance, status
         watcher.take(readings, now)
-    return silent_units(watcher.skin, watcher.state, now, PARAMS)
+    return _silent(watcher, now)
 
 
 @pytest.mark.parametrize(
@@ -261,14 +265,14 @@ def test_a_unit_that_falls_silent_slows_the_arm_and_is_named(watcher, age, facto
     heard = watcher.readings(10.0, **dict.fromkeys(watcher.skin.ids, 0.5))
     heard.stamp[watcher.skin.ids.index("wrist_front")] = 10.0 - age
     watcher.take(heard, 10.0)
-    left, silent = silent_units(watcher.skin, watcher.state, 10.0, PARAMS)
+    left, silent = _silent(watcher, 10.0)
     assert left == pytest.approx(factor)
     assert silent == names
 
 
 def test_all_units_never_heard_are_named(watcher):
     watcher.take(watcher.readings(0.0), 10.0)
-    left, silent = silent_units(watcher.skin, watcher.state, 10.0, PARAMS)
+    left, silent = _silent(watcher, 10.0)
     assert left == 0.0
     assert silent == ", ".join(watcher.skin.ids)
 
@@ -315,12 +319,16 @@ def test_a_failure_now_and_then_is_no_silence(watcher):
 def test_the_arm_stands_exactly_when_a_unit_is_named(panda_model, paper_skin, ages):
     watcher = _Watcher(panda_model, paper_skin)
     watcher.take(RangeReadings(10.0 - np.array(ages), np.ones(7), np.zeros(7, np.int64)), 10.0)
-    left, silent = silent_units(paper_skin, watcher.state, 10.0, PARAMS)
+    left, silent = _silent(watcher, 10.0)
     assert 0.0 <= left <= 1.0
     assert (left == 0.0) == bool(silent)
     assert left == 1.0 or max(ages) > 0.0999 or min(ages) < 0.0
 
 
 def test_without_proximity_no_unit_is_missed(panda_model, watcher):
-    assert silent_units(watcher.skin, watcher.state, 10.0, PerceptionParams(enabled=False)) == (1.0, "")
-    assert silent_units(Skin([], panda_model), track_init(0), 10.0, PARAMS) == (1.0, "")
+    watcher.params = PerceptionParams(enabled=False)
+    watcher.take(watcher.readings(0.0), 10.0)
+    assert _silent(watcher, 10.0) == (1.0, "")
+    bare = _Watcher(panda_model, Skin([], panda_model))
+    bare.take(RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64)), 10.0)
+    assert _silent(bare, 10.0) == (1.0, "")

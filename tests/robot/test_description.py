@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from pretouch.errors import PretouchError, RobotModelError
-from pretouch.robot.description import panda
+from pretouch.robot.description import SpeedEnvelope, fr3, panda
+from pretouch.robot.model import RobotModel
 
 
 def test_panda_has_the_limits_its_vendor_publishes():
@@ -14,6 +15,32 @@ def test_panda_has_the_limits_its_vendor_publishes():
     np.testing.assert_allclose(arm.qdd_max, [15, 7.5, 10, 12.5, 15, 20, 20])
     np.testing.assert_allclose(arm.tau_max, [87] * 4 + [12] * 3)
     np.testing.assert_allclose(np.rad2deg(arm.q_ready), [0, -45, 0, -135, 0, 90, 45])
+
+
+def test_fr3_has_the_limits_its_vendor_publishes():
+    arm = fr3()
+    np.testing.assert_allclose(arm.qd_max, [2.62] * 4 + [5.26, 4.18, 5.26])
+    np.testing.assert_allclose(arm.qdd_max, [10] * 7)
+    np.testing.assert_allclose(arm.tau_max, [87] * 4 + [12] * 3)
+    np.testing.assert_allclose(np.rad2deg(arm.q_ready), [0, -45, 0, -135, 0, 90, 45])
+
+
+def test_the_envelope_of_the_fr3_is_the_one_its_vendor_publishes():
+    envelope, arm = fr3().envelope, RobotModel(fr3())
+    np.testing.assert_allclose(envelope.offset, [0.30, 0.20, 0.20, 0.30, 0.35, 0.35, 0.35])
+    np.testing.assert_allclose(envelope.slope, [12, 5.17, 7, 8, 34, 11, 34])
+    np.testing.assert_allclose(envelope.q_upper, [2.7501, 1.7918, 2.9065, -0.1458, 2.8101, 4.5205, 3.0196])
+    np.testing.assert_allclose(-envelope.q_lower, [2.7501, 1.7918, 2.9065, 3.0481, 2.8101, -0.54092, 3.0196])
+    # it ends within 8 mrad of the stops: on both sides of joints 2, 3 and 7 beyond them, elsewhere before
+    end = envelope.offset**2 / envelope.slope
+    above, below = envelope.q_upper - end - arm.q_max, arm.q_min - envelope.q_lower - end
+    for beyond in (above, below):
+        np.testing.assert_array_equal(np.flatnonzero(beyond > 0), [1, 2, 6])
+        assert np.all((beyond > -8e-3) & (beyond < 4e-4))
+
+
+def test_a_panda_has_no_envelope():
+    assert panda().envelope is None
 
 
 @pytest.mark.parametrize("name", ["qd_max", "qdd_max", "tau_max"])
@@ -34,3 +61,43 @@ def test_limits_of_the_wrong_shape_are_refused(shape):
 def test_a_missing_mjcf_file_is_named():
     with pytest.raises(PretouchError, match=r"panda: there is no MJCF file at nowhere/arm\.xml"):
         replace(panda(), mjcf=Path("nowhere/arm.xml"))
+
+
+# A speed envelope
+
+GOOD = SpeedEnvelope(np.full(2, 0.3), np.full(2, 12.0), np.ones(2), -np.ones(2), "a test")
+
+
+@pytest.mark.parametrize(
+    ("name", "bad", "message"),
+    [
+        ("offset", np.array([0.3, -0.1]), r"offset is \[ 0\.3 -0\.1\]: none may be negative"),
+        ("slope", np.array([12.0, 0.0]), r"slope is \[12\.  0\.\]: all must be positive"),
+        ("slope", np.array([12.0, np.nan]), r"slope is .*give one finite number a joint"),
+        ("q_upper", np.array([1.0, np.inf]), r"q_upper is .*give one finite number a joint"),
+        ("q_lower", -np.ones(3), r"q_lower is .*give one finite number a joint"),
+        ("q_upper", np.array([1.0, -0.99]), "may move nowhere both ways: give each q_upper above its q_lower"),
+    ],
+)
+def test_an_envelope_that_is_none_is_refused(name, bad, message):
+    with pytest.raises(RobotModelError, match=message):
+        replace(GOOD, **{name: bad})
+
+
+def test_an_envelope_of_numbers_that_are_not_one_a_joint_is_refused():
+    with pytest.raises(RobotModelError, match=r"offset is 0\.3: give one finite number a joint"):
+        SpeedEnvelope(*(np.array(v) for v in (0.3, 12.0, 1.0, -1.0)), "a test")
+
+
+def test_an_envelope_for_another_number_of_joints_is_refused():
+    with pytest.raises(RobotModelError, match="fr3: the speed envelope is for 2 joints: give 7 of each number"):
+        replace(fr3(), envelope=GOOD)
+
+
+def test_an_envelope_moves_in_by_a_margin():
+    closer = GOOD.moved_in(0.2)
+    np.testing.assert_allclose(closer.q_upper, 0.8)
+    np.testing.assert_allclose(closer.q_lower, -0.8)
+    np.testing.assert_array_equal(closer.offset, GOOD.offset)
+    with pytest.raises(RobotModelError, match="may move nowhere"):
+        GOOD.moved_in(1.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 from rich.console import Console
@@ -73,17 +73,42 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Bench:
-    """Measure something on many simulated arms."""
+class FreeMotion:
+    """How far the force estimate of an arm left alone is off, and which detectors take that for a contact."""
 
-    what: tyro.conf.Positional[Literal["free-motion"]]
-    """free-motion: how far the force estimate is off, and which detectors take that for a contact."""
     seeds: int = 10
     """Simulated arms; each is left alone for twenty minutes, a quarter of them standing."""
     out: str = ""
-    """Folder for results, figures and page; by default runs/bench-WHAT."""
+    """Folder for results, figures and page; by default runs/bench-free-motion."""
     json: str = ""
     """File for all trials and their summary; by default results.json in the folder."""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """How long a control step takes: processor and wall time at a rate, overruns, and the share of each stage."""
+
+    points: str = "7,32,128,1000"
+    """Numbers of sensed points, separated by commas. All are new in every cycle, which is the worst case."""
+    rate: float = 1000.0
+    """Cycles a second; everything the profile counts in cycles is brought to it."""
+    cycles: int = 20_000
+    """Steps measured for each number of points."""
+    profile: str = "paper"
+    """Profile of the controller, or PROFILE:GROUP.FIELD=VALUE."""
+    json: str = ""
+    """File for the numbers; by default they are only shown."""
+    priority: int | None = None
+    """Real-time priority, 1 to 99 (80 is usual); by default the process keeps its own."""
+    cpu: int | None = None
+    """Number of the processor to stay on; by default the system decides."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measure something: the force estimate of many simulated arms, or the time of a control step."""
+
+    what: Annotated[FreeMotion, tyro.conf.subcommand("free-motion")] | Annotated[Cycle, tyro.conf.subcommand("cycle")]
 
 
 Command = (
@@ -115,7 +140,10 @@ def main(args: list[str] | None = None) -> int:
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
     try:
         with _sigterm_raises():
-            command = tyro.cli(Command, prog="pretouch", description="Contact-anticipating robot arms.", args=args)
+            command = tyro.cli(
+                Command, prog="pretouch", description="Contact-anticipating robot arms.", args=args,
+                config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+            )  # fmt: skip
             match command:
                 case Demo():
                     _demo(command)
@@ -123,8 +151,10 @@ def main(args: list[str] | None = None) -> int:
                     _reproduce(command)
                 case Figure():
                     _figure(command)
-                case Bench():
-                    _bench(command)
+                case Bench(FreeMotion() as what):
+                    _free_motion(what)
+                case Bench(Cycle() as what):
+                    _cycle(what)
     except PretouchError as error:
         errors.print(str(error), markup=False)
         return _USAGE
@@ -178,17 +208,32 @@ def _figure(command: Figure) -> None:
     print(f"Figure: {draw_figure(command.name, run, out, command.profile, command.seed)}")
 
 
-def _bench(command: Bench) -> None:
+def _free_motion(command: FreeMotion) -> None:
     from pretouch.cli.campaigns import run_all
     from pretouch.experiments.campaign import Request
 
-    out = Path(command.out or f"runs/bench-{command.what}")
-    request = Request((command.what,), command.seeds)
+    out = Path(command.out or "runs/bench-free-motion")
+    request = Request(("free-motion",), command.seeds)
     run_all([(request, out)], out, Path(command.json) if command.json else out / "results.json")
+
+
+def _cycle(command: Cycle) -> None:
+    from pretouch.cli.cycle import bench_cycle
+    from pretouch.experiments.cycle import CycleRequest
+
+    request = CycleRequest(command.rate, command.cycles, command.profile, command.priority, command.cpu)
+    bench_cycle(_counts(command.points), request, Path(command.json) if command.json else None)
 
 
 def _words(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _counts(text: str) -> tuple[int, ...]:
+    words = _words(text)
+    if not words or not all(word.isdecimal() for word in words):
+        raise ParameterError(f"The numbers of points are {text!r}: give whole numbers, separated by commas.")
+    return tuple(map(int, words))
 
 
 def _number(text: str) -> float:

@@ -21,6 +21,10 @@ def unwritable_said(what: str, place: Path) -> Iterator[None]:
 def check_writable(what: str, place: Path) -> None:
     """Make the folder of a file, and raise ExperimentError if the file could not be written there."""
     with unwritable_said(what, place):
+        if place.exists() and not place.is_file() and not place.is_dir():  # a device or pipe is written to as it is
+            if not os.access(place, os.W_OK):
+                raise PermissionError(13, "Permission denied")
+            return
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=place.parent):
             pass

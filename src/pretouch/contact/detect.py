@@ -1,17 +1,17 @@
 """Contact detection in one call: force in, thresholds and perhaps a contact out."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.contact.reaction import external_force
-from pretouch.contact.thresholds import crossed, side_distances, thresholds
-from pretouch.contact.window import WindowState, add
+from pretouch.contact.thresholds import crossed, outside, side_distances, threshold_parts
+from pretouch.contact.window import WindowState, add_to, added, window_mean, window_std
 from pretouch.params import ThresholdParams
 from pretouch.types import Contact, FloatArray, Obstacles, Thresholds
+from pretouch.values import value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Detection:
     """What one step found about the external force."""
 
@@ -33,15 +33,41 @@ def detect(
     Mean and deviation are those of the window with the newest value in it. Without an estimate (`force` None) the
     window stays as it is and nothing is detected. Nothing is detected either before the window is full.
     """
-    armed = state.full
+    armed, p, parts = state.full, params, np.empty((6, 3))
+    ring, sums = state.ring, state.sums
     if force is not None:
-        state = add(state, force, params.alpha, params.lambda_)
-    mean = state.mean()
-    positive, negative = side_distances(ee_position, obstacles.point, obstacles.ee_distance)
-    limits = thresholds(mean, state.std(), positive, negative, params)
-    if force is None or not armed:
-        return Detection(limits, None, armed), state
-    compared = state.newest if params.compare == "filtered" else force
-    axes = crossed(compared, limits)
-    contact = Contact(external_force(compared, mean), axes) if np.any(axes) else None
-    return Detection(limits, contact, armed), state
+        ring, sums = ring.copy(), sums.copy()
+    found = _detect(
+        ring, sums, state.next, state.count, force is not None, _NONE if force is None else force, ee_position,
+        obstacles.point, obstacles.ee_distance, p.alpha, p.lambda_, p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n,
+        p.d_max_m, p.d_min_m, p.compare == "filtered", parts,
+    )  # fmt: skip
+    after = state if force is None else added(state, ring, sums)
+    limits, contact = Thresholds(parts), None
+    if force is not None and found and armed:
+        compared = after.newest if p.compare == "filtered" else force
+        contact = Contact(external_force(compared, limits.mean), crossed(compared, limits))
+    return Detection(limits, contact, armed), after
+
+
+_NONE = np.full(3, np.nan)
+
+
+@compiled
+def _detect(
+    ring: FloatArray, sums: FloatArray, at: int, count: int, present: bool, force: FloatArray, ee_position: FloatArray,
+    point: FloatArray, ee_distance: FloatArray, alpha: float, lambda_: float, f_base: float, f_std: float,
+    sigma_max: float, f_d: float, d_max: float, d_min: float, filtered: bool, parts: FloatArray,
+) -> bool:  # fmt: skip
+    """Add to the window, write the thresholds (6, 3), and say whether the force crosses one of them."""
+    if present:
+        add_to(ring, sums, at, count, force, alpha, lambda_)
+        count = min(count + 1, len(ring))
+    mean = window_mean(sums, count)
+    positive, negative = side_distances(ee_position, point, ee_distance)
+    threshold_parts(
+        mean, window_std(sums, count), positive, negative, f_base, f_std, sigma_max, f_d, d_max, d_min, parts
+    )
+    if not present:
+        return False
+    return bool(outside(sums[0] if filtered else force, parts[0], parts[1]).any())

@@ -7,8 +7,8 @@ This is the chain an arm with joint torque sensors runs itself at 1 kHz (De Luca
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pretouch.compiled import compiled
 from pretouch.types import FloatArray
 
 
@@ -61,7 +61,7 @@ def observe(
     return ObserverState(residual, integral, mass_matrix)
 
 
-@njit(cache=True)
+@compiled
 def _observe(
     r: FloatArray, integral: FloatArray, M_last: FloatArray, M: FloatArray, bias: FloatArray, qd: FloatArray,
     tau: FloatArray, gain: float, dt: float,

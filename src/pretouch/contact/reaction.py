@@ -1,14 +1,14 @@
 """Moving with a push: eq. 12, and its linear decay."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.params import ReactionParams
 from pretouch.types import FloatArray
+from pretouch.values import value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ReactionState:
     """A reaction under way, or none."""
 
@@ -23,6 +23,7 @@ def reaction_init(params: ReactionParams) -> ReactionState:
     return ReactionState(np.zeros(3), params.decay_cycles)
 
 
+@compiled
 def external_force(reading: FloatArray, mean: FloatArray) -> FloatArray:
     """F_ext = F_reading - mu (3,) [N], the first part of eq. 12 of the paper."""
     return reading - mean

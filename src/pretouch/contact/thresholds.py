@@ -2,15 +2,18 @@
 
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.params import ThresholdParams
 from pretouch.types import BoolArray, FloatArray, Thresholds
 
 
+@compiled
 def noise_force(sigma: FloatArray, f_std: float, sigma_max: float) -> FloatArray:
     """F_sigma = min(sigma / sigma_max F_std, F_std) per axis [N], eq. 10 of the paper."""
     return np.minimum(sigma / sigma_max * f_std, f_std)
 
 
+@compiled
 def obstacle_force(distance: FloatArray, f_d: float, d_max: float, d_min: float) -> FloatArray:
     """F_obs = (d_max - d) / (d_max - d_min) F_d [N], eq. 11 of the paper, clipped to [0, F_d].
 
@@ -19,6 +22,7 @@ def obstacle_force(distance: FloatArray, f_d: float, d_max: float, d_min: float)
     return np.minimum(np.maximum((d_max - distance) / (d_max - d_min), 0.0), 1.0) * f_d
 
 
+@compiled
 def side_distances(
     ee_position: FloatArray, points: FloatArray, ee_distance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -27,11 +31,13 @@ def side_distances(
     An object belongs to the positive side of an axis if its coordinate (`points` (K, 3) [m]) is greater than the
     end-effector's, as the paper has it; sides without an object are infinitely far.
     """
-    beyond = points > ee_position
-    before = points < ee_position
-    distance = ee_distance[:, None]
-    positive = np.where(beyond, distance, np.inf).min(axis=0, initial=np.inf)
-    negative = np.where(before, distance, np.inf).min(axis=0, initial=np.inf)
+    positive, negative = np.full(3, np.inf), np.full(3, np.inf)
+    for k in range(len(points)):
+        for i in range(3):
+            if points[k, i] > ee_position[i]:
+                positive[i] = min(positive[i], ee_distance[k])
+            elif points[k, i] < ee_position[i]:
+                negative[i] = min(negative[i], ee_distance[k])
     return positive, negative
 
 
@@ -50,19 +56,32 @@ def thresholds(
         negative: (3,) the same for the negative side [m].
         params: F_b, F_std, sigma_max, F_d, d_max, d_min.
     """
-    f_sigma = noise_force(sigma, params.f_std_n, params.sigma_max_n)
-    f_positive = obstacle_force(positive, params.f_d_n, params.d_max_m, params.d_min_m)
-    f_negative = obstacle_force(negative, params.f_d_n, params.d_max_m, params.d_min_m)
-    return Thresholds(
-        upper=mean + params.f_base_n + f_sigma - f_negative,
-        lower=mean - params.f_base_n - f_sigma + f_positive,
-        mean=mean,
-        sigma=sigma,
-        obstacle_positive=f_positive,
-        obstacle_negative=f_negative,
+    p, parts = params, np.empty((6, 3))
+    threshold_parts(
+        mean, sigma, positive, negative, p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n, p.d_max_m, p.d_min_m, parts
     )
+    return Thresholds(parts)
+
+
+@compiled
+def threshold_parts(
+    mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, f_base: float, f_std: float,
+    sigma_max: float, f_d: float, d_max: float, d_min: float, parts: FloatArray,
+) -> None:  # fmt: skip
+    """Write what `thresholds` returns to `parts` (6, 3), in the order of `Thresholds`."""
+    f_sigma = noise_force(sigma, f_std, sigma_max)
+    f_positive, f_negative = obstacle_force(positive, f_d, d_max, d_min), obstacle_force(negative, f_d, d_max, d_min)
+    parts[0] = mean + f_base + f_sigma - f_negative
+    parts[1] = mean - f_base - f_sigma + f_positive
+    parts[2], parts[3], parts[4], parts[5] = mean, sigma, f_positive, f_negative
 
 
 def crossed(force: FloatArray, limits: Thresholds) -> BoolArray:
     """Say for each axis (3,) whether the force [N] exceeds its upper or lower threshold."""
-    return (force > limits.upper) | (force < limits.lower)
+    return outside(force, limits.upper, limits.lower)
+
+
+@compiled
+def outside(force: FloatArray, upper: FloatArray, lower: FloatArray) -> BoolArray:
+    """Answer of `crossed`."""
+    return (force > upper) | (force < lower)

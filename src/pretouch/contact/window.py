@@ -1,13 +1,15 @@
 """The sliding window of the external force: eq. 8, its mean and standard deviation by running sums, in O(1)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.types import FloatArray
+from pretouch.values import value
+
+_NEWEST, _ORIGIN, _TOTAL, _SQUARES = range(4)
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class WindowState:
     """A ring of the last N force samples and their running sums. All forces in N, per axis."""
 
@@ -17,38 +19,50 @@ class WindowState:
     """Where the next value goes."""
     count: int
     """Values held so far, at most N."""
-    newest: FloatArray
-    """(3,) the value added last."""
-    origin: FloatArray
-    """(3,) value the sums are taken about, so that a large mean costs no digits."""
-    total: FloatArray
-    """(3,) sum of (value - origin)."""
-    squares: FloatArray
-    """(3,) sum of (value - origin)^2."""
+    sums: FloatArray
+    """(4, 3) the value added last, the origin o the sums are taken about, so that a large mean costs no digits, the sum
+    of (value - o), and that of its square."""
 
     @property
     def full(self) -> bool:
         """Whether the window holds N values, so that its statistics mean something."""
         return self.count == len(self.ring)
 
+    @property
+    def newest(self) -> FloatArray:
+        """The value added last (3,), zero of an empty window."""
+        return self.sums[_NEWEST]
+
     def mean(self) -> FloatArray:
         """Mean mu (3,), zero of an empty window."""
-        return self.origin + self.total / self.count if self.count else np.zeros(3)
+        return window_mean(self.sums, self.count)
 
     def std(self) -> FloatArray:
         """Sample standard deviation sigma (3,), zero of fewer than two values."""
-        if self.count < 2:
-            return np.zeros(3)
-        variance = (self.squares - self.total**2 / self.count) / (self.count - 1)
-        return np.sqrt(np.maximum(variance, 0.0))
+        return window_std(self.sums, self.count)
 
 
 def window_init(samples: int) -> WindowState:
     """Return an empty window for N samples."""
-    zero = np.zeros(3)
-    return WindowState(np.zeros((samples, 3)), 0, 0, zero, zero, zero, zero)
+    return WindowState(np.zeros((samples, 3)), 0, 0, np.zeros((4, 3)))
 
 
+@compiled
+def window_mean(sums: FloatArray, count: int) -> FloatArray:
+    """Mean (3,) of a window with these sums (4, 3) and so many values; see `WindowState`."""
+    return sums[_ORIGIN] + sums[_TOTAL] / max(count, 1)
+
+
+@compiled
+def window_std(sums: FloatArray, count: int) -> FloatArray:
+    """Sample standard deviation (3,) of a window with these sums (4, 3) and so many values; see `WindowState`."""
+    if count < 2:
+        return np.zeros(3)
+    variance = (sums[_SQUARES] - sums[_TOTAL] ** 2 / count) / (count - 1)
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+@compiled
 def weighted_value(
     reading: FloatArray, last: FloatArray, mean: FloatArray, std: FloatArray, alpha: float, lambda_: float
 ) -> FloatArray:
@@ -63,19 +77,38 @@ def weighted_value(
 
 def add(state: WindowState, reading: FloatArray, alpha: float, lambda_: float) -> WindowState:
     """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on."""
-    x = weighted_value(reading, state.newest, state.mean(), state.std(), alpha, lambda_) if state.full else reading
-    ring = state.ring.copy()
-    gone = state.ring[state.next] if state.full else None
-    ring[state.next] = x
-    following = (state.next + 1) % len(ring)
-    count = min(state.count + 1, len(ring))
-    if following == 0 or state.count == 0:
+    ring, sums = state.ring.copy(), state.sums.copy()
+    add_to(ring, sums, state.next, state.count, reading, alpha, lambda_)
+    return added(state, ring, sums)
+
+
+def added(state: WindowState, ring: FloatArray, sums: FloatArray) -> WindowState:
+    """Return the state after one more value, with a ring and sums that hold it."""
+    size = len(ring)
+    return WindowState(ring, (state.next + 1) % size, min(state.count + 1, size), sums)
+
+
+@compiled
+def add_to(
+    ring: FloatArray, sums: FloatArray, at: int, count: int, reading: FloatArray, alpha: float, lambda_: float
+) -> None:
+    """Change ring (N, 3) and sums (4, 3) as `add` says."""
+    size = len(ring)
+    x, gone = reading, np.zeros(3)
+    if count == size:
+        mean, std = window_mean(sums, count), window_std(sums, count)
+        x = weighted_value(reading, sums[_NEWEST], mean, std, alpha, lambda_)
+        gone = ring[at] - sums[_ORIGIN]
+    ring[at] = x
+    sums[_NEWEST] = x
+    if at == size - 1 or count == 0:
         # once a turn the sums are taken afresh, so rounding errors never add up; O(1) on average
-        origin = x.copy()
-        values = ring[:count] - origin
-        return WindowState(ring, following, count, x, origin, values.sum(axis=0), (values**2).sum(axis=0))
-    new, old = x - state.origin, np.zeros(3) if gone is None else gone - state.origin
-    total, squares = state.total + new, state.squares + new**2
-    if gone is not None:
-        total, squares = total - old, squares - old**2
-    return WindowState(ring, following, count, x, state.origin, total, squares)
+        sums[_ORIGIN] = x
+        sums[_TOTAL:] = 0.0
+        for i in range(min(count + 1, size)):
+            sums[_TOTAL] += ring[i] - x
+            sums[_SQUARES] += (ring[i] - x) ** 2
+    else:
+        new = x - sums[_ORIGIN]
+        sums[_TOTAL] += new - gone
+        sums[_SQUARES] += new**2 - gone**2

@@ -1,10 +1,19 @@
-"""The range of joint velocities that keeps position, velocity and acceleration limits, now and ever after."""
+"""The range of joint velocities that keeps position, velocity and acceleration limits, now and ever after.
 
-from dataclasses import dataclass
+A velocity command is held for one period. It is viable if it keeps all limits until the end of its period, and full
+braking, which takes `qdd_max * period` off it in each further period, keeps them ever after. No limit rises towards the
+end of the range, so braking less hard never keeps a limit that full braking breaks: the largest viable command is the
+smallest of what each of the periods to come allows. Both `viable_speed` functions are that minimum in closed form.
+"""
+
+from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
+from pretouch.compiled import compiled
+from pretouch.errors import ParameterError
+from pretouch.robot.description import SpeedEnvelope
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 
@@ -22,9 +31,41 @@ class JointLimits:
     """(n,) [rad/s^2]"""
     period: float
     """Time a joint velocity command is held [s]."""
+    envelope: SpeedEnvelope | None = None
+    """What the speed may be at a position, if it depends on it."""
+    table: FloatArray = field(init=False, repr=False, compare=False)
+    """(9, n) all of the above for compiled code, a joint a column; a slope of 0 stands for no envelope."""
+
+    def __post_init__(self) -> None:
+        none = np.zeros(len(self.q_min))
+        e = self.envelope
+        rows = (none,) * 4 if e is None else (e.offset, e.slope, e.q_upper, e.q_lower)
+        table = np.array([self.q_min, self.q_max, self.qd_max, self.qdd_max, none + self.period, *rows])
+        object.__setattr__(self, "table", table)
 
 
-@njit(cache=True)
+def joint_limits(model: RobotModel, margin: float, period: float) -> JointLimits:
+    """Limits of an arm for commands held for `period` [s].
+
+    Args:
+        model: the arm.
+        margin: how far inside the arm's own the limits that depend on the position lie, its envelope included [rad].
+        period: [s].
+
+    Raises ParameterError for a margin that leaves a joint nothing of its range.
+    """
+    arm = model.description
+    narrowest = float((model.q_max - model.q_min).min())
+    if 2 * margin >= narrowest:
+        raise ParameterError(
+            f"A margin of {margin:g} rad at both ends leaves nothing of a joint of {arm.name} with a range of"
+            f" {narrowest:.3g} rad: choose less than {narrowest / 2:.3g} rad."
+        )
+    envelope = None if arm.envelope is None else arm.envelope.moved_in(margin)
+    return JointLimits(model.q_min + margin, model.q_max - margin, arm.qd_max, arm.qdd_max, period, envelope)
+
+
+@compiled
 def viable_speed(distance: FloatArray, acceleration: FloatArray, period: float) -> FloatArray:
     """Largest speed (n,) [rad/s] towards a limit at `distance` (n,) [rad] from which braking still ends before it.
 
@@ -34,36 +75,65 @@ def viable_speed(distance: FloatArray, acceleration: FloatArray, period: float) 
     """
     speed = np.empty(len(distance))
     for i in range(len(distance)):
-        d, a = max(distance[i], 0.0), acceleration[i]
-        steps = np.floor((np.sqrt(1.0 + 8.0 * d / (a * period**2)) - 1.0) / 2.0)
-        speed[i] = (d / period + a * period * steps * (steps + 1.0) / 2.0) / (steps + 1.0)
+        speed[i] = _before_limit(distance[i], acceleration[i], period)
     return speed
+
+
+@compiled
+def _before_limit(distance: float, acceleration: float, period: float) -> float:
+    d, a = max(distance, 0.0), acceleration
+    steps = np.floor((np.sqrt(1.0 + 8.0 * d / (a * period**2)) - 1.0) / 2.0)
+    return (d / period + a * period * steps * (steps + 1.0) / 2.0) / (steps + 1.0)
+
+
+@compiled
+def viable_speed_in_envelope(distance: float, offset: float, slope: float, acceleration: float, period: float) -> float:
+    """Largest speed [rad/s] at `distance` [rad] from an envelope's reference from which braking stays below it.
+
+    Exact for velocities held over a period, at whose end the envelope binds. Speeds are counted in a dt and distances
+    in a dt^2: b = slope / (2 a), o the offset, x the distance from where the envelope reaches zero. The command after
+    k periods of braking may be u if (u + o)^2 <= 2 b (x - (k + 1) (u + k / 2)) + o^2, so that now it may be
+    F(k) = k + u(k) = k + z / (p + sqrt(p^2 + z)) with p = o + b (k + 1) and z = b (2 x - k (k + 1)).
+
+    Where b <= 1 the brakes are stronger than the envelope is steep: F grows with k, and the first period binds. Where
+    b > 1 F has its minimum at k = sqrt(((o + b)^2 + 2 b x - b (b - 1) h^2) / b) - h, h = (2 (o + b) - 1) / (2 (b - 1)),
+    and either of the whole numbers about it binds; where the root is none, or the minimum lies before the first
+    period, F grows and that period binds. Zero where the envelope is zero.
+    """
+    unit = acceleration * period
+    b, o = slope / (2.0 * acceleration), offset / unit
+    x = max(distance - offset**2 / slope, 0.0) / (unit * period)
+    speed = _before_period(0.0, x, o, b)
+    if b > 1.0:
+        h = (2.0 * (o + b) - 1.0) / (2.0 * (b - 1.0))
+        square = ((o + b) ** 2 + 2.0 * b * x) / b - (b - 1.0) * h**2
+        if square > h**2:
+            k = np.floor(np.sqrt(square) - h)
+            speed = min(_before_period(k, x, o, b), _before_period(k + 1.0, x, o, b))
+    return speed * unit
+
+
+@compiled
+def _before_period(k: float, x: float, o: float, b: float) -> float:
+    """F(k) of `viable_speed_in_envelope`; a command that full braking has brought to rest by then keeps any limit."""
+    p, z = o + b * (k + 1.0), max(b * (2.0 * x - k * (k + 1.0)), 0.0)
+    return k + z / (p + np.sqrt(p**2 + z)) if z > 0.0 else k
 
 
 def joint_box(q: FloatArray, qd: FloatArray, limits: JointLimits) -> tuple[FloatArray, FloatArray]:
     """Lower and upper bounds (n,) [rad/s] on the next joint velocity command; never empty.
 
-    The box of velocity and position limits is met with what the acceleration allows from the last commanded
-    velocity. From a state that is no longer viable acceleration wins: the joint brakes at its limit.
+    The box of velocity and position limits, and of the envelope if there is one, is met with what the acceleration
+    allows from the last commanded velocity. From a state that is no longer viable acceleration wins: the joint brakes
+    at its limit.
 
     Args:
         q: (n,) commanded joint positions, where the motion generator is [rad].
         qd: (n,) last commanded joint velocities [rad/s].
         limits: the limits.
     """
-    return _box(q, qd, limits.q_min, limits.q_max, limits.qd_max, limits.qdd_max, limits.period)
-
-
-@njit(cache=True)
-def _box(
-    q: FloatArray, qd: FloatArray, q_min: FloatArray, q_max: FloatArray, qd_max: FloatArray, qdd_max: FloatArray,
-    period: float,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    reach = qdd_max * period
-    up = np.minimum(qd_max, viable_speed(q_max - q, qdd_max, period))
-    down = -np.minimum(qd_max, viable_speed(q - q_min, qdd_max, period))
-    slowest, fastest = qd - reach, qd + reach
-    return np.minimum(np.maximum(down, slowest), fastest), np.minimum(np.maximum(up, slowest), fastest)
+    lower, upper, _ = box_and_brake(q, qd, limits.table)
+    return lower, upper
 
 
 def brake(qd: FloatArray, lower: FloatArray, upper: FloatArray, limits: JointLimits) -> FloatArray:
@@ -71,6 +141,49 @@ def brake(qd: FloatArray, lower: FloatArray, upper: FloatArray, limits: JointLim
 
     All joints slow by the same factor, so the hand keeps its course, unless the box asks one of them for less.
     """
-    needed = float((np.abs(qd) / (limits.qdd_max * limits.period)).max())
-    slower = qd * max(0.0, 1.0 - 1.0 / needed) if needed > 0 else qd
-    return np.clip(slower, lower, upper)
+    return _brake(qd, lower, upper, limits.table)
+
+
+@compiled
+def box_and_brake(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`joint_box` and, inside it, `brake` in one call: lower, upper and braking velocities (n,) [rad/s].
+
+    Args:
+        q: (n,) commanded joint positions [rad].
+        qd: (n,) last commanded joint velocities [rad/s].
+        table: `JointLimits.table`.
+    """
+    n = len(q)
+    lower, upper = np.empty(n), np.empty(n)
+    for i in range(n):
+        reach = table[3, i] * table[4, i]
+        down, up = _viable(q[i], table, i)
+        slowest, fastest = qd[i] - reach, qd[i] + reach
+        lower[i] = np.minimum(np.maximum(down, slowest), fastest)
+        upper[i] = np.minimum(np.maximum(up, slowest), fastest)
+    return lower, upper, _brake(qd, lower, upper, table)
+
+
+@compiled
+def _viable(q: float, table: FloatArray, i: int) -> tuple[float, float]:
+    """Lowest and highest viable velocity of joint i at q."""
+    speed, a, period = table[2, i], table[3, i], table[4, i]
+    up = np.minimum(speed, _before_limit(table[1, i] - q, a, period))
+    down = np.minimum(speed, _before_limit(q - table[0, i], a, period))
+    offset, slope = table[5, i], table[6, i]
+    if slope > 0.0:
+        up = np.minimum(up, viable_speed_in_envelope(table[7, i] - q, offset, slope, a, period))
+        down = np.minimum(down, viable_speed_in_envelope(q - table[8, i], offset, slope, a, period))
+    return -down, up
+
+
+@compiled
+def _brake(qd: FloatArray, lower: FloatArray, upper: FloatArray, table: FloatArray) -> FloatArray:
+    needed = 0.0
+    for i in range(len(qd)):
+        needed = np.maximum(needed, abs(qd[i]) / (table[3, i] * table[4, i]))
+    factor = max(0.0, 1.0 - 1.0 / needed) if needed > 0.0 else 1.0
+    command = np.empty(len(qd))
+    for i in range(len(qd)):
+        command[i] = np.minimum(upper[i], np.maximum(lower[i], qd[i] * factor))
+    return command

@@ -1,5 +1,7 @@
 """Paths for the end-effector, driven by a phase: the arc length travelled, never the time."""
 
+import math
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,6 +10,7 @@ import numpy as np
 from pretouch.errors import PathError
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray
+from pretouch.values import value
 
 
 class Path(Protocol):
@@ -32,6 +35,13 @@ class Path(Protocol):
         ...
 
 
+_LARGEST = 1000.0
+"""Largest number that describes a path [m, rad]: any larger one is a mistake."""
+
+_SHORTEST = 1e-6
+"""Shortest radius or segment [m]."""
+
+
 @dataclass(frozen=True)
 class Circle:
     """A circle in the base frame's y-z plane, counter-clockwise seen from +x (paper, IV-A)."""
@@ -44,10 +54,15 @@ class Circle:
     """Where it begins, from +y towards +z [rad]."""
 
     def __post_init__(self) -> None:
-        if not np.all(np.isfinite([*self.center, self.radius, self.start_angle])):
-            raise PathError(f"The circle has center {self.center}, radius {self.radius} m: give finite numbers.")
-        if self.radius <= 0:
-            raise PathError(f"The circle has the radius {self.radius} m: it must be greater than 0.")
+        if not np.all(np.abs([*self.center, self.start_angle]) <= _LARGEST):
+            raise PathError(
+                f"The circle has center {self.center} m and start angle {self.start_angle} rad: give finite numbers,"
+                f" none beyond {_LARGEST:g}."
+            )
+        if not _SHORTEST <= self.radius <= _LARGEST:
+            raise PathError(
+                f"The circle has the radius {self.radius} m: it must be from {_SHORTEST:g} to {_LARGEST:g}."
+            )
 
     @property
     def length(self) -> float:
@@ -62,12 +77,13 @@ class Circle:
     def point(self, phase: float) -> FloatArray:
         """Return the position (3,) [m] at an arc length [m]."""
         angle = self.start_angle + phase / self.radius
-        return np.asarray(self.center) + self.radius * np.array([0.0, np.cos(angle), np.sin(angle)])
+        x, y, z = self.center
+        return np.array((x, y + self.radius * math.cos(angle), z + self.radius * math.sin(angle)))
 
     def tangent(self, phase: float) -> FloatArray:
         """Return the unit tangent (3,) at an arc length [m]."""
         angle = self.start_angle + phase / self.radius
-        return np.array([0.0, -np.sin(angle), np.cos(angle)])
+        return np.array((0.0, -math.sin(angle), math.cos(angle)))
 
 
 class WayPoints:
@@ -76,36 +92,39 @@ class WayPoints:
     def __init__(self, points: FloatArray, closed: bool = False) -> None:
         """Take W >= 2 points (W, 3) [m], base frame; `closed` leads from the last back to the first."""
         points = np.asarray(points, dtype=np.float64)
-        if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2 or not np.all(np.isfinite(points)):
-            raise PathError(f"The way-points are {points.tolist()}: give at least two finite points (x, y, z).")
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2 or not np.all(np.abs(points) <= _LARGEST):
+            raise PathError(
+                f"The way-points are {points.tolist()}: give at least two finite points (x, y, z), none beyond"
+                f" {_LARGEST:g} m."
+            )
         corners = np.vstack([points, points[:1]]) if closed else points
         steps = np.diff(corners, axis=0)
         lengths = np.sqrt((steps**2).sum(axis=1))
-        if np.any(lengths < 1e-6):
+        if np.any(lengths < _SHORTEST):
             i = int(np.argmin(lengths))
             raise PathError(f"The way-points {i} and {i + 1} coincide at {corners[i].tolist()}: leave one out.")
         self.closed = closed
-        self._corners = corners
-        self._directions = steps / lengths[:, None]
-        self._starts = np.concatenate([[0.0], np.cumsum(lengths)])
-        self.length = float(self._starts[-1])
+        self._corners: list[list[float]] = corners.tolist()
+        self._directions: list[list[float]] = (steps / lengths[:, None]).tolist()
+        self._starts: list[float] = [0.0, *np.cumsum(lengths).tolist()]
+        self.length = self._starts[-1]
 
     def _locate(self, phase: float) -> tuple[int, float]:
         s = phase % self.length if self.closed else min(max(phase, 0.0), self.length)
-        i = int(np.searchsorted(self._starts, s, side="right")) - 1
-        i = min(i, len(self._directions) - 1)
+        i = min(bisect_right(self._starts, s), len(self._directions)) - 1
         return i, s - self._starts[i]
 
     def point(self, phase: float) -> FloatArray:
         """Return the position (3,) [m] at an arc length [m]."""
         i, along = self._locate(phase)
-        return np.asarray(self._corners[i] + along * self._directions[i])
+        (x, y, z), (u, v, w) = self._corners[i], self._directions[i]
+        return np.array((x + along * u, y + along * v, z + along * w))
 
     def tangent(self, phase: float) -> FloatArray:
         """Return the unit tangent (3,) at an arc length [m], zero at the end of an open path."""
         if not self.closed and phase >= self.length:
             return np.zeros(3)
-        return np.asarray(self._directions[self._locate(phase)[0]])
+        return np.array(self._directions[self._locate(phase)[0]])
 
 
 def line(start: tuple[float, float, float], end: tuple[float, float, float]) -> WayPoints:
@@ -113,7 +132,7 @@ def line(start: tuple[float, float, float], end: tuple[float, float, float]) -> 
     return WayPoints(np.array([start, end]))
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class PathState:
     """How far along the path the task is."""
 
@@ -123,24 +142,50 @@ class PathState:
     """Speed allowed by now [m/s]; grows with limited acceleration from 0 at the start and after each pause."""
 
 
-def follow(path: Path, state: PathState, position: FloatArray, params: TaskParams) -> FloatArray:
-    """Task velocity x_d (3,) [m/s]: along the path, and towards it, no faster than the speed allowed by now.
+Vector = tuple[float, float, float]
+
+
+@value
+class Following:
+    """The path at one phase, and how to follow it from where the end-effector is."""
+
+    point: FloatArray
+    """(3,) where on the path the end-effector should be [m]."""
+    tangent: Vector
+    """Unit tangent there."""
+    velocity: Vector
+    """Task velocity x_d [m/s]."""
+    forward: float
+    """Its speed along the path, before it is limited [m/s]."""
+
+    def scaled(self, scale: float) -> FloatArray:
+        """Task velocity (3,) [m/s] times a factor."""
+        x, y, z = self.velocity
+        return np.array((scale * x, scale * y, scale * z))
+
+
+def follow(path: Path, state: PathState, position: FloatArray, params: TaskParams) -> Following:
+    """Task velocity x_d: along the path, and towards it, no faster than the speed allowed by now.
 
     Off the path the forward part shrinks, to nothing at `off_path_m`: the arm first returns to where it left.
     `position` (3,) [m] is the end-effector origin.
     """
-    error = path.point(state.phase) - position
-    velocity = _forward(error, state, params) * path.tangent(state.phase) + params.position_gain_1_s * error
-    speed = float(np.sqrt(velocity @ velocity))
-    return velocity if speed <= state.speed else velocity * (state.speed / speed)
+    # for three numbers, floats are faster than arrays
+    point = np.asarray(path.point(state.phase), dtype=np.float64)
+    tx, ty, tz = np.asarray(path.tangent(state.phase), dtype=np.float64).tolist()
+    (px, py, pz), (x, y, z) = point.tolist(), position.tolist()
+    ex, ey, ez = px - x, py - y, pz - z
+    forward = state.speed * max(0.0, 1.0 - math.hypot(ex, ey, ez) / params.off_path_m)
+    gain = params.position_gain_1_s
+    vx, vy, vz = forward * tx + gain * ex, forward * ty + gain * ey, forward * tz + gain * ez
+    speed = math.hypot(vx, vy, vz)
+    if speed > state.speed:
+        limit = state.speed / speed
+        vx, vy, vz = limit * vx, limit * vy, limit * vz
+    return Following(point, (tx, ty, tz), (vx, vy, vz), forward)
 
 
-def _forward(error: FloatArray, state: PathState, params: TaskParams) -> float:
-    """Speed along the path [m/s] at a distance `error` (3,) [m] from it."""
-    return state.speed * max(0.0, 1.0 - float(np.sqrt(error @ error)) / params.off_path_m)
-
-
-def advance(path: Path, state: PathState, position: FloatArray, velocity: FloatArray, params: TaskParams) -> PathState:
+def advance(path: Path, state: PathState, way: Following, velocity: FloatArray, params: TaskParams) -> PathState:
     """Move the phase on by one period of the task's forward speed, less what the arm falls short of it, never back.
 
     Slowing or blocking the arm so slows the phase. The way back to the path is no way along it, so an arm pushed
@@ -149,13 +194,13 @@ def advance(path: Path, state: PathState, position: FloatArray, velocity: FloatA
     Args:
         path: the path.
         state: phase and speed so far.
-        position: (3,) end-effector origin [m].
-        velocity: (3,) velocity commanded there [m/s].
+        way: how it is followed from there.
+        velocity: (3,) velocity commanded at the end-effector origin [m/s].
         params: speed, gains and period.
     """
-    missing = (follow(path, state, position, params) - velocity) @ path.tangent(state.phase)
-    forward = _forward(path.point(state.phase) - position, state, params)
-    phase = state.phase + max(0.0, forward - max(0.0, float(missing))) * params.control_period_s
+    (tx, ty, tz), (ax, ay, az), (vx, vy, vz) = way.tangent, way.velocity, velocity.tolist()
+    missing = (ax - vx) * tx + (ay - vy) * ty + (az - vz) * tz
+    phase = state.phase + max(0.0, way.forward - max(0.0, missing)) * params.control_period_s
     if not path.closed:
         phase = min(phase, path.length)
     return PathState(phase, min(params.speed_m_s, state.speed + params.acceleration_m_s2 * params.control_period_s))

@@ -1,22 +1,24 @@
 """The quadratic program for joint velocities: eq. 2 within joint box and approach rows. Never without an answer."""
 
-from dataclasses import dataclass
-
 import daqp
 import numpy as np
 
+from pretouch.compiled import compiled
+from pretouch.control.penalty import BUDGET, NOT_CONVEX, NOT_FINITE, SOLVED, minimise, possible_rows
 from pretouch.control.restriction import ApproachRows
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray, QpOutcome, QpSolution
+from pretouch.values import value
 
-_SOFT = 8
-_NO_BOUND = -1e30
-_OPTIMAL, _SOFT_OPTIMAL, _INFEASIBLE = 1, 2, -1
+ENDING = {
+    NOT_FINITE: "the problem holds numbers that are not finite",
+    NOT_CONVEX: "the Hessian is not convex",
+    BUDGET: "the iteration limit was reached",
+}
+_OPTIMAL, _INFEASIBLE, _CYCLED = 1, -1, -2
 _EXIT = {
-    _OPTIMAL: "solved",
-    _SOFT_OPTIMAL: "solved, an approach row is violated",
     _INFEASIBLE: "the approach rows cannot be met within the acceleration limits",
-    -2: "the solver cycled",
+    _CYCLED: "the solver cycled",
     -3: "the problem is unbounded",
     -4: "the iteration limit was reached",
     -5: "the Hessian is not convex",
@@ -24,7 +26,7 @@ _EXIT = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Cost:
     """Cost 1/2 qd^T H qd + f^T qd."""
 
@@ -34,16 +36,28 @@ class Cost:
     """(n,)."""
 
 
+@compiled
 def manipulability(jacobian: FloatArray) -> float:
     """Yoshikawa's measure w = sqrt(det(J J^T)) of a Jacobian (m, n)."""
-    return float(np.sqrt(max(0.0, float(np.linalg.det(jacobian @ jacobian.T)))))
+    # the volume its rows span, row by row: of the determinant rounding would leave half the digits near a singularity
+    rows, volume = jacobian.copy(), 1.0
+    for i in range(len(rows)):
+        height = np.sqrt((rows[i] ** 2).sum())
+        volume *= height
+        if height > 0:
+            rows[i] /= height
+            for k in range(i + 1, len(rows)):
+                rows[k] -= (rows[k] * rows[i]).sum() * rows[i]
+    return volume
 
 
+@compiled
 def damping(w: float, damping_max: float, threshold: float) -> float:
     """Factor mu of eq. 2 after Nakamura and Hanafusa (1986): lambda_0 (1 - w / w_0)^2 below w_0, else zero."""
     return damping_max * (1.0 - w / threshold) ** 2 if w < threshold else 0.0
 
 
+@compiled
 def mid_joint_velocity(q: FloatArray, q_mid: FloatArray, time: float) -> FloatArray:
     """Joint velocities qd_mid (n,) [rad/s] of eq. 2 that would reach the middle of the joint ranges in `time` [s]."""
     return (q_mid - q) / time
@@ -61,11 +75,32 @@ def task_cost(jacobian: FloatArray, velocity: FloatArray, q: FloatArray, q_mid: 
         q_mid: (n,) middle of the joint ranges [rad].
         params: damping and mid-joint term.
     """
-    mu = damping(manipulability(jacobian), params.damping_max, params.manipulability_threshold)
-    k = params.mid_joint_gain
-    H = jacobian.T @ jacobian + (mu + k) * np.eye(len(q))
-    f = -jacobian.T @ velocity - k * mid_joint_velocity(q, q_mid, params.mid_joint_time_s)
+    n, p = len(q), params
+    H, f = np.empty((n, n)), np.empty(n)
+    cost_into(
+        jacobian, velocity, q, q_mid, p.damping_max, p.manipulability_threshold, p.mid_joint_gain, p.mid_joint_time_s,
+        H, f,
+    )  # fmt: skip
     return Cost(H, f)
+
+
+@compiled
+def cost_into(
+    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, damping_max: float, threshold: float, k: float,
+    time: float, H: FloatArray, f: FloatArray,
+) -> None:  # fmt: skip
+    """Write H (n, n) and f (n,) of `task_cost`."""
+    mu = damping(manipulability(J), damping_max, threshold)
+    qd_mid = mid_joint_velocity(q, q_mid, time)
+    for i in range(len(q)):
+        f[i] = -k * qd_mid[i]
+        for m in range(len(x_d)):
+            f[i] -= J[m, i] * x_d[m]
+        for j in range(i + 1):
+            H[i, j] = mu + k if i == j else 0.0
+            for m in range(len(x_d)):
+                H[i, j] += J[m, i] * J[m, j]
+            H[j, i] = H[i, j]
 
 
 def solve(
@@ -75,6 +110,7 @@ def solve(
     rows: ApproachRows,
     slack_weight: float,
     stop: FloatArray,
+    budget: int = 500,
 ) -> QpSolution:
     """Minimise the cost over joint velocities within the box and the approach rows.
 
@@ -88,29 +124,52 @@ def solve(
         rows: G (K, n), h (K,).
         slack_weight: weight of a squared violation.
         stop: (n,) braking command inside the box [rad/s].
+        budget: iterations after which to brake. A limit in time would give another answer each time.
     """
     n, count = len(lower), len(rows.h)
-    if not all(np.isfinite(a).all() for a in (cost.H, cost.f, lower, upper, rows.G, rows.h)):
-        # the solver would answer NaN with success, or drop a row in silence
-        return _braking(stop, rows, QpOutcome.FAILED, "the problem holds numbers that are not finite")
-    model = daqp.Model()
-    sense = np.zeros(n + count, dtype=np.int32)
-    sense[n:] = _SOFT if rows.soft else 0
-    upper_bounds = np.concatenate([upper, rows.h])
-    lower_bounds = np.concatenate([lower, np.full(count, _NO_BOUND)])
-    flag, _ = model.setup(cost.H, cost.f, rows.G, upper_bounds, lower_bounds, sense)
-    if flag > 0:
-        model.settings = {"primal_tol": 1e-9}
-        if rows.soft:
-            reciprocal = np.full(n + count, 1.0 / slack_weight)
-            model.soft_weights(reciprocal, reciprocal)
-        x, _, flag, info = model.solve()
-    if flag not in (_OPTIMAL, _SOFT_OPTIMAL) or not np.isfinite(x).all():
-        outcome = QpOutcome.INFEASIBLE if flag == _INFEASIBLE else QpOutcome.FAILED
+    x, slack, multipliers = np.empty(n), np.empty(count), np.empty(n + count)
+    # hard rows have no price: what is best without them is best with them if it keeps them
+    weight = slack_weight if rows.soft else 0.0
+    ending = minimise(cost.H, cost.f, lower, upper, rows.G, rows.h, weight, budget, x, slack, multipliers)
+    if ending != SOLVED:
+        return _braking(stop, rows, QpOutcome.FAILED, ENDING[ending])
+    if count and not rows.soft and slack.max() > 0:
+        return _solve_hard(cost, lower, upper, rows, stop, budget)
+    violated = bool(count) and slack.max() > 0
+    status = "solved, an approach row is violated" if violated else "solved"
+    return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, status)
+
+
+def _solve_hard(
+    cost: Cost, lower: FloatArray, upper: FloatArray, rows: ApproachRows, stop: FloatArray, budget: int
+) -> QpSolution:
+    """Minimise the cost, all of it finite, where hard rows are in the way."""
+    which = possible_rows(rows.G, rows.h, lower, upper)
+    # the least bound DAQP takes for none
+    lowest = np.full(len(which), -1e30)
+    x, _, flag, info = daqp.solve(
+        cost.H, cost.f, rows.G[which], np.concatenate((upper, rows.h[which])), np.concatenate((lower, lowest)),
+        np.zeros(len(lower) + len(which), np.int32), primal_tol=1e-12, iter_limit=budget,
+    )  # fmt: skip
+    if flag != _OPTIMAL or not np.isfinite(x).all():
+        # of rows that contradict each other by little DAQP may say that it cycled
+        contradict = flag == _INFEASIBLE or (flag == _CYCLED and _contradict(lower, upper, rows, budget))
+        outcome, flag = (QpOutcome.INFEASIBLE, _INFEASIBLE) if contradict else (QpOutcome.FAILED, flag)
         return _braking(stop, rows, outcome, _EXIT.get(flag, f"the solver failed with exit code {flag}"))
     # the box holds to the solver's tolerance only; the clip makes it exact
     x = np.clip(x, lower, upper)
-    return QpSolution(x, np.maximum(rows.G @ x - rows.h, 0.0), info["lam"], QpOutcome.SOLVED, _EXIT[flag])
+    n = len(x)
+    multipliers = np.zeros(n + len(rows.h))
+    multipliers[:n], multipliers[n + which] = info["lam"][:n], info["lam"][n:]
+    return QpSolution(x, np.maximum(rows.G @ x - rows.h, 0.0), multipliers, QpOutcome.SOLVED, "solved")
+
+
+def _contradict(lower: FloatArray, upper: FloatArray, rows: ApproachRows, budget: int) -> bool:
+    """Whether no joint velocities in the box meet all rows: those that violate them least still do."""
+    n, count = len(lower), len(rows.h)
+    x, slack, multipliers = np.empty(n), np.empty(count), np.empty(n + count)
+    least = minimise(1e-6 * np.eye(n), np.zeros(n), lower, upper, rows.G, rows.h, 1e3, budget, x, slack, multipliers)
+    return least == SOLVED and bool(slack.max() > 1e-6)
 
 
 def skipped(stop: FloatArray, rows: ApproachRows) -> QpSolution:

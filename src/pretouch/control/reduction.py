@@ -1,11 +1,10 @@
 """Slowing the end-effector near obstacles: eqs. 3 and 4."""
 
-from dataclasses import dataclass
-
 from pretouch.params import ReductionParams
+from pretouch.values import value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ReductionState:
     """The factor a fading starts from, and how far it has come."""
 

@@ -1,16 +1,17 @@
 """Restricting the body's approach to obstacles: eqs. 5-7, as rows G qd <= h of the QP."""
 
-from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
-from numba import njit
 
+from pretouch.compiled import compiled
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
+from pretouch.values import value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ApproachRows:
     """K rows of the QP: G @ qd <= h, softly or not."""
 
@@ -22,17 +23,23 @@ class ApproachRows:
     """Whether a row may be violated at a cost."""
 
 
-def _sigmoid(v_max: float, exponent: FloatArray) -> FloatArray:
+Number = TypeVar("Number", float, FloatArray)
+
+
+@compiled
+def _sigmoid(v_max: float, exponent: Number) -> Number:
     # beyond +-500 the result is 0 or v_max to the last digit, and exp does not overflow
-    return v_max / (1.0 + np.exp(np.clip(exponent, -500.0, 500.0)))
+    return v_max / (1.0 + np.exp(np.minimum(np.maximum(exponent, -500.0), 500.0)))
 
 
-def velocity_a(d: FloatArray, v_max: float, beta: float, d_crit: float) -> FloatArray:
+@compiled
+def velocity_a(d: Number, v_max: float, beta: float, d_crit: float) -> Number:
     """V_a = V_max / (1 + exp(beta (2 d / d_crit - 1))) [m/s], eq. 5 of the paper. `d` [m] is from the surface."""
     return _sigmoid(v_max, beta * (2.0 * d / d_crit - 1.0))
 
 
-def velocity_b(d: FloatArray, v_max: float, beta: float, d_crit: float, d_notice: float) -> FloatArray:
+@compiled
+def velocity_b(d: Number, v_max: float, beta: float, d_crit: float, d_notice: float) -> Number:
     """V_b = V_max / (1 + exp(beta (2 (d - d_crit) / (d_notice - d_crit) - 1))) [m/s], eq. 6 of the paper."""
     return _sigmoid(v_max, beta * (2.0 * (d - d_crit) / (d_notice - d_crit) - 1.0))
 
@@ -44,10 +51,33 @@ def approach_limit(d: FloatArray, params: RestrictionParams) -> FloatArray:
     negative. In mode floor the limit never lies below `floor_m_s`.
     """
     p = params
-    repulse = velocity_a(d, p.v_max_m_s, p.beta, p.d_crit_m) - p.v_max_m_s
-    slow = velocity_b(d, p.v_max_m_s, p.beta, p.d_crit_m, p.d_notice_m)
-    limit = np.where(d < p.d_notice_m, np.where(d < p.d_repulse_m, repulse, slow), np.inf)
-    return np.maximum(limit, p.floor_m_s) if p.mode == "floor" else limit
+    return _limits(d, p.v_max_m_s, p.beta, p.d_crit_m, p.d_repulse_m, p.d_notice_m, least_limit(p))
+
+
+def least_limit(params: RestrictionParams) -> float:
+    """Return the approach limit no row falls below [m/s], -inf where there is none."""
+    return params.floor_m_s if params.mode == "floor" else -np.inf
+
+
+@compiled
+def _limits(
+    d: FloatArray, v_max: float, beta: float, d_crit: float, d_repulse: float, d_notice: float, floor: float
+) -> FloatArray:
+    limits = np.empty(len(d))
+    for k in range(len(d)):
+        limits[k] = _limit(d[k], v_max, beta, d_crit, d_repulse, d_notice, floor)
+    return limits
+
+
+@compiled
+def _limit(
+    d: float, v_max: float, beta: float, d_crit: float, d_repulse: float, d_notice: float, floor: float
+) -> float:
+    if not d < d_notice:
+        return np.inf
+    if d < d_repulse:
+        return max(velocity_a(d, v_max, beta, d_crit) - v_max, floor)
+    return max(velocity_b(d, v_max, beta, d_crit, d_notice), floor)
 
 
 def approach_rows(
@@ -58,42 +88,40 @@ def approach_rows(
     J_c is the Jacobian of the closest body point, d the direction from it to the obstacle; `moved_by` (L, n) says
     which joint moves which link.
     """
-    if params.mode == "off" or len(obstacles.unit) == 0:
-        return ApproachRows(np.zeros((0, len(kin.anchor))), np.zeros(0), soft=False), np.zeros(0, np.int64)
-    soft = params.mode in ("slack", "floor")
-    limit = approach_limit(obstacles.body_distance, params)
-    which = np.flatnonzero(np.isfinite(limit))
-    G = _rows(
-        kin.anchor,
-        kin.axis,
-        moved_by,
-        obstacles.link[which],
-        obstacles.body_point[which],
-        obstacles.direction[which],
-    )
-    return ApproachRows(G, limit[which], soft), which
+    p, n, count = params, len(kin.anchor), len(obstacles.unit)
+    if p.mode == "off" or count == 0:
+        return ApproachRows(np.zeros((0, n)), np.zeros(0), soft=False), np.zeros(0, np.int64)
+    G, h, which = np.empty((count, n)), np.empty(count), np.empty(count, np.int64)
+    found = rows_into(
+        kin.anchor, kin.axis, moved_by, obstacles.link, obstacles.body_point, obstacles.direction,
+        obstacles.body_distance, p.v_max_m_s, p.beta, p.d_crit_m, p.d_repulse_m, p.d_notice_m, least_limit(p),
+        G, h, which,
+    )  # fmt: skip
+    return ApproachRows(G[:found], h[:found], p.mode in ("slack", "floor")), which[:found]
 
 
-@njit(cache=True)
-def _rows(
-    anchor: FloatArray,
-    axis: FloatArray,
-    moved_by: BoolArray,
-    link: IntArray,
-    point: FloatArray,
-    direction: FloatArray,
-) -> FloatArray:
-    n = anchor.shape[0]
-    G = np.zeros((len(link), n))
+@compiled
+def rows_into(
+    anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, link: IntArray, point: FloatArray,
+    direction: FloatArray, distance: FloatArray, v_max: float, beta: float, d_crit: float, d_repulse: float,
+    d_notice: float, floor: float, G: FloatArray, h: FloatArray, which: IntArray,
+) -> int:  # fmt: skip
+    """Write the rows G, h of `approach_rows` and the indices of their obstacles; return how many."""
+    found = 0
     for k in range(len(link)):
-        d = direction[k]
-        for j in range(n):
+        limit = _limit(distance[k], v_max, beta, d_crit, d_repulse, d_notice, floor)
+        if limit == np.inf:
+            continue
+        h[found], which[found] = limit, k
+        dx, dy, dz = direction[k, 0], direction[k, 1], direction[k, 2]
+        for j in range(len(anchor)):
+            G[found, j] = 0.0
             if moved_by[link[k], j]:
-                r = point[k] - anchor[j]
-                z = axis[j]
-                G[k, j] = (
-                    d[0] * (z[1] * r[2] - z[2] * r[1])
-                    + d[1] * (z[2] * r[0] - z[0] * r[2])
-                    + d[2] * (z[0] * r[1] - z[1] * r[0])
+                x, y, z = point[k, 0] - anchor[j, 0], point[k, 1] - anchor[j, 1], point[k, 2] - anchor[j, 2]
+                G[found, j] = (
+                    dx * (axis[j, 1] * z - axis[j, 2] * y)
+                    + dy * (axis[j, 2] * x - axis[j, 0] * z)
+                    + dz * (axis[j, 0] * y - axis[j, 1] * x)
                 )
-    return G
+        found += 1
+    return found

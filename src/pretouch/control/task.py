@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray
 
@@ -24,11 +25,23 @@ def task(
     """
     if params.orientation == "free":
         return ee_jacobian[:3], velocity
-    angular = params.orientation_gain_1_s * rotation_error(rotation, rotation_goal)
-    return ee_jacobian, np.concatenate([velocity, angular])
+    return ee_jacobian, twist(velocity, rotation, rotation_goal, params.orientation_gain_1_s)
 
 
+@compiled
+def twist(velocity: FloatArray, rotation: FloatArray, goal: FloatArray, gain: float) -> FloatArray:
+    """Task velocity (6,) of `task` when the orientation is held [m/s, then rad/s]."""
+    return np.concatenate((velocity, gain * rotation_error(rotation, goal)))
+
+
+@compiled
 def rotation_error(rotation: FloatArray, goal: FloatArray) -> FloatArray:
     """Rotation from one orientation to the other (3,): the unit axis times the sine of the angle, base frame."""
-    turn = goal @ rotation.T
-    return 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    error = np.zeros(3)
+    # half the sum of the products of each axis of the one with its like of the other
+    for i in range(3):
+        x, y, z = rotation[0, i], rotation[1, i], rotation[2, i]
+        error[0] += 0.5 * (y * goal[2, i] - z * goal[1, i])
+        error[1] += 0.5 * (z * goal[0, i] - x * goal[2, i])
+        error[2] += 0.5 * (x * goal[1, i] - y * goal[0, i])
+    return error

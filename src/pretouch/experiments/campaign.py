@@ -149,11 +149,16 @@ def _object(path: Path) -> dict[str, Any]:
 
 
 def write_json(value: Any, path: Path) -> None:
-    """Write a JSON file, whole or not at all."""
+    """Write a JSON file, whole or not at all; into a device or pipe as it is, never in its place."""
+    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
+    if path.exists() and not path.is_file() and not path.is_dir():
+        path.write_text(text, encoding="utf-8")
+        return
+    path = Path(os.path.realpath(path))
     name = sha256(os.fsencode(path.name)).hexdigest()[:16]  # as short for a long name
     temporary = path.with_name(f".{name}.{os.getpid()}.tmp")
     try:
-        temporary.write_text(json.dumps(value, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8")
         os.replace(temporary, path)
     except BaseException:
         temporary.unlink(missing_ok=True)

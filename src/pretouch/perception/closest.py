@@ -1,12 +1,12 @@
 """The closest point of the body to each obstacle: signed distance and direction, on capsules."""
 
 import numpy as np
-from numba import njit
 
-from pretouch.perception.vectors import dot, placed
+from pretouch.compiled import compiled
+from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
-from pretouch.types import FloatArray, IntArray, Obstacles
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _ON_AXIS = 1e-9
 """Distance from a capsule's axis below which the direction to an obstacle is not defined [m]."""
@@ -34,8 +34,11 @@ def closest_points(
         last_direction: (K, 3) unit vectors to fall back on.
     """
     a, b = placed(body, kin)
-    body_point, link, direction, distance = _closest(body.link, a, b, body.radius, point, last_direction)
-    ee_distance = np.sqrt(((point - ee_position) ** 2).sum(axis=1))
+    count, every = len(point), np.ones(len(body), np.bool_)
+    body_point, link, distance = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
+    direction, ee_distance = last_direction.astype(np.float64), np.empty(count)
+    closest(body.link, a, b, body.radius, every, point, body_point, link, direction, distance)
+    distances(point, ee_position, ee_distance)
     return Obstacles(unit, point, ee_distance, body_point, link, direction, distance)
 
 
@@ -45,29 +48,75 @@ def no_obstacles() -> Obstacles:
     return Obstacles(np.zeros(0, np.int64), vectors, none, vectors, np.zeros(0, np.int64), vectors, none)
 
 
-@njit(cache=True)
-def _closest(
-    link: IntArray,
-    a: FloatArray,
-    b: FloatArray,
-    radius: FloatArray,
-    point: FloatArray,
-    last_direction: FloatArray,
-) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
-    count = len(point)
-    body_point, direction = np.empty((count, 3)), np.empty((count, 3))
-    on_link, distance = np.empty(count, np.int64), np.full(count, np.inf)
-    for k in range(count):
-        for c in range(len(radius)):
-            axis, to = b[c] - a[c], point[k] - a[c]
-            length2 = dot(axis, axis)
-            along = 0.0 if length2 == 0 else min(1.0, max(0.0, dot(to, axis) / length2))
-            foot = a[c] + along * axis
-            gap = point[k] - foot
-            from_axis = np.sqrt(dot(gap, gap))
-            if c == 0 or from_axis - radius[c] < distance[k]:
-                distance[k] = from_axis - radius[c]
-                on_link[k] = link[c]
-                direction[k] = gap / from_axis if from_axis > _ON_AXIS else last_direction[k]
-                body_point[k] = foot + radius[c] * direction[k]
-    return body_point, on_link, direction, distance
+@compiled
+def distances(point: FloatArray, origin: FloatArray, out: FloatArray) -> None:
+    """Write the distance (K,) [m] of points (K, 3) from one point (3,)."""
+    for k in range(len(point)):
+        x, y, z = point[k, 0] - origin[0], point[k, 1] - origin[1], point[k, 2] - origin[2]
+        out[k] = np.sqrt(x * x + y * y + z * z)
+
+
+@compiled
+def closest(
+    link: IntArray, a: FloatArray, b: FloatArray, radius: FloatArray, counts: BoolArray, point: FloatArray,
+    body_point: FloatArray, on_link: IntArray, direction: FloatArray, distance: FloatArray,
+) -> None:  # fmt: skip
+    """Write body points, links, directions and distances of `closest_points`, of those of C placed capsules that count.
+
+    `direction` (K, 3) holds the one to fall back on before.
+    """
+    which = np.flatnonzero(counts)
+    link, a, b, radius = link[which], a[which], b[which], radius[which]
+    spheres, gap2 = bounds(a, b, radius), np.empty(len(which))
+    for k in range(len(point)):
+        # begun with the capsule whose middle is nearest, most of the others need no closer look
+        to_spheres(point, k, spheres, gap2)
+        first = int(np.argmin(gap2))
+        best, nearest, at, axial = np.inf, -1, 0.0, 0.0
+        for i in range(-1, len(which)):
+            c = first if i < 0 else i
+            if i >= 0 and (c == first or gap2[c] > (best + spheres[3, c]) ** 2):
+                continue
+            along, from_axis = to_axis(point, k, a, b, c)
+            gap = from_axis - radius[c]
+            if nearest < 0 or gap < best or (gap == best and c < nearest):
+                best, nearest, at, axial = gap, c, along, from_axis
+        distance[k], on_link[k] = best, link[nearest]
+        for i in range(3):
+            foot = a[nearest, i] + at * (b[nearest, i] - a[nearest, i])
+            if axial > _ON_AXIS:
+                direction[k, i] = (point[k, i] - foot) / axial
+            body_point[k, i] = foot + radius[nearest] * direction[k, i]
+
+
+@compiled
+def bounds(a: FloatArray, b: FloatArray, radius: FloatArray) -> FloatArray:
+    """Spheres (4, C) round capsules, a little larger than they need to be: x, y, z and radius [m]."""
+    spheres = np.empty((4, len(radius)))
+    for c in range(len(radius)):
+        length2 = 0.0
+        for i in range(3):
+            spheres[i, c] = (a[c, i] + b[c, i]) / 2
+            length2 += (b[c, i] - a[c, i]) ** 2
+        spheres[3, c] = (np.sqrt(length2) / 2 + radius[c]) * (1 + 1e-12) + 1e-12
+    return spheres
+
+
+@compiled
+def to_spheres(point: FloatArray, k: int, spheres: FloatArray, gap2: FloatArray) -> None:
+    """Write the squared distance (C,) of point[k] from the middle of each sphere [m^2]."""
+    x, y, z = point[k, 0], point[k, 1], point[k, 2]
+    for c in range(len(gap2)):
+        u, v, w = spheres[0, c] - x, spheres[1, c] - y, spheres[2, c] - z
+        gap2[c] = u * u + v * v + w * w
+
+
+@compiled
+def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> tuple[float, float]:
+    """Where on the segment from a[c] to b[c] point[k] is closest, from 0 to 1, and how far from it [m]."""
+    ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
+    x, y, z = point[k, 0] - a[c, 0], point[k, 1] - a[c, 1], point[k, 2] - a[c, 2]
+    length2 = ux * ux + uy * uy + uz * uz
+    along = 0.0 if length2 == 0 else min(1.0, max(0.0, (x * ux + y * uy + z * uz) / length2))
+    x, y, z = x - along * ux, y - along * uy, z - along * uz
+    return along, np.sqrt(x * x + y * y + z * z)

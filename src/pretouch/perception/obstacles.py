@@ -1,68 +1,84 @@
 """Where the sensed obstacles are: eq. 1, which readings count, and how long a point is kept."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from numba import njit
 
-from pretouch.perception.vectors import rotated
+from pretouch.compiled import compiled
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MAX_DISTANCE, MIN_DISTANCE
 from pretouch.types import BoolArray, FloatArray, IntArray, RangeReadings, RangeStatus
+from pretouch.values import value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class TrackState:
     """The last point each of K units showed. NaN and -inf where there is none."""
 
     point: FloatArray
     """(K, 3) obstacle position, base frame [m]."""
-    seen: FloatArray
-    """(K,) instant of the measurement that showed it [s]."""
-    used: FloatArray
-    """(K,) stamp of the newest reading taken into account [s]."""
-    heard: FloatArray
-    """(K,) stamp of the newest reading that told anything [s]."""
     direction: FloatArray
     """(K, 3) last direction from the body to the point."""
+    times: FloatArray
+    """(3, K) instants `seen`, `used` and `heard` [s]."""
+
+    @property
+    def seen(self) -> FloatArray:
+        """Instant of the measurement that showed the point (K,) [s]."""
+        return self.times[_SEEN]
+
+    @property
+    def used(self) -> FloatArray:
+        """Stamp of the newest reading taken into account (K,) [s]."""
+        return self.times[_USED]
+
+    @property
+    def heard(self) -> FloatArray:
+        """Stamp of the newest reading that told anything (K,) [s]."""
+        return self.times[_HEARD]
+
+
+_SEEN, _USED, _HEARD = range(3)
 
 
 def track_init(units: int) -> TrackState:
     """Return the state before any reading."""
-    return TrackState(
-        np.full((units, 3), np.nan),
-        np.full(units, -np.inf),
-        np.full(units, -np.inf),
-        np.full(units, -np.inf),
-        np.full((units, 3), np.nan),
-    )
+    return TrackState(np.full((units, 3), np.nan), np.full((units, 3), np.nan), np.full((3, units), -np.inf))
 
 
 def sensor_poses(skin: Skin, kin: Kinematics) -> tuple[FloatArray, FloatArray]:
     """Positions (K, 3) [m] and orientations (K, 3, 3) of the sensors, base frame: T_O_link @ T_link_sensor."""
-    return _poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
+    return poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
 
 
-@njit(cache=True)
-def _poses(
+@compiled
+def poses(
     link_position: FloatArray, link_rotation: FloatArray, link: IntArray, T_link_sensor: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Return the poses of `sensor_poses` from those of the links."""
     position, rotation = np.empty((len(link), 3)), np.empty((len(link), 3, 3))
     for k in range(len(link)):
-        R_O_link = link_rotation[link[k]]
-        position[k] = link_position[link[k]] + rotated(R_O_link, T_link_sensor[k, :3, 3])
-        for column in range(3):
-            rotation[k, :, column] = rotated(R_O_link, T_link_sensor[k, :3, column])
+        m = link[k]
+        for i in range(3):
+            x, y, z = link_rotation[m, i, 0], link_rotation[m, i, 1], link_rotation[m, i, 2]
+            for j in range(3):
+                rotation[k, i, j] = x * T_link_sensor[k, 0, j] + y * T_link_sensor[k, 1, j] + z * T_link_sensor[k, 2, j]
+            position[k, i] = link_position[m, i] + (
+                x * T_link_sensor[k, 0, 3] + y * T_link_sensor[k, 1, 3] + z * T_link_sensor[k, 2, 3]
+            )
     return position, rotation
 
 
+@compiled
 def locate(position: FloatArray, rotation: FloatArray, distance: FloatArray) -> FloatArray:
     """Obstacle positions h_k = r_SUk + R_SUk [0 0 d_k]^T (K, 3) [m] in the base frame, eq. 1 of the paper.
 
     `position` (K, 3) [m] and `rotation` (K, 3, 3) are the sensors' poses, `distance` (K,) the readings [m].
     """
-    return position + rotation[:, :, 2] * distance[:, None]
+    point = np.empty((len(distance), 3))
+    for k in range(len(distance)):
+        for i in range(3):
+            point[k, i] = position[k, i] + rotation[k, i, 2] * distance[k]
+    return point
 
 
 def measured_distance(readings: RangeReadings) -> FloatArray:
@@ -71,7 +87,9 @@ def measured_distance(readings: RangeReadings) -> FloatArray:
     A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone. A number
     beyond what it can measure shows nothing, whatever its status.
     """
-    return _measured(readings.distance, readings.status)
+    shown = np.empty(len(readings.distance))
+    measured(readings.distance, readings.status, shown)
+    return shown
 
 
 def is_evidence(readings: RangeReadings, distance: FloatArray) -> BoolArray:
@@ -81,7 +99,7 @@ def is_evidence(readings: RangeReadings, distance: FloatArray) -> BoolArray:
     tells nothing, and is no more free space than silence is. A target beyond what the sensor can measure is far away.
     `distance` is what `measured_distance` makes of the readings.
     """
-    return _tells(readings.distance, readings.status, distance)
+    return tells_anything(readings.distance, readings.status, distance)
 
 
 _SHOWN = tuple(int(s) for s in (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED))
@@ -92,8 +110,9 @@ _NO_TARGET = tuple(
 """Statuses of a sensor at work that sees nothing near: too little light, too noisy, or beyond its range."""
 
 
-@njit(cache=True)
-def _tells(distance: FloatArray, status: IntArray, shown: FloatArray) -> BoolArray:
+@compiled
+def tells_anything(distance: FloatArray, status: IntArray, shown: FloatArray) -> BoolArray:
+    """Answer of `is_evidence`; `shown` (K,) is that of `measured_distance`."""
     tells = np.isfinite(shown)
     for k in range(len(status)):
         far = status[k] in _SHOWN and np.isfinite(distance[k]) and distance[k] > MAX_DISTANCE
@@ -101,15 +120,15 @@ def _tells(distance: FloatArray, status: IntArray, shown: FloatArray) -> BoolArr
     return tells
 
 
-@njit(cache=True)
-def _measured(distance: FloatArray, status: IntArray) -> FloatArray:
-    shown = np.full(len(distance), np.nan)
+@compiled
+def measured(distance: FloatArray, status: IntArray, shown: FloatArray) -> None:
+    """Write the answer (K,) of `measured_distance`."""
     for k in range(len(distance)):
+        shown[k] = np.nan
         if status[k] in _NEAR:
             shown[k] = MIN_DISTANCE
         elif status[k] in _SHOWN and 0 <= distance[k] <= MAX_DISTANCE:
             shown[k] = max(distance[k], MIN_DISTANCE)
-    return shown
 
 
 def track(
@@ -135,15 +154,25 @@ def track(
         now: instant of this step [s].
         persistence: age at which a point is given up [s].
     """
-    fresh = is_fresh(state, readings, now)
-    take = fresh & shows & (now - readings.stamp <= persistence)
-    return TrackState(
-        point=np.where(take[:, None], points, state.point),
-        seen=np.where(take, readings.stamp, state.seen),
-        used=np.where(fresh, readings.stamp, state.used),
-        heard=np.where(fresh & tells, readings.stamp, state.heard),
-        direction=state.direction,
-    )
+    point, times = state.point.copy(), state.times.copy()
+    take_in(point, times, readings.stamp, points, is_fresh(state, readings, now), shows, tells, now, persistence)
+    return TrackState(point, state.direction, times)
+
+
+@compiled
+def take_in(
+    point: FloatArray, times: FloatArray, stamp: FloatArray, points: FloatArray, fresh: BoolArray, shows: BoolArray,
+    tells: BoolArray, now: float, persistence: float,
+) -> None:  # fmt: skip
+    """Change the points (K, 3) and times (3, K) of a `TrackState` as `track` says."""
+    for k in range(len(stamp)):
+        if fresh[k]:
+            times[_USED, k] = stamp[k]
+            if tells[k]:
+                times[_HEARD, k] = stamp[k]
+            if shows[k] and now - stamp[k] <= persistence:
+                times[_SEEN, k] = stamp[k]
+                point[k] = points[k]
 
 
 def is_fresh(state: TrackState, readings: RangeReadings, now: float) -> BoolArray:
@@ -151,4 +180,10 @@ def is_fresh(state: TrackState, readings: RangeReadings, now: float) -> BoolArra
 
     A unit whose clock is ahead is so never heard: it must not pass for one that is well.
     """
-    return (readings.stamp > state.used) & (readings.stamp <= now)
+    return newer(state.used, readings.stamp, now)
+
+
+@compiled
+def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
+    """Answer of `is_fresh`."""
+    return (stamp > used) & (stamp <= now)

@@ -1,24 +1,39 @@
 """Perception in one call: readings in, obstacles with their closest body points out."""
 
-from dataclasses import replace
-
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.params import PerceptionParams
-from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.perception.closest import bounds, closest, distances, no_obstacles
 from pretouch.perception.obstacles import (
     TrackState,
-    is_evidence,
-    is_fresh,
     locate,
+    measured,
     measured_distance,
-    sensor_poses,
-    track,
+    newer,
+    poses,
+    take_in,
+    tells_anything,
 )
-from pretouch.perception.scene_filter import Fixtures, expected_range
+from pretouch.perception.scene_filter import RAYS, Fixtures, capsule_return, plane_return
+from pretouch.perception.vectors import placed_ends, rotate
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Obstacles, RangeReadings
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RangeReadings
+from pretouch.values import value
+
+
+@value
+class Perception:
+    """What one step sees."""
+
+    obstacles: Obstacles
+    distance: FloatArray
+    """(K,) what each reading stands for [m]; NaN where it shows no target."""
+    nearest: float
+    """Distance of the nearest obstacle from the end-effector origin [m], infinite if there is none."""
+    longest_silence: float
+    """Time since the unit that has been silent for longest told anything [s]."""
 
 
 def perceive(
@@ -30,45 +45,102 @@ def perceive(
     readings: RangeReadings,
     now: float,
     params: PerceptionParams,
-) -> tuple[Obstacles, TrackState]:
+) -> tuple[Perception, TrackState]:
     """Locate what the units see (eq. 1), leave out the arm and fixtures, and find the closest body points."""
     if not params.enabled or len(skin) == 0:
-        return no_obstacles(), state
-    position, rotation = sensor_poses(skin, kin)
-    fresh = np.flatnonzero(is_fresh(state, readings, now))
-    if len(fresh):
-        distance = measured_distance(readings)
-        known = np.full(len(skin), np.inf)
-        if params.filter_views:
-            known[fresh] = expected_range(
-                kin, position[fresh], rotation[fresh], skin.link[fresh], model.capsules, fixtures
-            )
-        shows = distance < known - params.self_margin_m
-        points = locate(position, rotation, np.where(shows, distance, 0.0))
-        tells = is_evidence(readings, distance)
-        state = track(state, readings, points, shows, tells, now, params.persistence_s)
-    unit = np.flatnonzero(now - state.seen <= params.persistence_s)
-    if len(unit) == 0:
-        return no_obstacles(), state
-    beam = rotation[unit, :, 2]
-    last = np.where(np.isfinite(state.direction[unit]), state.direction[unit], beam)
-    obstacles = closest_points(kin, model.body, kin.position[model.ee], unit, state.point[unit], last)
-    direction = state.direction.copy()
-    direction[unit] = obstacles.direction
-    return obstacles, replace(state, direction=direction)
+        return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0), state
+    arm, others, count = model.capsules, fixtures.capsules, len(skin)
+    tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy())
+    distance = np.empty(count)
+    indices, vectors, scalars = np.empty((2, count), np.int64), np.empty((3, count, 3)), np.empty((2, count))
+    found, nearest, oldest = _perceive(
+        tracks.point, tracks.direction, tracks.times,
+        kin.position, kin.rotation, model.ee, skin.link, skin.T_link_sensor,
+        readings.stamp, readings.distance, readings.status, now,
+        arm.link, arm.a, arm.b, arm.radius, model.moving_capsule,
+        others.link, others.a, others.b, others.radius, fixtures.planes, RAYS,
+        params.persistence_s, params.self_margin_m, params.filter_views,
+        distance, indices, vectors, scalars,
+    )  # fmt: skip
+    unit, link = indices[:, :found]
+    point, body_point, direction = vectors[:, :found]
+    ee_distance, body_distance = scalars[:, :found]
+    obstacles = Obstacles(unit, point, ee_distance, body_point, link, direction, body_distance)
+    return Perception(obstacles, distance, nearest, now - oldest), tracks
 
 
-def silent_units(skin: Skin, state: TrackState, now: float, params: PerceptionParams) -> tuple[float, str]:
+@compiled
+def _perceive(
+    point: FloatArray, last_direction: FloatArray, times: FloatArray,
+    link_position: FloatArray, link_rotation: FloatArray, ee: int, unit_link: IntArray, T_link_sensor: FloatArray,
+    stamp: FloatArray, reading: FloatArray, status: IntArray, now: float,
+    arm_link: IntArray, arm_a: FloatArray, arm_b: FloatArray, arm_radius: FloatArray, moving: BoolArray,
+    other_link: IntArray, other_a: FloatArray, other_b: FloatArray, other_radius: FloatArray, planes: FloatArray,
+    rays: FloatArray, persistence: float, margin: float, filter_views: bool,
+    distance: FloatArray, indices: IntArray, vectors: FloatArray, scalars: FloatArray,
+) -> tuple[int, float, float]:  # fmt: skip
+    """Change the tracks (first line of arguments), write obstacles (last line).
+
+    Returns how many there are, the distance of the nearest from the end-effector, and when the unit that is silent for
+    longest last told anything.
+    """
+    arm_from, arm_to = placed_ends(arm_link, arm_a, arm_b, link_position, link_rotation)
+    measured(reading, status, distance)
+
+    # which readings are new, show what is not known to be there, and where
+    fresh = newer(times[1], stamp, now)
+    if fresh.any():
+        position, rotation = poses(link_position, link_rotation, unit_link, T_link_sensor)
+        shows, tells = np.isfinite(distance), tells_anything(reading, status, distance)
+        if filter_views:
+            other_from, other_to = placed_ends(other_link, other_a, other_b, link_position, link_rotation)
+            arm_spheres = bounds(arm_from, arm_to, arm_radius)
+            other_spheres = bounds(other_from, other_to, other_radius)
+            for k in range(len(shows)):
+                if fresh[k] and shows[k]:
+                    # what the model predicts at this distance, or up to the margin behind it, is not an obstacle
+                    end, own = distance[k] + margin, unit_link[k]
+                    shows[k] = (
+                        capsule_return(position, rotation, k, own, arm_link, arm_from, arm_to, arm_radius,
+                                       arm_spheres, rays, end, end) > end
+                        and capsule_return(position, rotation, k, own, other_link, other_from, other_to, other_radius,
+                                           other_spheres, rays, end, end) > end
+                        and plane_return(position, rotation, k, planes, rays, end) > end
+                    )  # fmt: skip
+        points = locate(position, rotation, distance)
+        take_in(point, times, stamp, points, fresh, shows, tells, now, persistence)
+
+    # the points, as long as they last
+    (unit, link), (near, body_point, direction), (ee_distance, body_distance) = indices, vectors, scalars
+    found = 0
+    for k in range(len(unit)):
+        if now - times[0, k] <= persistence:
+            unit[found], near[found], direction[found] = k, point[k], last_direction[k]
+            if np.isnan(direction[found, 0]):
+                # in place of a direction from the body that never was, the one the unit looks in
+                rotate(link_rotation[unit_link[k]], T_link_sensor[k, :3, 2], direction[found])
+            found += 1
+
+    # the body's closest points to them
+    near, direction = near[:found], direction[:found]
+    closest(arm_link, arm_from, arm_to, arm_radius, moving, near, body_point, link, direction, body_distance)
+    distances(near, link_position[ee], ee_distance)
+    nearest = np.inf
+    for k in range(found):
+        last_direction[unit[k]] = direction[k]
+        nearest = min(nearest, ee_distance[k])
+    return found, nearest, times[2].min()
+
+
+def silent_units(
+    skin: Skin, state: TrackState, silence: float, now: float, params: PerceptionParams
+) -> tuple[float, str]:
     """Factor in [0, 1] on the speed for units that fall silent, and the names of those that are.
 
     Silence is never free space, and neither is a failure: from `slow_after_s` without a reading that tells anything the
-    arm slows, at `silent_after_s` it stands.
+    arm slows, at `silent_after_s` it stands. `silence` [s] is the longest of any unit.
     """
-    if not params.enabled or len(skin) == 0:
+    if silence <= params.slow_after_s:
         return 1.0, ""
-    age = now - state.heard
-    oldest = float(age.max())
-    if oldest <= params.slow_after_s:
-        return 1.0, ""
-    names = ", ".join(skin.ids[k] for k in np.flatnonzero(age >= params.silent_after_s))
-    return max(0.0, (params.silent_after_s - oldest) / (params.silent_after_s - params.slow_after_s)), names
+    names = ", ".join(skin.ids[k] for k in np.flatnonzero(now - state.heard >= params.silent_after_s))
+    return max(0.0, (params.silent_after_s - silence) / (params.silent_after_s - params.slow_after_s)), names

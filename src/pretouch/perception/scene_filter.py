@@ -3,18 +3,22 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from pretouch.perception.vectors import dot, placed, rotated
+from pretouch.compiled import compiled
+from pretouch.errors import FixtureError
+from pretouch.perception.closest import bounds, to_axis, to_spheres
+from pretouch.perception.vectors import dot, placed, rotate
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.unit import CONE_ANGLE, cone_rays
 from pretouch.types import FloatArray, IntArray
 
-_RAYS = cone_rays(2)
+RAYS = cone_rays(2)
+"""Unit vectors (19, 3) that stand for all a sensor sees, sensor frame; the first is its axis."""
 
-_TOUCHING = 1e-9
-"""Distance to a capsule's side below which rounding may put the start of a ray on either side of it [m]."""
+_COS, _SIN = float(np.cos(CONE_ANGLE / 2)), float(np.sin(CONE_ANGLE / 2))
+_ROUNDING = 1e-9
+"""Distance within which rounding may put a point on either side of a surface [m]."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,22 @@ class Fixtures:
     planes: FloatArray
     """(P, 4) rows (normal, offset): normal . p = offset, the normal pointing into free space."""
     capsules: Capsules
+
+    def __post_init__(self) -> None:
+        planes, c = np.asarray(self.planes), self.capsules
+        if planes.ndim != 2 or planes.shape[1] != 4 or not np.isfinite(planes).all():
+            raise FixtureError(
+                f"The planes are {planes.tolist()}: give rows of four finite numbers, normal and offset."
+            )
+        count = len(c)
+        if c.a.shape != (count, 3) or c.b.shape != (count, 3) or c.link.shape != (count,):
+            shapes = f"{c.link.shape}, {c.a.shape}, {c.b.shape} and {c.radius.shape}"
+            raise FixtureError(f"The capsules' links, ends and radii have the shapes {shapes}: give one of each.")
+        numbers = np.concatenate([c.a.ravel(), c.b.ravel(), c.radius])
+        if not np.isfinite(numbers).all() or np.any(c.radius < 0):
+            raise FixtureError("A capsule has an end or a radius that is not finite, or a negative radius: correct it.")
+        if c.link.any():
+            raise FixtureError(f"The capsules are on the links {c.link.tolist()}: fixtures stand on link 0, the world.")
 
 
 def no_fixtures() -> Fixtures:
@@ -51,79 +71,170 @@ def expected_range(
         body: the arm as capsules, base included.
         fixtures: what stands around it.
     """
-    near = np.full(len(own_link), np.inf)
+    near = np.array([plane_return(position, rotation, k, fixtures.planes, RAYS, np.inf) for k in range(len(own_link))])
     for part in (body, fixtures.capsules):
         a, b = placed(part, kin)
-        _see_capsules(near, position, rotation, own_link, part.link, a, b, part.radius, _RAYS)
-    _see_planes(near, position, rotation, fixtures.planes, _RAYS)
+        shape = (part.link, a, b, part.radius, bounds(a, b, part.radius))
+        for k in range(len(near)):
+            found = capsule_return(position, rotation, k, own_link[k], *shape, RAYS, np.inf, -np.inf)
+            near[k] = min(near[k], found)
     return near
 
 
-@njit(cache=True)
-def _see_capsules(
-    near: FloatArray, position: FloatArray, rotation: FloatArray, own: IntArray, link: IntArray, a: FloatArray,
-    b: FloatArray, radius: FloatArray, rays: FloatArray,
-) -> None:  # fmt: skip
-    beam = np.empty(3)
-    for k in range(len(own)):
-        p, R = position[k], rotation[k]
-        beam[:] = R[:, 2]
-        for c in range(len(link)):
-            if link[c] != own[k] and _may_meet(p, beam, a[c], b[c], radius[c]):
-                for i in range(len(rays)):
-                    near[k] = min(near[k], ray_capsule(p, rotated(R, rays[i]), a[c], b[c], radius[c]))
+@compiled
+def capsule_return(
+    position: FloatArray, rotation: FloatArray, k: int, own: int, link: IntArray, a: FloatArray, b: FloatArray,
+    radius: FloatArray, spheres: FloatArray, rays: FloatArray, within: float, enough: float,
+) -> float:  # fmt: skip
+    """Least distance [m] at which sensor k sees a capsule, infinite for none nearer than `within`.
+
+    The search ends with the first distance of `enough` or less, which then need not be the least. `spheres` are those
+    of `bounds`.
+    """
+    far2 = np.empty(len(link))
+    to_spheres(position, k, spheres, far2)
+    bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
+    start = position[k, 0] * bx + position[k, 1] * by + position[k, 2] * bz
+    least = np.inf
+    for c in range(len(link)):
+        reach = spheres[3, c] + _ROUNDING
+        if link[c] == own or far2[c] > (within + reach) ** 2:
+            continue
+        # the cone can meet the sphere only if it is ahead, and if cos l - sin z <= reach as in `_cone_meets`
+        along = spheres[0, c] * bx + spheres[1, c] * by + spheres[2, c] * bz - start
+        inside = reach + _SIN * along
+        if along < -reach or (far2[c] - along * along) * (_COS * _COS) > inside * inside:
+            continue
+        if _cone_meets(position, rotation, k, a, b, c, radius[c], within):
+            least = min(least, _cast(position, rotation, k, a, b, c, radius[c], rays, enough))
+            if least <= enough:
+                return least
+    return least if least <= within else np.inf
 
 
-@njit(cache=True)
-def _see_planes(
-    near: FloatArray, position: FloatArray, rotation: FloatArray, planes: FloatArray, rays: FloatArray
-) -> None:
-    for k in range(len(near)):
-        for m in range(len(planes)):
-            height = dot(planes[m], position[k]) - planes[m, 3]
+@compiled
+def plane_return(
+    position: FloatArray, rotation: FloatArray, k: int, planes: FloatArray, rays: FloatArray, within: float
+) -> float:
+    """Least distance [m] at which sensor k sees a plane from its free side, infinite for none nearer than `within`."""
+    least, ray = np.inf, np.empty(3)
+    for m in range(len(planes)):
+        normal = planes[m]
+        height = normal[0] * position[k, 0] + normal[1] * position[k, 1] + normal[2] * position[k, 2] - normal[3]
+        if 0 <= height <= within:
             for i in range(len(rays)):
-                rate = dot(planes[m], rotated(rotation[k], rays[i]))
-                if rate < 0 and height >= 0:
-                    near[k] = min(near[k], -height / rate)
+                rotate(rotation[k], rays[i], ray)
+                rate = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
+                if rate < 0:
+                    least = min(least, -height / rate)
+    return least if least <= within else np.inf
 
 
-@njit(cache=True)
-def _may_meet(p: FloatArray, beam: FloatArray, a: FloatArray, b: FloatArray, radius: float) -> bool:
-    """Whether a sensor's cone can meet the sphere round a capsule."""
-    to, axis = (a + b) / 2 - p, b - a
-    reach = np.sqrt(dot(axis, axis)) / 2 + radius
-    distance = np.sqrt(dot(to, to))
-    if distance <= reach:
-        return True
-    off_axis = np.arccos(min(1.0, max(-1.0, dot(to, beam) / distance)))
-    return bool(off_axis <= CONE_ANGLE / 2 + np.arcsin(reach / distance))
+@compiled
+def _cone_meets(
+    position: FloatArray, rotation: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int, radius: float,
+    within: float,
+) -> bool:  # fmt: skip
+    """Whether the cone of sensor k can meet a capsule at a distance of at most `within` [m]; never wrongly no.
+
+    With z along the beam and l across it, z sin - l cos is by how much a point lies inside the tangent plane of the
+    cone: no point of the capsule's axis may be farther out than the radius. On the axis that is a convex function,
+    whose least value is where its slope vanishes or at an end.
+    """
+    reach = radius + _ROUNDING
+    ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
+    x, y, z = a[c, 0] - position[k, 0], a[c, 1] - position[k, 1], a[c, 2] - position[k, 2]
+    bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
+    start, rise = x * bx + y * by + z * bz, ux * bx + uy * by + uz * bz
+    if max(start, start + rise) < -reach:
+        return False
+    if to_axis(position, k, a, b, c)[1] > within + reach:
+        return False
+    # across the beam: l(s)^2 = across + 2 s mixed + s^2 slope along the axis, s from 0 to 1
+    across = max(0.0, x * x + y * y + z * z - start * start)
+    mixed = x * ux + y * uy + z * uz - start * rise
+    slope = max(0.0, ux * ux + uy * uy + uz * uz - rise * rise)
+    least = min(
+        _COS * np.sqrt(across) - _SIN * start,
+        _COS * np.sqrt(max(0.0, across + 2 * mixed + slope)) - _SIN * (start + rise),
+    )
+    spread = _COS * _COS * slope - _SIN * _SIN * rise * rise
+    if slope > 0 and spread > 0:
+        middle = -mixed / slope
+        off = np.sqrt(max(0.0, across - mixed * mixed / slope))
+        s = middle + _SIN * rise * off / np.sqrt(slope * spread)
+        if 0 < s < 1:
+            l2 = max(0.0, across + s * (2 * mixed + s * slope))
+            least = min(least, _COS * np.sqrt(l2) - _SIN * (start + s * rise))
+    return bool(least <= reach)
 
 
-@njit(cache=True)
+@compiled
+def _cast(
+    position: FloatArray, rotation: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int, radius: float,
+    rays: FloatArray, enough: float,
+) -> float:  # fmt: skip
+    """Least distance [m] to capsule c along the rays of sensor k, or the first one of `enough` or less."""
+    ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
+    x, y, z = position[k, 0] - a[c, 0], position[k, 1] - a[c, 1], position[k, 2] - a[c, 2]
+    R = rotation[k]
+    # in the sensor's frame, where the rays are given
+    ux, uy, uz = (
+        R[0, 0] * ux + R[1, 0] * uy + R[2, 0] * uz,
+        R[0, 1] * ux + R[1, 1] * uy + R[2, 1] * uz,
+        R[0, 2] * ux + R[1, 2] * uy + R[2, 2] * uz,
+    )
+    x, y, z = (
+        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
+        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
+        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
+    )
+    aa, ao, oo = ux * ux + uy * uy + uz * uz, ux * x + uy * y + uz * z, x * x + y * y + z * z
+    if _inside(aa, ao, oo, radius):
+        return 0.0
+    least = np.inf
+    for i in range(len(rays)):
+        ar = ux * rays[i, 0] + uy * rays[i, 1] + uz * rays[i, 2]
+        rest = x * rays[i, 0] + y * rays[i, 1] + z * rays[i, 2]
+        least = min(least, _from_outside(aa, ao, oo, ar, rest, radius))
+        if least <= enough:
+            break
+    return least
+
+
+@compiled
 def ray_capsule(p: FloatArray, ray: FloatArray, a: FloatArray, b: FloatArray, radius: float) -> float:
     """Distance [m] along a unit ray (3,) from p (3,) to a capsule, 0 from inside, infinite for a miss."""
     axis, offset = b - a, p - a
-    aa, ar, ao = dot(axis, axis), dot(axis, ray), dot(axis, offset)
-    rest, oo = dot(ray, offset), dot(offset, offset)
-    along = 0.0 if aa == 0 else min(1.0, max(0.0, ao / aa))
-    gap = offset - along * axis
-    if dot(gap, gap) <= radius * radius:
+    aa, ao, oo = dot(axis, axis), dot(axis, offset), dot(offset, offset)
+    if _inside(aa, ao, oo, radius):
         return 0.0
+    return _from_outside(aa, ao, oo, dot(axis, ray), dot(ray, offset), radius)
+
+
+@compiled
+def _inside(aa: float, ao: float, oo: float, radius: float) -> bool:
+    """Whether a point lies in a capsule; aa, ao and oo are products of its axis a and the point's offset o from it."""
+    along = 0.0 if aa == 0 else min(1.0, max(0.0, ao / aa))
+    return bool(oo - along * (2 * ao - along * aa) <= radius * radius)
+
+
+@compiled
+def _from_outside(aa: float, ao: float, oo: float, ar: float, rest: float, radius: float) -> float:
+    """Answer of `ray_capsule` outside of it; as for `_inside`, and with the ray r, ar = a . r and rest = o . r."""
     best = np.inf
     quad = aa - ar * ar
     if quad > 1e-12 * aa:
         half_b = aa * rest - ao * ar
-        free = aa * oo - ao * ao - radius * radius * aa
-        disc = half_b * half_b - quad * free
+        disc = half_b * half_b - quad * (aa * oo - ao * ao - radius * radius * aa)
         if disc >= 0:
             t = (-half_b - np.sqrt(disc)) / quad
-            y = ao + t * ar
-            if t >= -_TOUCHING and 0 < y < aa:
+            if t >= -_ROUNDING and 0 < ao + t * ar < aa:
                 best = max(t, 0.0)
-    for end in (a, b):
-        to = p - end
-        half_b, free = dot(ray, to), dot(to, to) - radius * radius
-        disc = half_b * half_b - free
+    for end in range(2):
+        # of the sphere round the far end: its offset is o - a
+        half_b = rest - end * ar
+        disc = half_b * half_b - (oo - end * (2 * ao - aa) - radius * radius)
         if disc >= 0:
             t = -half_b - np.sqrt(disc)
             if 0 <= t < best:

@@ -4,15 +4,16 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from pretouch.compiled import compiled
 from pretouch.errors import RobotModelError
 from pretouch.robot.body import Capsules, capsules_of
 from pretouch.robot.description import RobotDescription
 from pretouch.types import BoolArray, FloatArray
+from pretouch.values import value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Kinematics:
     """Where everything is in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
 
@@ -68,6 +69,8 @@ class RobotModel:
         """The body, base included."""
         self.moved_by: BoolArray = self._moved_by()
         """(L, n) whether a joint moves a link."""
+        self.moving_capsule: BoolArray = np.asarray(self.moved_by.any(axis=1))[self.capsules.link]
+        """(C,) whether any joint moves a capsule."""
         self.body: Capsules = self.capsules.of_links(np.flatnonzero(self.moved_by.any(axis=1)))
         """The part of the body that any joint moves."""
         if not len(self.body):
@@ -112,7 +115,9 @@ class RobotModel:
 
     def jacobian(self, kin: Kinematics, link: int, point: FloatArray) -> FloatArray:
         """Jacobian (6, n) of a point (3,) [m, base frame] fixed to a link: velocity first, then angular velocity."""
-        return _jacobian(kin.anchor, kin.axis, self.moved_by[link], point)
+        jacobian = np.empty((6, self.n))
+        jacobian_into(kin.anchor, kin.axis, self.moved_by[link], point, jacobian)
+        return jacobian
 
     def ee_jacobian(self, kin: Kinematics) -> FloatArray:
         """Jacobian (6, n) of the end-effector origin."""
@@ -140,11 +145,13 @@ class RobotModel:
         return mass_matrix, bias
 
 
-@njit(cache=True)
-def _jacobian(anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray) -> FloatArray:
-    n = anchor.shape[0]
-    jacobian = np.zeros((6, n))
-    for j in range(n):
+@compiled
+def jacobian_into(
+    anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, jacobian: FloatArray
+) -> None:
+    """Write the Jacobian (6, n) of `RobotModel.jacobian`; `moved` (n,) says which joints move the link."""
+    jacobian[:] = 0.0
+    for j in range(len(anchor)):
         if moved[j]:
             x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
             jacobian[0, j] = axis[j, 1] * z - axis[j, 2] * y
@@ -153,4 +160,3 @@ def _jacobian(anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: Flo
             jacobian[3, j] = axis[j, 0]
             jacobian[4, j] = axis[j, 1]
             jacobian[5, j] = axis[j, 2]
-    return jacobian

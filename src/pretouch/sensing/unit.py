@@ -20,9 +20,12 @@ LARGEST_NUMBER = 1000.0
 """Largest number a pose may hold: any larger one is a mistake, and its square may not be finite."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SensorUnit:
-    """A unit named `id` on a link, with its pose. The sensor's z axis points outwards along the beam."""
+    """A unit named `id` on a link, with its pose. The sensor's z axis points outwards along the beam.
+
+    Two units are equal only if they are the same one: compare ids.
+    """
 
     id: str
     link: str

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from pretouch.params import Check, Checked, Fraction, NonNegative, Positive
+from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 
 Joints = tuple[float, ...]
 

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from pretouch.params import Checked, Fraction, NonNegative, Positive
+from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE, cone_rays
 from pretouch.sim.plant import Plant

@@ -5,7 +5,7 @@ import pytest
 from tests.experiments.limits import assert_within_limits
 from tests.experiments.width import width
 
-from pretouch.control.path import PathState, advance
+from pretouch.control.path import PathState, advance, follow
 from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.claims import free_motion, free_run
 from pretouch.experiments.claims.detectors import Windowed
@@ -205,5 +205,6 @@ def test_a_standing_path_goes_nowhere():
         standing = free_motion.path(trajectory, 0.0)
         start = free_motion.path(trajectory, 0.1).point(0.0)
         assert np.array_equal(standing.point(3.0), start)
-        state = advance(standing, PathState(0.0, 0.3), start + 0.01, np.zeros(3), TaskParams())
+        way = follow(standing, PathState(0.0, 0.3), start + 0.01, TaskParams())
+        state = advance(standing, PathState(0.0, 0.3), way, np.zeros(3), TaskParams())
         assert state.phase == 0.0

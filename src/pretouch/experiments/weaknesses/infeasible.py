@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.control.joint_box import JointLimits, joint_box
+from pretouch.control.joint_box import joint_box, joint_limits
 from pretouch.control.qp import solve, task_cost
 from pretouch.control.reduction import speed_scale
 from pretouch.control.restriction import ApproachRows, approach_rows
@@ -123,7 +123,7 @@ def answers(model: RobotModel, params: Profile, q: FloatArray, obstacles: Obstac
     twist = np.concatenate([task.speed_m_s * scale * heading, np.zeros(3)])
     cost = task_cost(model.ee_jacobian(kin), twist, q, model.q_mid, task)
     hard, _ = approach_rows(kin, model.moved_by, obstacles, replace(params.restriction, mode="hard"))
-    limits = JointLimits(model.q_min, model.q_max, arm.qd_max, arm.qdd_max, task.control_period_s)
+    limits = joint_limits(model, 0.0, task.control_period_s)
     rest, weight = np.zeros(model.n), params.restriction.slack_weight
     boxes = {"velocity": (-arm.qd_max, arm.qd_max), "rest": joint_box(q, rest, limits)}
     soft = ApproachRows(hard.G, hard.h, soft=True)

@@ -1,0 +1,172 @@
+"""All calls into Pretouch: the arm the problem is posed for, and our two contenders."""
+
+from importlib.metadata import version
+
+import mujoco
+import numpy as np
+from benchmarks.peers.geometry import Arm, Array
+from benchmarks.peers.problem import TERMS, Problem
+
+from pretouch.control.joint_box import JointLimits, brake, joint_box
+from pretouch.control.path import line
+from pretouch.control.qp import solve, task_cost
+from pretouch.control.restriction import approach_rows
+from pretouch.controller import Controller, ControllerState
+from pretouch.params import RestrictionParams, TaskParams, profile
+from pretouch.perception.closest import closest_points
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin, paper_skin
+from pretouch.sensing.unit import SensorUnit
+from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
+
+VERSIONS = {name: version(name) for name in ("pretouch", "mujoco-core", "numba", "daqp", "numpy")}
+
+
+def panda_arm() -> tuple[Arm, Array]:
+    """Read the Panda of Pretouch for everybody else: the arm, and its ready position (n,) [rad]."""
+    description = panda()
+    model = RobotModel(description)
+    mj = mujoco.MjModel.from_xml_path(str(description.mjcf))
+    T_joint, joint = np.tile(np.eye(4), (mj.nbody, 1, 1)), np.full(mj.nbody, -1)
+    placement = []
+    for body in range(1, mj.nbody):
+        T, parent = np.eye(4), mj.body_parentid[body]
+        R = np.empty(9)
+        mujoco.mju_quat2Mat(R, mj.body_quat[body])
+        T[:3, :3], T[:3, 3] = R.reshape(3, 3), mj.body_pos[body]
+        T_joint[body], joint[body] = T_joint[parent] @ T, joint[parent]
+        if mj.body_jntnum[body]:
+            # a joint's frame is its body's: Panda's joints turn about z through the origin
+            placement.append(T_joint[body].copy())
+            T_joint[body], joint[body] = np.eye(4), joint[parent] + 1
+    body = model.body
+    arm = Arm(
+        mjcf=str(description.mjcf), placement=np.array(placement), tool=T_joint[model.ee],
+        q_min=model.q_min, q_max=model.q_max, qd_max=description.qd_max, qdd_max=description.qdd_max,
+        joint=joint[body.link], a=_moved(T_joint[body.link], body.a), b=_moved(T_joint[body.link], body.b),
+        radius=body.radius,
+    )  # fmt: skip
+    return arm, description.q_ready
+
+
+def _moved(T: Array, points: Array) -> Array:
+    return np.einsum("cij,cj->ci", T[:, :3, :3], points) + T[:, :3, 3]
+
+
+class Rows:
+    """Kinematics, closest points, rows, joint box and QP, and nothing else: the very problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.model = problem, RobotModel(panda())
+        arm, count = problem.arm, problem.points.shape[1]
+        self.limits = JointLimits(arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, TERMS.period)
+        self.task = TaskParams(
+            damping_max=TERMS.damping_max, manipulability_threshold=TERMS.manipulability_threshold,
+            mid_joint_gain=TERMS.mid_joint_gain, mid_joint_time_s=TERMS.mid_joint_time,
+        )  # fmt: skip
+        self.restriction = RestrictionParams(
+            mode="hard", v_max_m_s=TERMS.v_max, beta=TERMS.beta, d_repulse_m=TERMS.d_repulse,
+            d_crit_m=TERMS.d_crit, d_notice_m=TERMS.d_notice,
+        )  # fmt: skip
+        self.unit, self.direction = np.arange(count), np.tile([0.0, 0.0, 1.0], (count, 1))
+
+    def solve(self, s: int) -> Array:
+        """Joint velocities (n,) [rad/s] of one snapshot."""
+        p, model = self.problem, self.model
+        q, qd = p.q[s], p.qd[s]
+        kin = model.kinematics(q)
+        obstacles = closest_points(
+            kin, model.body, kin.position[model.ee], self.unit, p.points[s], self.direction
+        )  # fmt: skip
+        rows, _ = approach_rows(kin, model.moved_by, obstacles, self.restriction)
+        lower, upper = joint_box(q, qd, self.limits)
+        cost = task_cost(model.ee_jacobian(kin)[:3], p.velocity[s], q, model.q_mid, self.task)
+        solution = solve(cost, lower, upper, rows, self.restriction.slack_weight, brake(qd, lower, upper, self.limits))
+        if solution.outcome.value != "solved":
+            raise RuntimeError(solution.status)
+        return solution.qd
+
+
+class Step:
+    """A whole control step with as many sensor units, each of which shows a point; for K = 0 seven that show none.
+
+    Beside the rows it examines the inputs, locates the points (eq. 1), leaves out views of the arm itself, tracks
+    points and silent units, filters the force, detects contacts, chooses the mode, follows the path and records all of
+    it. It is given the snapshot's arm; the points are others, where its own units look. Rows are soft.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.model = problem, RobotModel(panda())
+        count = problem.points.shape[1]
+        if count == 0:
+            self._equip(paper_skin(self.model), np.full(7, np.nan), "slack")
+            return
+        drawn = 3 * count + 30
+        units, distance = _units(self.model, drawn), np.random.default_rng(1).uniform(0.15, 0.5, drawn)
+        self._equip(Skin(units, self.model), distance, "off")
+        # only units that never see the arm itself: so each shows a point in every snapshot
+        steps = (self.controller.step(self.state, self._inputs(self.time, s))[0] for s in range(len(problem.q)))
+        shown = sorted(set.intersection(*(set(step.obstacles.unit.tolist()) for step in steps)))[:count]
+        self._equip(Skin([units[k] for k in shown], self.model), distance[shown], "slack")
+
+    def _equip(self, skin: Skin, distance: Array, restriction: str) -> None:
+        """Put a skin on the arm with what its units read [m], NaN for no target, and run until the arm tracks."""
+        paper = profile(f"paper:task.orientation=free:restriction.mode={restriction}")
+        x = self.model.kinematics(self.problem.q[0]).position[self.model.ee]
+        self.controller = Controller(self.model, skin, no_fixtures(), line(tuple(x), (x[0], x[1] + 0.4, x[2])), paper)
+        self.distance = distance
+        self.status = np.where(np.isnan(distance), int(RangeStatus.SIGNAL), int(RangeStatus.OK))
+        self.state = self._armed()
+
+    def _inputs(self, time: float, s: int) -> Inputs:
+        q, qd = self.problem.q[s], self.problem.qd[s]
+        robot = RobotState(time, q, qd, q, qd, np.zeros(len(q)), np.zeros(6))
+        stamp = np.full(len(self.distance), time)
+        return Inputs(time, robot, RangeReadings(stamp, self.distance, self.status))
+
+    def _armed(self) -> ControllerState:
+        """Return the state after the force window has filled, from where on the arm tracks."""
+        state = self.controller.init(self._inputs(0.0, 0).robot)
+        for cycle in range(self.controller.profile.threshold.window_samples + 10):
+            _, state = self.controller.step(state, self._inputs(TERMS.period * cycle, 0))
+        self.time = TERMS.period * (cycle + 1)
+        return state
+
+    def solve(self, s: int) -> Array:
+        """Joint velocities (n,) [rad/s] of one step from the armed state."""
+        step, _ = self.controller.step(self.state, self._inputs(self.time, s))
+        if step.mode.value != "track":
+            raise RuntimeError(step.reason)
+        return step.command
+
+
+def _units(model: RobotModel, count: int) -> list[SensorUnit]:
+    """Units all over the capsules that look outwards."""
+    rng, body = np.random.default_rng(0), model.body
+    units: list[SensorUnit] = []
+    while len(units) < count:
+        c = rng.integers(len(body))
+        z = rng.normal(size=3)
+        axis = body.b[c] - body.a[c]
+        z -= axis * (z @ axis) / (axis @ axis)
+        z /= np.linalg.norm(z)
+        p = body.a[c] + rng.uniform() * axis + (body.radius[c] + 0.002) * z
+        own = body.link == body.link[c]
+        if _height(p, body.a[own], body.b[own], body.radius[own]) > 0.001:
+            T = np.eye(4)
+            x = np.cross(axis, z) / np.linalg.norm(axis)
+            T[:3, :3], T[:3, 3] = np.column_stack([x, np.cross(z, x), z]), p
+            units.append(SensorUnit(f"unit {len(units)}", model.links[body.link[c]], T))
+    return units
+
+
+def _height(p: Array, a: Array, b: Array, radius: Array) -> float:
+    """Distance of a point from the surface of the capsules [m]."""
+    axis = b - a
+    along = np.clip(np.einsum("ci,ci->c", p - a, axis) / np.einsum("ci,ci->c", axis, axis), 0.0, 1.0)
+    return float((np.linalg.norm(p - a - along[:, None] * axis, axis=1) - radius).min())
+
+
+CONTENDERS = {"ours, rows": Rows, "ours, whole step": Step}

@@ -1,0 +1,60 @@
+"""Checks of parameters: what a field may hold stands in its type."""
+
+import math
+from dataclasses import dataclass, fields
+from numbers import Integral, Real
+from typing import Annotated, Literal, get_args, get_origin, get_type_hints
+
+from pretouch.errors import ParameterError
+
+_SMALLEST, _LARGEST = 1e-6, 1e6
+
+
+@dataclass(frozen=True)
+class Check:
+    """Allowed range of a finite number, ends included unless they are open."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    open_low: bool = False
+    open_high: bool = False
+
+    def problem(self, value: float) -> str | None:
+        """Say what is wrong with the value, or None."""
+        if not math.isfinite(value):
+            return "must be finite"
+        if value != 0 and not _SMALLEST <= abs(value) <= _LARGEST:
+            return f"must be between {_SMALLEST:g} and {_LARGEST:g} in size, or else a unit is wrong"
+        if value < self.low or (self.open_low and value == self.low):
+            return f"must be {'greater than' if self.open_low else 'at least'} {self.low:g}"
+        if value > self.high or (self.open_high and value == self.high):
+            return f"must be {'less than' if self.open_high else 'at most'} {self.high:g}"
+        return None
+
+
+Negative = Annotated[float, Check(high=0.0, open_high=True)]
+Positive = Annotated[float, Check(low=0.0, open_low=True)]
+NonNegative = Annotated[float, Check(low=0.0)]
+Fraction = Annotated[float, Check(low=0.0, high=1.0)]
+PositiveCount = Annotated[int, Check(low=1)]
+
+
+class Checked:
+    """Base of parameter sets: checks every field when it is made."""
+
+    def __post_init__(self) -> None:
+        hints = get_type_hints(type(self), include_extras=True)
+        for item in fields(self):  # type: ignore[arg-type]
+            _check_field(type(self).__name__, item.name, hints[item.name], getattr(self, item.name))
+
+
+def _check_field(owner: str, name: str, hint: object, value: object) -> None:
+    if get_origin(hint) is Literal and value not in get_args(hint):
+        raise ParameterError(f"{owner}.{name} is {value!r}: choose one of {', '.join(map(str, get_args(hint)))}.")
+    whole = getattr(hint, "__origin__", None) is int
+    for check in getattr(hint, "__metadata__", ()):
+        if whole and not isinstance(value, Integral):
+            raise ParameterError(f"{owner}.{name} is {value}: it must be a whole number.")
+        problem = check.problem(float(value)) if isinstance(value, Real) else "must be a number"
+        if problem:
+            raise ParameterError(f"{owner}.{name} is {value}: it {problem}.")

@@ -1,0 +1,195 @@
+"""The work of a control step at its hardest: every point new in every step, an arm that moves and is restricted."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.control.path import Circle
+from pretouch.errors import ExperimentError
+from pretouch.params import Profile
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import CONE_ANGLE, SensorUnit
+from pretouch.types import FloatArray, Inputs, IntArray, RangeReadings, RangeStatus, RobotState
+
+LARGEST_SKIN = 10_000
+"""Units from which the arm would be covered more than once over."""
+
+_SPHERES = 40
+_SPHERE_RADIUS = 0.1
+_ROOM_CENTER, _ROOM_RADIUS = np.array([0.25, 0.0, 0.45]), 1.0
+"""The room is round, and as wide as the arm can reach [m]: every beam ends at a sphere or at its wall."""
+_CLEAR = 0.3, 0.5
+"""Nearest and farthest a sphere's surface lies from the arm at the start [m]: much nearer, eq. 6 lets nothing move."""
+_HAND = 0.1
+"""Reach of the hand round its origin [m]."""
+_CIRCLE = 0.1
+"""Radius of the path [m]."""
+_FIRST_LINK = "panda_link2"
+_ABOVE = 0.006
+"""Height of a unit above its link [m]."""
+_SEEN = 0.55
+"""Largest first reading of a unit [m]: within d_notice of Table I."""
+_FORCE_NOISE = 0.3
+"""Standard deviation of the force estimate [N]."""
+_TRIES = 40
+"""Places on a link that are tried before the next link: some have few that see anything."""
+_DRAWS = 4096
+"""Samples of force noise before they repeat."""
+_TURNS = 100
+"""Cycles in which every reading is worked out anew, a part of them in each: so it costs little beside the step."""
+
+
+class Workload:
+    """A Panda with K units among spheres in a room, on a circle, that does exactly as it is commanded.
+
+    Every unit sees something, and all readings are new in every cycle, as no real skin's are: the worst case. Time is
+    counted in cycles, so a run is the same whatever the machine does meanwhile.
+    """
+
+    def __init__(self, model: RobotModel, units: int, profile: Profile, seed: int) -> None:
+        """Draw spheres and skin with a seed."""
+        if not 1 <= units <= LARGEST_SKIN:
+            raise ExperimentError(f"The number of points is {units}: give 1 to {LARGEST_SKIN}.")
+        rng = np.random.default_rng(seed)
+        self._model, self._period = model, profile.task.control_period_s
+        self._q, self._qd, self._cycle = model.description.q_ready.copy(), np.zeros(model.n), 0
+        body = _Body.at(model, self._q)
+        self.path = Circle(center=tuple(body.hand - [0.0, _CIRCLE, 0.0]), radius=_CIRCLE)
+        around = np.array([self.path.point(s) for s in np.linspace(0, self.path.length, 32)])
+        self._centers = _spheres(rng, body, around)
+        self.skin = _skin(rng, model, units, body, self._centers)
+        self._force = np.zeros((_DRAWS, 6))
+        self._force[:, :3] = rng.normal(0.0, _FORCE_NOISE, (_DRAWS, 3))
+        self._distance = self._ranges(np.arange(units))
+
+    def inputs(self) -> Inputs:
+        """What the controller is given in this cycle."""
+        units, now = len(self.skin), self._cycle * self._period
+        part = np.arange(self._cycle % _TURNS, units, _TURNS)
+        self._distance[part] = self._ranges(part)
+        readings = RangeReadings(np.full(units, now), self._distance.copy(), np.full(units, int(RangeStatus.OK)))
+        wrench = self._force[self._cycle % _DRAWS]
+        robot = RobotState(now, self._q, self._qd, self._q, self._qd, np.zeros(self._model.n), wrench)
+        return Inputs(now, robot, readings)
+
+    def move(self, qd: FloatArray) -> None:
+        """Let one cycle pass with joint velocities (n,) [rad/s]."""
+        self._q, self._qd, self._cycle = self._q + qd * self._period, qd, self._cycle + 1
+
+    def clearance(self) -> float:
+        """Distance from the arm to the nearest sphere [m]."""
+        return float(_Body.at(self._model, self._q).distance(self._centers).min()) - _SPHERE_RADIUS
+
+    def _ranges(self, units: IntArray) -> FloatArray:
+        """Distance (k,) [m] along the beams of some units to the nearest sphere or the wall."""
+        kin = self._model.kinematics(self._q)
+        R, T = kin.rotation[self.skin.link[units]], self.skin.T_link_sensor[units]
+        origin = kin.position[self.skin.link[units]] + np.einsum("kij,kj->ki", R, T[:, :3, 3])
+        return _ranges(origin, np.einsum("kij,kj->ki", R, T[:, :3, 2]), self._centers)
+
+
+@dataclass(frozen=True)
+class _Body:
+    """The arm's capsules in one posture, base frame."""
+
+    link: IntArray
+    a: FloatArray
+    b: FloatArray
+    radius: FloatArray
+    hand: FloatArray
+    """(3,) end-effector origin."""
+
+    @staticmethod
+    def at(model: RobotModel, q: FloatArray) -> "_Body":
+        kin, body = model.kinematics(q), model.capsules
+        R, p = kin.rotation[body.link], kin.position[body.link]
+        a, b = (p + np.einsum("cij,cj->ci", R, end) for end in (body.a, body.b))
+        return _Body(body.link, a, b, body.radius, kin.position[model.ee])
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Signed distance (P, C) [m] from each point (P, 3) to each capsule."""
+        axis, to = self.b - self.a, points[:, None] - self.a
+        along = np.clip((to * axis).sum(-1) / np.maximum((axis * axis).sum(-1), 1e-12), 0.0, 1.0)
+        gap: FloatArray = np.linalg.norm(to - along[..., None] * axis, axis=-1) - self.radius
+        return gap
+
+
+def _spheres(rng: np.random.Generator, body: _Body, around: FloatArray) -> FloatArray:
+    """Centres (S, 3) [m] of spheres round the arm, none near the way (P, 3) of its hand."""
+    low, high = np.minimum(body.a, body.b).min(axis=0) - 1.0, np.maximum(body.a, body.b).max(axis=0) + 1.0
+    found: list[FloatArray] = []
+    while len(found) < _SPHERES:
+        center = rng.uniform(low, high)
+        clear = float(body.distance(center[None]).min()) - _SPHERE_RADIUS
+        passed = float(np.linalg.norm(around - center, axis=1).min()) - _SPHERE_RADIUS - _HAND
+        if _CLEAR[0] <= min(clear, passed) and clear <= _CLEAR[1]:
+            found.append(center)
+    return np.array(found)
+
+
+def _skin(rng: np.random.Generator, model: RobotModel, units: int, body: _Body, centers: FloatArray) -> Skin:
+    """Units on all links in turn that look away from the arm, and at something near in the posture of `body`."""
+    kin = model.kinematics(model.description.q_ready)
+    links = itertools.cycle(range(model.link_index(_FIRST_LINK), len(model.links)))
+    found: list[SensorUnit] = []
+    while len(found) < units:
+        link = next(links)
+        for T_O_sensor in _places(rng, body, link):
+            p, beam = T_O_sensor[:3, 3], T_O_sensor[:3, 2]
+            seen = float(_ranges(p[None], beam[None], centers)[0])
+            if seen <= _SEEN and _sees_past(body, link, p, beam, seen):
+                T, R = np.eye(4), kin.rotation[link]
+                T[:3, :3], T[:3, 3] = R.T @ T_O_sensor[:3, :3], R.T @ (p - kin.position[link])
+                found.append(SensorUnit(f"unit_{len(found)}", model.links[link], T))
+                break
+    return Skin(found, model)
+
+
+def _places(rng: np.random.Generator, body: _Body, link: int) -> Iterator[FloatArray]:
+    """Draw poses (4, 4) just above the capsules of a link, base frame: as many as are tried before the next link."""
+    capsules = np.flatnonzero(body.link == link)
+    for _ in range(_TRIES if len(capsules) else 0):
+        yield _outwards(rng, body, int(rng.choice(capsules)))
+
+
+def _outwards(rng: np.random.Generator, body: _Body, c: int) -> FloatArray:
+    """Draw a pose (4, 4) just above a capsule, base frame: z points away from its axis."""
+    axis = body.b[c] - body.a[c]
+    z = np.cross(axis, rng.normal(size=3))
+    z /= np.linalg.norm(z)
+    x = axis / np.linalg.norm(axis)
+    T = np.eye(4)
+    T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    T[:3, 3] = body.a[c] + rng.uniform() * axis + (body.radius[c] + _ABOVE) * z
+    return T
+
+
+def _sees_past(body: _Body, link: int, p: FloatArray, beam: FloatArray, seen: float) -> bool:
+    """Whether a unit lies outside the arm, and no other link reaches into its cone as far as it sees."""
+    if float(body.distance(p[None]).min()) < 0.5 * _ABOVE:
+        return False
+    along = np.linspace(0.0, seen, 16)
+    others = body.distance(p + along[:, None] * beam)[:, body.link != link]
+    return bool(np.all(others > along[:, None] * np.tan(CONE_ANGLE / 2)))
+
+
+def _ranges(origin: FloatArray, beam: FloatArray, centers: FloatArray) -> FloatArray:
+    """Distance (k,) [m] along rays (k, 3) to the nearest of the spheres, or from within to the wall of the room."""
+    along, half = _crossing(origin, beam, centers, _SPHERE_RADIUS)
+    met = (half >= 0) & (along > 0)
+    sphere = np.where(met, along - np.sqrt(np.maximum(half, 0.0)), np.inf).min(axis=1)
+    along, half = _crossing(origin, beam, _ROOM_CENTER[None], _ROOM_RADIUS)
+    wall: FloatArray = (along + np.sqrt(half))[:, 0]
+    return np.minimum(sphere, wall)
+
+
+def _crossing(
+    origin: FloatArray, beam: FloatArray, centers: FloatArray, radius: float
+) -> tuple[FloatArray, FloatArray]:
+    """How far along rays their points nearest to the centres lie (k, S) [m], and the half chords there, squared."""
+    to = centers - origin[:, None]
+    along = (to * beam[:, None]).sum(-1)
+    return along, radius**2 - (to * to).sum(-1) + along**2

@@ -1,0 +1,203 @@
+"""Running the loop at 1 kHz on Linux: everything compiled first, no garbage collection, priority, and a processor."""
+
+import ctypes
+import gc
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from pretouch import loop
+from pretouch.controller import Controller
+from pretouch.errors import ParameterError
+from pretouch.ports import Recorder, Robot, Skin
+from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
+
+_PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
+"""Of Linux' `prctl`."""
+
+_WARM_UP_STEPS = 3
+"""Steps of each kind: what one sees for the first time the next one remembers."""
+
+
+def run(
+    controller: Controller,
+    robot: Robot,
+    skin: Skin,
+    clock: loop.MonotonicClock,
+    recorder: Recorder,
+    done: Callable[[ControlStep], bool],
+    resume: Callable[[], bool] = lambda: False,
+    *,
+    priority: int | None = None,
+    cpu: int | None = None,
+    tell: Callable[[str], None] = print,
+) -> None:
+    """`loop.run`, warmed up and in a process prepared for real time. However it ends, `clock.timing()` is the report.
+
+    Args:
+        controller: its period must be the clock's.
+        robot: the arm.
+        skin: its sensor units.
+        clock: gives the ticks and measures how they are kept.
+        recorder: keeps the steps; it runs in the loop, so it must not wait for a disk.
+        done: whether a step was the last.
+        resume: whether a person now asks to leave a latched HOLD.
+        priority: see `real_time`.
+        cpu: see `real_time`.
+        tell: is given each sentence on what could not be had, before the loop begins.
+    """
+    if clock.period != controller.limits.period:
+        raise ParameterError(
+            f"The clock has a period of {clock.period:g} s, the controller {controller.limits.period:g} s:"
+            " make them the same (params.at_rate makes a profile for another rate)."
+        )
+    warm_up(controller, robot.read())
+    with real_time(priority, cpu) as missing:
+        for sentence in missing:
+            tell(sentence)
+        loop.run(controller, robot, skin, clock, recorder, done, resume)
+
+
+@contextmanager
+def real_time(priority: int | None = None, cpu: int | None = None) -> Iterator[tuple[str, ...]]:
+    """Prepare this process for a loop in real time, and undo it all afterwards.
+
+    The garbage collector is off, and what is there already is frozen: a full collection stops a loop for a tenth of a
+    second. Timers of this thread wake without slack. What the machine refuses is left out.
+
+    Args:
+        priority: of the thread in the scheduling class SCHED_FIFO, 1 to 99; None leaves the class as it is.
+        cpu: number of the processor to stay on; None leaves that to the system.
+
+    Yields:
+        A sentence for each thing that could not be had.
+    """
+    check_wishes(priority, cpu)
+    with ExitStack() as undo:
+        undo.enter_context(_no_collections())
+        if sys.platform == "linux":
+            _sharpen_timers(undo)
+            yield tuple(said for said in (_go_first(priority, undo), _stay(cpu, undo)) if said)
+        else:
+            yield (f"This is {sys.platform}, not Linux: the loop runs without priority, and wakes as late as it does.",)
+
+
+def check_wishes(priority: int | None, cpu: int | None) -> None:
+    """Raise ParameterError for a priority or processor there is not, naming those there are."""
+    if sys.platform != "linux":
+        return
+    low, high = os.sched_get_priority_min(os.SCHED_FIFO), os.sched_get_priority_max(os.SCHED_FIFO)
+    if priority is not None and not low <= priority <= high:
+        raise ParameterError(f"The real-time priority is {priority}: give {low} to {high}.")
+    allowed = sorted(os.sched_getaffinity(0))
+    if cpu is not None and cpu not in allowed:
+        raise ParameterError(
+            f"Processor {cpu} is none this process may use: choose from {', '.join(map(str, allowed))}."
+        )
+
+
+@contextmanager
+def _no_collections() -> Iterator[None]:
+    was_on, froze = gc.isenabled(), gc.get_freeze_count() == 0
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if froze:  # what somebody else froze stays so
+            gc.unfreeze()
+        if was_on:
+            gc.enable()
+
+
+def _sharpen_timers(undo: ExitStack) -> None:
+    """Take away the 50 us by which Linux lets the timers of ordinary threads be late."""
+    prctl = getattr(ctypes.CDLL(None), "prctl", None)
+    if prctl is None:
+        return
+    before = prctl(_PR_GET_TIMERSLACK, 0, 0, 0, 0)
+    # a thread with real-time priority has none already
+    if before > 0 and prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0) == 0:
+        undo.callback(prctl, _PR_SET_TIMERSLACK, before, 0, 0, 0)
+
+
+def _go_first(priority: int | None, undo: ExitStack) -> str:
+    if sys.platform != "linux" or priority is None:
+        return ""
+    policy, param = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except PermissionError:
+        return (
+            f"Real-time priority {priority} was refused, so the loop runs at ordinary priority: add the line"
+            " 'USER - rtprio 99' with your user's name to /etc/security/limits.conf and log in again, or run with"
+            " CAP_SYS_NICE."
+        )
+    except OSError as error:
+        return f"Real-time priority {priority} is not to be had here ({error.strerror}): the loop runs without it."
+    undo.callback(os.sched_setscheduler, 0, policy, param)
+    return ""
+
+
+def _stay(cpu: int | None, undo: ExitStack) -> str:
+    if sys.platform != "linux" or cpu is None:
+        return ""
+    before = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {cpu})
+    except OSError as error:
+        return (
+            f"Staying on processor {cpu} was refused ({error.strerror}), so the loop may move: let the container or"
+            " cpuset of this process have it."
+        )
+    undo.callback(os.sched_setaffinity, 0, before)
+    return ""
+
+
+def warm_up(controller: Controller, robot: RobotState) -> None:
+    """Run steps whose results are dropped, so that nothing is left to be compiled or loaded in the loop.
+
+    They see obstacles and none, follow the path, meet a contact and a robot that cannot be believed: TRACK, REACT and
+    HOLD. The controller and its arm are left as they are.
+
+    Args:
+        controller: the one that the loop will turn.
+        robot: a state of the arm, as its interface gives it.
+    """
+    quiet, push = np.zeros(6), np.array([0.9 * controller.profile.failure.force_max_n, 0, 0, 0, 0, 0])
+    lost = np.full(len(robot.q), np.nan)
+    for seen in (RangeStatus.SIGNAL, RangeStatus.OK):
+        rehearsal = _Rehearsal(controller, robot)
+        for _ in range(controller.profile.threshold.window_samples):
+            rehearsal.step(None, quiet)
+        for wrench in (robot.wrench, None, quiet, push):
+            for _ in range(_WARM_UP_STEPS):
+                rehearsal.step(seen, wrench)
+        # a loss that latches, and the way out of it
+        rehearsal.step(seen, quiet, q=lost)
+        rehearsal.step(seen, quiet, resume=True)
+
+
+class _Rehearsal:
+    """A controller that is given made-up inputs, one period after another."""
+
+    def __init__(self, controller: Controller, robot: RobotState) -> None:
+        self._controller, self._robot, self._now = controller, robot, robot.stamp
+        self._state = controller.init(robot)
+
+    def step(
+        self, seen: RangeStatus | None, wrench: FloatArray | None, q: FloatArray | None = None, resume: bool = False
+    ) -> None:
+        """Turn the controller once. All units say `seen`, at distances up to 1 m; without it they say nothing."""
+        self._now += self._controller.limits.period
+        units = len(self._controller.skin)
+        stamp = np.full(units, -np.inf if seen is None else self._now)
+        status = np.full(units, int(RangeStatus.NONE if seen is None else seen))
+        robot = replace(self._robot, stamp=self._now, wrench=wrench, q=self._robot.q if q is None else q)
+        inputs = Inputs(self._now, robot, RangeReadings(stamp, np.linspace(0.0, 1.0, units), status), resume)
+        _, self._state = self._controller.step(self._state, inputs)

@@ -1,0 +1,1 @@
+"""A seeded machine that drives the controller through anything, and what must hold after each step."""

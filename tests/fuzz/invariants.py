@@ -1,0 +1,199 @@
+"""What must hold after each control step, whatever went in. Each check recomputes what it compares with."""
+
+import math
+from dataclasses import fields, is_dataclass
+from functools import cache
+
+import numpy as np
+
+from pretouch.params import Profile
+from pretouch.robot.description import SpeedEnvelope
+from pretouch.robot.model import RobotModel
+from pretouch.types import ControlStep, Mode, QpOutcome
+from tests.fuzz.oracle import LATCHING, MODES, WORDS, Expected, Oracle
+
+MAY_BE_NAN = {"range_distance", "force"}
+
+
+@cache
+def _names(kind: type) -> tuple[str, ...]:
+    return tuple(f.name for f in fields(kind)) if is_dataclass(kind) else ()
+
+
+def arrays_of(value: object) -> list[tuple[str, np.ndarray]]:
+    """All arrays within a value, with their names."""
+    found: list[tuple[str, np.ndarray]] = []
+    for part in _names(type(value)):
+        inner = getattr(value, part)
+        found += [(part, inner)] if isinstance(inner, np.ndarray) else arrays_of(inner)
+    return found
+
+
+def same(a: object, b: object) -> bool:
+    """Whether two values agree to the last bit, NaN with NaN."""
+    if isinstance(a, np.ndarray):
+        return isinstance(b, np.ndarray) and a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    if _names(type(a)):
+        return type(a) is type(b) and all(same(getattr(a, name), getattr(b, name)) for name in _names(type(a)))
+    if isinstance(a, tuple):
+        return isinstance(b, tuple) and len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, float):
+        return isinstance(b, float) and (a == b or (math.isnan(a) and math.isnan(b)))
+    return bool(a == b)
+
+
+def check_shapes(step: ControlStep, n: int, units: int) -> None:
+    """Every array has the shape and type its docstring says."""
+    k, rows = len(step.obstacles.unit), len(step.restricted)
+    shapes = {
+        **dict.fromkeys(("q", "q_commanded", "command", "qd"), (n,)), "range_distance": (units,),
+        "parts": (6, 3), "restricted": (rows,), "approach_limit": (rows,), "slack": (rows,), "multipliers": (n + rows,),
+        **dict.fromkeys(("unit", "link", "ee_distance", "body_distance"), (k,)),
+        **dict.fromkeys(("point", "body_point", "direction"), (k, 3)),
+    }  # fmt: skip
+    for name, array in arrays_of(step):
+        whole, logical = name in ("unit", "link", "restricted"), name == "axes"
+        assert array.dtype == (np.int64 if whole else np.bool_ if logical else np.float64), name
+        assert array.shape == shapes.get(name, (3,)), name
+
+
+def check_finite(step: ControlStep, e: Expected) -> None:
+    """Every number is finite but for what is documented to be NaN."""
+    numbers = [array.ravel() for name, array in arrays_of(step) if name not in MAY_BE_NAN]
+    assert np.isfinite(np.concatenate(numbers)).all()
+    assert np.isnan(step.force).all() if e.force is None else np.array_equal(step.force, e.force)
+    assert math.isfinite(step.stamp)
+    assert step.stamp == e.now
+    assert math.isfinite(step.path_phase)
+    assert 0.0 <= step.speed_scale <= e.scale + 1e-12
+
+
+def check_speed_scale(step: ControlStep, p: Profile) -> None:
+    """Eq. 3 bounds the factor, whatever came before, and the factor bounds the speed along the path."""
+    if step.mode is Mode.TRACK:
+        assert np.linalg.norm(step.desired_velocity) <= step.speed_scale * p.task.speed_m_s * (1 + 1e-9) + 1e-12
+    if p.reduction.enabled and len(step.obstacles.unit):
+        assert step.speed_scale <= step.obstacles.ee_distance.min() / p.reduction.d_max_m + 1e-12
+
+
+def end_of_braking(speed: np.ndarray, reach: np.ndarray, period: float) -> np.ndarray:
+    """How far joints still travel [rad] that move at `speed` [rad/s] and lose `reach` [rad/s] each period from now."""
+    speed = np.clip(speed, 0.0, 1e6)  # far beyond any limit, and its square is finite
+    steps = np.floor(speed / reach)
+    return np.asarray(period * (steps * speed - reach * steps * (steps + 1) / 2))
+
+
+def check_command(step: ControlStep, e: Expected, p: Profile, model: RobotModel) -> None:
+    """Acceleration within limits; position and velocity too, or as hard as possible on the way back to them."""
+    dt, arm, margin = p.task.control_period_s, model.description, p.task.position_margin_rad
+    c, reach = step.command, arm.qdd_max * dt
+    assert np.isfinite(c).all()
+    rounding = 1e-9 + 1e-15 * np.abs(e.qd)
+    assert (np.abs(c - e.qd) <= reach + rounding).all(), ("acceleration", np.abs(c - e.qd) / reach)
+    q = e.q + c * dt
+    for sign, room in ((1.0, model.q_max - margin - q), (-1.0, q - model.q_min - margin)):
+        braking = sign * c <= sign * e.qd - reach + rounding
+        still = sign * c <= 1e-12
+        assert (braking | (sign * c <= arm.qd_max + 1e-9)).all(), "velocity"
+        assert (braking | still | (end_of_braking(sign * c, reach, dt) <= room + 1e-9)).all(), "position"
+        if arm.envelope is not None:
+            below = below_envelope(sign * c, sign * q, sign, reach, dt, arm.envelope.moved_in(margin))
+            assert (braking | still | below).all(), "envelope"
+
+
+def below_envelope(
+    speed: np.ndarray, q: np.ndarray, sign: float, reach: np.ndarray, period: float, envelope: SpeedEnvelope
+) -> np.ndarray:
+    """Whether joints that are at q (n,) with `speed`, and brake from now on, stay below the envelope on that side.
+
+    Speeds and positions are counted towards that side, at the end of each period.
+    """
+    speed = np.clip(speed, 0.0, 10.0)
+    k = np.arange(1 + int((speed / reach).max()))[:, None]
+    speeds = np.maximum(speed - k * reach, 0.0)
+    places = q - speed * period + np.cumsum(speeds, axis=0) * period
+    end = envelope.q_upper if sign > 0 else -envelope.q_lower
+    most = np.sqrt(np.maximum(envelope.slope * (end - places), 0.0)) - envelope.offset
+    return np.asarray((speeds <= np.maximum(most, 0.0) + 1e-7).all(axis=0))
+
+
+def check_braking(step: ControlStep, e: Expected, p: Profile, model: RobotModel) -> None:
+    """Where no motion was asked for, no joint speeds up or turns round, and one of them brakes as hard as it may."""
+    if step.qp.outcome is QpOutcome.SOLVED:
+        return
+    rounding = 1e-9 + 1e-15 * np.abs(e.qd)
+    assert (step.command * np.sign(e.qd) >= -rounding).all()
+    assert (np.abs(step.command) <= np.abs(e.qd) + rounding).all()
+    full = np.abs(step.command - e.qd) >= model.description.qdd_max * p.task.control_period_s - 2 * rounding
+    assert full.any() or not step.command.any()
+
+
+def check_rows(step: ControlStep, p: Profile, model: RobotModel) -> None:
+    """Approach velocities by finite differences: no faster than eq. 7 allows and the reported slack."""
+    o, which = step.obstacles, step.restricted
+    off = p.restriction.mode == "off"
+    notice = o.body_distance < p.restriction.d_notice_m
+    assert np.array_equal(which, np.flatnonzero(notice & (not off)))
+    if not len(which) or np.abs(step.q).max() > 100.0 or np.abs(step.command).max() > 1e3:
+        return  # answers to lies, beyond what differences resolve
+    limit = [approach_limit(d, p) for d in o.body_distance[which].tolist()]
+    assert (np.abs(step.approach_limit - limit) <= 1e-9 * p.restriction.v_max_m_s).all()
+    excess = approach_velocity(step, model) - step.approach_limit
+    size = 1e-7 * (1.0 + np.abs(step.command).max())
+    assert (step.qp.slack >= 0.0).all()
+    assert (np.abs(step.qp.slack - np.maximum(excess, 0.0)) <= size).all(), (step.qp.slack, excess)
+    if p.restriction.mode == "hard" and step.qp.outcome is QpOutcome.SOLVED:
+        assert step.qp.slack.max() <= 1e-7
+
+
+def approach_limit(d: float, p: Profile) -> float:
+    """Eq. 7 of the paper at a body distance within d_notice [m]."""
+    r = p.restriction
+    near, far = 2.0 * d / r.d_crit_m - 1.0, 2.0 * (d - r.d_crit_m) / (r.d_notice_m - r.d_crit_m) - 1.0
+    slope = min(max(r.beta * (near if d < r.d_repulse_m else far), -700.0), 700.0)
+    limit = r.v_max_m_s / (1.0 + math.exp(slope)) - (r.v_max_m_s if d < r.d_repulse_m else 0.0)
+    return max(limit, r.floor_m_s) if r.mode == "floor" else limit
+
+
+def approach_velocity(step: ControlStep, model: RobotModel) -> np.ndarray:
+    """Velocity of the restricted body points towards their obstacles [m/s], by central differences of the posture."""
+    o, which = step.obstacles, step.restricted
+    link, point, direction = o.link[which], o.body_point[which], o.direction[which]
+    h = 1e-5 / max(1.0, float(np.abs(step.command).max()))
+    here = model.kinematics(step.q)
+    local = np.einsum("kji,kj->ki", here.rotation[link], point - here.position[link])
+    ends = [model.kinematics(step.q + s * h * step.command) for s in (1.0, -1.0)]
+    ahead, behind = (k.position[link] + np.einsum("kij,kj->ki", k.rotation[link], local) for k in ends)
+    return np.asarray(((ahead - behind) * direction).sum(axis=1) / (2.0 * h))
+
+
+def check_obstacles(step: ControlStep, units: int) -> None:
+    """One obstacle a unit at most, each with a unit vector."""
+    o = step.obstacles
+    assert len(set(o.unit.tolist())) == len(o.unit) <= units
+    assert (np.abs((o.direction**2).sum(axis=1) - 1.0) <= 1e-9).all()
+
+
+def check_mode(step: ControlStep, e: Expected, oracle: Oracle, resume: bool, latched: bool) -> str:
+    """The mode and its sentence are those of the cause; return the cause. `latched` is what the state remembers."""
+    before = oracle.reason
+    contact = step.contact
+    cause = oracle.cause(e, step, resume)
+    assert step.reason
+    if cause == "latched":
+        assert step.reason == before
+    else:
+        assert WORDS[cause] in step.reason, (cause, step.reason)
+    assert step.mode is MODES.get(cause, Mode.HOLD), (cause, step.reason)
+    assert latched == (cause in LATCHING)
+    if cause == "silent":
+        assert all(name in step.reason for name in e.silent)
+    assert (step.qp.outcome is QpOutcome.SKIPPED) == (step.mode is Mode.HOLD and cause not in ("failed", "blocked"))
+    assert contact is None or cause in ("contact", "blocked reaction", "failed")
+    assert contact is not None or cause != "contact"
+    if step.mode is Mode.HOLD:
+        assert not step.desired_velocity.any()
+    if step.mode is not Mode.REACT:
+        assert not step.reaction_velocity.any()
+    assert np.linalg.norm(step.reaction_velocity) <= oracle.p.reaction.speed_max_m_s + 1e-12
+    return cause

@@ -1,0 +1,148 @@
+"""Drives controllers of many worlds through all weathers, with an arm that follows commands exactly."""
+
+from collections import Counter
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+
+from pretouch.controller import Controller, ControllerState
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.types import ControlStep, Inputs, QpOutcome, RobotState
+from tests.fuzz import invariants, weather
+from tests.fuzz.oracle import Expected, Oracle
+from tests.fuzz.worlds import World, any_world
+
+DEEP = 10
+"""Each so many steps the dear checks are made: shapes, inputs untouched, the same again."""
+
+
+class Machine:
+    """One seed: worlds, one after the other, and what was reached in them."""
+
+    def __init__(self, seed: int, lies: list[float] = weather.LIES) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.models = RobotModel(panda()), RobotModel(fr3())
+        # the checks' own, apart from the scratch memory of those that are checked
+        self.others = {"panda": RobotModel(panda()), "fr3": RobotModel(fr3())}
+        self.lies = lies
+        self.reached: Counter[str] = Counter()
+        self.given: tuple[object, ...] = ()
+
+    def run(self, steps: int, each: int = 250) -> Counter[str]:
+        """Run so many steps, `each` in one world, and count what was reached. What fails is told with its place."""
+        for begun in range(0, steps, each):
+            try:
+                Course(self, any_world(self.rng, self.models[begun // each % 2])).run(min(each, steps - begun))
+            except Exception as error:
+                error.add_note(f"In the world begun at step {begun}: {self.given}")
+                raise
+        return self.reached
+
+
+class Course:
+    """One arm in one world."""
+
+    def __init__(self, machine: Machine, world: World) -> None:
+        self.machine, self.world, self.rng = machine, world, machine.rng
+        self.controller = Controller(world.model, world.skin, world.fixtures, world.path, world.profile)
+        self.other = machine.others[world.model.description.name]
+        self.q, self.qd, self.time = world.q.copy(), world.qd.copy(), float(self.rng.uniform(0.0, 1e5))
+        self.weather = weather.Weather(self.rng, len(world.skin))
+        self.read_only = self.rng.random() < 0.3
+        robot = self.robot()
+        self.state = self.controller.init(robot)
+        self.oracle = Oracle(world.profile, world.skin.ids, robot, world.model.description.qd_max)
+
+    def robot(self) -> RobotState:
+        """Return what the arm's interface reports: the truth, but for the measured joint positions."""
+        measured = self.q + self.rng.normal(scale=self.world.measured_off, size=len(self.q))
+        return weather.report(self.time, self.q, self.qd, measured, self.weather.wrench())
+
+    def run(self, steps: int) -> None:
+        """Let the arm be driven for so many steps."""
+        for i in range(steps):
+            self.weather.pass_on()
+            inputs, fault = self._inputs()
+            self.machine.given = (i, fault, self.weather, inputs, self.world)
+            self.step(inputs, deep=i % DEEP == 0)
+            self.machine.reached[f"fault {fault}"] += 1
+
+    def _inputs(self) -> tuple[Inputs, str]:
+        rng = self.rng
+        fault = str(rng.choice(weather.FAULTS)) if rng.random() < 0.02 else ""
+        if fault == "overrun":
+            self.time += float(rng.choice([0.06, 0.6]))
+        resume = bool(rng.random() < 0.1)
+        inputs = Inputs(self.time, self.robot(), self.weather.readings(self.time), resume)
+        if fault:
+            inputs = weather.spoiled(inputs, fault, float(rng.choice(weather.NOT_FINITE)), int(rng.integers(7)))
+        elif self.world.lying and rng.random() < 0.03:
+            fault = str(rng.choice(weather.FAULTS[:4]))
+            inputs = weather.spoiled(inputs, fault, float(rng.choice(self.machine.lies)), int(rng.integers(7)))
+            fault = f"lie about {fault}"
+        if self.read_only:
+            for _, array in invariants.arrays_of(inputs.readings) + invariants.arrays_of(inputs.robot):
+                array.flags.writeable = False
+        return inputs, fault
+
+    def step(self, inputs: Inputs, deep: bool) -> ControlStep:
+        """Run one step, check all there is to check, and move the arm as commanded."""
+        before, given = self.state, deepcopy((inputs, self.state)) if deep else None
+        step, self.state = self.controller.step(before, inputs)
+        e = self.oracle.expect(inputs)
+        cause = self._check(step, e, inputs)
+        if given is not None:
+            invariants.check_shapes(step, self.world.model.n, len(self.world.skin))
+            assert invariants.same(inputs, given[0]), "inputs were changed"
+            self._replay(before, inputs, step)
+            assert invariants.same(before, given[1]), "the state before was changed"
+        self._count(step, cause)
+        self._follow(step.command)
+        return step
+
+    def _check(self, step: ControlStep, e: Expected, inputs: Inputs) -> str:
+        p, model = self.world.profile, self.other
+        invariants.check_command(step, e, p, model)
+        invariants.check_finite(step, e)
+        invariants.check_braking(step, e, p, model)
+        invariants.check_obstacles(step, len(self.world.skin))
+        invariants.check_speed_scale(step, p)
+        invariants.check_rows(step, p, model)
+        assert invariants.same(step.qp.qd, step.command)
+        assert self.world.lying or step.qp.outcome is not QpOutcome.FAILED, step.qp.status
+        if e.believed:
+            assert np.array_equal(step.q, inputs.robot.q)
+            assert np.allclose(step.q_commanded, e.q, rtol=1e-12, atol=1e-12)
+        return invariants.check_mode(step, e, self.oracle, inputs.resume, self.state.mode.latched)
+
+    def _replay(self, before: ControllerState, inputs: Inputs, step: ControlStep) -> None:
+        """The same again, after another step in between, is the same to the last bit."""
+        kept, kept_state = deepcopy((step, self.state))
+        self.controller.step(self.state, replace(inputs, stamp=inputs.stamp + 0.01, resume=True))
+        again, state_again = self.controller.step(before, inputs)
+        assert invariants.same(again, step), "not the same again"
+        assert invariants.same(state_again, kept_state), "not the same state again"
+        assert invariants.same(self.state, kept_state), "the state was changed"
+        assert invariants.same(step, kept), "a published step changed"
+
+    def _count(self, step: ControlStep, cause: str) -> None:
+        p = self.world.profile
+        tight = len(step.restricted) and step.qp.slack.max() > 1e-6
+        self.machine.reached.update([
+            "step", f"arm {self.world.model.description.name}",
+            f"mode {step.mode.name}", f"outcome {step.qp.outcome.name}", f"cause {cause}",
+            f"restriction {p.restriction.mode}", f"period {p.task.control_period_s}", f"units {len(self.world.skin)}",
+            f"sight {self.weather.sight}", f"force {self.weather.feel}", f"slack {bool(tight)}",
+            f"slowed {step.speed_scale < 1}", f"on the axis {bool((step.obstacles.body_distance < -0.04).any())}",
+        ])  # fmt: skip
+
+    def _follow(self, command: np.ndarray) -> None:
+        """Move as commanded; a command no arm could follow, the answer to a lie, stops it."""
+        dt = self.world.profile.task.control_period_s
+        reach = self.world.model.description.qdd_max * dt
+        followed = (np.abs(command - self.qd) <= reach + 1e-9).all()
+        self.qd = command.copy() if followed else self.qd - np.clip(self.qd, -reach, reach)
+        self.q = self.q + self.qd * dt
+        self.time += dt

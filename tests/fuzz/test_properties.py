@@ -1,0 +1,157 @@
+"""Any numbers whatever in any input: an answer within the limits, with the right sentence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pretouch.control.path import Circle, line
+from pretouch.params import PROFILES, Profile
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import paper_skin
+from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
+from tests.fuzz.machine import Course, Machine
+from tests.fuzz.weather import STATUS
+from tests.fuzz.worlds import World
+
+MODEL = RobotModel(panda())
+SKIN = paper_skin(MODEL)
+PAPER = PROFILES["paper"]
+SHORT = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=3, compare="raw"))
+K, N = len(SKIN), MODEL.n
+READY = MODEL.description.q_ready
+
+
+def restricted(mode: str, **task: object) -> Profile:
+    return replace(SHORT, restriction=replace(SHORT.restriction, mode=mode), task=replace(SHORT.task, **task))
+
+
+profiles = st.sampled_from([
+    *map(restricted, ("slack", "hard", "floor", "off")), restricted("hard", control_period_s=0.001),
+    restricted("slack", orientation="free"), replace(SHORT, perception=replace(SHORT.perception, filter_views=False)),
+])  # fmt: skip
+
+
+def between(low: np.ndarray, high: np.ndarray) -> st.SearchStrategy[np.ndarray]:
+    """Vectors whose parts are anywhere between, and often at the ends."""
+    share = st.lists(st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0.0, 1.0)), min_size=N, max_size=N)
+    return share.map(lambda s: low + np.array(s) * (high - low))
+
+
+postures = st.one_of(
+    st.just(READY),
+    st.just(np.zeros(N)),  # stretched and beyond a limit
+    between(MODEL.q_min + 0.01, MODEL.q_max - 0.01),
+    between(MODEL.q_min - 0.5, MODEL.q_max + 0.5),
+)
+speeds = between(-1.5 * MODEL.description.qd_max, 1.5 * MODEL.description.qd_max)
+some_floats = st.one_of(st.floats(-1.0, 5.0), st.floats())
+readings = st.tuples(
+    st.lists(st.one_of(st.just(0.0), st.floats(-1.0, 1.0), st.floats()), min_size=K, max_size=K),  # stamps, from now
+    st.lists(some_floats, min_size=K, max_size=K),
+    st.lists(st.one_of(st.just(0), st.sampled_from(STATUS), st.integers(-300, 300)), min_size=K, max_size=K),
+)
+wrenches = st.none() | st.lists(st.one_of(st.floats(-80, 80), st.floats()), min_size=6, max_size=6).map(np.array)
+
+
+def course(profile: Profile, q: np.ndarray, qd: np.ndarray) -> Course:
+    """A controller of an arm in that state."""
+    course = Course(
+        Machine(0), World(MODEL, profile, SKIN, no_fixtures(), Circle(), q, qd, lying=True, measured_off=0.0)
+    )
+    course.time = 100.0
+    course.weather.feel = "calm"
+    return course
+
+
+def calm(course: Course) -> Inputs:
+    """No target in view, and nothing felt."""
+    robot = replace(course.robot(), wrench=np.zeros(6))
+    none = RangeReadings(np.full(K, course.time), np.zeros(K), np.full(K, int(RangeStatus.SIGNAL)))
+    return Inputs(course.time, robot, none)
+
+
+def begun(profile: Profile, q: np.ndarray, qd: np.ndarray) -> Course:
+    """The same after some calm steps: past the filling of its window, and on the move if it may."""
+    a = course(profile, q, qd)
+    a.state = a.controller.init(calm(a).robot)
+    a.oracle = type(a.oracle)(profile, SKIN.ids, calm(a).robot, a.oracle.qd_max)
+    for _ in range(6):
+        a.step(calm(a), deep=False)
+    return a
+
+
+@given(profiles, postures, speeds, st.lists(readings, min_size=1, max_size=6))
+@settings(deadline=None, derandomize=True, max_examples=80)
+def test_any_posture_and_any_readings(profile, q, qd, sequence):
+    arm = begun(profile, q, qd)
+    for stamp, distance, status in sequence:
+        seen = RangeReadings(arm.time + np.array(stamp), np.array(distance), np.array(status))
+        arm.step(replace(calm(arm), readings=seen), deep=True)
+
+
+@given(profiles, st.lists(st.tuples(wrenches, st.booleans()), min_size=1, max_size=10))
+@settings(deadline=None, derandomize=True, max_examples=60)
+def test_any_force(profile, sequence):
+    arm = begun(profile, READY, np.zeros(N))
+    for wrench, resume in sequence:
+        inputs = calm(arm)
+        arm.step(replace(inputs, robot=replace(inputs.robot, wrench=wrench), resume=resume), deep=True)
+
+
+stamps = st.one_of(st.just(0.0), st.floats(-0.2, 0.2), st.floats())
+
+
+@given(profiles, st.lists(st.tuples(stamps, stamps, stamps, st.booleans()), min_size=1, max_size=10))
+@settings(deadline=None, derandomize=True, max_examples=60)
+def test_any_stamps(profile, sequence):
+    arm = begun(profile, READY, np.zeros(N))
+    for step, robot, unit, resume in sequence:
+        inputs, now = calm(arm), arm.time + step
+        seen = replace(inputs.readings, stamp=np.full(K, now + unit))
+        said = replace(inputs.robot, stamp=now + robot)
+        arm.step(Inputs(now, said, seen, resume), deep=True)
+
+
+parts = st.sampled_from(["q", "qd", "q_commanded", "qd_commanded", "tau_ext"])
+
+
+@given(profiles, st.lists(st.tuples(parts, st.integers(0, N - 1), st.floats(), st.booleans()), min_size=1, max_size=10))
+@settings(deadline=None, derandomize=True, max_examples=80)
+def test_any_robot_state(profile, sequence):
+    arm = begun(profile, READY, np.zeros(N))
+    for part, joint, value, resume in sequence:
+        inputs = calm(arm)
+        wrong = getattr(inputs.robot, part).copy()
+        wrong[joint] = value
+        arm.step(replace(inputs, robot=replace(inputs.robot, **{part: wrong}), resume=resume), deep=True)
+
+
+@given(
+    profiles, postures, st.tuples(*[st.floats(-3.0, 3.0)] * 3),
+    st.lists(st.tuples(*[st.floats(0.0, 0.6)] * K), min_size=1, max_size=6),
+)  # fmt: skip
+@settings(deadline=None, derandomize=True, max_examples=60)
+def test_any_goal_among_any_obstacles(profile, q, goal, sequence):
+    arm = begun(profile, q, np.zeros(N))
+    start = tuple(MODEL.kinematics(arm.q).position[MODEL.ee])
+    if np.linalg.norm(np.subtract(goal, start)) > 1e-3:
+        arm.controller.path = line(start, goal)
+    for distance in sequence:
+        for _ in range(3):
+            seen = RangeReadings(np.full(K, arm.time), np.array(distance), np.zeros(K, np.int64))
+            arm.step(replace(calm(arm), readings=seen), deep=False)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("part", ["stamp", "q", "qd", "q_commanded", "qd_commanded"])
+def test_no_controller_starts_from_what_is_no_number(part: str, value: float):
+    arm = course(SHORT, READY, np.zeros(N))
+    robot: RobotState = arm.robot()
+    wrong = value if part == "stamp" else np.full(N, value)
+    with pytest.raises(ValueError, match="cannot start"):
+        arm.controller.init(replace(robot, **{part: wrong}))

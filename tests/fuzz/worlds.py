@@ -1,0 +1,186 @@
+"""What a fuzzed controller is made of: profile, skin, fixtures, path, and where the arm starts."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from pretouch.control.path import Circle, Path, WayPoints, line
+from pretouch.params import (
+    FailureParams,
+    PerceptionParams,
+    Profile,
+    ReactionParams,
+    ReductionParams,
+    RestrictionParams,
+    TaskParams,
+    ThresholdParams,
+)
+from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.robot.body import Capsules
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin, paper_skin
+from pretouch.sensing.unit import SensorUnit
+
+# for each parameter its usual value and values far to both sides; what a check bounds, up to the bound
+CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
+    PerceptionParams: {
+        "enabled": (True, True, True, False), "filter_views": (True, False), "persistence_s": (0.06, 0.005, 1.0),
+        "self_margin_m": (0.06, 0.0, 1.0), "slow_after_s": (0.1, 0.02), "silent_after_s": (0.3, 0.101),
+    },
+    TaskParams: {
+        "speed_m_s": (0.3, 1e-3, 5.0), "acceleration_m_s2": (1.0, 1e-3, 100.0), "position_gain_1_s": (2.0, 0.0, 50.0),
+        "off_path_m": (0.1, 1e-3, 10.0), "orientation": ("hold", "free"), "orientation_gain_1_s": (1.0, 0.0, 20.0),
+        "damping_max": (0.1, 0.0, 10.0), "manipulability_threshold": (0.001, 1e-6, 10.0),
+        "mid_joint_gain": (0.001, 1e-6, 1.0), "mid_joint_time_s": (5.0, 0.01, 1e3),
+        "control_period_s": (0.01, 0.001), "position_margin_rad": (0.01, 0.0, 0.2),
+    },
+    ReductionParams: {"enabled": (True, False), "d_max_m": (0.8, 1e-3, 5.0), "l_max_cycles": (20, 1, 10_000)},
+    RestrictionParams: {
+        "mode": ("slack", "hard", "floor", "off"), "v_max_m_s": (0.04, 1e-4, 2.0), "beta": (-10.0, -1e-3, -1e3),
+        "d_repulse_m": (0.1, 1e-3, 1.0), "d_crit_m": (0.1, 1e-3), "d_notice_m": (0.6, 0.2, 5.0),
+        "floor_m_s": (0.02, 0.0, 1.0), "slack_weight": (1000.0, 1e-2, 1e6),
+    },
+    ThresholdParams: {
+        "window_samples": (5, 2, 30), "alpha": (0.1, 0.0, 1.0), "lambda_": (0.75, 0.0, 5.0), "f_base_n": (10.0, 4.1),
+        "f_std_n": (3.0, 0.0), "sigma_max_n": (3.0, 1e-3), "f_d_n": (4.0, 0.0), "d_max_m": (0.8, 5.0),
+        "d_min_m": (0.05, 0.0, 0.79), "compare": ("filtered", "raw"),
+    },
+    ReactionParams: {
+        "compliance_m_s_n": (0.03, 1e-4, 1.0), "speed_max_m_s": (0.3, 0.01, 2.0), "decay_cycles": (20, 1, 200),
+    },
+    FailureParams: {
+        "state_timeout_s": (0.05, 1.0), "overrun_s": (0.05, 0.5), "force_max_n": (1e5, 200.0),
+        "force_timeout_s": (0.2, 0.05),
+    },
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class World:
+    """One arm's controller and the state the arm is in when it takes over."""
+
+    model: RobotModel
+    profile: Profile
+    skin: Skin
+    fixtures: Fixtures
+    path: Path
+    q: np.ndarray
+    qd: np.ndarray
+    lying: bool
+    """Whether the arm's interface also gives finite numbers that are not true."""
+    measured_off: float
+    """Spread of the measured about the commanded joint positions [rad]."""
+
+
+def any_world(rng: np.random.Generator, model: RobotModel) -> World:
+    """Draw a world."""
+    profile = any_profile(rng)
+    q, qd = any_start(rng, model, profile.task.position_margin_rad)
+    return World(
+        model, profile, any_skin(rng, model), any_fixtures(rng), any_path(rng, model, q), q, qd,
+        lying=rng.random() < 0.15, measured_off=float(rng.choice([0.0, 1e-3, 0.03])),
+    )  # fmt: skip
+
+
+def any_profile(rng: np.random.Generator) -> Profile:
+    """Draw each parameter: in a third of the profiles mostly the usual value."""
+    usual = 0.85 if rng.random() < 1 / 3 else 0.4
+    groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES}
+    drawn = {name: group(**_drawn(rng, CHOICES[group], usual)) for name, group in groups.items()}
+    restriction = replace(drawn["restriction"], mode=str(rng.choice(["slack", "hard", "floor", "off"])))
+    return Profile(**{**drawn, "restriction": restriction, "name": "fuzzed"})
+
+
+def _drawn(rng: np.random.Generator, choices: dict[str, tuple[object, ...]], usual: float) -> dict[str, object]:
+    return {name: v[0] if rng.random() < usual else v[rng.integers(len(v))] for name, v in choices.items()}
+
+
+def any_skin(rng: np.random.Generator, model: RobotModel) -> Skin:
+    """Draw the paper's skin where it fits, or 0, 1, 7 or 32 units on the surface of the arm.
+
+    They look outwards, anywhere, or inwards: then a reading may put its point on the axis of the unit's own link.
+    """
+    if rng.random() < 0.3 and model.description.name == "panda":
+        return paper_skin(model)
+    count = int(rng.choice([0, 1, 7, 7, 32]))
+    return Skin([_unit(rng, model, f"u{i}") for i in range(count)], model)
+
+
+def _unit(rng: np.random.Generator, model: RobotModel, name: str) -> SensorUnit:
+    while True:
+        c = int(rng.integers(len(model.capsules)))
+        link = int(model.capsules.link[c])
+        a, b, radius = model.capsules.a[c], model.capsules.b[c], model.capsules.radius[c]
+        out = np.cross(b - a if np.any(b != a) else rng.normal(size=3), rng.normal(size=3))
+        out /= np.linalg.norm(out)
+        place = a + rng.random() * (b - a) + (radius + 0.005) * out
+        own = model.capsules.of_links(np.array([link]))
+        if link and all(_height(place, own, i) > 0 for i in range(len(own))):
+            break
+    looks = {0: out, 1: rng.normal(size=3), 2: -out}[int(rng.choice([0, 0, 1, 2]))]
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = _frame(looks / np.linalg.norm(looks)), place
+    return SensorUnit(name, model.links[link], T)
+
+
+def _height(p: np.ndarray, capsules: Capsules, i: int) -> float:
+    a, b = capsules.a[i], capsules.b[i]
+    along = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
+    return float(np.linalg.norm(p - a - along * (b - a)) - capsules.radius[i])
+
+
+def _frame(z: np.ndarray) -> np.ndarray:
+    """Some rotation whose third column is z."""
+    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def any_fixtures(rng: np.random.Generator) -> Fixtures:
+    """Draw nothing, a floor, or a floor, a wall, a pole and a ball, one of them where the arm is."""
+    kind = rng.integers(3)
+    if kind == 0:
+        return no_fixtures()
+    planes = np.array([[0.0, 0.0, 1.0, -0.2], [0.0, 1.0, 0.0, rng.uniform(-1.0, 0.5)]])[:kind]
+    a = rng.uniform(-0.8, 0.8, (2, 3))
+    b = a + np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    pole_and_ball = Capsules(np.zeros(2, np.int64), a, b, np.array([0.03, 0.3]))
+    return Fixtures(planes, pole_and_ball if kind == 2 else no_fixtures().capsules)
+
+
+def any_start(rng: np.random.Generator, model: RobotModel, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Draw joint positions and velocities: ready, anywhere, at limits, beyond them, stretched, folded."""
+    low, high = model.q_min + margin, model.q_max - margin
+    q = model.description.q_ready.copy()
+    kind = rng.integers(6)
+    if kind == 1:
+        q = rng.uniform(low, high)
+    elif kind == 2:
+        q = np.where(rng.random(7) < 0.5, low, high)
+    elif kind == 3:
+        j = rng.integers(7)
+        q[j] = rng.choice([low[j] - rng.choice([1e-9, 0.05, 3.0]), high[j] + rng.choice([1e-9, 0.05, 3.0])])
+    elif kind == 4:
+        q = np.array([0.0, 0.0, 0.0, high[3], 0.0, 0.0, 0.0])
+    elif kind == 5:
+        q[3] = low[3]
+    qd = model.description.qd_max * rng.uniform(-1.0, 1.0, 7) * rng.choice([0.0, 0.0, 0.3, 1.0, 1.6])
+    return q, qd
+
+
+def any_path(rng: np.random.Generator, model: RobotModel, q: np.ndarray) -> Path:
+    """Draw a path: the paper's, at the hand, tiny, through many corners, far away, out of reach."""
+    x = model.kinematics(q).position[model.ee]
+    kind = rng.integers(7)
+    if kind == 0:
+        return Circle()
+    if kind == 1:
+        return Circle((x[0], x[1] - 0.25, x[2]))
+    if kind == 2:
+        return Circle(tuple(x), float(rng.choice([1e-6, 1e-4, 10.0])))
+    if kind == 3:
+        return WayPoints(x + rng.uniform(-0.4, 0.4, (int(rng.integers(2, 9)), 3)), closed=bool(rng.random() < 0.5))
+    if kind == 4:
+        return WayPoints(x + np.array([[0, 0, 0], [2e-6, 0, 0], [0, 2e-6, 0]]), closed=bool(rng.random() < 0.5))
+    ends = rng.uniform(-1.0, 1.0, 3) * rng.choice([1.0, 3.0, 900.0])
+    return line(tuple(x), tuple(ends)) if kind == 5 else line((0.0, 0.0, 0.3), tuple(ends + 2.0))

@@ -1,0 +1,122 @@
+"""From readings to obstacles, unit by unit: eq. 1, what a status means, how long a point is kept, what the arm sees
+of itself."""
+
+import numpy as np
+
+from pretouch.params import PerceptionParams
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import MAX_DISTANCE, MIN_DISTANCE, cone_rays
+from pretouch.types import Obstacles, RangeReadings, RangeStatus
+from tests.reference.geometry import Posture, closest, first_hit
+
+RAYS = cone_rays(2)
+A_TARGET = {RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED}
+TOO_NEAR = {RangeStatus.MIN_RANGE, RangeStatus.MIN_CLIPPED}
+NOTHING_NEAR = {RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED}
+
+
+def shown(distance: float, status: int) -> float:
+    """Distance a reading stands for [m], NaN for none: at least what the sensor can measure, none beyond its range."""
+    if status in TOO_NEAR:
+        return MIN_DISTANCE
+    if status in A_TARGET and 0 <= distance <= MAX_DISTANCE:
+        return max(distance, MIN_DISTANCE)
+    return np.nan
+
+
+def shown_by(readings: RangeReadings) -> np.ndarray:
+    """The same (K,) of all readings."""
+    return np.array([shown(d, s) for d, s in zip(readings.distance, readings.status, strict=True)])
+
+
+def tells(distance: float, status: int) -> bool:
+    """Whether a reading tells anything: a target, one far away, or that none near returns light. Failures do not."""
+    far = status in A_TARGET and MAX_DISTANCE < distance < np.inf
+    return bool(np.isfinite(shown(distance, status)) or far or status in NOTHING_NEAR)
+
+
+class Eyes:
+    """What is remembered of each unit's readings."""
+
+    def __init__(self, model: RobotModel, skin: Skin, fixtures: Fixtures, params: PerceptionParams) -> None:
+        self.model, self.skin, self.fixtures, self.params = model, skin, fixtures, params
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew."""
+        units = range(len(self.skin))
+        self.point: list[np.ndarray | None] = [None for _ in units]
+        self.direction: list[np.ndarray | None] = [None for _ in units]
+        self.seen = [-np.inf for _ in units]
+        self.used = [-np.inf for _ in units]
+        self.heard = [-np.inf for _ in units]
+
+    def look(self, posture: Posture, ee: np.ndarray, readings: RangeReadings, now: float) -> Obstacles:
+        """Take in what is new; return the points known now, with the closest points of the body."""
+        if not self.params.enabled:
+            return obstacles_of([])
+        found = []
+        for k in range(len(self.skin)):
+            T = posture.T[self.skin.link[k]] @ self.skin.T_link_sensor[k]
+            self._take(k, T, posture, readings, now)
+            if now - self.seen[k] <= self.params.persistence_s:
+                found.append((k, *self._nearest(k, T, posture, ee)))
+        return obstacles_of(found)
+
+    def _take(self, k: int, T: np.ndarray, posture: Posture, readings: RangeReadings, now: float) -> None:
+        stamp, distance, status = float(readings.stamp[k]), float(readings.distance[k]), int(readings.status[k])
+        if not self.used[k] < stamp <= now:
+            return
+        self.used[k] = stamp
+        if tells(distance, status):
+            self.heard[k] = stamp
+        d = shown(distance, status)
+        late = now - stamp > self.params.persistence_s
+        if not np.isnan(d) and not late and d < self._predicted(k, T, posture) - self.params.self_margin_m:
+            self.point[k], self.seen[k] = (T @ [0.0, 0.0, d, 1.0])[:3], stamp  # eq. 1
+
+    def _predicted(self, k: int, T: np.ndarray, posture: Posture) -> float:
+        """Distance at which unit k would see another link or a fixture, over the rays of its cone."""
+        if not self.params.filter_views:
+            return np.inf
+        p, rays = T[:3, 3], RAYS @ T[:3, :3].T
+        nearest = np.inf
+        for part in (self.model.capsules, self.fixtures.capsules):
+            other = part.link != self.skin.link[k]
+            a, b = posture.ends(part)
+            nearest = min(nearest, first_hit(p, rays, a[other], b[other], part.radius[other]))
+        for plane in self.fixtures.planes:
+            height, sinking = plane[:3] @ p - plane[3], -rays @ plane[:3]
+            if height >= 0:
+                nearest = min(nearest, (height / sinking[sinking > 0]).min(initial=np.inf))
+        return nearest
+
+    def _nearest(self, k: int, T: np.ndarray, posture: Posture, ee: np.ndarray) -> tuple:
+        point, last = self.point[k], self.direction[k]
+        assert point is not None
+        body = self.model.body
+        fallback = T[:3, 2] if last is None else last
+        c, on_body, direction, distance = closest(point, *posture.ends(body), body.radius, fallback)
+        self.direction[k] = direction
+        return point, np.linalg.norm(point - ee), on_body, body.link[c], direction, distance
+
+    def silence(self, now: float) -> tuple[float, str]:
+        """Factor on the speed for the unit that has been silent longest, and the names of those silent too long."""
+        if not self.params.enabled or not self.heard:
+            return 1.0, ""
+        ages = [now - heard for heard in self.heard]
+        from_, to = self.params.slow_after_s, self.params.silent_after_s
+        names = [name for name, age in zip(self.skin.ids, ages, strict=True) if age >= to]
+        return min(1.0, max(0.0, (to - max(ages)) / (to - from_))), ", ".join(names)
+
+
+def obstacles_of(found: list[tuple]) -> Obstacles:
+    """Gather obstacles found one by one: unit, point, ee_distance, body_point, link, direction, body_distance."""
+    unit, point, ee_distance, body_point, link, direction, distance = zip(*found, strict=True) if found else [()] * 7
+    return Obstacles(
+        np.array(unit, dtype=np.int64), np.reshape(point, (-1, 3)), np.array(ee_distance),
+        np.reshape(body_point, (-1, 3)), np.array(link, dtype=np.int64), np.reshape(direction, (-1, 3)),
+        np.array(distance),
+    )  # fmt: skip

@@ -1,0 +1,50 @@
+"""Skins of any number of units, spread over the surface of an arm."""
+
+import numpy as np
+
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
+
+HEIGHT = 0.008
+"""Height of a unit above the surface it is on [m]."""
+
+
+def spread(model: RobotModel, count: int, seed: int) -> Skin:
+    """Lay `count` units on the capsules that move, by the size of their sides, each looking straight out.
+
+    A unit that another capsule of its link would cover is laid anew. The turn about the beam is random.
+    """
+    rng = np.random.default_rng(seed)
+    body = model.body
+    length = np.linalg.norm(body.b - body.a, axis=1)
+    share = body.radius * (length + 2 * body.radius)
+    units: list[SensorUnit] = []
+    while len(units) < count:
+        c = int(rng.choice(len(body), p=share / share.sum()))
+        out = rng.normal(size=3)
+        along, axis = rng.uniform(-body.radius[c], length[c] + body.radius[c]), (body.b[c] - body.a[c]) / length[c]
+        if 0 < along < length[c]:
+            out -= out @ axis * axis
+        elif out @ axis * (along - length[c] / 2) < 0:
+            out = -out
+        out /= np.linalg.norm(out)
+        foot = body.a[c] + np.clip(along, 0.0, length[c]) * axis
+        place = foot + (body.radius[c] + HEIGHT) * out
+        if _covered(model, int(body.link[c]), place):
+            continue
+        side = np.cross(out, rng.normal(size=3))
+        side /= np.linalg.norm(side)
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = np.column_stack([side, np.cross(out, side), out]), place
+        units.append(SensorUnit(f"unit_{len(units)}", model.links[body.link[c]], T))
+    return Skin(units, model)
+
+
+def _covered(model: RobotModel, link: int, place: np.ndarray) -> bool:
+    own = model.capsules.of_links(np.array([link]))
+    for a, b, radius in zip(own.a, own.b, own.radius, strict=True):
+        along = np.clip((place - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+        if np.linalg.norm(place - a - along * (b - a)) < radius + HEIGHT / 2:
+            return True
+    return False

@@ -1,0 +1,141 @@
+"""The loop at 1 kHz with samples that come late or not at all: nothing raises, and the commands keep the limits."""
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch import loop
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
+from pretouch.params import PROFILES, at_rate
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
+
+DT = 0.001
+PAPER = PROFILES["paper"]
+# hard accelerations, so that they are at their limits often; a short window, so that the arm soon moves
+BRISK = replace(
+    PAPER,
+    task=replace(PAPER.task, acceleration_m_s2=50.0, speed_m_s=0.8),
+    threshold=replace(PAPER.threshold, window_samples=20),
+)
+
+
+class World:
+    """An arm that does as it is told, whose state is read with a delay and sometimes not anew, its skin and clock."""
+
+    def __init__(self, model: RobotModel, units: int, lost: float = 0.0, delay: int = 0) -> None:
+        self.units, self.lost, self.rng = units, lost, np.random.default_rng(0)
+        self.now, self.q, self.qd = 0.0, model.description.q_ready.copy(), np.zeros(7)
+        self.states: deque[RobotState] = deque(maxlen=delay + 1)
+        self.sent: list[np.ndarray] = [self.qd]
+        self.been: list[np.ndarray] = []
+        self.steps: list[ControlStep] = []
+        self.silent_from, self.silent_until = np.inf, np.inf
+
+    def tick(self) -> float:
+        self.now += DT
+        self.q = self.q + self.qd * DT
+        self.been.append(self.q)
+        return self.now
+
+    def read(self) -> RobotState:
+        if not self.states or self.rng.uniform() >= self.lost:
+            wrench = np.concatenate([self.rng.normal(0.0, 0.3, 3), np.zeros(3)])
+            self.states.append(RobotState(self.now, self.q, self.qd, self.q, self.qd, np.zeros(7), wrench))
+        return self.states[0]
+
+    def command(self, qd: np.ndarray) -> None:
+        self.qd = qd
+        self.sent.append(qd)
+
+    def record(self, step: ControlStep) -> None:
+        self.steps.append(step)
+
+
+class SilentFor:
+    """A skin that sees nothing, and stops in the times of its world."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    def read(self) -> RangeReadings:
+        w, k = self.world, self.world.units
+        stamp = w.silent_from if w.silent_from <= w.now < w.silent_until else w.now
+        return RangeReadings(np.full(k, stamp), np.zeros(k), np.full(k, int(RangeStatus.SIGNAL)))
+
+
+def turn(model: RobotModel, skin: Skin, world: World, seconds: float) -> list[Mode]:
+    controller = Controller(model, skin, no_fixtures(), Circle(), at_rate(BRISK, 1 / DT))
+    loop.run(controller, world, SilentFor(world), world, world, lambda step: world.now >= seconds)
+    return [step.mode for step in world.steps]
+
+
+def assert_within_limits(model: RobotModel, world: World) -> None:
+    arm, sent = model.description, np.array(world.sent)
+    assert np.all(np.isfinite(sent))
+    assert np.all(np.abs(sent) <= arm.qd_max + 1e-9)
+    assert np.all(np.abs(np.diff(sent, axis=0)) <= arm.qdd_max * DT * (1 + 1e-9))
+    assert np.all((world.been >= model.q_min) & (world.been <= model.q_max))
+    np.testing.assert_array_equal(sent[-1], 0.0)
+
+
+@pytest.mark.parametrize("lost", [0.01, 0.3])
+def test_lost_samples_keep_the_arm_going_within_its_limits(panda_model: RobotModel, paper_skin: Skin, lost: float):
+    world = World(panda_model, len(paper_skin), lost=lost)
+    modes = turn(panda_model, paper_skin, world, 2.0)
+    assert set(modes[300:]) == {Mode.TRACK}
+    assert np.abs(world.sent).max() > 0.5
+    assert_within_limits(panda_model, world)
+
+
+@pytest.mark.parametrize("delay", [1, 20])
+def test_a_late_state_keeps_the_arm_going_within_its_limits(panda_model: RobotModel, paper_skin: Skin, delay: int):
+    world = World(panda_model, len(paper_skin), delay=delay)
+    modes = turn(panda_model, paper_skin, world, 2.0)
+    assert set(modes[300:]) == {Mode.TRACK}
+    assert np.abs(world.sent).max() > 0.5
+    assert_within_limits(panda_model, world)
+
+
+@pytest.mark.parametrize("delay", [0, 20])
+def test_a_skin_that_stops_stops_the_arm_until_it_is_heard_again(panda_model: RobotModel, paper_skin: Skin, delay: int):
+    world = World(panda_model, len(paper_skin), lost=0.01, delay=delay)
+    world.silent_from, world.silent_until = 0.6, 1.5
+    modes = turn(panda_model, paper_skin, world, 2.0)
+    at = np.array([step.stamp for step in world.steps])
+    # held 0.3 s after the last reading, and at rest no later than from full speed
+    assert {mode for mode, t in zip(modes, at, strict=True) if 0.91 < t < 1.49} == {Mode.HOLD}
+    speeds = np.abs([step.command for step in world.steps]).max(axis=1)
+    assert np.all(speeds[(at > 1.25) & (at < 1.49)] == 0.0)
+    assert modes[-1] is Mode.TRACK
+    assert speeds[-1] > 0
+    assert_within_limits(panda_model, world)
+
+
+def test_a_state_too_old_latches(panda_model: RobotModel, paper_skin: Skin):
+    world = World(panda_model, len(paper_skin), delay=60)
+    modes = turn(panda_model, paper_skin, world, 0.5)
+    assert modes[-1] is Mode.HOLD
+    assert "old: check the connection" in world.steps[-1].reason
+    assert_within_limits(panda_model, world)
+
+
+def test_readings_older_than_the_last_ones_are_no_news(panda_model: RobotModel, paper_skin: Skin):
+    """A radio that delivers a reading twice, or two in the wrong order, moves no obstacle back."""
+    controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(BRISK, 1 / DT))
+    world = World(panda_model, len(paper_skin))
+    state, k = controller.init(world.read()), len(paper_skin)
+    seen = []
+    for stamp, distance in ((0.001, 0.3), (0.003, 0.2), (0.002, 0.4), (0.003, 0.5)):
+        world.tick()
+        readings = RangeReadings(np.full(k, stamp), np.full(k, distance), np.zeros(k, np.int64))
+        step, state = controller.step(state, Inputs(max(world.now, stamp), world.read(), readings))
+        seen.append(step.obstacles.point)
+    assert len(seen[1]) > 0
+    np.testing.assert_allclose(seen[2], seen[1])
+    np.testing.assert_allclose(seen[3], seen[1])

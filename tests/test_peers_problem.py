@@ -1,0 +1,126 @@
+"""The problem on which Pretouch is compared with its peers: the same for all, feasible, and thinly so."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import nnls
+
+from pretouch.robot.model import RobotModel
+
+sys.path.append(str(Path(__file__).parents[1]))  # benchmarks are not installed
+
+from benchmarks.peers.geometry import approach_rows, damping, frames_of, joint_box, linear_jacobian
+from benchmarks.peers.ours import Rows, Step, panda_arm
+from benchmarks.peers.problem import MARGIN, TERMS, Problem, generate, load
+
+SNAPSHOTS, POINTS = 12, 32
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return generate(*panda_arm(), SNAPSHOTS, POINTS, seed=3)
+
+
+def constraints(problem: Problem, s: int):
+    """Rows G qd <= h, joint box and all, of one snapshot."""
+    G, h = approach_rows(problem.arm, *frames_of(problem.arm, problem.q[s]), problem.points[s], TERMS)
+    lower, upper = joint_box(problem.arm, problem.q[s], problem.qd[s], TERMS.period)
+    return G, h, lower, upper
+
+
+def test_it_is_about_our_arm(problem: Problem, panda_model: RobotModel):
+    for q in problem.q:
+        kin = panda_model.kinematics(q)
+        rotation, origin = frames_of(problem.arm, q)
+        np.testing.assert_allclose(origin, kin.anchor, atol=1e-12)
+        np.testing.assert_allclose(
+            linear_jacobian(problem.arm, rotation, origin), panda_model.ee_jacobian(kin)[:3], atol=1e-12
+        )
+    assert len(problem.arm.radius) == len(panda_model.body)
+
+
+def test_the_motion_keeps_every_limit_by_a_margin_that_is_thin(problem: Problem):
+    for s in range(SNAPSHOTS):
+        G, h, lower, upper = constraints(problem, s)
+        margin = h - G @ problem.witness[s]
+        assert margin.min() >= MARGIN - 1e-12
+        assert margin.min() < 20 * MARGIN
+        # half of the points are those of smallest margin among four times as many
+        assert np.median(margin) < 0.02
+        assert np.all((lower < problem.witness[s]) & (problem.witness[s] < upper))
+
+
+def test_our_answer_is_the_minimum(problem: Problem):
+    rows, touched, arm = Rows(problem), 0, problem.arm
+    for s in range(SNAPSHOTS):
+        G, h, lower, upper = constraints(problem, s)
+        qd = rows.solve(s)
+        A, b = np.concatenate([G, np.eye(7), -np.eye(7)]), np.concatenate([h, upper, -lower])
+        assert (A @ qd - b).max() < 1e-8
+        # optimal, by Karush, Kuhn and Tucker: the cost falls only towards limits that are reached
+        J = linear_jacobian(arm, *frames_of(arm, problem.q[s]))
+        k = TERMS.mid_joint_gain
+        mid = ((arm.q_min + arm.q_max) / 2 - problem.q[s]) / TERMS.mid_joint_time
+        gradient = J.T @ (J @ qd - problem.velocity[s]) + damping(J, TERMS) * qd + k * (qd - mid)
+        reached = A @ qd - b > -1e-8
+        assert nnls(A[reached].T, -gradient)[1] < 1e-8
+        touched += bool(reached[: len(h)].any())
+    assert touched > SNAPSHOTS / 2
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.floats(0.0, 0.2), st.floats(1.0, 20.0))
+def test_the_box_lets_the_arm_stop_before_its_limits_and_no_sooner(distance: float, acceleration: float):
+    arm, period = panda_arm()[0], TERMS.period
+    arm = replace(arm, qdd_max=np.full(7, acceleration), qd_max=np.full(7, 100.0))
+    for sign, limit in ((1.0, arm.q_max), (-1.0, arm.q_min)):
+        q = limit - sign * distance
+        # the last velocity is such that it is position that limits
+        fastest = sign * joint_box(arm, q, np.zeros(7), period)[sign > 0][0]
+        if fastest >= acceleration * period * (1 - 1e-9):
+            last = sign * np.sqrt(2 * acceleration * distance)
+            fastest = sign * joint_box(arm, q, np.full(7, last), period)[sign > 0][0]
+        assert travelled(fastest, acceleration, period) <= distance + 1e-12
+        assert travelled(fastest + 1e-6, acceleration, period) > distance
+
+
+def travelled(speed: float, acceleration: float, period: float) -> float:
+    """Way of an arm that holds a speed for a period and then brakes, a velocity a period [rad]."""
+    speeds = np.maximum(speed - acceleration * period * np.arange(2000), 0.0)
+    return float(speeds.sum() * period)
+
+
+@pytest.mark.parametrize("points", [0, 7])
+def test_the_whole_step_sees_as_many_points_in_every_snapshot(points: int):
+    whole = Step(generate(*panda_arm(), SNAPSHOTS, points, seed=3))
+    for s in range(SNAPSHOTS):
+        step, _ = whole.controller.step(whole.state, whole._inputs(whole.time, s))
+        assert len(step.obstacles.unit) == points
+        np.testing.assert_array_equal(whole.solve(s), step.command)  # it is pure, and it tracks
+
+
+def test_it_is_drawn_from_its_seed_alone(problem: Problem):
+    again, other = (generate(*panda_arm(), SNAPSHOTS, POINTS, seed=seed) for seed in (3, 4))
+    np.testing.assert_array_equal(again.points, problem.points)
+    np.testing.assert_array_equal(again.velocity, problem.velocity)
+    assert not np.any(other.points == problem.points)
+
+
+def test_no_points_are_a_problem_too():
+    problem = generate(*panda_arm(), 2, 0, seed=0)
+    assert problem.points.shape == (2, 0, 3)
+    assert np.all(np.isfinite(Rows(problem).solve(0)))
+
+
+def test_a_file_holds_all_of_it(problem: Problem, tmp_path: Path):
+    problem.save(tmp_path / "problem.npz")
+    read = load(tmp_path / "problem.npz")
+    for name in ("q", "qd", "witness", "velocity", "points"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(problem, name))
+    for name, value in vars(problem.arm).items():
+        np.testing.assert_array_equal(getattr(read.arm, name), value)

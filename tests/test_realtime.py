@@ -1,0 +1,313 @@
+"""What a process is given for real time, that it is taken back, and that nothing is left to compile in the loop."""
+
+import ctypes
+import gc
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pretouch import realtime
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
+from pretouch.errors import ParameterError
+from pretouch.loop import MonotonicClock
+from pretouch.params import PROFILES, at_rate, profile
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RobotState
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="priorities and processors are chosen on Linux only")
+FAST = at_rate(PROFILES["paper"], 1000.0)
+
+
+@pytest.fixture(autouse=True)
+def collector() -> Iterator[None]:
+    gc.unfreeze()
+    gc.enable()
+    yield
+    assert gc.isenabled()
+    gc.unfreeze()
+
+
+@pytest.fixture
+def controller(panda_model: RobotModel, paper_skin: Skin) -> Controller:
+    return Controller(panda_model, paper_skin, no_fixtures(), Circle(), FAST)
+
+
+def at_rest(model: RobotModel, stamp: float = 0.0) -> RobotState:
+    q, zero = model.description.q_ready, np.zeros(7)
+    return RobotState(stamp, q, zero, q, zero, zero, np.zeros(6))
+
+
+def test_nothing_is_collected_meanwhile():
+    with realtime.real_time() as missing:
+        assert not gc.isenabled()
+        assert gc.get_freeze_count() > 1000
+    assert gc.isenabled()
+    assert gc.get_freeze_count() == 0
+    assert missing == () or sys.platform != "linux"
+
+
+def test_the_collector_comes_back_after_an_error():
+    with pytest.raises(RuntimeError, match="lost"), realtime.real_time():
+        raise RuntimeError("lost")
+    assert gc.isenabled()
+    assert gc.get_freeze_count() == 0
+
+
+def test_a_collector_somebody_switched_off_and_froze_stays_so():
+    gc.disable()
+    gc.freeze()
+    try:
+        with realtime.real_time():
+            pass
+        assert not gc.isenabled()
+        assert gc.get_freeze_count() > 0
+    finally:
+        gc.enable()
+
+
+@linux
+def test_a_refused_priority_is_one_sentence_and_the_run_goes_on(monkeypatch: pytest.MonkeyPatch):
+    def refuse(*_args: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    with realtime.real_time(priority=80) as missing:
+        assert not gc.isenabled()
+    (said,) = missing
+    assert said.startswith("Real-time priority 80 was refused")
+    assert "rtprio 99" in said
+    assert "/etc/security/limits.conf" in said
+    assert "CAP_SYS_NICE" in said
+
+
+@linux
+def test_a_priority_there_is_not_here_is_one_sentence(monkeypatch: pytest.MonkeyPatch):
+    def fail(*_args: object) -> None:
+        raise OSError(22, "Invalid argument")
+
+    monkeypatch.setattr(os, "sched_setscheduler", fail)
+    with realtime.real_time(priority=1) as missing:
+        pass
+    assert missing == ("Real-time priority 1 is not to be had here (Invalid argument): the loop runs without it.",)
+
+
+@linux
+@pytest.mark.parametrize("ends", [None, RuntimeError("lost")])
+def test_a_priority_is_set_and_taken_back(monkeypatch: pytest.MonkeyPatch, ends: Exception | None):
+    calls = []
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *call: calls.append(call))
+    before = os.sched_getscheduler(0)
+    try:
+        with realtime.real_time(priority=80) as missing:
+            assert missing == ()
+            assert [(who, policy, param.sched_priority) for who, policy, param in calls] == [(0, os.SCHED_FIFO, 80)]
+            if ends:
+                raise ends
+    except RuntimeError:
+        pass
+    assert [(who, policy) for who, policy, _ in calls[1:]] == [(0, before)]
+
+
+@linux
+def test_the_process_stays_on_a_processor_meanwhile():
+    before = os.sched_getaffinity(0)
+    with realtime.real_time(cpu=max(before)) as missing:
+        assert os.sched_getaffinity(0) == {max(before)}
+    assert missing == ()
+    assert os.sched_getaffinity(0) == before
+
+
+@linux
+def test_a_refused_processor_is_one_sentence(monkeypatch: pytest.MonkeyPatch):
+    def refuse(*_args: object) -> None:
+        raise OSError(22, "Invalid argument")
+
+    monkeypatch.setattr(os, "sched_setaffinity", refuse)
+    cpu = min(os.sched_getaffinity(0))
+    with realtime.real_time(cpu=cpu) as missing:
+        pass
+    (said,) = missing
+    assert said.startswith(f"Staying on processor {cpu} was refused (Invalid argument)")
+
+
+@linux
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        ({"priority": 0}, "The real-time priority is 0: give 1 to 99."),
+        ({"priority": 100}, "The real-time priority is 100: give 1 to 99."),
+        ({"cpu": -1}, "Processor -1 is none this process may use: choose from "),
+        ({"cpu": 100_000}, "Processor 100000 is none this process may use: choose from "),
+    ],
+)
+def test_wishes_that_cannot_be_name_the_range(wish: dict[str, int], words: str):
+    with pytest.raises(ParameterError, match=words), realtime.real_time(**wish):
+        pytest.fail("nothing is to be run")
+    assert gc.isenabled()
+
+
+@linux
+def test_timers_are_sharp_meanwhile():
+    prctl = ctypes.CDLL(None).prctl
+    first = prctl(30, 0, 0, 0, 0)
+    prctl(29, 40_000, 0, 0, 0)
+    with realtime.real_time():
+        assert prctl(30, 0, 0, 0, 0) == 1
+    assert prctl(30, 0, 0, 0, 0) == 40_000
+    prctl(29, first, 0, 0, 0)
+
+
+def test_elsewhere_than_on_linux_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(realtime, "sys", SimpleNamespace(platform="darwin"))
+    with realtime.real_time(priority=80, cpu=1) as missing:
+        assert not gc.isenabled()
+    (said,) = missing
+    assert said.startswith("This is darwin, not Linux")
+
+
+class Arm:
+    """A robot and a recorder."""
+
+    def __init__(self, controller: Controller) -> None:
+        self.model, self.units = controller.model, len(controller.skin)
+        self.steps: list[ControlStep] = []
+        self.collecting: list[bool] = []
+
+    def read(self) -> RobotState:
+        return at_rest(self.model)
+
+    def command(self, qd: np.ndarray) -> None:
+        assert np.all(np.isfinite(qd))
+
+    def record(self, step: ControlStep) -> None:
+        self.steps.append(step)
+        self.collecting.append(gc.isenabled())
+
+
+class NoReadings:
+    def __init__(self, units: int) -> None:
+        self.units = units
+
+    def read(self) -> RangeReadings:
+        return RangeReadings(np.full(self.units, -np.inf), np.zeros(self.units), np.full(self.units, 255))
+
+
+def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypatch: pytest.MonkeyPatch):
+    def refuse(*_args: object) -> None:
+        raise OSError(22, "Invalid argument")
+
+    if sys.platform == "linux":
+        monkeypatch.setattr(os, "sched_setaffinity", refuse)
+    clock, told = MonotonicClock(0.001), []
+    arm = Arm(controller)
+    realtime.run(
+        controller, arm, NoReadings(arm.units), clock, arm, lambda step: len(arm.steps) == 20,
+        cpu=0 if sys.platform != "linux" else min(os.sched_getaffinity(0)), tell=told.append,
+    )  # fmt: skip
+    assert len(told) == 1
+    assert arm.collecting == [False] * 20
+    assert clock.timing().cycles == 20
+
+
+def test_a_clock_of_another_period_is_refused(controller: Controller):
+    clock = MonotonicClock(0.01)
+    arm = Arm(controller)
+    with pytest.raises(ParameterError, match=r"period of 0\.01 s, the controller 0\.001 s: make them the same"):
+        realtime.run(controller, arm, NoReadings(arm.units), clock, arm, lambda step: True)
+    assert arm.steps == []
+
+
+def recorded(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> list[ControlStep]:
+    steps: list[ControlStep] = []
+    turn = controller.step
+
+    def step(state: object, inputs: Inputs) -> object:
+        steps.append((result := turn(state, inputs))[0])
+        return result
+
+    monkeypatch.setattr(controller, "step", step)
+    return steps
+
+
+@pytest.mark.parametrize("name", ["paper", "blind", "paper:restriction.mode=hard", "paper:threshold.compare=raw"])
+@pytest.mark.parametrize("rate", [100.0, 1000.0])
+def test_a_warm_up_sees_every_mode(
+    panda_model: RobotModel, paper_skin: Skin, monkeypatch: pytest.MonkeyPatch, name: str, rate: float
+):
+    controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(profile(name), rate))
+    steps = recorded(controller, monkeypatch)
+    realtime.warm_up(controller, at_rest(panda_model))
+    assert {step.mode for step in steps} == set(Mode)
+    if name == "paper":
+        seen = {(step.mode, len(step.restricted) > 0) for step in steps}
+        assert seen >= {(Mode.TRACK, True), (Mode.TRACK, False), (Mode.REACT, True), (Mode.REACT, False)}
+
+
+def test_steps_leave_nothing_for_the_collector(controller: Controller):
+    realtime.warm_up(controller, at_rest(controller.model))
+    with realtime.real_time():
+        realtime.warm_up(controller, at_rest(controller.model))
+        # a cycle of objects in each of a thousand steps would be thousands
+        assert gc.collect() < 100
+
+
+PROBE = """
+import sys, types
+import numpy as np
+from pretouch import realtime
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
+from pretouch.params import at_rate, profile
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import paper_skin
+from pretouch.types import Inputs, Mode, RangeReadings, RobotState
+
+def loaded():
+    found = {}
+    for module in [m for name, m in sys.modules.items() if name.startswith("pretouch")]:
+        for name, value in vars(module).items():
+            if hasattr(value, "signatures"):
+                found[module.__name__, name] = len(value.signatures)
+    return found
+
+model = RobotModel(panda())
+controller = Controller(model, paper_skin(model), no_fixtures(), Circle(), at_rate(profile(sys.argv[2]), 1000.0))
+q, qd, now, units = model.description.q_ready, np.zeros(7), 0.0, len(controller.skin)
+
+def robot(push=0.0):
+    return RobotState(now, q, qd, q, qd, np.zeros(7), np.array([push, 0, 0, 0, 0, 0]))
+
+if sys.argv[1] == "warm":
+    realtime.warm_up(controller, robot())
+before, state, modes = loaded(), controller.init(robot()), set()
+for i in range(1500):
+    now += 0.001
+    status = np.full(units, 0 if 1100 < i < 1300 else 2)
+    seen = RangeReadings(np.full(units, now), np.linspace(0.05, 0.6, units), status)
+    step, state = controller.step(state, Inputs(now, robot(5000.0 if i == 1400 else 0.0), seen))
+    q, qd = q + step.command * 0.001, step.command
+    modes.add(step.mode)
+assert modes == set(Mode), modes
+new = {name: count for name, count in loaded().items() if count != before.get(name, 0)}
+sys.exit(f"compiled in the loop: {new}" if new else 0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "name"), [("warm", "paper"), ("warm", "paper:restriction.mode=hard"), ("warm", "blind"), ("cold", "paper")]
+)
+def test_nothing_is_compiled_after_a_warm_up(how: str, name: str):
+    done = subprocess.run([sys.executable, "-c", PROBE, how, name], capture_output=True, text=True)
+    assert done.returncode == (0 if how == "warm" else 1), done.stderr
+    if how == "cold":
+        assert done.stderr.startswith("compiled in the loop")
