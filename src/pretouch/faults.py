@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.types import FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.types import WHOLE, FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
 from pretouch.values import value
 
 _LARGEST = 1e3
@@ -172,7 +172,7 @@ def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, 
     if not stamp.shape == distance.shape == status.shape == (units,):
         shapes = f"{stamp.shape}, {distance.shape} and {status.shape}"
         return _nothing(units), f"stamps, distances and statuses have the shapes {shapes}, not ({units},)"
-    if status.dtype != np.int64:
+    if status.dtype is not WHOLE:
         if status.dtype.kind not in "iu":
             return _nothing(units), f"statuses are of type {status.dtype}, not whole numbers"
         status = status.astype(np.int64)

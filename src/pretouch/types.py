@@ -15,6 +15,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+WHOLE = np.dtype(np.int64)
+"""Type of the numbers in an `IntArray`."""
+
 
 class RangeStatus(IntEnum):
     """Range status codes of the VL53L1X (ST, UM2356); 255 is set by the driver before the first measurement."""

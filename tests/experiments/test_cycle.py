@@ -64,14 +64,20 @@ def test_a_seed_is_a_workload(panda_model: RobotModel):
     assert np.any(first(1).readings.distance != first(2).readings.distance)
 
 
+@pytest.mark.parametrize("all_new", [False, True])
 @pytest.mark.parametrize("points", [7, 128])
-def test_the_arm_moves_restricted_and_never_touches(panda_model: RobotModel, points: int):
-    work = Workload(panda_model, points, FAST, 0)
+def test_the_arm_moves_restricted_and_never_touches(panda_model: RobotModel, points: int, all_new: bool):
+    work = Workload(panda_model, points, FAST, 0, all_new)
     controller = Controller(panda_model, work.skin, no_fixtures(), work.path, FAST)
     state, steps, clear = controller.init(work.inputs().robot), [], []
-    for _ in range(1500):
+    last = np.full(points, -np.inf)
+    for i in range(1500):
         inputs = work.inputs()
-        assert np.all(inputs.readings.stamp == inputs.stamp)
+        fresh, last = inputs.readings.stamp > last, inputs.readings.stamp
+        assert np.all(last <= inputs.stamp)
+        # 50 a second in cycles of a millisecond: each unit once in twenty
+        assert np.all(fresh) if all_new or not i else np.sum(fresh) <= points
+        assert np.all(inputs.stamp - last <= (0.0 if all_new else 0.02 + 1e-9))
         step, state = controller.step(state, inputs)
         work.move(step.command)
         steps.append(step)

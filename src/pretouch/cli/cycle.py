@@ -50,12 +50,13 @@ def bench_cycle(points: tuple[int, ...], request: CycleRequest, json_file: Path 
 
 def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
     console = Console(highlight=False)
-    title = f"\nTime of a control step at {request.rate:g} Hz, {request.cycles} cycles [us]"
+    title = f"\nTime of a control step, {request.cycles} cycles [us]"
     console.print(title, style="bold", markup=False)
-    console.print(_times(rows))
+    console.print(_times(rows, request.rate))
     console.print(
-        "All points new in every cycle. Overruns: steps that took longer than the period. Restricting: points within"
-        " reach of eq. 7, median.\n",
+        "CPU: steps back to back, a reading of each unit 50 times a second; all new: every reading in every step; at a"
+        " rate: the processor sleeps between steps, and its caches cool. Overruns: steps that took longer than the"
+        " period. Restricting: points within reach of eq. 7, median.\n",
         style="dim", markup=False,
     )  # fmt: skip
     console.print("Share of each stage [%]", style="bold", markup=False)
@@ -68,17 +69,20 @@ def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
         console.print(f"With {', '.join(idle)} points the arm did not follow its path in every cycle.", markup=False)
 
 
-def _times(rows: list[Row]) -> Table:
+def _times(rows: list[Row], rate: float) -> Table:
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("points", justify="right")
     table.add_column("")
     for name in (*_SPREAD, "overruns", "restricting"):
         table.add_column(name, justify="right")
+    runs = {"CPU": "", "CPU, all new": "all_new_", f"CPU at {rate:g} Hz": "at_rate_", f"wall at {rate:g} Hz": "wall_"}
     for row in rows:
-        cpu = [f"{row[key]:.0f}" for key in _SPREAD.values()]
-        wall = [f"{row[f'wall_{key}']:.0f}" for key in _SPREAD.values()]
-        table.add_row(str(row["points"]), "CPU", *cpu)
-        table.add_row("", "wall", *wall, str(row["overruns"]), f"{row['restricting_median']:.0f}")
+        for name, prefix in runs.items():
+            took = [f"{row[prefix + key]:.0f}" for key in _SPREAD.values()]
+            first = str(row["points"]) if not prefix else ""
+            overruns = str(row["overruns"]) if prefix == "wall_" else ""
+            restricting = f"{row['restricting_median']:.0f}" if not prefix else ""
+            table.add_row(first, name, *took, overruns, restricting)
     return table
 
 

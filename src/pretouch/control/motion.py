@@ -14,7 +14,7 @@ from pretouch.control.restriction import approach_rows, least_limit, rows_into
 from pretouch.control.task import task, twist
 from pretouch.params import Profile
 from pretouch.robot.model import Kinematics, RobotModel, jacobian_into
-from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, QpOutcome, QpSolution, RobotState
+from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Obstacles, QpOutcome, QpSolution, RobotState
 from pretouch.values import value
 
 
@@ -60,7 +60,7 @@ def joint_motion(
     t, r = profile.task, profile.restriction
     n, count = model.n, 0 if r.mode == "off" else len(obstacles.unit)
     qd, multipliers, velocities = np.empty(n), np.empty(n + count), np.empty((2, 3))
-    restricted, rows = np.empty(count, np.int64), np.empty((2, count))
+    restricted, rows = np.empty(count, WHOLE), np.empty((2, count))
     soft = r.mode != "hard"
     found, ending, violated = _motion(
         kin.position, kin.rotation, kin.anchor, kin.axis, model.moved_by, model.ee,

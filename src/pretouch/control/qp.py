@@ -40,14 +40,19 @@ class Cost:
 def manipulability(jacobian: FloatArray) -> float:
     """Yoshikawa's measure w = sqrt(det(J J^T)) of a Jacobian (m, n)."""
     # the volume its rows span, row by row: of the determinant rounding would leave half the digits near a singularity
+    m, n = jacobian.shape
     rows, volume = jacobian.copy(), 1.0
-    for i in range(len(rows)):
-        height = np.sqrt((rows[i] ** 2).sum())
-        volume *= height
-        if height > 0:
-            rows[i] /= height
-            for k in range(i + 1, len(rows)):
-                rows[k] -= (rows[k] * rows[i]).sum() * rows[i]
+    for i in range(m):
+        height = 0.0
+        for j in range(n):
+            height += rows[i, j] * rows[i, j]
+        volume *= np.sqrt(height)
+        for k in range(i + 1, m):
+            along = 0.0
+            for j in range(n):
+                along += rows[k, j] * rows[i, j]
+            for j in range(n):
+                rows[k, j] -= along * rows[i, j] / height if height > 0 else 0.0
     return volume
 
 

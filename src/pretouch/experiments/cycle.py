@@ -13,14 +13,14 @@ import numpy as np
 
 from pretouch.controller import STAGES, Controller, ControllerState
 from pretouch.errors import ExperimentError
-from pretouch.experiments.workload import Workload
+from pretouch.experiments.workload import UNIT_RATE, Workload
 from pretouch.loop import MonotonicClock
 from pretouch.params import Profile, at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.realtime import real_time, warm_up
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, IntArray, Mode
+from pretouch.types import IntArray, Mode
 
 Row = dict[str, Any]
 
@@ -28,6 +28,8 @@ _SETTLE = 500
 """Cycles after the force window is full in which the arm gets up to speed."""
 _STAGED = 2000
 """Most cycles in which the stages are told apart."""
+_SHORTER = 5000
+"""Most cycles in which every reading is new."""
 _PACKAGES = ("pretouch", "numpy", "numba", "mujoco-core", "daqp")
 
 
@@ -62,37 +64,40 @@ class CycleRequest:
 def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = lambda sentence: None) -> Row:
     """Time the control step with a skin of that many points: a row of `pretouch bench cycle`.
 
-    First a paced run that is timed from outside, then a shorter one, back to back, in which the controller says where
+    Three runs are timed from outside: steps back to back, the same with every reading new in every cycle, and steps at
+    the ticks of a clock, between which the processor sleeps and its caches cool. In a fourth the controller says where
     one stage ends and the next begins. `tell` is given what real time could not be had.
     """
     model, params = RobotModel(panda()), request.at_rate()
-    work = Workload(model, points, params, request.seed)
+    work, hard, paced = (Workload(model, points, params, request.seed, new) for new in (False, True, False))
     controller = Controller(model, work.skin, no_fixtures(), work.path, params)
     warm_up(controller, work.inputs().robot)
     with real_time(request.priority, request.cpu) as missing:
         for sentence in missing:
             tell(sentence)
-        paced = _paced(controller, work, request)
+        steps = _timed(controller, work, request.cycles, None)
+        all_new = _timed(controller, hard, min(request.cycles, _SHORTER), None)
+        at_rate = _timed(controller, paced, request.cycles, MonotonicClock(1 / request.rate))
         shares = _stages(model, points, params, request)
-    cpu, wall = paced.cpu / 1000, paced.wall / 1000
+    others = {"all_new": all_new.cpu, "at_rate": at_rate.cpu, "wall": at_rate.wall}
     return {
         "points": points,
-        **_spread(cpu),
-        "overruns": int((paced.wall > 1e9 / request.rate).sum()),
+        **_spread(steps.cpu),
+        "overruns": int((at_rate.wall > 1e9 / request.rate).sum()),
         "stages": shares,
-        **{f"wall_{name}": value for name, value in _spread(wall).items()},
+        **{f"{run}_{name}": value for run, took in others.items() for name, value in _spread(took).items()},
         "cycles": request.cycles,
-        "missed_ticks": paced.missed,
-        "wake_up_median_us": paced.wake_up_us,
-        "restricting_median": float(np.median(paced.restricting)),
-        "tracking": float(paced.tracking.mean()),
-        "travelled_m": paced.travelled,
+        "missed_ticks": at_rate.missed,
+        "wake_up_median_us": at_rate.wake_up_us,
+        "restricting_median": float(np.median(steps.restricting)),
+        "tracking": float(steps.tracking.mean()),
+        "travelled_m": steps.travelled,
     }
 
 
 @dataclass(frozen=True)
-class _Paced:
-    """What a run at the rate came to."""
+class _Timed:
+    """What a run came to."""
 
     cpu: IntArray
     """(cycles,) processor time of each step [ns], all threads."""
@@ -118,13 +123,14 @@ def _settled(controller: Controller, work: Workload) -> ControllerState:
     return state
 
 
-def _paced(controller: Controller, work: Workload, request: CycleRequest) -> _Paced:
-    cpu, wall, restricting, tracking = (np.zeros(request.cycles, np.int64) for _ in range(4))
+def _timed(controller: Controller, work: Workload, cycles: int, clock: MonotonicClock | None) -> _Timed:
+    """Time each step, at the ticks of a clock or back to back."""
+    cpu, wall, restricting, tracking = (np.zeros(cycles, np.int64) for _ in range(4))
     state = _settled(controller, work)
     begin = state.path.phase
-    clock = MonotonicClock(1 / request.rate)
-    for i in range(request.cycles):
-        clock.tick()
+    for i in range(cycles):
+        if clock:
+            clock.tick()
         inputs = work.inputs()
         cpu_before, before = time.process_time_ns(), time.perf_counter_ns()
         step, state = controller.step(state, inputs)
@@ -132,9 +138,10 @@ def _paced(controller: Controller, work: Workload, request: CycleRequest) -> _Pa
         cpu[i], wall[i] = cpu_after - cpu_before, after - before
         restricting[i], tracking[i] = len(step.restricted), step.mode is Mode.TRACK
         work.move(step.command)
-    late = clock.timing().wake_up
-    wake_up_us = 1e6 * late.median if late.max > 0 else None
-    return _Paced(cpu, wall, restricting, tracking, state.path.phase - begin, clock.missed, wake_up_us)
+    late = clock.timing().wake_up if clock else None
+    wake_up_us = 1e6 * late.median if late and late.max > 0 else None
+    missed = clock.missed if clock else 0
+    return _Timed(cpu, wall, restricting, tracking, state.path.phase - begin, missed, wake_up_us)
 
 
 def _stages(model: RobotModel, points: int, params: Profile, request: CycleRequest) -> dict[str, float]:
@@ -173,7 +180,8 @@ class _Stopwatch:
         self._before = time.perf_counter_ns()
 
 
-def _spread(us: FloatArray) -> dict[str, float]:
+def _spread(took: IntArray) -> dict[str, float]:
+    us = took / 1000
     median, p99, p999 = map(float, np.percentile(us, [50, 99, 99.9]))
     return {"median_us": median, "p99_us": p99, "p999_us": p999, "max_us": float(us.max())}
 
@@ -186,7 +194,7 @@ def about(request: CycleRequest) -> Row:
         "seed": request.seed,
         "priority": request.priority,
         "cpu": request.cpu,
-        "readings": "all new in every cycle",
+        "readings_hz": UNIT_RATE,
         "python": platform.python_version(),
         "versions": {name: version(name) for name in _PACKAGES},
         "processor": _processor(),

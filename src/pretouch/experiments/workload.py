@@ -1,4 +1,4 @@
-"""The work of a control step at its hardest: every point new in every step, an arm that moves and is restricted."""
+"""Work for a control step: many points near an arm that moves and is restricted by them."""
 
 import itertools
 from collections.abc import Iterator
@@ -38,19 +38,20 @@ _TRIES = 40
 """Places on a link that are tried before the next link: some have few that see anything."""
 _DRAWS = 4096
 """Samples of force noise before they repeat."""
-_TURNS = 100
-"""Cycles in which every reading is worked out anew, a part of them in each: so it costs little beside the step."""
+UNIT_RATE = 50.0
+"""Readings of a unit in a second (paper, III-A)."""
 
 
 class Workload:
     """A Panda with K units among spheres in a room, on a circle, that does exactly as it is commanded.
 
-    Every unit sees something, and all readings are new in every cycle, as no real skin's are: the worst case. Time is
-    counted in cycles, so a run is the same whatever the machine does meanwhile.
+    Every unit sees something, 50 times a second, each at times of its own; with `all_new` every reading is stamped new
+    in every cycle, as no real skin's are. Time is counted in cycles, so a run is the same whatever the machine does
+    meanwhile.
     """
 
-    def __init__(self, model: RobotModel, units: int, profile: Profile, seed: int) -> None:
-        """Draw spheres and skin with a seed."""
+    def __init__(self, model: RobotModel, units: int, profile: Profile, seed: int, all_new: bool = False) -> None:
+        """Draw spheres, skin and the units' times with a seed."""
         if not 1 <= units <= LARGEST_SKIN:
             raise ExperimentError(f"The number of points is {units}: give 1 to {LARGEST_SKIN}.")
         rng = np.random.default_rng(seed)
@@ -63,14 +64,19 @@ class Workload:
         self.skin = _skin(rng, model, units, body, self._centers)
         self._force = np.zeros((_DRAWS, 6))
         self._force[:, :3] = rng.normal(0.0, _FORCE_NOISE, (_DRAWS, 3))
-        self._distance = self._ranges(np.arange(units))
+        self._all_new = all_new
+        self._phase = rng.uniform(0.0, 1 / UNIT_RATE, units)
+        self._turn = np.full(units, -np.inf)
+        self._distance = np.zeros(units)
 
     def inputs(self) -> Inputs:
         """What the controller is given in this cycle."""
         units, now = len(self.skin), self._cycle * self._period
-        part = np.arange(self._cycle % _TURNS, units, _TURNS)
-        self._distance[part] = self._ranges(part)
-        readings = RangeReadings(np.full(units, now), self._distance.copy(), np.full(units, int(RangeStatus.OK)))
+        turn = np.floor((now - self._phase) * UNIT_RATE)
+        due = np.flatnonzero(turn > self._turn)
+        self._turn, self._distance[due] = turn, self._ranges(due)
+        stamp = np.full(units, now) if self._all_new else np.minimum(self._phase + turn / UNIT_RATE, now)
+        readings = RangeReadings(stamp, self._distance.copy(), np.full(units, int(RangeStatus.OK)))
         wrench = self._force[self._cycle % _DRAWS]
         robot = RobotState(now, self._q, self._qd, self._q, self._qd, np.zeros(self._model.n), wrench)
         return Inputs(now, robot, readings)

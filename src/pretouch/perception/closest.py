@@ -6,7 +6,7 @@ from pretouch.compiled import compiled
 from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
-from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
+from pretouch.types import FloatArray, IntArray, Obstacles
 
 _ON_AXIS = 1e-9
 """Distance from a capsule's axis below which the direction to an obstacle is not defined [m]."""
@@ -34,10 +34,10 @@ def closest_points(
         last_direction: (K, 3) unit vectors to fall back on.
     """
     a, b = placed(body, kin)
-    count, every = len(point), np.ones(len(body), np.bool_)
+    count = len(point)
     body_point, link, distance = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
     direction, ee_distance = last_direction.astype(np.float64), np.empty(count)
-    closest(body.link, a, b, body.radius, every, point, body_point, link, direction, distance)
+    closest(body.link, a, b, body.radius, point, body_point, link, direction, distance)
     distances(point, ee_position, ee_distance)
     return Obstacles(unit, point, ee_distance, body_point, link, direction, distance)
 
@@ -58,22 +58,20 @@ def distances(point: FloatArray, origin: FloatArray, out: FloatArray) -> None:
 
 @compiled
 def closest(
-    link: IntArray, a: FloatArray, b: FloatArray, radius: FloatArray, counts: BoolArray, point: FloatArray,
-    body_point: FloatArray, on_link: IntArray, direction: FloatArray, distance: FloatArray,
+    link: IntArray, a: FloatArray, b: FloatArray, radius: FloatArray, point: FloatArray, body_point: FloatArray,
+    on_link: IntArray, direction: FloatArray, distance: FloatArray,
 ) -> None:  # fmt: skip
-    """Write body points, links, directions and distances of `closest_points`, of those of C placed capsules that count.
+    """Write body points, links, directions and distances of `closest_points`, for C placed capsules.
 
     `direction` (K, 3) holds the one to fall back on before.
     """
-    which = np.flatnonzero(counts)
-    link, a, b, radius = link[which], a[which], b[which], radius[which]
-    spheres, gap2 = bounds(a, b, radius), np.empty(len(which))
+    spheres, gap2 = bounds(a, b, radius), np.empty(len(radius))
     for k in range(len(point)):
         # begun with the capsule whose middle is nearest, most of the others need no closer look
         to_spheres(point, k, spheres, gap2)
         first = int(np.argmin(gap2))
         best, nearest, at, axial = np.inf, -1, 0.0, 0.0
-        for i in range(-1, len(which)):
+        for i in range(-1, len(radius)):
             c = first if i < 0 else i
             if i >= 0 and (c == first or gap2[c] > (best + spheres[3, c]) ** 2):
                 continue

@@ -19,7 +19,7 @@ from pretouch.perception.scene_filter import RAYS, Fixtures, capsule_return, pla
 from pretouch.perception.vectors import placed_ends, rotate
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RangeReadings
+from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings
 from pretouch.values import value
 
 
@@ -49,15 +49,15 @@ def perceive(
     """Locate what the units see (eq. 1), leave out the arm and fixtures, and find the closest body points."""
     if not params.enabled or len(skin) == 0:
         return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0), state
-    arm, others, count = model.capsules, fixtures.capsules, len(skin)
+    arm, body, others, count = model.capsules, model.body, fixtures.capsules, len(skin)
     tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy())
     distance = np.empty(count)
-    indices, vectors, scalars = np.empty((2, count), np.int64), np.empty((3, count, 3)), np.empty((2, count))
+    indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.empty((2, count))
     found, nearest, oldest = _perceive(
         tracks.point, tracks.direction, tracks.times,
         kin.position, kin.rotation, model.ee, skin.link, skin.T_link_sensor,
         readings.stamp, readings.distance, readings.status, now,
-        arm.link, arm.a, arm.b, arm.radius, model.moving_capsule,
+        arm.link, arm.a, arm.b, arm.radius, body.link, body.a, body.b, body.radius,
         others.link, others.a, others.b, others.radius, fixtures.planes, RAYS,
         params.persistence_s, params.self_margin_m, params.filter_views,
         distance, indices, vectors, scalars,
@@ -74,7 +74,8 @@ def _perceive(
     point: FloatArray, last_direction: FloatArray, times: FloatArray,
     link_position: FloatArray, link_rotation: FloatArray, ee: int, unit_link: IntArray, T_link_sensor: FloatArray,
     stamp: FloatArray, reading: FloatArray, status: IntArray, now: float,
-    arm_link: IntArray, arm_a: FloatArray, arm_b: FloatArray, arm_radius: FloatArray, moving: BoolArray,
+    arm_link: IntArray, arm_a: FloatArray, arm_b: FloatArray, arm_radius: FloatArray,
+    body_link: IntArray, body_a: FloatArray, body_b: FloatArray, body_radius: FloatArray,
     other_link: IntArray, other_a: FloatArray, other_b: FloatArray, other_radius: FloatArray, planes: FloatArray,
     rays: FloatArray, persistence: float, margin: float, filter_views: bool,
     distance: FloatArray, indices: IntArray, vectors: FloatArray, scalars: FloatArray,
@@ -84,7 +85,6 @@ def _perceive(
     Returns how many there are, the distance of the nearest from the end-effector, and when the unit that is silent for
     longest last told anything.
     """
-    arm_from, arm_to = placed_ends(arm_link, arm_a, arm_b, link_position, link_rotation)
     measured(reading, status, distance)
 
     # which readings are new, show what is not known to be there, and where
@@ -93,6 +93,7 @@ def _perceive(
         position, rotation = poses(link_position, link_rotation, unit_link, T_link_sensor)
         shows, tells = np.isfinite(distance), tells_anything(reading, status, distance)
         if filter_views:
+            arm_from, arm_to = placed_ends(arm_link, arm_a, arm_b, link_position, link_rotation)
             other_from, other_to = placed_ends(other_link, other_a, other_b, link_position, link_rotation)
             arm_spheres = bounds(arm_from, arm_to, arm_radius)
             other_spheres = bounds(other_from, other_to, other_radius)
@@ -123,7 +124,8 @@ def _perceive(
 
     # the body's closest points to them
     near, direction = near[:found], direction[:found]
-    closest(arm_link, arm_from, arm_to, arm_radius, moving, near, body_point, link, direction, body_distance)
+    body_from, body_to = placed_ends(body_link, body_a, body_b, link_position, link_rotation)
+    closest(body_link, body_from, body_to, body_radius, near, body_point, link, direction, body_distance)
     distances(near, link_position[ee], ee_distance)
     nearest = np.inf
     for k in range(found):

@@ -227,10 +227,11 @@ def _from_outside(aa: float, ao: float, oo: float, ar: float, rest: float, radiu
     if quad > 1e-12 * aa:
         half_b = aa * rest - ao * ar
         disc = half_b * half_b - quad * (aa * oo - ao * ao - radius * radius * aa)
-        if disc >= 0:
-            t = (-half_b - np.sqrt(disc)) / quad
-            if t >= -_ROUNDING and 0 < ao + t * ar < aa:
-                best = max(t, 0.0)
+        if disc < -1e-9 * quad * aa:
+            return best  # past the whole cylinder, and the spheres at its ends with it
+        t = (-half_b - np.sqrt(max(disc, 0.0))) / quad
+        if disc >= 0 and t >= -_ROUNDING and 0 < ao + t * ar < aa:
+            best = max(t, 0.0)
     for end in range(2):
         # of the sphere round the far end: its offset is o - a
         half_b = rest - end * ar

@@ -69,8 +69,6 @@ class RobotModel:
         """The body, base included."""
         self.moved_by: BoolArray = self._moved_by()
         """(L, n) whether a joint moves a link."""
-        self.moving_capsule: BoolArray = np.asarray(self.moved_by.any(axis=1))[self.capsules.link]
-        """(C,) whether any joint moves a capsule."""
         self.body: Capsules = self.capsules.of_links(np.flatnonzero(self.moved_by.any(axis=1)))
         """The part of the body that any joint moves."""
         if not len(self.body):
