@@ -170,7 +170,7 @@ def test_bench_cycle_shows_and_writes_what_it_measured(capsys, tmp_path):
     file = tmp_path / "cycle.json"
     code, said = run(capsys, "bench", "cycle", "--points", "3,5", "--cycles", "20", "--json", str(file))
     assert code == 0
-    for words in ("Time of a control step at 1000 Hz, 20 cycles [us]", "overruns", "[%]", str(file)):
+    for words in ("Time of a control step, 20 cycles [us]", "wall at 1000 Hz", "overruns", "[%]", str(file)):
         assert words in said.out
     assert max(len(line) for line in said.out.splitlines() if str(tmp_path) not in line) <= 80
     written = json.loads(file.read_text())

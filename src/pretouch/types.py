@@ -5,6 +5,7 @@ Everything here is a value, set once when it is made; its arrays are to be read 
 """
 
 from enum import Enum, IntEnum
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from pretouch.values import value
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+Number = TypeVar("Number", float, NDArray[np.float64])
 
 WHOLE = np.dtype(np.int64)
 """Type of the numbers in an `IntArray`."""

@@ -70,18 +70,19 @@ def test_the_arm_moves_restricted_and_never_touches(panda_model: RobotModel, poi
     work = Workload(panda_model, points, FAST, 0, all_new)
     controller = Controller(panda_model, work.skin, no_fixtures(), work.path, FAST)
     state, steps, clear = controller.init(work.inputs().robot), [], []
-    last = np.full(points, -np.inf)
-    for i in range(1500):
+    last, came = np.full(points, -np.inf), np.zeros(points)
+    for _ in range(1500):
         inputs = work.inputs()
         fresh, last = inputs.readings.stamp > last, inputs.readings.stamp
         assert np.all(last <= inputs.stamp)
-        # 50 a second in cycles of a millisecond: each unit once in twenty
-        assert np.all(fresh) if all_new or not i else np.sum(fresh) <= points
+        came += fresh
         assert np.all(inputs.stamp - last <= (0.0 if all_new else 0.02 + 1e-9))
         step, state = controller.step(state, inputs)
         work.move(step.command)
         steps.append(step)
         clear.append(work.clearance())
+    # 50 a second, in cycles of a millisecond
+    assert set(came) == {1500} if all_new else set(came) <= {75, 76}
     settled = steps[600:]
     assert {step.mode for step in settled} == {Mode.TRACK}
     assert np.median([len(step.restricted) for step in settled]) > 0.5 * points
@@ -157,7 +158,7 @@ def test_slow_steps_are_overruns_in_wall_time_alone(monkeypatch: pytest.MonkeyPa
 def test_a_spread_is_numpys():
     values = np.random.default_rng(0).exponential(100.0, 20_000)
     spread = cycle._spread(values)
-    expected = np.percentile(values, [50, 99, 99.9, 100])
+    expected = np.percentile(values, [50, 99, 99.9, 100]) / 1000  # of nanoseconds
     np.testing.assert_allclose(list(spread.values()), expected)
     assert list(spread) == ["median_us", "p99_us", "p999_us", "max_us"]
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.contact.reaction import external_force
-from pretouch.contact.thresholds import crossed, outside, side_distances, threshold_parts
+from pretouch.contact.thresholds import crossed, side_distances, threshold_parts
 from pretouch.contact.window import WindowState, add_to, added, window_mean, window_std
 from pretouch.params import ThresholdParams
 from pretouch.types import Contact, FloatArray, Obstacles, Thresholds
@@ -70,4 +70,8 @@ def _detect(
     )
     if not present:
         return False
-    return bool(outside(sums[0] if filtered else force, parts[0], parts[1]).any())
+    found = False
+    for i in range(3):
+        compared = sums[0, i] if filtered else force[i]
+        found = found or compared > parts[0, i] or compared < parts[1, i]
+    return found

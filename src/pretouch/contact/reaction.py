@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from pretouch.compiled import compiled
 from pretouch.params import ReactionParams
 from pretouch.types import FloatArray
 from pretouch.values import value
@@ -23,7 +22,6 @@ def reaction_init(params: ReactionParams) -> ReactionState:
     return ReactionState(np.zeros(3), params.decay_cycles)
 
 
-@compiled
 def external_force(reading: FloatArray, mean: FloatArray) -> FloatArray:
     """F_ext = F_reading - mu (3,) [N], the first part of eq. 12 of the paper."""
     return reading - mean

@@ -4,17 +4,17 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.params import ThresholdParams
-from pretouch.types import BoolArray, FloatArray, Thresholds
+from pretouch.types import BoolArray, FloatArray, Number, Thresholds
 
 
 @compiled
-def noise_force(sigma: FloatArray, f_std: float, sigma_max: float) -> FloatArray:
+def noise_force(sigma: Number, f_std: float, sigma_max: float) -> Number:
     """F_sigma = min(sigma / sigma_max F_std, F_std) per axis [N], eq. 10 of the paper."""
     return np.minimum(sigma / sigma_max * f_std, f_std)
 
 
 @compiled
-def obstacle_force(distance: FloatArray, f_d: float, d_max: float, d_min: float) -> FloatArray:
+def obstacle_force(distance: Number, f_d: float, d_max: float, d_min: float) -> Number:
     """F_obs = (d_max - d) / (d_max - d_min) F_d [N], eq. 11 of the paper, clipped to [0, F_d].
 
     `distance` [m] is from the end-effector origin; infinite where there is no object, which gives zero.
@@ -69,19 +69,15 @@ def threshold_parts(
     sigma_max: float, f_d: float, d_max: float, d_min: float, parts: FloatArray,
 ) -> None:  # fmt: skip
     """Write what `thresholds` returns to `parts` (6, 3), in the order of `Thresholds`."""
-    f_sigma = noise_force(sigma, f_std, sigma_max)
-    f_positive, f_negative = obstacle_force(positive, f_d, d_max, d_min), obstacle_force(negative, f_d, d_max, d_min)
-    parts[0] = mean + f_base + f_sigma - f_negative
-    parts[1] = mean - f_base - f_sigma + f_positive
-    parts[2], parts[3], parts[4], parts[5] = mean, sigma, f_positive, f_negative
+    for i in range(3):
+        f_sigma = noise_force(sigma[i], f_std, sigma_max)
+        f_positive = obstacle_force(positive[i], f_d, d_max, d_min)
+        f_negative = obstacle_force(negative[i], f_d, d_max, d_min)
+        parts[0, i] = mean[i] + f_base + f_sigma - f_negative
+        parts[1, i] = mean[i] - f_base - f_sigma + f_positive
+        parts[2, i], parts[3, i], parts[4, i], parts[5, i] = mean[i], sigma[i], f_positive, f_negative
 
 
 def crossed(force: FloatArray, limits: Thresholds) -> BoolArray:
     """Say for each axis (3,) whether the force [N] exceeds its upper or lower threshold."""
-    return outside(force, limits.upper, limits.lower)
-
-
-@compiled
-def outside(force: FloatArray, upper: FloatArray, lower: FloatArray) -> BoolArray:
-    """Answer of `crossed`."""
-    return (force > upper) | (force < lower)
+    return (force > limits.upper) | (force < limits.lower)

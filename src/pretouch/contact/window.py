@@ -50,16 +50,20 @@ def window_init(samples: int) -> WindowState:
 @compiled
 def window_mean(sums: FloatArray, count: int) -> FloatArray:
     """Mean (3,) of a window with these sums (4, 3) and so many values; see `WindowState`."""
-    return sums[_ORIGIN] + sums[_TOTAL] / max(count, 1)
+    mean = np.empty(3)
+    for i in range(3):
+        mean[i] = sums[_ORIGIN, i] + sums[_TOTAL, i] / max(count, 1)
+    return mean
 
 
 @compiled
 def window_std(sums: FloatArray, count: int) -> FloatArray:
     """Sample standard deviation (3,) of a window with these sums (4, 3) and so many values; see `WindowState`."""
-    if count < 2:
-        return np.zeros(3)
-    variance = (sums[_SQUARES] - sums[_TOTAL] ** 2 / count) / (count - 1)
-    return np.sqrt(np.maximum(variance, 0.0))
+    std = np.zeros(3)
+    if count > 1:
+        for i in range(3):
+            std[i] = np.sqrt(max(0.0, (sums[_SQUARES, i] - sums[_TOTAL, i] ** 2 / count) / (count - 1)))
+    return std
 
 
 @compiled
@@ -71,8 +75,11 @@ def weighted_value(
     With x the reading: alpha x + (1 - alpha) x_{t-1} if |x - mu_{t-1}| > lambda sigma_{t-1}, else x. With sigma = 0
     every change is an outlier.
     """
-    outlier = np.abs(reading - mean) > lambda_ * std
-    return np.where(outlier, alpha * reading + (1 - alpha) * last, reading)
+    value = reading.copy()
+    for i in range(len(value)):
+        if abs(reading[i] - mean[i]) > lambda_ * std[i]:
+            value[i] = alpha * reading[i] + (1 - alpha) * last[i]
+    return value
 
 
 def add(state: WindowState, reading: FloatArray, alpha: float, lambda_: float) -> WindowState:
@@ -93,22 +100,20 @@ def add_to(
     ring: FloatArray, sums: FloatArray, at: int, count: int, reading: FloatArray, alpha: float, lambda_: float
 ) -> None:
     """Change ring (N, 3) and sums (4, 3) as `add` says."""
-    size = len(ring)
-    x, gone = reading, np.zeros(3)
-    if count == size:
-        mean, std = window_mean(sums, count), window_std(sums, count)
-        x = weighted_value(reading, sums[_NEWEST], mean, std, alpha, lambda_)
-        gone = ring[at] - sums[_ORIGIN]
-    ring[at] = x
-    sums[_NEWEST] = x
-    if at == size - 1 or count == 0:
-        # once a turn the sums are taken afresh, so rounding errors never add up; O(1) on average
-        sums[_ORIGIN] = x
-        sums[_TOTAL:] = 0.0
-        for i in range(min(count + 1, size)):
-            sums[_TOTAL] += ring[i] - x
-            sums[_SQUARES] += (ring[i] - x) ** 2
-    else:
-        new = x - sums[_ORIGIN]
-        sums[_TOTAL] += new - gone
-        sums[_SQUARES] += new**2 - gone**2
+    size, x = len(ring), reading
+    full = count == size
+    if full:
+        x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), alpha, lambda_)
+    afresh = at == size - 1 or count == 0
+    for i in range(3):
+        gone, ring[at, i], sums[_NEWEST, i] = ring[at, i], x[i], x[i]
+        if afresh:
+            # once a turn the sums are taken anew, so rounding errors never add up; O(1) on average
+            sums[_ORIGIN, i], sums[_TOTAL, i], sums[_SQUARES, i] = x[i], 0.0, 0.0
+            for m in range(min(count + 1, size)):
+                sums[_TOTAL, i] += ring[m, i] - x[i]
+                sums[_SQUARES, i] += (ring[m, i] - x[i]) ** 2
+        else:
+            new, old = x[i] - sums[_ORIGIN, i], gone - sums[_ORIGIN, i] if full else 0.0
+            sums[_TOTAL, i] += new - old
+            sums[_SQUARES, i] += new**2 - old**2

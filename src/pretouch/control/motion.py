@@ -99,7 +99,7 @@ def _motion(
     answer: FloatArray, multipliers: FloatArray, velocities: FloatArray, restricted: IntArray, rows: FloatArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Write the last line of arguments; return how many rows, how the solver ended, and whether any is violated."""
-    n, (limit, slack) = len(q), rows
+    n, limit, slack = len(q), rows[0], rows[1]
     J = np.empty((6, n))
     jacobian_into(anchor, axis, moved_by[ee], position[ee], J)
 
@@ -118,16 +118,21 @@ def _motion(
         cost_into(J[:m], x_d[:m], q, q_mid, damping_max, threshold, mid_gain, mid_time, H, f)
         ending = minimise(H, f, lower, upper, G, h, weight, budget, answer, slack[:found], multipliers[: n + found])
     if hold or ending != SOLVED:
-        answer[:] = stop
-        multipliers[:] = 0.0
+        for j in range(n):
+            answer[j] = stop[j]
+        for j in range(len(multipliers)):
+            multipliers[j] = 0.0
         excesses(G, h, answer, slack)
 
-    velocities[:] = 0.0
     for i in range(3):
+        velocities[0, i], velocities[1, i] = 0.0, 0.0
         for j in range(n):
             velocities[0, i] += J[i, j] * qd[j]
             velocities[1, i] += J[i, j] * answer[j]
-    return found, ending, bool((slack[:found] > 0).any())
+    violated = False
+    for k in range(found):
+        violated = violated or slack[k] > 0
+    return found, ending, violated
 
 
 def _motion_with_hard_rows(

@@ -46,28 +46,32 @@ def minimise(
     if not _finite(H, f, lower, upper, G, h):
         return NOT_FINITE
     n = len(x)
-    # the middle of the box is the last command, as a rule, and the next one near it
-    x[:] = 0.5 * (lower + upper)
+    for i in range(n):
+        # the middle of the box is the last command, as a rule, and the next one near it
+        x[i] = 0.5 * (lower[i] + upper[i])
     which = possible_rows(G, h, lower, upper)
     violated, at_bound = np.zeros(len(h), np.bool_), np.zeros(n, np.int64)
     hessian, linear = H.copy(), f.copy()
     _take_violated(G, h, which, weight, x, violated, hessian, linear)
-    y, used = x.copy(), 0
+    y, left = x.copy(), budget
     while True:
-        status, used = _box_minimum(hessian, linear, lower, upper, y, at_bound, used, budget)
+        status, left = _box_minimum(hessian, linear, lower, upper, y, at_bound, left)
         if status != SOLVED:
             return status
         if not _differs(G, h, which, y, violated):
             break
         _shorten(H, f, G, h, which, weight, x, y)
-        x[:] = y
         for i in range(n):
+            x[i] = y[i]
             if at_bound[i] != 0 and lower[i] < x[i] < upper[i]:
                 at_bound[i] = 0
         _take_violated(G, h, which, weight, x, violated, hessian, linear)
-    x[:] = y
+    sound = True
+    for i in range(n):
+        x[i] = y[i]
+        sound = sound and np.isfinite(x[i])
     _certify(hessian, linear, G, h, weight, at_bound, x, slack, multipliers)
-    return SOLVED if np.isfinite(x).all() else NOT_FINITE
+    return SOLVED if sound else NOT_FINITE
 
 
 @compiled
@@ -153,7 +157,9 @@ def _shorten(
     y: FloatArray,
 ) -> None:  # fmt: skip
     """Draw y back towards x to the least of the cost on the way from x to it."""
-    n, d = len(x), y - x
+    n, d = len(x), np.empty(len(x))
+    for i in range(n):
+        d[i] = y[i] - x[i]
     # along the way the slope of the cost is start + t bend + w sum rate_k max(0, excess_k + t rate_k): it only rises
     start, bend = 0.0, 0.0
     for i in range(n):
@@ -204,19 +210,18 @@ def _slope(
 
 @compiled
 def _box_minimum(
-    H: FloatArray, f: FloatArray, lower: FloatArray, upper: FloatArray, x: FloatArray, at_bound: IntArray, used: int,
-    budget: int,
+    H: FloatArray, f: FloatArray, lower: FloatArray, upper: FloatArray, x: FloatArray, at_bound: IntArray, left: int
 ) -> tuple[int, int]:  # fmt: skip
     """Move x within the box to the least of 1/2 x^T H x + f^T x, by an active-set method.
 
     `at_bound` (n,) says which joints are held at their upper (1) or lower bound (-1). Returns how it ended and the
-    factorisations used so far.
+    factorisations that are left of those allowed.
     """
     n = len(x)
     gradient, step, L = np.empty(n), np.empty(n), np.empty((n, n))
     free, last = np.empty(n, np.int64), np.inf
-    while used < budget:
-        used += 1
+    while left > 0:
+        left -= 1
         size, count = 0.0, 0
         for i in range(n):
             gradient[i], terms = f[i], abs(f[i])
@@ -228,7 +233,7 @@ def _box_minimum(
                 free[count] = i
                 count += 1
         if not _newton_step(H, gradient, free[:count], L, step):
-            return NOT_CONVEX, used
+            return NOT_CONVEX, left
         # as far as the box allows
         t, block, length = 1.0, -1, 0.0
         for i in free[:count]:
@@ -252,9 +257,9 @@ def _box_minimum(
                 if at_bound[i] * gradient[i] > pull:
                     pull, most = at_bound[i] * gradient[i], i
             if most < 0:
-                return SOLVED, used
+                return SOLVED, left
             at_bound[most], last = 0, np.inf
-    return BUDGET, used
+    return BUDGET, left
 
 
 @compiled

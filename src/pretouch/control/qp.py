@@ -7,7 +7,7 @@ from pretouch.compiled import compiled
 from pretouch.control.penalty import BUDGET, NOT_CONVEX, NOT_FINITE, SOLVED, minimise, possible_rows
 from pretouch.control.restriction import ApproachRows
 from pretouch.params import TaskParams
-from pretouch.types import FloatArray, QpOutcome, QpSolution
+from pretouch.types import FloatArray, Number, QpOutcome, QpSolution
 from pretouch.values import value
 
 ENDING = {
@@ -63,7 +63,7 @@ def damping(w: float, damping_max: float, threshold: float) -> float:
 
 
 @compiled
-def mid_joint_velocity(q: FloatArray, q_mid: FloatArray, time: float) -> FloatArray:
+def mid_joint_velocity(q: Number, q_mid: Number, time: float) -> Number:
     """Joint velocities qd_mid (n,) [rad/s] of eq. 2 that would reach the middle of the joint ranges in `time` [s]."""
     return (q_mid - q) / time
 
@@ -96,9 +96,8 @@ def cost_into(
 ) -> None:  # fmt: skip
     """Write H (n, n) and f (n,) of `task_cost`."""
     mu = damping(manipulability(J), damping_max, threshold)
-    qd_mid = mid_joint_velocity(q, q_mid, time)
     for i in range(len(q)):
-        f[i] = -k * qd_mid[i]
+        f[i] = -k * mid_joint_velocity(q[i], q_mid[i], time)
         for m in range(len(x_d)):
             f[i] -= J[m, i] * x_d[m]
         for j in range(i + 1):

@@ -1,13 +1,11 @@
 """Restricting the body's approach to obstacles: eqs. 5-7, as rows G qd <= h of the QP."""
 
-from typing import TypeVar
-
 import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
-from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
+from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles
 from pretouch.values import value
 
 
@@ -21,9 +19,6 @@ class ApproachRows:
     """(K,) largest approach velocity [m/s]; negative asks for a retreat."""
     soft: bool
     """Whether a row may be violated at a cost."""
-
-
-Number = TypeVar("Number", float, FloatArray)
 
 
 @compiled

@@ -31,7 +31,10 @@ def task(
 @compiled
 def twist(velocity: FloatArray, rotation: FloatArray, goal: FloatArray, gain: float) -> FloatArray:
     """Task velocity (6,) of `task` when the orientation is held [m/s, then rad/s]."""
-    return np.concatenate((velocity, gain * rotation_error(rotation, goal)))
+    error, both = rotation_error(rotation, goal), np.empty(6)
+    for i in range(3):
+        both[i], both[3 + i] = velocity[i], gain * error[i]
+    return both
 
 
 @compiled

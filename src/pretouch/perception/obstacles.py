@@ -113,10 +113,10 @@ _NO_TARGET = tuple(
 @compiled
 def tells_anything(distance: FloatArray, status: IntArray, shown: FloatArray) -> BoolArray:
     """Answer of `is_evidence`; `shown` (K,) is that of `measured_distance`."""
-    tells = np.isfinite(shown)
+    tells = np.empty(len(status), np.bool_)
     for k in range(len(status)):
         far = status[k] in _SHOWN and np.isfinite(distance[k]) and distance[k] > MAX_DISTANCE
-        tells[k] = tells[k] or far or status[k] in _NO_TARGET
+        tells[k] = not np.isnan(shown[k]) or far or status[k] in _NO_TARGET
     return tells
 
 
@@ -172,7 +172,8 @@ def take_in(
                 times[_HEARD, k] = stamp[k]
             if shows[k] and now - stamp[k] <= persistence:
                 times[_SEEN, k] = stamp[k]
-                point[k] = points[k]
+                for i in range(3):
+                    point[k, i] = points[k, i]
 
 
 def is_fresh(state: TrackState, readings: RangeReadings, now: float) -> BoolArray:
@@ -186,4 +187,7 @@ def is_fresh(state: TrackState, readings: RangeReadings, now: float) -> BoolArra
 @compiled
 def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
     """Answer of `is_fresh`."""
-    return (stamp > used) & (stamp <= now)
+    fresh = np.empty(len(stamp), np.bool_)
+    for k in range(len(stamp)):
+        fresh[k] = used[k] < stamp[k] <= now
+    return fresh

@@ -88,10 +88,14 @@ def _perceive(
     measured(reading, status, distance)
 
     # which readings are new, show what is not known to be there, and where
-    fresh = newer(times[1], stamp, now)
-    if fresh.any():
+    fresh, any_fresh = newer(times[1], stamp, now), False
+    for k in range(len(fresh)):
+        any_fresh = any_fresh or fresh[k]
+    if any_fresh:
         position, rotation = poses(link_position, link_rotation, unit_link, T_link_sensor)
-        shows, tells = np.isfinite(distance), tells_anything(reading, status, distance)
+        tells, shows = tells_anything(reading, status, distance), np.empty(len(distance), np.bool_)
+        for k in range(len(shows)):
+            shows[k] = not np.isnan(distance[k])
         if filter_views:
             arm_from, arm_to = placed_ends(arm_link, arm_a, arm_b, link_position, link_rotation)
             other_from, other_to = placed_ends(other_link, other_a, other_b, link_position, link_rotation)
@@ -112,11 +116,14 @@ def _perceive(
         take_in(point, times, stamp, points, fresh, shows, tells, now, persistence)
 
     # the points, as long as they last
-    (unit, link), (near, body_point, direction), (ee_distance, body_distance) = indices, vectors, scalars
+    unit, link, near, body_point, direction = indices[0], indices[1], vectors[0], vectors[1], vectors[2]
+    ee_distance, body_distance = scalars[0], scalars[1]
     found = 0
     for k in range(len(unit)):
         if now - times[0, k] <= persistence:
-            unit[found], near[found], direction[found] = k, point[k], last_direction[k]
+            unit[found] = k
+            for i in range(3):
+                near[found, i], direction[found, i] = point[k, i], last_direction[k, i]
             if np.isnan(direction[found, 0]):
                 # in place of a direction from the body that never was, the one the unit looks in
                 rotate(link_rotation[unit_link[k]], T_link_sensor[k, :3, 2], direction[found])
@@ -127,11 +134,14 @@ def _perceive(
     body_from, body_to = placed_ends(body_link, body_a, body_b, link_position, link_rotation)
     closest(body_link, body_from, body_to, body_radius, near, body_point, link, direction, body_distance)
     distances(near, link_position[ee], ee_distance)
-    nearest = np.inf
-    for k in range(found):
-        last_direction[unit[k]] = direction[k]
-        nearest = min(nearest, ee_distance[k])
-    return found, nearest, times[2].min()
+    nearest, oldest = np.inf, np.inf
+    for m in range(found):
+        nearest = min(nearest, ee_distance[m])
+        for i in range(3):
+            last_direction[unit[m], i] = direction[m, i]
+    for k in range(len(unit)):
+        oldest = min(oldest, times[2, k])
+    return found, nearest, oldest
 
 
 def silent_units(

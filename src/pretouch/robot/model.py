@@ -148,8 +148,9 @@ def jacobian_into(
     anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, jacobian: FloatArray
 ) -> None:
     """Write the Jacobian (6, n) of `RobotModel.jacobian`; `moved` (n,) says which joints move the link."""
-    jacobian[:] = 0.0
     for j in range(len(anchor)):
+        for i in range(6):
+            jacobian[i, j] = 0.0
         if moved[j]:
             x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
             jacobian[0, j] = axis[j, 1] * z - axis[j, 2] * y

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
+from pretouch.compiled import compiled
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
 
@@ -76,7 +76,7 @@ class Hand:
         )  # fmt: skip
 
 
-@njit(cache=True)
+@compiled
 def _spring(
     last: FloatArray, goal: FloatArray, speed: float, x: FloatArray, v: FloatArray, k: float, d: float,
     force_max: float, dt: float,
@@ -91,7 +91,7 @@ def _spring(
     return at, _shortened(k * (at - x) + d * ((at - last) / dt - v), force_max)
 
 
-@njit(cache=True)
+@compiled
 def _shortened(vector: FloatArray, length: float) -> FloatArray:
     size = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     return vector if size <= length else vector * (length / size)

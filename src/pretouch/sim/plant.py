@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from pretouch.compiled import compiled
 from pretouch.contact.observer import ObserverState, observe, observer_init, wrench_from_torques
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
@@ -163,7 +163,7 @@ class Plant:
         return total
 
 
-@njit(cache=True)
+@compiled
 def _drive(
     q: FloatArray, qd: FloatArray, q_d: FloatArray, qd_d: FloatArray, qd_set: FloatArray, dt: float, follow: float,
     bias: FloatArray, k: FloatArray, d: FloatArray, tau_max: FloatArray, friction: FloatArray, applied: FloatArray,
@@ -181,7 +181,7 @@ def _drive(
     return tau, lost
 
 
-@njit(cache=True)
+@compiled
 def _sensed(
     tau: FloatArray, qdd: FloatArray, armature: float, q: FloatArray, offset: FloatArray, ripple: FloatArray,
     noise: FloatArray, keep: float, drive: FloatArray, friction: FloatArray, compensated: float,

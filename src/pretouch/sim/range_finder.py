@@ -6,9 +6,9 @@ from typing import Literal
 
 import mujoco
 import numpy as np
-from numba import njit
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
+from pretouch.compiled import compiled
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE, cone_rays
 from pretouch.sim.plant import Plant
@@ -137,7 +137,7 @@ def _flat_wall(cosines: FloatArray) -> float:
     return float((cosines**3).sum() / (cosines**2).sum())
 
 
-@njit(cache=True)
+@compiled
 def _beams(
     xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray, cone: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -162,7 +162,7 @@ _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
 )
 
 
-@njit(cache=True)
+@compiled
 def _reading(
     distance: FloatArray, rays: FloatArray, normal: FloatArray, reflectance: float, reflectance_limit: float,
     distance_max: float, merge: float, calibration: float, noise_floor: float, noise_rate: float,
