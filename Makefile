@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test test-slow lint bench format clean
+.PHONY: setup demo test test-slow lint bench peers format clean
 
 setup: $(STAMP)
 
@@ -13,6 +13,7 @@ $(STAMP): pyproject.toml constraints.txt
 		{ echo "Python 3.11 or newer is needed: say make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/pretouch warm-up
 	@touch $@
 
 demo: setup
@@ -32,6 +33,10 @@ lint: setup
 
 bench: setup
 	@for file in benchmarks/*.py; do $(BIN)/python $$file || exit 1; done
+
+# about a quarter of an hour: sets up an environment for each peer, measures, and writes the tables of docs/peers.md
+peers: setup
+	$(BIN)/python -m benchmarks.peers --set-up --runs 2 --docs
 
 format: setup
 	$(BIN)/ruff format .

@@ -1,3 +1,73 @@
-"""Contact-anticipating control for robot arms with onboard proximity sensing."""
+"""Contact-anticipating control for robot arms with onboard proximity sensing.
+
+What a program of your own needs is here by name and loaded when it is asked for: `import pretouch` loads nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from pretouch.contact.detect import detect as detect
+    from pretouch.contact.window import window_init as window_init
+    from pretouch.control.joint_box import joint_box as joint_box
+    from pretouch.control.joint_box import joint_limits as joint_limits
+    from pretouch.control.path import Circle as Circle
+    from pretouch.control.path import WayPoints as WayPoints
+    from pretouch.control.path import line as line
+    from pretouch.control.restriction import approach_rows as approach_rows
+    from pretouch.controller import Controller as Controller
+    from pretouch.errors import PretouchError as PretouchError
+    from pretouch.params import Profile as Profile
+    from pretouch.params import RestrictionParams as RestrictionParams
+    from pretouch.params import ThresholdParams as ThresholdParams
+    from pretouch.params import at_rate as at_rate
+    from pretouch.params import profile as profile
+    from pretouch.perception.closest import closest_points as closest_points
+    from pretouch.perception.closest import no_obstacles as no_obstacles
+    from pretouch.perception.scene_filter import Fixtures as Fixtures
+    from pretouch.perception.scene_filter import no_fixtures as no_fixtures
+    from pretouch.robot.description import RobotDescription as RobotDescription
+    from pretouch.robot.description import fr3 as fr3
+    from pretouch.robot.description import panda as panda
+    from pretouch.robot.model import RobotModel as RobotModel
+    from pretouch.sensing.skin import Skin as Skin
+    from pretouch.sensing.skin import load_skin as load_skin
+    from pretouch.sensing.skin import paper_skin as paper_skin
+    from pretouch.sensing.unit import SensorUnit as SensorUnit
+    from pretouch.types import ControlStep as ControlStep
+    from pretouch.types import Inputs as Inputs
+    from pretouch.types import Mode as Mode
+    from pretouch.types import RangeReadings as RangeReadings
+    from pretouch.types import RangeStatus as RangeStatus
+    from pretouch.types import RobotState as RobotState
+
+_PLACES = {
+    "contact.detect": ("detect",),
+    "contact.window": ("window_init",),
+    "control.joint_box": ("joint_box", "joint_limits"),
+    "control.path": ("Circle", "WayPoints", "line"),
+    "control.restriction": ("approach_rows",),
+    "controller": ("Controller",),
+    "errors": ("PretouchError",),
+    "params": ("Profile", "RestrictionParams", "ThresholdParams", "at_rate", "profile"),
+    "perception.closest": ("closest_points", "no_obstacles"),
+    "perception.scene_filter": ("Fixtures", "no_fixtures"),
+    "robot.description": ("RobotDescription", "fr3", "panda"),
+    "robot.model": ("RobotModel",),
+    "sensing.skin": ("Skin", "load_skin", "paper_skin"),
+    "sensing.unit": ("SensorUnit",),
+    "types": ("ControlStep", "Inputs", "Mode", "RangeReadings", "RangeStatus", "RobotState"),
+}
+_PLACE = {name: f"pretouch.{module}" for module, names in _PLACES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _PLACE:
+        raise AttributeError(f"module 'pretouch' has no attribute {name!r}")
+    return getattr(import_module(_PLACE[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PLACE})

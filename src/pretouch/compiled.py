@@ -38,3 +38,15 @@ def compiled(function: Function) -> Function:
     except RuntimeError:  # nowhere to keep it
         kept = njit(error_model="numpy")(function)
     return cast(Function, kept)
+
+
+@compiled
+def _nothing() -> None:
+    """Compile to almost nothing."""
+
+
+def kept_in() -> str:
+    """Return the folder that compiled functions are kept in, or '' where there is none."""
+    _nothing()
+    stats = getattr(_nothing, "stats", None)
+    return str(Path(stats.cache_path).parent) if stats and stats.cache_path else ""

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import SkinError
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing import skin as sensing_skin
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.sensing.unit import SensorUnit
 
@@ -205,3 +209,16 @@ def test_a_file_that_cannot_be_read_is_named(panda_model, tmp_path):
     (tmp_path / "latin.toml").write_bytes(b'id = "\xe9"')
     with pytest.raises(SkinError, match=r"latin\.toml is not UTF-8 text: .* at byte 6"):
         load_skin(tmp_path / "latin.toml", panda_model)
+
+
+def test_the_fr3_has_the_same_seven_units(paper_skin):
+    skin = sensing_skin.paper_skin(RobotModel(fr3()))
+    assert skin.ids == paper_skin.ids
+    np.testing.assert_array_equal(skin.T_link_sensor, paper_skin.T_link_sensor)
+    assert [unit.link.replace("fr3", "panda") for unit in skin.units] == [unit.link for unit in paper_skin.units]
+
+
+def test_another_arm_has_no_skin_yet():
+    other = RobotModel(replace(panda(), name="other"))
+    with pytest.raises(SkinError, match="There is no skin of seven units for other: write a file like panda"):
+        sensing_skin.paper_skin(other)

@@ -89,7 +89,7 @@ class Cycle:
     """How long a control step takes: processor and wall time at a rate, overruns, and the share of each stage."""
 
     points: str = "7,32,128,1000"
-    """Numbers of sensed points, separated by commas. All are new in every cycle, which is the worst case."""
+    """Numbers of sensed points, separated by commas, each shown by a unit 50 times a second."""
     rate: float = 1000.0
     """Cycles a second; everything the profile counts in cycles is brought to it."""
     cycles: int = 20_000
@@ -111,11 +111,17 @@ class Bench:
     what: Annotated[FreeMotion, tyro.conf.subcommand("free-motion")] | Annotated[Cycle, tyro.conf.subcommand("cycle")]
 
 
+@dataclass(frozen=True)
+class WarmUp:
+    """Compile a control step, once after an installation: what comes later then starts within a second."""
+
+
 Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Figure, tyro.conf.subcommand("figure")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[WarmUp, tyro.conf.subcommand("warm-up")]
 )
 
 
@@ -155,6 +161,8 @@ def main(args: list[str] | None = None) -> int:
                     _free_motion(what)
                 case Bench(Cycle() as what):
                     _cycle(what)
+                case WarmUp():
+                    _warm_up()
     except PretouchError as error:
         errors.print(str(error), markup=False)
         return _USAGE
@@ -223,6 +231,15 @@ def _cycle(command: Cycle) -> None:
 
     request = CycleRequest(command.rate, command.cycles, command.profile, command.priority, command.cpu)
     bench_cycle(_counts(command.points), request, Path(command.json) if command.json else None)
+
+
+def _warm_up() -> None:
+    from pretouch.experiments.cycle import CycleRequest, warmed_up
+
+    kept = warmed_up(CycleRequest())
+    print(
+        f"Compiled, and kept in {kept}." if kept else "Compiled, but there is nowhere to keep it: HOME is not writable."
+    )
 
 
 def _words(text: str) -> tuple[str, ...]:

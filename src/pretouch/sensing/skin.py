@@ -22,7 +22,7 @@ _LARGEST_COMPONENT = 10.0
 """Largest component of a quaternion that is looked at any further."""
 
 PAPER_SKIN = Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.toml"))
-"""The file of `paper_skin`."""
+"""The file of `paper_skin` for the Panda."""
 
 
 class Skin:
@@ -106,11 +106,17 @@ def save_skin(skin: Skin, path: Path) -> None:
 
 
 def paper_skin(model: RobotModel) -> Skin:
-    """Seven units for the paper's experiment on a Panda: four round the hand, one at the wrist, two on the forearm.
+    """Seven units for the paper's experiment: four round the hand, one at the wrist, two on the forearm.
 
-    The paper does not publish its layout; this one is ours.
+    The paper does not publish its layout; this one is ours, for the Panda and the FR3. Raises SkinError for another arm.
     """
-    return load_skin(PAPER_SKIN, model)
+    path = PAPER_SKIN.with_name(f"{model.description.name}_seven_units.toml")
+    if not path.is_file():
+        raise SkinError(
+            f"There is no skin of seven units for {model.description.name}: write a file like {PAPER_SKIN.name} for it,"
+            " and load it with load_skin."
+        )
+    return load_skin(path, model)
 
 
 def _unit_from(entry: Any) -> SensorUnit:

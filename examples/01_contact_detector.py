@@ -1,0 +1,31 @@
+"""The contact detector alone, on any force signal: thresholds that move with its statistics, and with what is near.
+
+    python examples/01_contact_detector.py
+
+Nothing else of Pretouch is needed: a force per sample, and if you know of objects near, where they are.
+"""
+
+import numpy as np
+
+import pretouch as pt
+
+rng = np.random.default_rng(0)
+force = rng.normal(0.0, 0.5, (400, 3))  # your signal [N], on the robot by the environment
+force[300:, 1] -= 14.0  # somebody pushes towards -y
+
+ee = np.array([0.5, 0.0, 0.3])
+arm = pt.RobotModel(pt.panda())
+hand = pt.closest_points(
+    arm.kinematics(arm.description.q_ready), arm.body, ee,
+    unit=np.array([0]), point=ee[None] + [[0.0, 0.2, 0.0]], last_direction=np.array([[0.0, 1.0, 0.0]]),
+)  # fmt: skip
+
+for name, near in {"nothing near": pt.no_obstacles(), "a hand 0.2 m away at +y": hand}.items():
+    params, state, said = pt.ThresholdParams(), pt.window_init(100), "no contact"
+    for i, sample in enumerate(force):
+        found, state = pt.detect(state, sample, ee, near, params)
+        if found.contact is not None:
+            crossed = f"{found.contact.force[1]:.1f} N in y, lower threshold {found.thresholds.lower[1]:.1f} N"
+            said = f"contact {i - 300} samples after the push began: {crossed}"
+            break
+    print(f"{name}: {said}")

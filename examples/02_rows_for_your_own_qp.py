@@ -1,0 +1,32 @@
+"""The approach restrictions (eqs. 5-7) as rows G qd <= h, in a quadratic program of your own.
+
+    python examples/02_rows_for_your_own_qp.py
+
+Here the program is solved by DAQP; the rows and the joint box are plain arrays for any solver.
+"""
+
+import daqp
+import numpy as np
+
+import pretouch as pt
+
+arm = pt.RobotModel(pt.panda())
+q, qd = arm.description.q_ready, np.zeros(7)
+kin = arm.kinematics(q)
+ee, J = kin.position[arm.ee], arm.ee_jacobian(kin)[:3]
+
+# obstacle points from wherever you have them: a skin, a camera, a map
+points = ee + np.array([[0.12, 0.0, 0.05], [0.0, 0.3, 0.0]])
+near = pt.closest_points(kin, arm.body, ee, np.arange(2), points, np.tile([1.0, 0.0, 0.0], (2, 1)))
+rows, which = pt.approach_rows(kin, arm.moved_by, near, pt.RestrictionParams(mode="hard"))
+lower, upper = pt.joint_box(q, qd, pt.joint_limits(arm, margin=0.01, period=0.01))
+
+wanted = np.array([0.1, 0.0, 0.0])  # towards the nearer point [m/s]
+H, f = J.T @ J + 1e-3 * np.eye(7), -J.T @ wanted
+lowest = np.concatenate([lower, np.full(len(rows.h), -1e30)])
+for name, G, h in (("free", np.zeros((1, 7)), np.ones(1)), ("restricted", rows.G, rows.h)):
+    x, _, flag, _ = daqp.solve(
+        H, f, np.ascontiguousarray(G), np.concatenate([upper, h]), lowest[: 7 + len(h)], np.zeros(7 + len(h), np.int32)
+    )  # fmt: skip
+    approach = rows.G @ x
+    print(f"{name}: hand {(J @ x).round(3)} m/s, approach to the points {approach.round(3)} of {rows.h.round(3)} m/s")

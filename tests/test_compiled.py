@@ -1,0 +1,112 @@
+"""Compiled functions are kept under a name that tells all of them, and work where nothing can be kept."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+import pretouch
+from pretouch import compiled
+from pretouch.perception.vectors import dot
+
+PACKAGE = Path(pretouch.__file__).parent
+
+
+def test_the_digest_tells_all_files_with_compiled_functions(tmp_path: Path):
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "a.py").write_text("@compiled\ndef f(): return 1\n")
+    (tmp_path / "b.py").write_text("def g(): return 1\n")
+    before = compiled.digest(tmp_path)
+    (tmp_path / "b.py").write_text("def g(): return 2\n")
+    assert compiled.digest(tmp_path) == before
+    (tmp_path / "deep" / "a.py").write_text("@compiled\ndef f(): return 2\n")
+    changed = compiled.digest(tmp_path)
+    assert changed != before
+    (tmp_path / "deep" / "a.py").rename(tmp_path / "deep" / "c.py")
+    assert compiled.digest(tmp_path) not in (before, changed)
+
+
+def test_what_is_kept_carries_the_digest():
+    assert dot.__qualname__ == f"dot-{compiled.digest(PACKAGE)}"
+
+
+def test_where_nothing_can_be_kept_functions_work_all_the_same(monkeypatch: pytest.MonkeyPatch):
+    def njit(cache: bool = False, **options: object):
+        if cache:
+            raise RuntimeError("cannot cache function 'f': no locator available for file 'f.py'")
+        return numba.njit(**options)
+
+    monkeypatch.setattr(compiled, "njit", njit)
+
+    def half(x: float) -> float:
+        return x / 2
+
+    assert compiled.compiled(half)(3.0) == 1.5
+
+
+def test_a_division_by_zero_is_a_number():
+    @compiled.compiled
+    def over(a: float, b: float) -> float:
+        return a / b
+
+    assert over(1.0, 0.0) == np.inf
+    assert np.isnan(over(0.0, 0.0))
+
+
+def in_python(code: str, **environment: str) -> str:
+    """Run some code in a process of its own; return what it prints."""
+    known = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "XDG", "PYTHON"))}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=known | environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_import_loads_nothing():
+    loaded = in_python("import sys, pretouch; print(*(n for n in sys.modules if '.' not in n))").split()
+    assert not {"numpy", "numba", "scipy", "mujoco", "daqp", "matplotlib", "tyro", "rich"} & set(loaded)
+
+
+def test_public_names_are_there():
+    for name in dir(pretouch):
+        assert getattr(pretouch, name) is not None
+    assert pretouch.Controller.__module__ == "pretouch.controller"
+    with pytest.raises(AttributeError, match="has no attribute 'controler'"):
+        _ = pretouch.controler
+
+
+STEP = """
+import numpy as np, pretouch as pt
+from pretouch.compiled import kept_in
+arm = pt.RobotModel(pt.panda())
+control = pt.Controller(arm, pt.paper_skin(arm), pt.no_fixtures(), pt.Circle(), pt.profile("paper"))
+q, rest = arm.description.q_ready, np.zeros(7)
+robot = pt.RobotState(0.0, q, rest, q, rest, rest, np.zeros(6))
+seen = pt.RangeReadings(np.zeros(7), np.full(7, 0.4), np.zeros(7, np.int64))
+step, _ = control.step(control.init(robot), pt.Inputs(0.0, robot, seen))
+print(pt.__file__, repr(kept_in()), step.mode.value)
+"""
+
+
+@pytest.mark.slow
+def test_an_installation_nobody_can_write_to_works(tmp_path: Path):
+    # a file where a folder for the cache would have to be keeps even root from writing there
+    package = tmp_path / "pretouch"
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in [package, *(path for path in package.rglob("*") if path.is_dir())]:
+        (folder / "__pycache__").touch()
+    home = tmp_path / "home"
+    home.touch()
+    nowhere = {"HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
+    said = in_python(STEP, PYTHONPATH=str(tmp_path), PYTHONDONTWRITEBYTECODE="1", **nowhere)
+    assert said.split() == [str(package / "__init__.py"), "''", "hold"]
+    # and with a home it is kept there
+    home.unlink()
+    said = in_python(STEP, PYTHONPATH=str(tmp_path), PYTHONDONTWRITEBYTECODE="1", **nowhere)
+    assert str(home) in said
