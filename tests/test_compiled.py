@@ -17,17 +17,17 @@ from pretouch.perception.vectors import dot
 PACKAGE = Path(pretouch.__file__).parent
 
 
-def test_the_digest_tells_all_files_with_compiled_functions(tmp_path: Path):
-    (tmp_path / "deep").mkdir()
-    (tmp_path / "deep" / "a.py").write_text("@compiled\ndef f(): return 1\n")
-    (tmp_path / "b.py").write_text("def g(): return 1\n")
+def test_the_digest_tells_all_files_that_may_get_into_compiled_functions(tmp_path: Path):
+    for place in ("core/a.py", "core/constants.py", "cli/c.py"):
+        (tmp_path / place).parent.mkdir(exist_ok=True)
+        (tmp_path / place).write_text("NEAREST = 0.04\n")
     before = compiled.digest(tmp_path)
-    (tmp_path / "b.py").write_text("def g(): return 2\n")
+    (tmp_path / "cli" / "c.py").write_text("NEAREST = 0.08\n")
     assert compiled.digest(tmp_path) == before
-    (tmp_path / "deep" / "a.py").write_text("@compiled\ndef f(): return 2\n")
+    (tmp_path / "core" / "constants.py").write_text("NEAREST = 0.08\n")
     changed = compiled.digest(tmp_path)
     assert changed != before
-    (tmp_path / "deep" / "a.py").rename(tmp_path / "deep" / "c.py")
+    (tmp_path / "core" / "constants.py").rename(tmp_path / "core" / "numbers.py")
     assert compiled.digest(tmp_path) not in (before, changed)
 
 
@@ -47,6 +47,18 @@ def test_where_nothing_can_be_kept_functions_work_all_the_same(monkeypatch: pyte
         return x / 2
 
     assert compiled.compiled(half)(3.0) == 1.5
+
+
+def test_a_full_disk_is_no_reason_to_stop(monkeypatch: pytest.MonkeyPatch):
+    def full(*_given: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", full)
+
+    def third(x: float) -> float:
+        return x / 3
+
+    assert compiled.compiled(third)(3.0) == 1.0
 
 
 def test_a_division_by_zero_is_a_number():

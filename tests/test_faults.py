@@ -187,9 +187,29 @@ def test_the_first_part_that_cannot_be_used_is_named():
     assert sound_robot(replace(robot(), wrench=np.full(6, np.nan), tau_ext=wrong), QD_MAX)[1] == ""
 
 
-def test_the_same_instant_twice_is_no_fault():
+def test_a_clock_set_back_is_seen_with_a_state_that_cannot_be_used_too():
     _, _, watch = judge(inputs(5.0))
-    assert judge(inputs(5.0), watch)[1] == {}
+    _, faults, watch = judge(inputs(4.0, q=np.full(2, np.nan)), watch)
+    assert list(faults) == [Event.UNUSABLE, Event.TIME_BACKWARDS]
+    assert watch.stamp == 4.0
+
+
+def test_what_was_sent_before_a_fault_is_not_forgotten():
+    # sent from 1.00 to 1.01 s and, with a state that cannot be used, from 1.01 to 1.02 s; this report is from 1.00 s
+    _, _, watch = judge(inputs(1.0))
+    _, _, watch = judge(inputs(1.01, q=np.full(2, np.nan)), watch)
+    given = inputs(1.02)
+    believed, faults, _ = judge(replace(given, robot=replace(given.robot, stamp=1.0)), watch)
+    assert faults == {}
+    np.testing.assert_allclose(believed.q_commanded, np.array([0.11, 0.21]) + COMMAND * 0.02)
+
+
+def test_the_same_instant_twice_is_no_fault_and_no_time():
+    _, _, watch = judge(inputs(5.0))
+    believed, faults, _ = judge(inputs(5.0), watch)
+    assert faults == {}
+    # the last command has not moved anything yet: what the robot reports still holds
+    assert_same(believed, robot(5.0))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The loop with fakes for everything around it."""
 
+import signal
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -303,3 +304,48 @@ def test_a_speed_that_is_no_number_is_not_braked_for_ever(controller: Controller
     arm = Ticks()
     loop.come_to_rest(controller, arm, arm, controller.model.q_mid, np.full(7, np.nan))
     assert len(arm.sent) < 100
+
+
+@pytest.mark.parametrize("times", [1, 3])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_that_come_while_the_arm_brakes_wait(controller: Controller, world: World, number: int, times: int):
+    """However often somebody presses Ctrl-C, the arm comes to rest first."""
+    before = signal.signal(number, signal.default_int_handler)
+    ticks = 0
+    tick = world.tick
+
+    def ticking() -> float:
+        nonlocal ticks
+        ticks += 1
+        if ticks >= 60 and ticks < 60 + 4 * times and ticks % 4 == 0:
+            signal.raise_signal(number)
+        return tick()
+
+    world.tick = ticking
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            loop.run(controller, world, world.skin(), world, FakeRecorder(), lambda step: False)
+    finally:
+        signal.signal(number, before)
+    assert not world.qd.any()
+    assert np.abs(world.held[59]).max() > 0.05
+
+
+def test_a_skin_that_stamps_as_it_reads_is_heard(controller: Controller, world: World):
+    class Stamping(FakeSkin):
+        def read(self) -> RangeReadings:
+            readings = super().read()
+            return replace(readings, stamp=readings.stamp + 2e-4)
+
+    recorder = FakeRecorder()
+    loop.run(controller, world, Stamping(world), world, recorder, lambda step: len(recorder.steps) == 60)
+    assert recorder.steps[-1].mode is Mode.TRACK
+
+    # but a clock that is ahead is no clock
+    class Ahead(FakeSkin):
+        def read(self) -> RangeReadings:
+            return replace(super().read(), stamp=np.full(self.world.units, self.world.now + 2 * DT))
+
+    recorder = FakeRecorder()
+    loop.run(controller, world, Ahead(world), world, recorder, lambda step: len(recorder.steps) == 60)
+    assert recorder.steps[-1].mode is Mode.HOLD

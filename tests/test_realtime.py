@@ -3,6 +3,7 @@
 import ctypes
 import gc
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -215,6 +216,27 @@ def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypat
     assert len(told) == 1
     assert arm.collecting == [False] * 20
     assert clock.timing().cycles == 20
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_that_ends_processes_ends_the_loop_in_order(controller: Controller, number: int):
+    before = signal.signal(number, signal.SIG_DFL)
+    arm, clock = Arm(controller), MonotonicClock(0.001)
+
+    def done(_step: ControlStep) -> bool:
+        if len(arm.steps) == 5:
+            signal.raise_signal(number)
+        return False
+
+    try:
+        with pytest.raises(SystemExit) as ended:
+            realtime.run(controller, arm, NoReadings(arm.units), clock, arm, done)
+        assert signal.getsignal(number) is signal.SIG_DFL
+    finally:
+        signal.signal(number, before)
+    assert ended.value.code == 128 + number
+    assert clock.timing().cycles >= 5
+    assert gc.isenabled()
 
 
 def test_a_clock_of_another_period_is_refused(controller: Controller):

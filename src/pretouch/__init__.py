@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from pretouch import loop as loop
+    from pretouch import realtime as realtime
     from pretouch.contact.detect import detect as detect
     from pretouch.contact.window import window_init as window_init
     from pretouch.control.joint_box import joint_box as joint_box
@@ -18,8 +20,11 @@ if TYPE_CHECKING:
     from pretouch.control.path import line as line
     from pretouch.control.restriction import approach_rows as approach_rows
     from pretouch.controller import Controller as Controller
+    from pretouch.controller import ControllerState as ControllerState
     from pretouch.errors import PretouchError as PretouchError
+    from pretouch.loop import MonotonicClock as MonotonicClock
     from pretouch.params import Profile as Profile
+    from pretouch.params import ReactionParams as ReactionParams
     from pretouch.params import RestrictionParams as RestrictionParams
     from pretouch.params import ThresholdParams as ThresholdParams
     from pretouch.params import at_rate as at_rate
@@ -39,6 +44,7 @@ if TYPE_CHECKING:
     from pretouch.types import ControlStep as ControlStep
     from pretouch.types import Inputs as Inputs
     from pretouch.types import Mode as Mode
+    from pretouch.types import Obstacles as Obstacles
     from pretouch.types import RangeReadings as RangeReadings
     from pretouch.types import RangeStatus as RangeStatus
     from pretouch.types import RobotState as RobotState
@@ -49,25 +55,34 @@ _PLACES = {
     "control.joint_box": ("joint_box", "joint_limits"),
     "control.path": ("Circle", "WayPoints", "line"),
     "control.restriction": ("approach_rows",),
-    "controller": ("Controller",),
+    "controller": ("Controller", "ControllerState"),
     "errors": ("PretouchError",),
-    "params": ("Profile", "RestrictionParams", "ThresholdParams", "at_rate", "profile"),
+    "loop": ("MonotonicClock",),
+    "params": ("Profile", "ReactionParams", "RestrictionParams", "ThresholdParams", "at_rate", "profile"),
     "perception.closest": ("closest_points", "no_obstacles"),
     "perception.scene_filter": ("Fixtures", "no_fixtures"),
     "robot.description": ("RobotDescription", "fr3", "panda"),
     "robot.model": ("RobotModel",),
     "sensing.skin": ("Skin", "load_skin", "paper_skin"),
     "sensing.unit": ("SensorUnit",),
-    "types": ("ControlStep", "Inputs", "Mode", "RangeReadings", "RangeStatus", "RobotState"),
+    "types": ("ControlStep", "Inputs", "Mode", "Obstacles", "RangeReadings", "RangeStatus", "RobotState"),
 }
 _PLACE = {name: f"pretouch.{module}" for module, names in _PLACES.items() for name in names}
 
 
-def __getattr__(name: str) -> object:
-    if name not in _PLACE:
-        raise AttributeError(f"module 'pretouch' has no attribute {name!r}")
-    return getattr(import_module(_PLACE[name]), name)
+_MODULES = ("loop", "realtime")
 
+__all__ = sorted([*_PLACE, *_MODULES])
 
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_PLACE})
+if not TYPE_CHECKING:  # a type checker takes the imports above, and knows what is not there
+
+    def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            return import_module(f"pretouch.{name}")
+        if name not in _PLACE:
+            raise AttributeError(f"module 'pretouch' has no attribute {name!r}")
+        found = globals()[name] = getattr(import_module(_PLACE[name]), name)
+        return found
+
+    def __dir__() -> list[str]:
+        return [*__all__, "__version__"]

@@ -1,9 +1,10 @@
 """Compiled numerical functions, kept between runs wherever the machine has a place to keep them."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import njit
 
@@ -11,12 +12,15 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def digest(folder: Path) -> str:
-    """Return what tells this state of the files under a folder that hold compiled functions from any other."""
+    """Return what tells this state of the Python files under a folder from any other.
+
+    But for those of the command line and the experiments, of which nothing gets into a compiled function.
+    """
     content = sha256()
     for path in sorted(folder.rglob("*.py")):
-        text = path.read_bytes()
-        if b"@compiled" in text:
-            content.update(path.name.encode() + b"\0" + text)
+        place = path.relative_to(folder)
+        if place.parts[0] not in ("cli", "experiments"):
+            content.update(str(place).encode() + b"\0" + path.read_bytes())
     return content.hexdigest()[:12]
 
 
@@ -30,14 +34,27 @@ def compiled(function: Function) -> Function:
     kept beside the module, or in the user's cache where an installation is read-only. Where neither can be written it
     is compiled anew in each process: that takes seconds, and works.
     """
-    # Numba looks at the function's own file only to tell whether what it kept is out of date. What is compiled into one
-    # function from another file, it would go on using as it was: so the name it keeps it under tells all files.
+    # Numba looks at the function's own file only to tell whether what it kept is out of date. What got into a function
+    # from another file, a constant or a call, it would go on using as it was: so the name it keeps it under tells all.
     function.__qualname__ += f"-{_DIGEST}"
     try:
         kept = njit(cache=True, error_model="numpy")(function)
     except RuntimeError:  # nowhere to keep it
-        kept = njit(error_model="numpy")(function)
+        return cast(Function, njit(error_model="numpy")(function))
+    _keep_if_possible(kept)
     return cast(Function, kept)
+
+
+def _keep_if_possible(kept: Any) -> None:
+    """Let a full disk be no reason to stop: Numba raises where it cannot write what it just compiled."""
+    cache = kept._cache
+    save = cache.save_overload
+
+    def try_to_save(*given: object) -> None:
+        with suppress(OSError):
+            save(*given)
+
+    cache.save_overload = try_to_save
 
 
 @compiled

@@ -83,8 +83,10 @@ class Controller:
         )
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
-        """Run one control cycle."""
+        """Run one control cycle; to be called once a period, with the state that the step before returned."""
         p, model, mark = self.profile, self.model, self._mark
+        if len(state.command) != model.n or len(state.tracks.point) != len(self.skin):
+            raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         robot, events, watch = examine(
             state.watch, inputs, state.command, self.limits.period, self.limits.qd_max, p.failure
         )
@@ -151,7 +153,7 @@ class Controller:
             reaction=reaction.advance(react) if reacting else react,
             path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
-            mode=mode, command=qp.qd, rotation_goal=state.rotation_goal,
+            mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal,
         )  # fmt: skip
         mark("record")
         return step, after
@@ -176,7 +178,7 @@ def _events(
     if reaction.active(react, p.reaction):
         left = (p.reaction.decay_cycles - react.cycle) * p.task.control_period_s
         events[Event.REACTING] = f"{left:.2f} s"
-    if unfit:
+    if unfit and p.perception.enabled:
         events[Event.SKIN_UNFIT] = unfit
     if silent:
         events[Event.SKIN_SILENT] = silent

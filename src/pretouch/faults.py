@@ -61,23 +61,23 @@ def examine(
     faults: dict[Event, str] = {}
     robot, wrong = sound_robot(inputs.robot, qd_max)
     stamp = _time(inputs.stamp)
+    now = watch.stamp if stamp is None else stamp
     if robot is None:
         faults[Event.UNUSABLE] = wrong
     elif stamp is None:
         faults[Event.UNUSABLE] = f"the step's time stamp is {inputs.stamp}"
-    else:
-        if stamp < watch.stamp:
-            faults[Event.TIME_BACKWARDS] = f"from {watch.stamp:.3f} s to {stamp:.3f} s"
-        age = stamp - robot.stamp
-        if abs(age) > params.state_timeout_s:
-            faults[Event.STATE_STALE] = f"{age:.3f} s old" if age > 0 else f"{-age:.3f} s in the future"
-    now = watch.stamp if stamp is None else stamp
+    elif abs(now - robot.stamp) > params.state_timeout_s:
+        age = now - robot.stamp
+        faults[Event.STATE_STALE] = f"{age:.3f} s old" if age > 0 else f"{-age:.3f} s in the future"
+    sent = (*watch.sent[-int(params.state_timeout_s / period) - 1 :], (watch.stamp, command))
+    if now < watch.stamp:
+        faults[Event.TIME_BACKWARDS] = f"from {watch.stamp:.3f} s to {now:.3f} s"
+        sent = ()
     if robot is None or faults:
         last = watch.robot
         believed = replace(last, q_commanded=last.q_commanded + command * period, qd_commanded=command, wrench=None)
-        return believed, faults, Watch(now, believed, min(watch.force_stamp, now))
-    sent = (*watch.sent[-int(params.state_timeout_s / period) - 1 :], (watch.stamp, command))
-    if robot.stamp <= watch.stamp:
+        return believed, faults, Watch(now, believed, min(watch.force_stamp, now), sent)
+    if robot.stamp <= watch.stamp < now:
         robot = replace(robot, q_commanded=_moved_on(robot, now, sent), qd_commanded=command)
     if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
         robot = replace(robot, wrench=None)
@@ -103,22 +103,24 @@ def _moved_on(robot: RobotState, now: float, sent: tuple[tuple[float, FloatArray
 def _time(stamp: float) -> float | None:
     """Return a time stamp, or None if it is none."""
     try:
-        return stamp if abs(stamp) < _LATEST else None
-    except TypeError:
+        time = float(stamp)
+    except (TypeError, ValueError, OverflowError):
         return None
+    return time if abs(time) < _LATEST else None
 
 
 def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | None, str]:
     """Copy a robot's state as arrays of float64, or say what keeps it from being that of an arm with these limits."""
     try:
-        stamp, given = robot.stamp, (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
+        stamp, given = _time(robot.stamp), (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
+        tau_ext = np.array(robot.tau_ext)
         wrench = None if robot.wrench is None else np.array(robot.wrench, dtype=np.float64)
     except AttributeError:
         return None, f"it is {robot!r}"
     except (TypeError, ValueError, OverflowError):
         return None, "its force estimate is no array of numbers"
-    if _time(stamp) is None:
-        return None, f"its time stamp is {stamp}"
+    if stamp is None:
+        return None, f"its time stamp is {robot.stamp}"
     try:
         numbers = np.array(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -132,7 +134,7 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
         i, j = np.argwhere(~(np.abs(numbers) < bounds))[0]
         return None, f"{_PARTS[i]} hold {numbers[i, j]:g}"
     q, qd, q_commanded, qd_commanded = numbers
-    return RobotState(stamp, q, qd, q_commanded, qd_commanded, robot.tau_ext, wrench), ""
+    return RobotState(stamp, q, qd, q_commanded, qd_commanded, tau_ext, wrench), ""
 
 
 @compiled

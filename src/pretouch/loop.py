@@ -1,9 +1,13 @@
 """The only clock of the package, and the loop that turns the controller: read, step, command, record."""
 
 import math
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from types import FrameType
 
 import numpy as np
 
@@ -11,7 +15,7 @@ from pretouch.control.joint_box import box_and_brake
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.ports import Clock, Recorder, Robot, Skin
-from pretouch.types import ControlStep, FloatArray, Inputs
+from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState
 
 _FINEST = 1e-7
 """Shortest time `Durations` tells apart [s]."""
@@ -162,15 +166,49 @@ def run(
     sent = state.command
     try:
         while True:
-            now = clock.tick()
-            step, state = controller.step(state, Inputs(now, robot.read(), skin.read(), resume()))
+            tick = clock.tick()
+            report, readings = robot.read(), skin.read()
+            now = _instant(tick, controller.limits.period, report, readings)
+            step, state = controller.step(state, Inputs(now, report, readings, resume()))
             robot.command(step.command)
             sent = step.command
             recorder.record(step)
             if done(step):
                 return
     finally:
-        come_to_rest(controller, robot, clock, state.watch.robot.q_commanded, sent)
+        with _undisturbed():
+            come_to_rest(controller, robot, clock, state.watch.robot.q_commanded, sent)
+
+
+def _instant(tick: float, period: float, report: RobotState, readings: RangeReadings) -> float:
+    """Instant of a step [s]: a port that stamps what it reads as it reads it is a little later than the tick."""
+    latest = tick
+    for given in (getattr(report, "stamp", tick), getattr(readings, "stamp", tick)):
+        with suppress(TypeError, ValueError):  # the controller names what is wrong
+            stamps = np.asarray(given, dtype=np.float64)
+            latest = max(latest, float(stamps[(stamps > tick) & (stamps <= tick + period)].max(initial=tick)))
+    return latest
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM wait until what is under way has ended: an arm on its way to rest."""
+    came: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        came.append(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals reach the main thread alone
+        return
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for ours, handler in before.items():
+            signal.signal(ours, handler)
+        for number in came[:1]:
+            signal.raise_signal(number)
 
 
 def come_to_rest(controller: Controller, robot: Robot, clock: Clock, q: FloatArray, qd: FloatArray) -> None:

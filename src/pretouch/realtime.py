@@ -2,11 +2,15 @@
 
 import ctypes
 import gc
+import math
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from types import FrameType
 
 import numpy as np
 
@@ -38,6 +42,8 @@ def run(
 ) -> None:
     """`loop.run`, warmed up and in a process prepared for real time. However it ends, `clock.timing()` is the report.
 
+    SIGTERM and SIGHUP, where nobody else handles them, end it like Ctrl-C: the arm comes to rest first.
+
     Args:
         controller: its period must be the clock's.
         robot: the arm.
@@ -50,16 +56,34 @@ def run(
         cpu: see `real_time`.
         tell: is given each sentence on what could not be had, before the loop begins.
     """
-    if clock.period != controller.limits.period:
+    if not math.isclose(clock.period, controller.limits.period, rel_tol=1e-9):
         raise ParameterError(
-            f"The clock has a period of {clock.period:g} s, the controller {controller.limits.period:g} s:"
+            f"The clock has a period of {clock.period!r} s, the controller {controller.limits.period!r} s:"
             " make them the same (params.at_rate makes a profile for another rate)."
         )
     warm_up(controller, robot.read())
-    with real_time(priority, cpu) as missing:
+    with _ended_in_order(), real_time(priority, cpu) as missing:
         for sentence in missing:
             tell(sentence)
         loop.run(controller, robot, skin, clock, recorder, done, resume)
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """Turn the signals that end a process at once into an exception, so that the loop can brake."""
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        raise SystemExit(128 + number)
+
+    numbers = (signal.SIGTERM, signal.SIGHUP) if threading.current_thread() is threading.main_thread() else ()
+    ours = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    for number in ours:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @contextmanager

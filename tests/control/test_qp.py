@@ -267,3 +267,28 @@ def test_repeated_rows_change_nothing():
 def test_skipped_is_the_braking_command():
     problem = simple(np.eye(7)[0], 0.1)
     assert_braking(skipped(problem.stop, problem.rows), problem, QpOutcome.SKIPPED)
+
+
+def test_rows_that_were_violated_on_the_way_leave_no_rounding():
+    # 300 heavy rows ask for the box's corner where the search begins, and none binds at the answer
+    rng = np.random.default_rng(1)
+    G, cost = rng.uniform(0.1, 1.0, (300, 7)), Cost(1e-3 * np.eye(7), np.full(7, 1e-3))
+    rows = ApproachRows(G, -0.05 * G.sum(axis=1), soft=True)
+    answer = solve(cost, np.full(7, -1.0), np.full(7, 1.0), rows, 8e5, np.zeros(7))
+    np.testing.assert_allclose(answer.qd, -1.0, atol=1e-12)
+    assert not answer.slack.any()
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_rows_that_meet_in_the_answer_do_not_hold_it_up(seed: int):
+    # rows drawn through one point, so that ties abound
+    rng = np.random.default_rng(seed)
+    n, count = 7, int(rng.integers(2, 9))
+    at = rng.integers(-2, 3, n) * 0.25
+    G = rng.integers(-1, 2, (count, n)) * 0.5
+    J = rng.integers(-1, 2, (3, n)).astype(float)
+    cost = Cost(J.T @ J + 1e-3 * np.eye(n), -J.T @ rng.integers(-1, 2, 3).astype(float))
+    problem = Problem(cost, np.full(n, -0.5), np.full(n, 0.5), ApproachRows(G, G @ at, soft=True), np.zeros(n))
+    answer = problem.solve()
+    assert answer.outcome is QpOutcome.SOLVED
+    assert kkt_residual(problem, answer.qd, answer.multipliers) <= 1e-8

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pretouch.controller import STAGES, Controller
-from pretouch.errors import ExperimentError, ParameterError
+from pretouch.errors import ExperimentError
 from pretouch.experiments import cycle
 from pretouch.experiments.cycle import CycleRequest, measure
 from pretouch.experiments.workload import LARGEST_SKIN, Workload
@@ -103,7 +103,7 @@ def test_bad_requests_are_refused_when_made():
         CycleRequest(cycles=0)
     with pytest.raises(ExperimentError, match="The seed is -1"):
         CycleRequest(seed=-1)
-    with pytest.raises(ParameterError, match="it must be more than 20 Hz"):
+    with pytest.raises(ExperimentError, match="The rate is 20 Hz: give more than 20 and up to 10000 Hz"):
         CycleRequest(rate=20.0)
 
 

@@ -70,14 +70,14 @@ class Oracle:
         fault = self._fault(inputs)
         last = self.stamp
         now = self.stamp = inputs.stamp if abs(inputs.stamp) < LATEST else self.stamp
-        if fault:
-            self.sent = []
-        else:
+        kept = int(p.failure.state_timeout_s / p.task.control_period_s) + 1
+        self.sent = [] if now < last else [*self.sent[-kept:], (last, self.qd)]
+        if not fault:
             self._believe(robot, last, now)
         w = None if fault else robot.wrench
         felt = w is not None and bool(np.isfinite(w).all() and np.abs(w).max() < p.failure.force_max_n)
         self.force_stamp = now if felt else min(self.force_stamp, now)
-        self._hear(inputs, now, fault == "backwards")
+        self._hear(inputs, now, now < last)
         age = now - self.heard if p.perception.enabled and len(self.ids) else np.zeros(0)
         slow, stop = p.perception.slow_after_s, p.perception.silent_after_s
         return Expected(
@@ -90,9 +90,7 @@ class Oracle:
 
     def _believe(self, robot: RobotState, last: float, now: float) -> None:
         """Go by a report, and by the commands it cannot know of."""
-        kept = int(self.p.failure.state_timeout_s / self.p.task.control_period_s) + 1
-        self.sent = [*self.sent[-kept:], (last, self.qd)]
-        if robot.stamp > last:
+        if robot.stamp > last or now == last:
             self.q, self.qd = robot.q_commanded.copy(), robot.qd_commanded.copy()
             return
         q, at = robot.q_commanded.copy(), robot.stamp

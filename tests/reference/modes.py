@@ -77,25 +77,25 @@ class Trust:
         """Return the state to go by and what is wrong; a state that is not believed goes on by the last command."""
         robot, last, wrong, before = inputs.robot, self.robot, {}, self.now
         odd = unusable(inputs, self.qd_max)
+        self.now = inputs.stamp if np.isfinite(inputs.stamp) else before
         if odd:
             wrong[UNUSABLE] = odd
         else:
-            if inputs.stamp < before:
-                wrong[BACKWARDS] = f"from {before:.3f} s to {inputs.stamp:.3f} s"
             age = inputs.stamp - robot.stamp
             if abs(age) > self.params.state_timeout_s:
                 wrong[STALE] = f"{age:.3f} s old" if age > 0 else f"{-age:.3f} s in the future"
-        self.now = inputs.stamp if np.isfinite(inputs.stamp) else before
+        kept = int(self.params.state_timeout_s / period) + 1
+        self.sent = [*self.sent[-kept:], (before, command)]
+        if self.now < before:
+            wrong[BACKWARDS] = f"from {before:.3f} s to {self.now:.3f} s"
+            self.sent = []
         # a force cannot have been felt later than now
         self.felt = min(self.felt, self.now)
         if wrong:
             q = last.q_commanded + command * period
             self.robot = replace(last, q_commanded=q, qd_commanded=command, wrench=None)
-            self.sent = []
             return self.robot, wrong
-        kept = int(self.params.state_timeout_s / period) + 1
-        self.sent = [*self.sent[-kept:], (before, command)]
-        if robot.stamp <= before:
+        if robot.stamp <= before < self.now:
             # it is from before the last command, and cannot tell of it nor of others since its time
             edges = [robot.stamp, *(t for t, _ in self.sent if t > robot.stamp), self.now]
             ahead = robot.q_commanded

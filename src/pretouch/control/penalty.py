@@ -52,7 +52,7 @@ def minimise(
     which = possible_rows(G, h, lower, upper)
     violated, at_bound = np.zeros(len(h), np.bool_), np.zeros(n, np.int64)
     hessian, linear = H.copy(), f.copy()
-    _take_violated(G, h, which, weight, x, violated, hessian, linear)
+    _take_violated(H, f, G, h, which, weight, x, violated, hessian, linear)
     y, left = x.copy(), budget
     while True:
         status, left = _box_minimum(hessian, linear, lower, upper, y, at_bound, left)
@@ -61,14 +61,20 @@ def minimise(
         if not _differs(G, h, which, y, violated):
             break
         _shorten(H, f, G, h, which, weight, x, y)
+        moved = 0.0
+        for i in range(n):
+            moved = max(moved, abs(y[i] - x[i]) / (1.0 + abs(x[i])))
+        if moved <= 1e-15:
+            break  # several rows meet here: no way leads further down
         for i in range(n):
             x[i] = y[i]
             if at_bound[i] != 0 and lower[i] < x[i] < upper[i]:
                 at_bound[i] = 0
-        _take_violated(G, h, which, weight, x, violated, hessian, linear)
+        _take_violated(H, f, G, h, which, weight, x, violated, hessian, linear)
     sound = True
     for i in range(n):
-        x[i] = y[i]
+        # the box to the last digit, which rounding may miss
+        x[i] = min(max(y[i], lower[i]), upper[i])
         sound = sound and np.isfinite(x[i])
     _certify(hessian, linear, G, h, weight, at_bound, x, slack, multipliers)
     return SOLVED if sound else NOT_FINITE
@@ -121,21 +127,27 @@ def excesses(G: FloatArray, h: FloatArray, x: FloatArray, slack: FloatArray) -> 
 
 @compiled
 def _take_violated(
-    G: FloatArray, h: FloatArray, which: IntArray, weight: float, x: FloatArray, violated: BoolArray,
-    hessian: FloatArray, linear: FloatArray,
+    H: FloatArray, f: FloatArray, G: FloatArray, h: FloatArray, which: IntArray, weight: float, x: FloatArray,
+    violated: BoolArray, hessian: FloatArray, linear: FloatArray,
 ) -> None:  # fmt: skip
     """Make hessian and linear those of the piece of the cost that x is on, and note its violated rows."""
-    n = len(x)
+    n, dropped = len(x), False
     for k in which:
-        now = _excess(G, h, k, x) > 0
-        if now == violated[k]:
-            continue
-        violated[k] = now
-        w = weight if now else -weight
+        dropped = dropped or (violated[k] and not _excess(G, h, k, x) > 0)
+    if dropped:
+        # to take a row out again would leave the rounding of its large terms
         for i in range(n):
-            linear[i] -= w * h[k] * G[k, i]
-            for j in range(i + 1):
-                hessian[i, j] += w * G[k, i] * G[k, j]
+            linear[i] = f[i]
+            for j in range(n):
+                hessian[i, j] = H[i, j]
+    for k in which:
+        known = violated[k] and not dropped
+        violated[k] = _excess(G, h, k, x) > 0
+        if violated[k] and not known:
+            for i in range(n):
+                linear[i] -= weight * h[k] * G[k, i]
+                for j in range(i + 1):
+                    hessian[i, j] += weight * G[k, i] * G[k, j]
     for i in range(n):
         for j in range(i):
             hessian[j, i] = hessian[i, j]
@@ -304,4 +316,4 @@ def _certify(
         pull = linear[i]
         for j in range(n):
             pull += hessian[i, j] * x[j]
-        multipliers[i] = -pull if at_bound[i] != 0 else 0.0
+        multipliers[i] = at_bound[i] * max(0.0, -at_bound[i] * pull)

@@ -31,6 +31,9 @@ _STAGED = 2000
 """Most cycles in which the stages are told apart."""
 _SHORTER = 5000
 """Most cycles in which every reading is new."""
+_MOST_CYCLES = 10_000_000
+_SLOWEST, _FASTEST = 20.0, 10_000.0
+"""[Hz]: slower, each step would be late; faster than the shortest control period there may be."""
 _PACKAGES = ("pretouch", "numpy", "numba", "mujoco-core", "daqp")
 
 
@@ -51,8 +54,12 @@ class CycleRequest:
     """Of the scene, the skin and the force noise."""
 
     def __post_init__(self) -> None:
-        if self.cycles < 1:
-            raise ExperimentError(f"The number of cycles is {self.cycles}: give 1 or more.")
+        if not 1 <= self.cycles <= _MOST_CYCLES:
+            raise ExperimentError(f"The number of cycles is {self.cycles}: give 1 to {_MOST_CYCLES}.")
+        if not _SLOWEST < self.rate <= _FASTEST:
+            raise ExperimentError(
+                f"The rate is {self.rate:g} Hz: give more than {_SLOWEST:g} and up to {_FASTEST:g} Hz."
+            )
         if self.seed < 0:
             raise ExperimentError(f"The seed is {self.seed}: give 0 or more.")
         self.at_rate()

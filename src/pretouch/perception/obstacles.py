@@ -24,20 +24,20 @@ class TrackState:
     @property
     def seen(self) -> FloatArray:
         """Instant of the measurement that showed the point (K,) [s]."""
-        return self.times[_SEEN]
+        return self.times[SEEN]
 
     @property
     def used(self) -> FloatArray:
         """Stamp of the newest reading taken into account (K,) [s]."""
-        return self.times[_USED]
+        return self.times[USED]
 
     @property
     def heard(self) -> FloatArray:
         """Stamp of the newest reading that told anything (K,) [s]."""
-        return self.times[_HEARD]
+        return self.times[HEARD]
 
 
-_SEEN, _USED, _HEARD = range(3)
+SEEN, USED, HEARD = range(3)
 
 
 def track_init(units: int) -> TrackState:
@@ -167,11 +167,11 @@ def take_in(
     """Change the points (K, 3) and times (3, K) of a `TrackState` as `track` says."""
     for k in range(len(stamp)):
         if fresh[k]:
-            times[_USED, k] = stamp[k]
+            times[USED, k] = stamp[k]
             if tells[k]:
-                times[_HEARD, k] = stamp[k]
+                times[HEARD, k] = stamp[k]
             if shows[k] and now - stamp[k] <= persistence:
-                times[_SEEN, k] = stamp[k]
+                times[SEEN, k] = stamp[k]
                 for i in range(3):
                     point[k, i] = points[k, i]
 

@@ -6,6 +6,9 @@ from pretouch.compiled import compiled
 from pretouch.params import PerceptionParams
 from pretouch.perception.closest import bounds, closest, distances, no_obstacles
 from pretouch.perception.obstacles import (
+    HEARD,
+    SEEN,
+    USED,
     TrackState,
     locate,
     measured,
@@ -88,7 +91,7 @@ def _perceive(
     measured(reading, status, distance)
 
     # which readings are new, show what is not known to be there, and where
-    fresh, any_fresh = newer(times[1], stamp, now), False
+    fresh, any_fresh = newer(times[USED], stamp, now), False
     for k in range(len(fresh)):
         any_fresh = any_fresh or fresh[k]
     if any_fresh:
@@ -120,7 +123,7 @@ def _perceive(
     ee_distance, body_distance = scalars[0], scalars[1]
     found = 0
     for k in range(len(unit)):
-        if now - times[0, k] <= persistence:
+        if now - times[SEEN, k] <= persistence:
             unit[found] = k
             for i in range(3):
                 near[found, i], direction[found, i] = point[k, i], last_direction[k, i]
@@ -140,7 +143,7 @@ def _perceive(
         for i in range(3):
             last_direction[unit[m], i] = direction[m, i]
     for k in range(len(unit)):
-        oldest = min(oldest, times[2, k])
+        oldest = min(oldest, times[HEARD, k])
     return found, nearest, oldest
 
 

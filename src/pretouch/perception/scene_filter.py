@@ -30,7 +30,8 @@ class Fixtures:
     capsules: Capsules
 
     def __post_init__(self) -> None:
-        planes, c = np.asarray(self.planes), self.capsules
+        planes, c = np.array(self.planes, dtype=np.float64), self.capsules
+        object.__setattr__(self, "planes", planes)
         if planes.ndim != 2 or planes.shape[1] != 4 or not np.isfinite(planes).all():
             raise FixtureError(
                 f"The planes are {planes.tolist()}: give rows of four finite numbers, normal and offset."

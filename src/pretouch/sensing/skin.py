@@ -72,8 +72,9 @@ def _check_place(unit: SensorUnit, model: RobotModel) -> None:
         )
 
 
-def load_skin(path: Path, model: RobotModel) -> Skin:
+def load_skin(path: Path | str, model: RobotModel) -> Skin:
     """Read a skin file. What is wrong with it is a SkinError that names the file, the unit and the way out."""
+    path = Path(path)
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -108,7 +109,7 @@ def save_skin(skin: Skin, path: Path) -> None:
 def paper_skin(model: RobotModel) -> Skin:
     """Seven units for the paper's experiment: four round the hand, one at the wrist, two on the forearm.
 
-    The paper does not publish its layout; this one is ours, for the Panda and the FR3. Raises SkinError for another arm.
+    The paper does not publish its layout; this one is ours, for Panda and FR3. Raises SkinError for another arm.
     """
     path = PAPER_SKIN.with_name(f"{model.description.name}_seven_units.toml")
     if not path.is_file():
