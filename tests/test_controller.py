@@ -295,6 +295,8 @@ def arrays_in(value: object) -> list[np.ndarray]:
         return [value]
     if is_dataclass(value):
         return [a for f in fields(value) for a in arrays_in(getattr(value, f.name))]
+    if isinstance(value, tuple):
+        return [a for part in value for a in arrays_in(part)]
     return []
 
 
@@ -303,6 +305,8 @@ def same(a: object, b: object) -> bool:
         return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
     if isinstance(a, np.ndarray):
         return bool(np.array_equal(a, b, equal_nan=True))
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(same, a, b))
     return a == b
 
 

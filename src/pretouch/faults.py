@@ -48,7 +48,8 @@ def examine(
 
     In place of a state that cannot be believed stands the last one that could, moved on by the last command. One from
     before the last command, lost or late, is moved on by the commands it cannot know of: the next one may differ from
-    the last one sent by so much only. What is returned shares no memory with the inputs.
+    the last one sent by so much only. What is returned shares no memory with the inputs but
+    `tau_ext`, which no step reads.
 
     Args:
         watch: memory.
@@ -113,7 +114,7 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
     """Copy a robot's state as arrays of float64, or say what keeps it from being that of an arm with these limits."""
     try:
         stamp, given = _time(robot.stamp), (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
-        tau_ext = np.array(robot.tau_ext)
+        tau_ext = robot.tau_ext
         wrench = None if robot.wrench is None else np.array(robot.wrench, dtype=np.float64)
     except AttributeError:
         return None, f"it is {robot!r}"

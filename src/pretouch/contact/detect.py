@@ -5,7 +5,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.contact.reaction import external_force
 from pretouch.contact.thresholds import crossed, side_distances, threshold_parts
-from pretouch.contact.window import WindowState, add_to, added, window_mean, window_std
+from pretouch.contact.window import WindowState, add_to, added, place, window_mean, window_std
 from pretouch.params import ThresholdParams
 from pretouch.types import Contact, FloatArray, Obstacles, Thresholds
 from pretouch.values import value
@@ -34,15 +34,13 @@ def detect(
     window stays as it is and nothing is detected. Nothing is detected either before the window is full.
     """
     armed, p, parts = state.full, params, np.empty((6, 3))
-    ring, sums = state.ring, state.sums
-    if force is not None:
-        ring, sums = ring.copy(), sums.copy()
+    chunk, at, sums = place(state)
     found = _detect(
-        ring, sums, state.next, state.count, force is not None, _NONE if force is None else force, ee_position,
+        chunk, at, sums, state.count, armed, force is not None, _NONE if force is None else force, ee_position,
         obstacles.point, obstacles.ee_distance, p.alpha, p.lambda_, p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n,
         p.d_max_m, p.d_min_m, p.compare == "filtered", parts,
     )  # fmt: skip
-    after = state if force is None else added(state, ring, sums)
+    after = state if force is None else added(state, chunk, sums)
     limits, contact = Thresholds(parts), None
     if force is not None and found and armed:
         compared = after.newest if p.compare == "filtered" else force
@@ -55,14 +53,15 @@ _NONE = np.full(3, np.nan)
 
 @compiled
 def _detect(
-    ring: FloatArray, sums: FloatArray, at: int, count: int, present: bool, force: FloatArray, ee_position: FloatArray,
+    chunk: FloatArray, at: int, sums: FloatArray, count: int, full: bool, present: bool, force: FloatArray,
+    ee_position: FloatArray,
     point: FloatArray, ee_distance: FloatArray, alpha: float, lambda_: float, f_base: float, f_std: float,
     sigma_max: float, f_d: float, d_max: float, d_min: float, filtered: bool, parts: FloatArray,
 ) -> bool:  # fmt: skip
     """Add to the window, write the thresholds (6, 3), and say whether the force crosses one of them."""
     if present:
-        add_to(ring, sums, at, count, force, alpha, lambda_)
-        count = min(count + 1, len(ring))
+        add_to(chunk, at, sums, count, full, force, alpha, lambda_)
+        count = count if full else count + 1
     mean = window_mean(sums, count)
     positive, negative = side_distances(ee_position, point, ee_distance)
     threshold_parts(

@@ -8,25 +8,35 @@ from pretouch.values import value
 
 _NEWEST, _ORIGIN, _TOTAL, _SQUARES = range(4)
 
+_CHUNK = 64
+"""Values that are copied for one more: a window at 1 kHz holds a thousand."""
+
 
 @value
 class WindowState:
     """A ring of the last N force samples and their running sums. All forces in N, per axis."""
 
-    ring: FloatArray
-    """(N, 3) values, oldest at `next` once full."""
+    chunks: tuple[FloatArray, ...]
+    """(up to 64, 3) each, together the N values of the ring, oldest at `next` once full."""
     next: int
     """Where the next value goes."""
     count: int
     """Values held so far, at most N."""
+    size: int
+    """N."""
     sums: FloatArray
     """(4, 3) the value added last, the origin o the sums are taken about, so that a large mean costs no digits, the sum
     of (value - o), and that of its square."""
 
     @property
+    def ring(self) -> FloatArray:
+        """The values (N, 3), in the order of their places."""
+        return np.concatenate(self.chunks)
+
+    @property
     def full(self) -> bool:
         """Whether the window holds N values, so that its statistics mean something."""
-        return self.count == len(self.ring)
+        return self.count == self.size
 
     @property
     def newest(self) -> FloatArray:
@@ -44,7 +54,8 @@ class WindowState:
 
 def window_init(samples: int) -> WindowState:
     """Return an empty window for N samples."""
-    return WindowState(np.zeros((samples, 3)), 0, 0, np.zeros((4, 3)))
+    chunks = tuple(np.zeros((min(_CHUNK, samples - start), 3)) for start in range(0, samples, _CHUNK))
+    return WindowState(chunks, 0, 0, samples, np.zeros((4, 3)))
 
 
 @compiled
@@ -84,36 +95,41 @@ def weighted_value(
 
 def add(state: WindowState, reading: FloatArray, alpha: float, lambda_: float) -> WindowState:
     """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on."""
-    ring, sums = state.ring.copy(), state.sums.copy()
-    add_to(ring, sums, state.next, state.count, reading, alpha, lambda_)
-    return added(state, ring, sums)
+    chunk, at, sums = place(state)
+    add_to(chunk, at, sums, state.count, state.full, reading, alpha, lambda_)
+    return added(state, chunk, sums)
 
 
-def added(state: WindowState, ring: FloatArray, sums: FloatArray) -> WindowState:
-    """Return the state after one more value, with a ring and sums that hold it."""
-    size = len(ring)
-    return WindowState(ring, (state.next + 1) % size, min(state.count + 1, size), sums)
+def place(state: WindowState) -> tuple[FloatArray, int, FloatArray]:
+    """Return copies of what the next value changes: its chunk, with the index in it, and the sums."""
+    k, at = divmod(state.next, _CHUNK)
+    return state.chunks[k].copy(), at, state.sums.copy()
 
 
 @compiled
 def add_to(
-    ring: FloatArray, sums: FloatArray, at: int, count: int, reading: FloatArray, alpha: float, lambda_: float
-) -> None:
-    """Change ring (N, 3) and sums (4, 3) as `add` says."""
-    size, x = len(ring), reading
-    full = count == size
+    chunk: FloatArray, at: int, sums: FloatArray, count: int, full: bool, reading: FloatArray, alpha: float,
+    lambda_: float,
+) -> None:  # fmt: skip
+    """Change the chunk, at an index, and the sums (4, 3) as `add` says, for a window of `count` values so far."""
+    x = reading
     if full:
         x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), alpha, lambda_)
-    afresh = at == size - 1 or count == 0
     for i in range(3):
-        gone, ring[at, i], sums[_NEWEST, i] = ring[at, i], x[i], x[i]
-        if afresh:
-            # once a turn the sums are taken anew, so rounding errors never add up; O(1) on average
-            sums[_ORIGIN, i], sums[_TOTAL, i], sums[_SQUARES, i] = x[i], 0.0, 0.0
-            for m in range(min(count + 1, size)):
-                sums[_TOTAL, i] += ring[m, i] - x[i]
-                sums[_SQUARES, i] += (ring[m, i] - x[i]) ** 2
-        else:
-            new, old = x[i] - sums[_ORIGIN, i], gone - sums[_ORIGIN, i] if full else 0.0
-            sums[_TOTAL, i] += new - old
-            sums[_SQUARES, i] += new**2 - old**2
+        gone, chunk[at, i], sums[_NEWEST, i] = chunk[at, i], x[i], x[i]
+        new, old = x[i] - sums[_ORIGIN, i], gone - sums[_ORIGIN, i] if full else 0.0
+        sums[_TOTAL, i] += new - old
+        sums[_SQUARES, i] += new**2 - old**2
+
+
+def added(state: WindowState, chunk: FloatArray, sums: FloatArray) -> WindowState:
+    """Return the state after one more value, of which the chunk and the sums know already."""
+    k, size = state.next // _CHUNK, state.size
+    chunks = (*state.chunks[:k], chunk, *state.chunks[k + 1 :])
+    after = WindowState(chunks, (state.next + 1) % size, min(state.count + 1, size), size, sums)
+    if after.next == 0 or after.count == 1:
+        # once a turn the sums are taken afresh, so rounding errors never add up; O(1) on average
+        origin = sums[_NEWEST].copy()
+        values = after.ring[: after.count] - origin
+        sums[_ORIGIN], sums[_TOTAL], sums[_SQUARES] = origin, values.sum(axis=0), (values**2).sum(axis=0)
+    return after
