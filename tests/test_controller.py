@@ -1,16 +1,15 @@
 """The line from readings to a joint velocity, closed over an arm that follows its commands exactly."""
 
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pretouch.controller import Controller
-from pretouch.errors import RobotStateError
 from pretouch.params import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings
+from pretouch.types import ControlStep, Mode, QpOutcome
 from tests.following_arm import PAPER, Arm
 
 LEFT, RIGHT = 0, 1  # units of the paper's skin that look along +y and -y in the ready posture
@@ -288,104 +287,3 @@ def test_a_hand_turned_away_turns_back(panda_model: RobotModel, paper_skin: Skin
 def test_the_joint_limits_keep_their_margin(arm: Arm):
     np.testing.assert_allclose(arm.controller.limits.q_min, arm.model.q_min + 0.01)
     np.testing.assert_allclose(arm.controller.limits.q_max, arm.model.q_max - 0.01)
-
-
-def arrays_in(value: object) -> list[np.ndarray]:
-    if isinstance(value, np.ndarray):
-        return [value]
-    if is_dataclass(value):
-        return [a for f in fields(value) for a in arrays_in(getattr(value, f.name))]
-    if isinstance(value, tuple):
-        return [a for part in value for a in arrays_in(part)]
-    return []
-
-
-def same(a: object, b: object) -> bool:
-    if is_dataclass(a):
-        return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
-    if isinstance(a, np.ndarray):
-        return bool(np.array_equal(a, b, equal_nan=True))
-    if isinstance(a, tuple):
-        return len(a) == len(b) and all(map(same, a, b))
-    return a == b
-
-
-@pytest.mark.parametrize("force", [(0.0, 0.0, 0.0), (0.0, 50.0, 0.0)])
-def test_a_step_is_pure(arm: Arm, force: tuple[float, float, float]):
-    arm.run(3, seen={LEFT: 0.3}, force=force)
-    state, inputs = arm.state, Inputs(arm.time, arm.robot(force), arm.readings({LEFT: 0.3}))
-    given = [*arrays_in(state), *arrays_in(inputs)]
-    assert len(given) > 20
-    before = [array.copy() for array in given]
-    first = arm.controller.step(state, inputs)
-    second = arm.controller.step(state, inputs)
-    assert same(first[0], second[0])
-    assert same(first[1], second[1])
-    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(given, before, strict=True))
-
-
-def test_readings_that_do_not_fit_hold_until_they_do(arm: Arm):
-    state, robot = arm.state, arm.robot()
-    few = RangeReadings(np.zeros(3), np.zeros(3), np.zeros(3, np.int64))
-    held, after = arm.controller.step(state, Inputs(arm.time, robot, few))
-    assert held.mode is Mode.HOLD
-    assert "the shapes (3,), (3,) and (3,), not (7,)" in held.reason
-    assert arm.controller.step(after, Inputs(arm.time + 0.01, arm.robot(), arm.readings()))[0].mode is Mode.TRACK
-
-
-def test_a_blind_arm_does_not_look_at_readings(panda_model: RobotModel, paper_skin: Skin):
-    arm = Arm(panda_model, paper_skin, PROFILES["blind"])
-    arm.run(150)
-    step, _ = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), None))
-    assert step.mode is Mode.TRACK
-
-
-def test_a_state_of_another_controller_is_refused(arm: Arm, panda_model: RobotModel):
-    other = Arm(panda_model, Skin([], panda_model))
-    with pytest.raises(RobotStateError, match="another arm or skin"):
-        arm.controller.step(other.state, Inputs(arm.time, arm.robot(), arm.readings()))
-
-
-def test_a_command_changed_by_its_user_is_not_the_one_remembered(arm: Arm):
-    step, after = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), arm.readings()))
-    sent = step.command.copy()
-    step.command[:] = 0.0
-    np.testing.assert_array_equal(after.command, sent)
-
-
-def test_a_path_that_hands_out_its_own_memory_changes_no_step(panda_model: RobotModel, paper_skin: Skin):
-    class Reused:
-        """The same array each time, as a path in a hurry may do."""
-
-        length, closed, at = 1.0, True, np.array([0.5, 0.0, 0.4])
-
-        def point(self, phase: float) -> np.ndarray:
-            self.at[2] += 0.001
-            return self.at
-
-        def tangent(self, phase: float) -> np.ndarray:
-            return np.array([0.0, 0.0, 1.0])
-
-    arm = Arm(panda_model, paper_skin)
-    arm.controller = Controller(panda_model, paper_skin, arm.controller.fixtures, Reused(), PAPER)
-    first, second = arm.step(), arm.step()
-    assert second.path_position[2] - first.path_position[2] == pytest.approx(0.001)
-
-
-@pytest.mark.parametrize("seen", [True, False])
-def test_after_a_clock_set_back_with_a_broken_state_the_arm_sees_again(arm: Arm, seen: bool):
-    broken = replace(arm.robot(), qd=np.full(7, np.nan))
-    arm.time = 0.5
-    held, arm.state = arm.controller.step(arm.state, Inputs(0.5, replace(broken, stamp=0.5), arm.readings()))
-    assert held.mode is Mode.HOLD
-    for i in range(40):
-        arm.time = 0.51 + 0.01 * i
-        readings = (
-            arm.readings(dict.fromkeys(range(7), 0.05)) if seen else arm.readings(silent=dict.fromkeys(range(7), 1.0))
-        )
-        step, arm.state = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), readings, resume=True))
-    if seen:
-        assert step.speed_scale < 0.3
-    else:
-        assert step.mode is Mode.HOLD
-        assert "No usable reading" in step.reason

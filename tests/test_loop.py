@@ -309,7 +309,6 @@ def test_a_speed_that_is_no_number_is_not_braked_for_ever(controller: Controller
 @pytest.mark.parametrize("times", [1, 3])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals_that_come_while_the_arm_brakes_wait(controller: Controller, world: World, number: int, times: int):
-    """However often somebody presses Ctrl-C, the arm comes to rest first."""
     before = signal.signal(number, signal.default_int_handler)
     ticks = 0
     tick = world.tick
