@@ -199,6 +199,8 @@ def test_what_bench_cycle_measured_before_it_was_stopped_is_kept(capsys, tmp_pat
     assert "No priority." in said.out
     written = json.loads(file.read_text())
     assert [row["points"] for row in written["rows"]] == [3]
+    assert written["about"]["asked"] == [3, 5]
+    assert "Stopped: 1 of 2 numbers of points were measured." in said.err
     assert written["about"]["missing"] == ["No priority."]
 
 

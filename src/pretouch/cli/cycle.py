@@ -42,8 +42,11 @@ def bench_cycle(points: tuple[int, ...], request: CycleRequest, json_file: Path 
             missing = list(dict.fromkeys(said))
             if json_file:  # first, for the terminal may be gone
                 with unwritable_said("file", json_file):
-                    write_json({"about": {**about(request), "missing": missing}, "rows": rows}, json_file)
+                    facts = {**about(request), "missing": missing, "asked": list(points)}
+                    write_json({"about": facts, "rows": rows}, json_file)
             _show(rows, request, missing)
+        if len(rows) < len(points):
+            print(f"Stopped: {len(rows)} of {len(points)} numbers of points were measured.", file=sys.stderr)
     if json_file:
         Console(highlight=False).print(f"Numbers: {json_file}", soft_wrap=True, markup=False)
 
