@@ -134,8 +134,7 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
         bounds = np.vstack([np.full((3, len(qd_max)), _LARGEST), _FASTEST * qd_max])
         i, j = np.argwhere(~(np.abs(numbers) < bounds))[0]
         return None, f"{_PARTS[i]} hold {numbers[i, j]:g}"
-    q, qd, q_commanded, qd_commanded = numbers
-    return RobotState(stamp, q, qd, q_commanded, qd_commanded, tau_ext, wrench), ""
+    return RobotState(stamp, numbers[0], numbers[1], numbers[2], numbers[3], tau_ext, wrench), ""
 
 
 @compiled

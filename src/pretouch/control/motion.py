@@ -79,9 +79,8 @@ def joint_motion(
         outcome, status = QpOutcome.SKIPPED, "not posed: the arm holds"
     elif ending != SOLVED:
         outcome, status = QpOutcome.FAILED, ENDING[ending]
-    limit, slack = rows[:, :found]
-    qp = QpSolution(qd, slack, multipliers[: n + found], outcome, status)
-    return Motion(qp, restricted[:found], limit, *velocities)
+    qp = QpSolution(qd, rows[1, :found], multipliers[: n + found], outcome, status)
+    return Motion(qp, restricted[:found], rows[0, :found], velocities[0], velocities[1])
 
 
 _NO_LINK = np.zeros(0, np.int64)

@@ -65,10 +65,11 @@ def perceive(
         params.persistence_s, params.self_margin_m, params.filter_views,
         distance, indices, vectors, scalars,
     )  # fmt: skip
-    unit, link = indices[:, :found]
-    point, body_point, direction = vectors[:, :found]
-    ee_distance, body_distance = scalars[:, :found]
-    obstacles = Obstacles(unit, point, ee_distance, body_point, link, direction, body_distance)
+    obstacles = Obstacles(
+        unit=indices[0, :found], link=indices[1, :found],
+        point=vectors[0, :found], body_point=vectors[1, :found], direction=vectors[2, :found],
+        ee_distance=scalars[0, :found], body_distance=scalars[1, :found],
+    )  # fmt: skip
     return Perception(obstacles, distance, nearest, now - oldest), tracks
 
 

@@ -109,7 +109,8 @@ class RobotModel:
         """Compute poses and joint axes at joint positions q (n,) [rad]."""
         self._qpos[:] = q
         mujoco.mj_kinematics(self._model, self._data)
-        return Kinematics(*(view.copy() for view in self._frames))
+        position, rotation, anchor, axis = self._frames
+        return Kinematics(position.copy(), rotation.copy(), anchor.copy(), axis.copy())
 
     def jacobian(self, kin: Kinematics, link: int, point: FloatArray) -> FloatArray:
         """Jacobian (6, n) of a point (3,) [m, base frame] fixed to a link: velocity first, then angular velocity."""
