@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.params import PerceptionParams
-from pretouch.perception.closest import bounds, closest, distances, no_obstacles
+from pretouch.perception.closest import closest, distances, no_obstacles
 from pretouch.perception.obstacles import (
     HEARD,
     SEEN,
@@ -18,7 +18,7 @@ from pretouch.perception.obstacles import (
     take_in,
     tells_anything,
 )
-from pretouch.perception.scene_filter import RAYS, Fixtures, capsule_return, plane_return
+from pretouch.perception.scene_filter import RAYS, Fixtures, leave_out, leave_out_planes
 from pretouch.perception.vectors import placed_ends, rotate
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
@@ -103,19 +103,12 @@ def _perceive(
         if filter_views:
             arm_from, arm_to = placed_ends(arm_link, arm_a, arm_b, link_position, link_rotation)
             other_from, other_to = placed_ends(other_link, other_a, other_b, link_position, link_rotation)
-            arm_spheres = bounds(arm_from, arm_to, arm_radius)
-            other_spheres = bounds(other_from, other_to, other_radius)
-            for k in range(len(shows)):
-                if fresh[k] and shows[k]:
-                    # what the model predicts at this distance, or up to the margin behind it, is not an obstacle
-                    end, own = distance[k] + margin, unit_link[k]
-                    shows[k] = (
-                        capsule_return(position, rotation, k, own, arm_link, arm_from, arm_to, arm_radius,
-                                       arm_spheres, rays, end, end) > end
-                        and capsule_return(position, rotation, k, own, other_link, other_from, other_to, other_radius,
-                                           other_spheres, rays, end, end) > end
-                        and plane_return(position, rotation, k, planes, rays, end) > end
-                    )  # fmt: skip
+            ends = distance + margin
+            leave_out(shows, fresh, ends, position, rotation, unit_link, arm_link, arm_from, arm_to, arm_radius, rays)
+            leave_out(
+                shows, fresh, ends, position, rotation, unit_link, other_link, other_from, other_to, other_radius, rays
+            )
+            leave_out_planes(shows, fresh, ends, position, rotation, planes, rays)
         points = locate(position, rotation, distance)
         take_in(point, times, stamp, points, fresh, shows, tells, now, persistence)
 

@@ -11,7 +11,7 @@ from pretouch.perception.vectors import dot, placed, rotate
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.unit import CONE_ANGLE, cone_rays
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray, IntArray
 
 RAYS = cone_rays(2)
 """Unit vectors (19, 3) that stand for all a sensor sees, sensor frame; the first is its axis."""
@@ -80,6 +80,30 @@ def expected_range(
             found = capsule_return(position, rotation, k, own_link[k], *shape, RAYS, np.inf, -np.inf)
             near[k] = min(near[k], found)
     return near
+
+
+@compiled
+def leave_out(
+    shows: BoolArray, fresh: BoolArray, ends: FloatArray, position: FloatArray, rotation: FloatArray, own: IntArray,
+    link: IntArray, a: FloatArray, b: FloatArray, radius: FloatArray, rays: FloatArray,
+) -> None:  # fmt: skip
+    """Take from `shows` (K,) each fresh reading that a placed capsule explains: one seen up to its `ends` (K,) [m]."""
+    spheres = bounds(a, b, radius)
+    for k in range(len(shows)):
+        if fresh[k] and shows[k]:
+            seen = capsule_return(position, rotation, k, own[k], link, a, b, radius, spheres, rays, ends[k], ends[k])
+            shows[k] = seen > ends[k]
+
+
+@compiled
+def leave_out_planes(
+    shows: BoolArray, fresh: BoolArray, ends: FloatArray, position: FloatArray, rotation: FloatArray,
+    planes: FloatArray, rays: FloatArray,
+) -> None:  # fmt: skip
+    """Take from `shows` (K,) what planes explain, as `leave_out` does for capsules."""
+    for k in range(len(shows)):
+        if fresh[k] and shows[k]:
+            shows[k] = plane_return(position, rotation, k, planes, rays, ends[k]) > ends[k]
 
 
 @compiled
