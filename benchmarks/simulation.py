@@ -12,7 +12,7 @@ import sys
 import time
 
 from pretouch.control.path import Circle
-from pretouch.controller import Controller
+from pretouch.controller import Controller, Cycle
 from pretouch.experiments.posture import brought_to
 from pretouch.loop import run
 from pretouch.params import profile
@@ -23,7 +23,6 @@ from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, fixtures
-from pretouch.types import ControlStep
 
 
 class Tally:
@@ -32,7 +31,7 @@ class Tally:
     def __init__(self) -> None:
         self.steps = 0
 
-    def record(self, step: ControlStep) -> None:
+    def record(self, _cycle: Cycle) -> None:
         """Count one step."""
         self.steps += 1
 

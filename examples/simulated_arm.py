@@ -9,7 +9,7 @@ with `dataclasses.replace`.
 from dataclasses import replace
 
 from pretouch.control.path import Circle
-from pretouch.controller import Controller
+from pretouch.controller import Controller, Cycle
 from pretouch.experiments.posture import brought_to
 from pretouch.loop import run
 from pretouch.params import RestrictionParams, profile
@@ -20,7 +20,6 @@ from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, SceneSpec, fixtures
-from pretouch.types import ControlStep
 
 
 class Narrator:
@@ -29,8 +28,9 @@ class Narrator:
     def __init__(self) -> None:
         self._told = ""
 
-    def record(self, step: ControlStep) -> None:
+    def record(self, cycle: Cycle) -> None:
         """Print a step that begins a new mode."""
+        step = cycle.step
         told = step.mode.value
         if told != self._told:
             self._told = told

@@ -9,7 +9,7 @@ import pytest
 
 from pretouch import loop
 from pretouch.control.path import Circle
-from pretouch.controller import Controller
+from pretouch.controller import Controller, Cycle
 from pretouch.errors import RobotStateError
 from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
@@ -64,8 +64,8 @@ class FakeRecorder:
     steps: list[ControlStep] = field(default_factory=list)
     on_step: Callable[[int], None] = lambda count: None
 
-    def record(self, step: ControlStep) -> None:
-        self.steps.append(step)
+    def record(self, cycle: Cycle) -> None:
+        self.steps.append(cycle.step)
         self.on_step(len(self.steps))
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from pretouch import loop
 from pretouch.control.path import Circle
-from pretouch.controller import Controller
+from pretouch.controller import Controller, Cycle
 from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.model import RobotModel
@@ -53,8 +53,8 @@ class World:
         self.qd = qd
         self.sent.append(qd)
 
-    def record(self, step: ControlStep) -> None:
-        self.steps.append(step)
+    def record(self, cycle: Cycle) -> None:
+        self.steps.append(cycle.step)
 
 
 class SilentFor:

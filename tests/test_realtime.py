@@ -14,7 +14,7 @@ import pytest
 
 from pretouch import realtime
 from pretouch.control.path import Circle
-from pretouch.controller import Controller
+from pretouch.controller import Controller, Cycle
 from pretouch.errors import ParameterError
 from pretouch.loop import MonotonicClock
 from pretouch.params import PROFILES, at_rate, profile
@@ -188,8 +188,8 @@ class Arm:
     def command(self, qd: np.ndarray) -> None:
         assert np.all(np.isfinite(qd))
 
-    def record(self, step: ControlStep) -> None:
-        self.steps.append(step)
+    def record(self, cycle: Cycle) -> None:
+        self.steps.append(cycle.step)
         self.collecting.append(gc.isenabled())
 
 
@@ -286,7 +286,7 @@ import sys, types
 import numpy as np
 from pretouch import realtime
 from pretouch.control.path import Circle
-from pretouch.controller import Controller
+from pretouch.controller import Controller, Cycle
 from pretouch.params import at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import panda

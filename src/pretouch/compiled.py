@@ -10,16 +10,18 @@ from numba import njit
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
+_NOT_COMPILED = ("cli", "reporting", "viewer", "experiments", "recording")
+
 
 def digest(folder: Path) -> str:
     """Return what tells this state of the Python files under a folder from any other.
 
-    But for those of the command line and the experiments, of which nothing gets into a compiled function.
+    But for those of packages of which nothing gets into a compiled function.
     """
     content = sha256()
     for path in sorted(folder.rglob("*.py")):
         place = path.relative_to(folder)
-        if place.parts[0] not in ("cli", "experiments"):
+        if place.parts[0] not in _NOT_COMPILED:
             content.update(str(place).encode() + b"\0" + path.read_bytes())
     return content.hexdigest()[:12]
 

@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,6 +45,16 @@ class ControllerState:
     """(3, 3) R_O_ee at the start, held if the task asks for it."""
 
 
+@value
+class Cycle:
+    """One turn of the loop: `step(before, inputs)` gives `step` again."""
+
+    inputs: Inputs
+    before: ControllerState
+    """The state the step began with."""
+    step: ControlStep
+
+
 STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motion", "record")
 """What a step is made of, in order."""
 
@@ -80,6 +91,27 @@ class Controller:
             mode=mode_init(),
             command=sound.qd_commanded,
             rotation_goal=self.model.kinematics(sound.q).rotation[self.model.ee],
+        )
+
+    def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
+        """Go on from a state of another controller of the same arm and skin, with this one's profile and path.
+
+        A force window of another length is filled anew, another path is joined where it is nearest, and the speed along
+        it grows from 0. A reaction that is over stays so.
+        """
+        mine, theirs, robot = self.profile, before.profile, state.watch.robot
+        if len(state.command) != self.model.n or len(state.tracks.point) != len(self.skin):
+            raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
+        same_window = mine.threshold.window_samples == theirs.threshold.window_samples
+        reacting = reaction.active(state.reaction, theirs.reaction)
+        way = paths.pause(state.path)
+        if self.path is not before.path:
+            way = paths.joined(self.path, self.model.kinematics(robot.q).position[self.model.ee])
+        return replace(
+            state,
+            window=state.window if same_window else window_init(mine.threshold.window_samples),
+            reaction=state.reaction if reacting else reaction.reaction_init(mine.reaction),
+            path=way,
         )
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:

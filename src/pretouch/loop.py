@@ -8,13 +8,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
+from typing import Protocol
 
 import numpy as np
 
 from pretouch.control.joint_box import box_and_brake
-from pretouch.controller import Controller
+from pretouch.controller import Controller, ControllerState, Cycle
 from pretouch.errors import ParameterError
-from pretouch.ports import Clock, Recorder, Robot, Skin
+from pretouch.ports import Clock, Robot, Skin
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState
 
 _FINEST = 1e-7
@@ -149,6 +150,14 @@ class MonotonicClock:
         )  # fmt: skip
 
 
+class Recorder(Protocol):
+    """Something that keeps what the loop did."""
+
+    def record(self, cycle: Cycle) -> None:
+        """Keep one turn of the loop."""
+        ...
+
+
 def run(
     controller: Controller,
     robot: Robot,
@@ -167,17 +176,25 @@ def run(
     try:
         while True:
             tick = clock.tick()
-            report, readings = robot.read(), skin.read()
-            now = _instant(tick, controller.limits.period, report, readings)
-            step, state = controller.step(state, Inputs(now, report, readings, resume()))
-            robot.command(step.command)
-            sent = step.command
-            recorder.record(step)
-            if done(step):
+            cycle, state = turn(controller, state, robot, skin, tick, resume())
+            sent = cycle.step.command
+            recorder.record(cycle)
+            if done(cycle.step):
                 return
     finally:
         with _undisturbed():
             come_to_rest(controller, robot, clock, state.watch.robot.q_commanded, sent)
+
+
+def turn(
+    controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float, resume: bool = False
+) -> tuple[Cycle, ControllerState]:
+    """Turn the controller once, at a tick [s]: read, step, command. Returns what was done, and the state after it."""
+    report, readings = robot.read(), skin.read()
+    inputs = Inputs(_instant(tick, controller.limits.period, report, readings), report, readings, resume)
+    step, after = controller.step(state, inputs)
+    robot.command(step.command)
+    return Cycle(inputs, state, step), after
 
 
 def _instant(tick: float, period: float, report: RobotState, readings: RangeReadings) -> float:

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from pretouch.types import ControlStep, FloatArray, RangeReadings, RobotState
+from pretouch.types import FloatArray, RangeReadings, RobotState
 
 
 class Robot(Protocol):
@@ -32,10 +32,3 @@ class Clock(Protocol):
         """Wait for the next control period and return its instant [s]."""
         ...
 
-
-class Recorder(Protocol):
-    """Something that keeps control steps."""
-
-    def record(self, step: ControlStep) -> None:
-        """Keep one step."""
-        ...

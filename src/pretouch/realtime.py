@@ -17,7 +17,7 @@ import numpy as np
 from pretouch import loop
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
-from pretouch.ports import Recorder, Robot, Skin
+from pretouch.ports import Robot, Skin
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
 
 _PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
@@ -32,7 +32,7 @@ def run(
     robot: Robot,
     skin: Skin,
     clock: loop.MonotonicClock,
-    recorder: Recorder,
+    recorder: loop.Recorder,
     done: Callable[[ControlStep], bool],
     resume: Callable[[], bool] = lambda: False,
     *,

@@ -41,6 +41,9 @@ _LARGEST = 1000.0
 _SHORTEST = 1e-6
 """Shortest radius or segment [m]."""
 
+_PLACES = 400
+"""Places of a path that are looked at for where to join it."""
+
 
 @dataclass(frozen=True)
 class Circle:
@@ -143,6 +146,13 @@ class PathState:
 
 
 Vector = tuple[float, float, float]
+
+
+def joined(path: Path, position: FloatArray) -> PathState:
+    """Begin where the path comes nearest to a position (3,) [m], to within a two-hundredth of its length."""
+    phases = np.linspace(0.0, path.length, _PLACES, endpoint=not path.closed)
+    away = [float(((path.point(phase) - position) ** 2).sum()) for phase in phases]
+    return PathState(float(phases[int(np.argmin(away))]))
 
 
 @value

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.controller import Controller
+from pretouch.controller import Controller, Cycle
 from pretouch.experiments.posture import brought_to
 from pretouch.loop import run
 from pretouch.params import Profile
@@ -87,8 +87,8 @@ class _Recorder:
         self.steps: list[ControlStep] = []
         self.hand_position: list[FloatArray] = []
 
-    def record(self, step: ControlStep) -> None:
-        self.steps.append(step)
+    def record(self, cycle: Cycle) -> None:
+        self.steps.append(cycle.step)
         self.hand_position.append(self._hand.position.copy() if self._hand else np.full(3, np.nan))
 
 

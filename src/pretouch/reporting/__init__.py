@@ -1,0 +1,1 @@
+"""What a recording tells, as a page to keep."""

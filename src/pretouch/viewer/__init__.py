@@ -1,0 +1,1 @@
+"""The arm in a browser: a simulation to touch, or a recording."""
