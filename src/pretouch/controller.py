@@ -96,7 +96,7 @@ class Controller:
     def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
         """Go on from a state of another controller of the same arm and skin, with this one's profile and path.
 
-        A force window of another length is filled anew, another path is joined where it is nearest, and the speed along
+        A force window of another length is filled anew; another path is joined where it is nearest, and the speed along
         it grows from 0. A reaction that is over stays so.
         """
         mine, theirs, robot = self.profile, before.profile, state.watch.robot
@@ -104,7 +104,7 @@ class Controller:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.threshold.window_samples == theirs.threshold.window_samples
         reacting = reaction.active(state.reaction, theirs.reaction)
-        way = paths.pause(state.path)
+        way = state.path
         if self.path is not before.path:
             way = paths.joined(self.path, self.model.kinematics(robot.q).position[self.model.ee])
         return replace(

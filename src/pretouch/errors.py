@@ -34,3 +34,11 @@ class PathError(PretouchError, ValueError):
 
 class ExperimentError(PretouchError, ValueError):
     """An experiment was asked for something it cannot do."""
+
+
+class RecordingError(PretouchError, ValueError):
+    """A recording cannot be made, opened or used as asked."""
+
+
+class ViewerError(PretouchError, RuntimeError):
+    """The page cannot be shown."""

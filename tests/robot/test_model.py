@@ -279,3 +279,8 @@ def test_a_model_that_would_be_misunderstood_is_refused(tmp_path, joint, geom, m
 def test_an_unknown_end_effector_is_refused():
     with pytest.raises(RobotModelError, match="link 'gripper' is unknown"):
         RobotModel(replace(panda(), ee_body="gripper"))
+
+
+@pytest.mark.parametrize("arm", [panda, fr3])
+def test_joints_have_the_names_of_the_vendors_description(arm):
+    assert RobotModel(arm()).joints == tuple(f"{arm.__name__}_joint{j}" for j in range(1, 8))

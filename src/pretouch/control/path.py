@@ -112,6 +112,11 @@ class WayPoints:
         self._starts: list[float] = [0.0, *np.cumsum(lengths).tolist()]
         self.length = self._starts[-1]
 
+    @property
+    def points(self) -> FloatArray:
+        """The given points (W, 3) [m]."""
+        return np.array(self._corners[: len(self._corners) - self.closed])
+
     def _locate(self, phase: float) -> tuple[int, float]:
         s = phase % self.length if self.closed else min(max(phase, 0.0), self.length)
         i = min(bisect_right(self._starts, s), len(self._directions)) - 1

@@ -63,6 +63,8 @@ class RobotModel:
         self._check()
         self.links: tuple[str, ...] = tuple(self._model.body(i).name for i in range(self._model.nbody))
         """Names of the links; a link's index is its place here, 0 is the world."""
+        self.joints: tuple[str, ...] = tuple(self._model.joint(j).name for j in range(self.n))
+        """Names of the joints, in the order of q."""
         self.ee: int = self.link_index(description.ee_body)
         """Index of the end-effector's link."""
         self.capsules: Capsules = capsules_of(self._model)

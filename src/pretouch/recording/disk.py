@@ -1,0 +1,214 @@
+"""A recording's file and the thread that writes it, so that no disk makes a control loop wait."""
+
+import errno
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable
+from itertools import chain
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import BinaryIO
+
+from mcap.writer import CompressionType, Writer
+
+from pretouch.errors import RecordingError
+from pretouch.recording.container import Contents, begins_as_mcap, scan
+from pretouch.recording.ending import Entry, ending, entry
+from pretouch.recording.messages import LIBRARY, Item, definition
+
+_FLUSH_S = 0.5
+"""Time after which what was recorded is written [s]."""
+_CHUNK = 1 << 18
+"""Bytes of messages in a chunk at most: to index more of them at once would keep a fast loop waiting."""
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_SOME_WAITING = 1000
+"""Cycles that wait when a run that is faster than the clock should wait too."""
+_PATIENCE_S = 10.0
+"""Time it then waits at most [s]."""
+_MOST_WAITING = 20_000
+"""Cycles that may wait to be written: a disk that is farther behind does not keep up."""
+
+
+More = Callable[[], Iterable[Item]]
+"""Makes messages."""
+
+
+class _File:
+    """A file without a buffer: what is written is with the operating system, which a killed process does not undo."""
+
+    def __init__(self, place: Path) -> None:
+        self._handle = os.open(place, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        self._at = 0
+
+    def write(self, data: bytes) -> int:
+        left = memoryview(data)
+        while left:
+            left = left[os.write(self._handle, left) :]
+        self._at += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._at
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def end_at(self, size: int, tail: bytes) -> None:
+        """Cut the file off at a size and end it with a tail."""
+        os.ftruncate(self._handle, size)
+        os.lseek(self._handle, size, os.SEEK_SET)
+        self._at = size
+        self.write(tail)
+
+    def close(self) -> None:
+        os.close(self._handle)
+
+
+class Disk:
+    """Takes messages at once, and writes them in a thread of its own."""
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+        self._file = _opened(place)
+        self._queue: SimpleQueue[tuple[list[Item], More] | None] = SimpleQueue()
+        self._writer = Writer(self._file, _CHUNK, CompressionType.ZSTD)  # type: ignore[arg-type]
+        try:
+            self._writer.start("ros2", LIBRARY)
+        except OSError as error:
+            self._file.close()
+            place.unlink()
+            raise _refused(place, error) from error
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self.trouble = ""
+        """Why nothing more is written, as a sentence, or ''."""
+        self._thread = threading.Thread(target=self._work, name=f"recording {place.name}", daemon=True)
+        self._thread.start()
+
+    def put(self, items: list[Item], more: More = tuple) -> None:
+        """Hand messages over, and what makes more of them, in the thread."""
+        if self._queue.qsize() > _MOST_WAITING and not self.trouble:
+            self.trouble = f"The recording {self._place} ended early: the disk does not keep up, take a faster one."
+        self._queue.put((items, more))
+
+    def behind(self) -> bool:
+        """Whether much waits to be written."""
+        return self._queue.qsize() > _SOME_WAITING
+
+    def wait(self) -> None:
+        """Let the thread catch up for a while."""
+        until = time.monotonic() + _PATIENCE_S
+        while self._queue.qsize() > _SOME_WAITING // 2 and self._thread.is_alive() and time.monotonic() < until:
+            time.sleep(0.002)
+
+    def close(self) -> None:
+        """Write what waits, end the file, and stop."""
+        self._queue.put(None)
+        self._thread.join()
+
+    def size(self) -> int:
+        """Return the size of the file [B]; 0 if somebody took it away."""
+        try:
+            return self._place.stat().st_size
+        except OSError:
+            return 0
+
+    def _work(self) -> None:
+        try:
+            self._write_all()
+            self._writer.finish()  # type: ignore[no-untyped-call]
+        except OSError as error:
+            self._rescue(error)
+        except Exception as error:  # the run goes on, whatever failed here
+            self.trouble = f"The recording {self._place} ended early: {type(error).__name__}: {error}."
+            self._rescue(None)
+        finally:
+            self._file.close()
+
+    def _write_all(self) -> None:
+        due = time.monotonic() + _FLUSH_S
+        while True:
+            try:
+                job = self._queue.get(timeout=max(0.0, due - time.monotonic()))
+            except Empty:
+                pass
+            else:
+                if job is None:
+                    return
+                items, more = job
+                for item in chain(items, more()):
+                    self._add(item)
+                time.sleep(0)  # lets the control loop have the interpreter, if it waits for it
+            if time.monotonic() >= due:
+                self._writer.flush()  # type: ignore[no-untyped-call]
+                due = time.monotonic() + _FLUSH_S
+
+    def _add(self, item: Item) -> None:
+        channel = self._channels.get(item.topic)
+        if channel is None:
+            if item.kind not in self._schemas:
+                # the name by which ROS and the viewers know a type
+                text = definition(item.kind).encode()
+                self._schemas[item.kind] = self._writer.register_schema(item.kind, "ros2msg", text)
+            channel = self._writer.register_channel(item.topic, "cdr", self._schemas[item.kind])
+            self._channels[item.topic] = channel
+        self._writer.add_message(channel, item.time, item.data, item.time, item.sequence % 2**32)
+
+    def _rescue(self, error: OSError | None) -> None:
+        """End the file after as many whole chunks as leave room for the index."""
+        contents = Contents()
+        try:
+            with self._place.open("rb") as file:
+                begins_as_mcap(file)
+                entries, ends = _indexed(file, contents)
+            held = _end(self._file, contents, entries, ends)
+        except OSError as another:
+            held, error = "it cannot be opened", another
+        cause = os.strerror(error.errno) if error and error.errno else str(error or "")
+        if error is not None:
+            remedy = "make room, then record again" if error.errno in _FULL else "see to the disk"
+            self.trouble = f"The recording {self._place} ended early ({cause}): {held}; {remedy}."
+
+
+def _indexed(file: BinaryIO, contents: Contents) -> tuple[list[Entry], list[int]]:
+    """Index of each chunk that is followed by all of its message indexes, and where those end."""
+    entries: list[Entry] = []
+    ends: list[int] = []
+    for chunk in scan(file, contents):
+        made = entry(chunk, chunk.start)
+        if chunk.end != chunk.start + len(chunk.record) + len(made.index):
+            break
+        entries.append(made)
+        ends.append(chunk.end)
+    return entries, ends
+
+
+def _end(file: _File, contents: Contents, entries: list[Entry], ends: list[int]) -> str:
+    """Write the index, of fewer chunks if it does not fit, and say what the file then holds."""
+    for count in range(len(entries), 0, -1):
+        try:
+            file.end_at(ends[count - 1], ending(contents, entries[:count], ends[count - 1]))
+        except OSError as error:
+            if error.errno not in _FULL:
+                raise
+        else:
+            return f"it holds the run up to {entries[count - 1].last / 1e9:.2f} s"
+    file.end_at(0, b"")
+    return "it holds nothing"
+
+
+def _opened(place: Path) -> _File:
+    try:
+        return _File(place)
+    except OSError as error:
+        raise _refused(place, error) from error
+
+
+def _refused(place: Path, error: OSError) -> RecordingError:
+    """Say why a file cannot be made, and the way out."""
+    if isinstance(error, FileExistsError):
+        return RecordingError(f"There is something at {place} already: give another name, or move it away.")
+    if not place.parent.is_dir():
+        return RecordingError(f"The folder {place.parent} for the recording is not there: make it first.")
+    return RecordingError(f"The recording {place} cannot be written: {error.strerror}.")

@@ -1,0 +1,123 @@
+"""The last seconds before a HOLD that lasts until a person resumes, each in a recording of its own."""
+
+import threading
+from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from pretouch.controller import Controller, Cycle
+from pretouch.loop import Recorder
+from pretouch.recording.codec import decode_inputs, encode_inputs
+from pretouch.recording.plain import JSON
+from pretouch.recording.truth import Truth
+from pretouch.recording.writer import Recording
+from pretouch.types import Mode
+
+
+class _Passed(NamedTuple):
+    """A cycle that has passed, with its inputs as they were then: a port may use its arrays again."""
+
+    cycle: Cycle
+    inputs: bytes | None
+    truth: Truth | None
+
+    def again(self) -> Cycle:
+        if self.inputs is None:
+            return self.cycle
+        inputs = decode_inputs(self.inputs)[1]
+        return Cycle(inputs, self.cycle.before, self.cycle.step) if inputs is not None else self.cycle
+
+
+class LastSeconds:
+    """A recorder that writes `hold-1.mcap`, `hold-2.mcap`, ... to a folder as HOLDs latch, and raises nothing.
+
+    Each file ends with the step that latched. What is recorded is handed on to another recorder, if there is one.
+    """
+
+    def __init__(
+        self, controller: Controller, folder: Path, recorder: Recorder | None = None, seconds: float = 5.0,
+        most: int = 5, about: Mapping[str, JSON] | None = None,
+    ) -> None:  # fmt: skip
+        """Keep the cycles of a controller.
+
+        Args:
+            controller: whose cycles will be recorded.
+            folder: for the files; it is made when the first is written.
+            recorder: what else records.
+            seconds: how far back each file begins [s].
+            most: files written at most.
+            about: as for `Recording`.
+        """
+        self.written: list[Path] = []
+        """The files so far; each is finished once `close` has returned."""
+        self.trouble = ""
+        """Why a file could not be written, as a sentence, or ''."""
+        self._controller, self._folder, self._recorder = controller, Path(folder), recorder
+        self._seconds, self._most, self._about = seconds, most, dict(about or {})
+        self._ring: deque[_Passed] = deque(maxlen=max(1, round(2 * seconds / controller.limits.period)))
+        self._latched = False
+        self._writing: list[threading.Thread] = []
+
+    def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
+        """Keep one turn of the loop for a while."""
+        if isinstance(self._recorder, Recording):
+            self._recorder.record(cycle, truth)
+        elif self._recorder is not None:
+            self._recorder.record(cycle)
+        latched = cycle.before.mode.latched
+        if latched and not self._latched:
+            self._write()
+        self._latched = latched
+        data, whole = encode_inputs(0, cycle.inputs)
+        self._ring.append(_Passed(cycle, data if whole else None, truth))
+        begin = cycle.step.stamp - self._seconds
+        while self._ring[0].cycle.step.stamp < begin:
+            self._ring.popleft()
+
+    def change(self, controller: Controller) -> None:
+        """Let the cycles from the next one on be those of another controller of the same arm."""
+        if isinstance(self._recorder, Recording):
+            self._recorder.change(controller)
+        self._controller = controller
+        self._ring.clear()
+
+    def close(self) -> None:
+        """Write what the very last step calls for, and wait for what is being written."""
+        if self._ring and not self._latched and self._ring[-1].cycle.step.mode is Mode.HOLD:
+            last = self._ring[-1]
+            _, after = self._controller.step(last.cycle.before, last.again().inputs)
+            if after.mode.latched:
+                self._write()
+        self._ring.clear()
+        for thread in self._writing:
+            thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _write(self) -> None:
+        """Have what is kept written, by a thread: the arm is braking, and its loop must not wait."""
+        if not self._ring or len(self.written) + bool(self.trouble) >= self._most:
+            return
+        thread = threading.Thread(target=self._write_all, args=(self._controller, tuple(self._ring)))
+        self._writing.append(thread)
+        thread.start()
+
+    def _write_all(self, controller: Controller, cycles: tuple[_Passed, ...]) -> None:
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            number = 1
+            while (place := self._folder / f"hold-{number}.mcap").exists():
+                number += 1
+            recording = Recording(place, controller, self._about)
+            for passed in cycles:
+                recording.record(passed.again(), passed.truth)
+            recording.close()
+            self.written.append(place)
+            self.trouble = recording.trouble or self.trouble
+        except Exception as error:  # the arm is stopping, and nothing may come between
+            self.trouble = f"The last seconds before a HOLD were not kept: {error}"

@@ -1,0 +1,199 @@
+"""A recording, opened: each of its control steps, and the controllers that made them."""
+
+import struct
+from bisect import bisect_right
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.controller import ControllerState
+from pretouch.errors import RecordingError
+from pretouch.recording.codec import decode_inputs, decode_step, decode_truth
+from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
+from pretouch.recording.messages import LIBRARY, TOPICS, definition
+from pretouch.recording.recorded_path import Tangents
+from pretouch.recording.setting import Run, decode_run
+from pretouch.recording.state_codec import decode_state
+from pretouch.recording.truth import Truth
+from pretouch.types import ControlStep, FloatArray, Inputs
+from pretouch.values import value
+
+__all__ = ["Kept", "Recorded", "Run", "open_recording"]
+
+_NUMBER = struct.Struct("<Q")
+"""Number of the step, first in each of our messages, behind the encapsulation header."""
+_STAMP = struct.Struct("<d")
+_HEAD = 4
+
+
+@value
+class Kept:
+    """One control step of a recording."""
+
+    run: int
+    """Which of the runs made it."""
+    inputs: Inputs | None
+    """None if they could not be put into a message."""
+    step: ControlStep
+    truth: Truth | None
+    """None if there was no simulation."""
+    snapshot: ControllerState | None
+    """The state the step began with, at some steps."""
+    anew: bool = False
+    """Whether that state does not follow from the step before."""
+
+
+Raw = dict[str, dict[int, bytes]]
+"""Messages of each of our topics, by the number of the step."""
+
+
+class Recorded:
+    """A recording: a sequence of control steps, each decoded when it is asked for."""
+
+    def __init__(self, place: Path, raw: Raw, said: str) -> None:
+        self.place = place
+        self.said = said
+        """What is missing, as a sentence, or ''."""
+        self.complete = not said
+        self._raw = raw
+        self._numbers = sorted(raw["/pretouch/step"])
+        runs = [raw["/pretouch/run"][n] for n in sorted(raw["/pretouch/run"])]
+        self.runs: tuple[Run, ...] = tuple(decode_run(data, self._tangents) for data in runs)
+        """The controllers that made steps, in order."""
+        self._begins = [run.sequence for run in self.runs]
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, i: int) -> Kept:
+        number = self._numbers[i]
+        raw = self._raw
+        inputs = raw["/pretouch/inputs"].get(number)
+        truth = raw["/pretouch/truth"].get(number)
+        state = raw["/pretouch/state"].get(number)
+        anew, snapshot = (False, None) if state is None else decode_state(state)
+        return Kept(
+            run=max(0, bisect_right(self._begins, number) - 1),
+            inputs=None if inputs is None else decode_inputs(inputs)[1],
+            step=decode_step(raw["/pretouch/step"][number])[1],
+            truth=None if truth is None else decode_truth(truth)[1],
+            snapshot=snapshot,
+            anew=anew,
+        )
+
+    def __iter__(self) -> Iterator[Kept]:
+        return (self[i] for i in range(len(self)))
+
+    def number(self, i: int) -> int:
+        """Return the number a step had when it was recorded: where some are missing it is not `i`."""
+        return self._numbers[i]
+
+    def unreadable(self, i: int) -> str:
+        """Say what is known of inputs that could not be kept, or ''."""
+        inputs = self._raw["/pretouch/inputs"].get(self._numbers[i])
+        return "they are missing" if inputs is None else decode_inputs(inputs)[2]
+
+    def step_data(self, i: int) -> bytes:
+        """Return a step as it was written."""
+        return self._raw["/pretouch/step"][self._numbers[i]]
+
+    def tangent(self, i: int) -> FloatArray | None:
+        """Return the path's tangent (3,) at a step, where it was kept with it."""
+        tangent = decode_step(self.step_data(i))[2]
+        return tangent if len(tangent) else None
+
+    def stamps(self) -> FloatArray:
+        """Stamps (S,) of the steps [s]."""
+        steps = self._raw["/pretouch/step"]
+        return np.array([_STAMP.unpack_from(steps[n], _HEAD + _NUMBER.size)[0] for n in self._numbers])
+
+    def _tangents(self, number: int) -> Tangents:
+        """Find where the path led in the steps of the run that begins with a number."""
+        later = [begin for begin in self._begins if begin > number]
+        found: Tangents = {}
+        for n in self._numbers:
+            if number <= n and (not later or n < later[0]):
+                _, step, tangent = decode_step(self._raw["/pretouch/step"][n])
+                if len(tangent):
+                    found[step.path_phase] = step.path_position, tangent
+        return found
+
+
+def open_recording(place: Path) -> Recorded:
+    """Open a recording, finished or cut off.
+
+    RecordingError for a file that is not there, is no MCAP file, is another program's (`pretouch detect` reads those),
+    or is of a later version.
+    """
+    place = Path(place)
+    contents, raw = Contents(), {topic: dict[int, bytes]() for topic in TOPICS}
+    try:
+        with place.open("rb") as file:
+            if not begins_as_mcap(file):
+                raise RecordingError(_no_mcap(place))
+            for chunk in scan(file, contents):
+                _take(chunk, contents, raw)
+    except OSError as error:
+        reason = "there is none" if isinstance(error, FileNotFoundError) else error.strerror
+        raise RecordingError(f"The recording {place} cannot be read: {reason}.") from error
+    _check(place, contents, raw)
+    return Recorded(place, raw, _missing(place, contents))
+
+
+def _take(chunk: Chunk, contents: Contents, raw: Raw) -> None:
+    """Keep our messages of a chunk."""
+    ours = {i: topic for i, (topic, kind) in contents.topics().items() if TOPICS.get(topic) == kind}
+    for message in messages(chunk):
+        topic = ours.get(message.channel)
+        if topic is not None and len(message.data) >= _HEAD + _NUMBER.size + _STAMP.size:
+            (number,) = _NUMBER.unpack_from(message.data, _HEAD)
+            raw[topic].setdefault(number, message.data)
+
+
+def _check(place: Path, contents: Contents, raw: Raw) -> None:
+    """Refuse a file without a step of ours, or with messages that are not these."""
+    for topic, number, _ in contents.channels.values():
+        kind, schema = contents.schemas.get(number, ("", b""))
+        if TOPICS.get(topic) == kind and not _is_ours(schema, kind):
+            raise RecordingError(
+                f"{place} was recorded by another version of pretouch, whose messages on {topic} are others: open it"
+                " with that version."
+            )
+    if raw["/pretouch/step"] and raw["/pretouch/run"]:
+        return
+    if contents.library.startswith(LIBRARY.split()[0]) or any(t in TOPICS for t, _, _ in contents.channels.values()):
+        raise RecordingError(f"{place} holds no control step: the run ended before the first was written.")
+    raise RecordingError(
+        f"{place} holds no recording of pretouch: for one of another program use `pretouch detect {place}`."
+    )
+
+
+def _is_ours(schema: bytes, kind: str) -> bool:
+    """Whether a schema record ends with the definition of a type of ours, comments apart."""
+    ours, at = definition(kind), len(schema)
+    text = schema[max(0, at - 4 * len(ours)) :].decode(errors="replace")
+    return _bare(text).endswith(_bare(ours))
+
+
+def _bare(text: str) -> str:
+    lines = (line.partition("#")[0].split() for line in text.splitlines())
+    return "\n".join(" ".join(words) for words in lines if words)
+
+
+def _no_mcap(place: Path) -> str:
+    if place.stat().st_size == 0:
+        return f"{place} is empty: the run ended before anything was written."
+    return f"{place} is no MCAP file: for a recording of another program use `pretouch detect {place}`."
+
+
+def _missing(place: Path, contents: Contents) -> str:
+    """Say what is missing of a file, or ''."""
+    said = []
+    if contents.damaged:
+        said.append(f"{contents.damaged} damaged part{'s' if contents.damaged > 1 else ''} left out")
+    if not contents.complete:
+        said.append("the end is missing, as of a run that was killed")
+    if not said:
+        return ""
+    return f"{place}: {' and '.join(said)}; `pretouch recover {place}` makes a file that opens everywhere."

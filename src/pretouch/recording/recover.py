@@ -1,0 +1,68 @@
+"""A recording of a killed run, made into a file that opens everywhere."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from pretouch.errors import RecordingError
+from pretouch.recording.container import Contents, begins_as_mcap, scan
+from pretouch.recording.ending import ending, entry, header, in_chunk
+from pretouch.recording.messages import LIBRARY
+from pretouch.recording.reader import open_recording
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """What recovering a recording gave."""
+
+    place: Path
+    """The file that opens everywhere: a new one, or the given one if it was complete."""
+    steps: int
+    said: str
+    """What was done, for a person to read."""
+
+
+def recover(place: Path, out: Path | None = None) -> Recovered:
+    """Write all that is whole of a recording to another file, with the index that was missing.
+
+    The recording stays as it is. The other file is by default `NAME.recovered.mcap` beside it; one that is there
+    already is a RecordingError, as is a file that holds no recording.
+    """
+    place = Path(place)
+    recorded = open_recording(place)
+    steps = len(recorded)
+    if recorded.complete:
+        return Recovered(place, steps, f"{place} is complete, with {steps} control steps: there is nothing to recover.")
+    out = Path(out) if out is not None else place.with_name(f"{place.name.removesuffix('.mcap')}.recovered.mcap")
+    try:
+        with place.open("rb") as source, out.open("xb") as target:
+            try:
+                _copy(source, target)
+            except OSError:
+                out.unlink()
+                raise
+    except FileExistsError as error:
+        raise RecordingError(f"There is something at {out} already: give another name, or move it away.") from error
+    except OSError as error:
+        raise RecordingError(f"The recovered recording {out} cannot be written: {error.strerror}.") from error
+    last = recorded.stamps()[-1]
+    return Recovered(out, steps, f"{out} holds what was whole of {place}: {steps} control steps, up to {last:.2f} s.")
+
+
+def _copy(source: BinaryIO, target: BinaryIO) -> None:
+    """Write a file of all schemas and channels, the whole chunks, and their index."""
+    contents, entries = Contents(), []
+    begins_as_mcap(source)
+    for _ in scan(source, contents):
+        pass  # what channels there are may only stand behind the chunk that first needs them
+    target.write(header(contents.profile or "ros2", LIBRARY))
+    for record in contents.definitions():
+        target.write(record)
+    source.seek(0)
+    begins_as_mcap(source)
+    for chunk in scan(source, Contents()):
+        whole = in_chunk(chunk)
+        made = entry(whole, target.tell())
+        target.write(whole.record + made.index)
+        entries.append(made)
+    target.write(ending(contents, entries, target.tell()))

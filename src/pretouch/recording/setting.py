@@ -1,0 +1,195 @@
+"""What made the steps of a recording: arm, skin, surroundings, path and parameters, to a message and back."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path as FilePath
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import Any
+from weakref import finalize
+
+import numpy as np
+
+from pretouch.control.path import Circle, Path, WayPoints
+from pretouch.controller import Controller
+from pretouch.errors import PretouchError, RecordingError
+from pretouch.params import Profile
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.recording.messages import FORMAT, PACKAGE, decoded, encoded, make
+from pretouch.recording.plain import JSON, as_json, from_json, profile_from, sound
+from pretouch.recording.recorded_path import RecordedPath, Tangents
+from pretouch.recording.versions import versions
+from pretouch.robot.body import Capsules
+from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
+from pretouch.types import FloatArray
+
+RUN = f"{PACKAGE}/msg/Run"
+
+_SAMPLES = 400
+"""Points kept of a path whose class is not ours, to draw it by."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One controller that made steps of a recording."""
+
+    sequence: int
+    """Number of the first step it made."""
+    versions: dict[str, str]
+    """Program, libraries and machine it ran on."""
+    started: float
+    """When its first step was recorded [s since 1970, UTC]."""
+    about: dict[str, JSON]
+    """Whatever the caller said of the run."""
+    profile: Profile
+    unlike: tuple[str, ...]
+    """Parameters that the version which made it has and this one has not, or the other way round."""
+    _message: Any
+    _tangents: Callable[[], Tangents]
+
+    @cached_property
+    def model(self) -> RobotModel:
+        """The arm."""
+        return sound(lambda: _model(self._message))
+
+    @cached_property
+    def skin(self) -> Skin:
+        """The sensor units on it."""
+        return sound(lambda: _skin(self._message, self.model))
+
+    @cached_property
+    def fixtures(self) -> Fixtures:
+        """What stood around it."""
+        return sound(lambda: _fixtures(self._message))
+
+    @cached_property
+    def path(self) -> Path:
+        """The path it followed."""
+        return sound(lambda: _path(self._message, self._tangents))
+
+    def controller(self) -> Controller:
+        """Make the controller again, on the model, skin, fixtures and path of this run."""
+        if self.unlike:
+            raise RecordingError(
+                f"The recorded profile differs in {', '.join(self.unlike)} from what this version knows: recompute it"
+                f" with the version that made it, {self.versions.get('pretouch', 'unknown')}."
+            )
+        return sound(lambda: Controller(self.model, self.skin, self.fixtures, self.path, self.profile))
+
+
+def encode_run(sequence: int, controller: Controller, about: Mapping[str, JSON]) -> bytes:
+    """Return what describes a controller as CDR. Facts that JSON cannot hold are a RecordingError."""
+    model, skin, capsules = controller.model, controller.skin, controller.fixtures.capsules
+    kind, numbers = _path_numbers(controller.path)
+    return encoded(RUN, make(
+        RUN, sequence, FORMAT, time.time(), as_json(versions()), as_json(dict(about)),
+        as_json(asdict(controller.profile)), as_json(_description(model.description)), _mjcf(model.description),
+        list(skin.ids),
+        [unit.link for unit in skin.units], skin.T_link_sensor.reshape(-1).copy(),
+        controller.fixtures.planes.reshape(-1).copy(), _flat(capsules.a), _flat(capsules.b), _flat(capsules.radius),
+        kind, numbers, float(controller.path.length), bool(controller.path.closed),
+    ))  # fmt: skip
+
+
+def decode_run(data: bytes, tangents: Callable[[int], Tangents]) -> Run:
+    """Return what a Run message describes; `tangents` finds those kept with the steps from a number on."""
+    m = decoded(RUN, data)
+    if m.format > FORMAT:
+        raise RecordingError(
+            f"The recording has format {m.format}, this version of pretouch knows {FORMAT}: open it with a later one."
+        )
+    profile, unlike = profile_from(from_json(m.profile))
+    return Run(
+        m.sequence, from_json(m.versions), m.started, from_json(m.about), profile, unlike, m,
+        lambda: tangents(m.sequence),
+    )  # fmt: skip
+
+
+_ARRAYS = ("qd_max", "qdd_max", "tau_max", "q_ready")
+_ENVELOPE = ("offset", "slope", "q_upper", "q_lower")
+
+
+def _description(arm: RobotDescription) -> dict[str, JSON]:
+    described: dict[str, JSON] = {"name": arm.name, "ee_body": arm.ee_body, "source": arm.source, "envelope": None}
+    described |= {name: getattr(arm, name) for name in _ARRAYS}
+    if arm.envelope:
+        described["envelope"] = {name: getattr(arm.envelope, name) for name in (*_ENVELOPE, "source")}
+    return described
+
+
+def _mjcf(arm: RobotDescription) -> str:
+    try:
+        return arm.mjcf.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(
+            f"The MJCF file {arm.mjcf} cannot be read, to keep it in the recording: {error}"
+        ) from error
+
+
+def _model(m: Any) -> RobotModel:
+    """Make the arm: from the file of this installation if that says the same, otherwise from the recorded one."""
+    given = from_json(m.robot)
+    arrays = {name: np.array(given[name], dtype=np.float64) for name in _ARRAYS}
+    envelope = given["envelope"] and SpeedEnvelope(
+        **{name: np.array(given["envelope"][name], dtype=np.float64) for name in _ENVELOPE},
+        source=given["envelope"]["source"],
+    )
+    described = {"name": given["name"], "ee_body": given["ee_body"], "source": given["source"], **arrays}
+    for installed in (panda().mjcf, fr3().mjcf):
+        if installed.read_text(encoding="utf-8") == m.mjcf:
+            return RobotModel(RobotDescription(mjcf=installed, envelope=envelope, **described))
+    folder = FilePath(mkdtemp(prefix="pretouch-"))
+    kept = folder / "arm.xml"
+    kept.write_text(m.mjcf, encoding="utf-8")
+    try:
+        model = RobotModel(RobotDescription(mjcf=kept, envelope=envelope, **described))
+    except PretouchError:
+        rmtree(folder)
+        raise
+    finalize(model, rmtree, folder, ignore_errors=True)  # whoever has the model may read its file
+    return model
+
+
+def _skin(m: Any, model: RobotModel) -> Skin:
+    poses = m.unit_pose.reshape(-1, 4, 4)
+    return Skin([SensorUnit(*unit) for unit in zip(m.unit_id, m.unit_link, poses, strict=True)], model)
+
+
+def _fixtures(m: Any) -> Fixtures:
+    radius = m.capsule_radius.copy()
+    a, b = m.capsule_a.reshape(-1, 3).copy(), m.capsule_b.reshape(-1, 3).copy()
+    return Fixtures(m.planes.reshape(-1, 4), Capsules(np.zeros(len(radius), np.int64), a, b, radius))
+
+
+def is_described(path: Path) -> bool:
+    """Whether a Run message holds all of a path; of any other the steps keep where it led."""
+    return type(path) in (Circle, WayPoints)
+
+
+def _path_numbers(path: Path) -> tuple[str, FloatArray]:
+    if type(path) is Circle:
+        return "circle", np.array([*path.center, path.radius, path.start_angle], dtype=np.float64)
+    if type(path) is WayPoints:
+        return "way-points", path.points.reshape(-1)
+    phases = np.linspace(0.0, path.length, _SAMPLES)
+    return "recorded", np.array([path.point(phase) for phase in phases.tolist()], dtype=np.float64).reshape(-1)
+
+
+def _path(m: Any, tangents: Callable[[], Tangents]) -> Path:
+    numbers = m.path_numbers.tolist()
+    if m.path == "circle":
+        x, y, z, radius, start_angle = numbers
+        return Circle((x, y, z), radius, start_angle)
+    points = m.path_numbers.reshape(-1, 3)
+    if m.path == "way-points":
+        return WayPoints(points, m.path_closed)
+    return RecordedPath(points.copy(), m.path_length, m.path_closed, tangents)
+
+
+def _flat(array: FloatArray) -> FloatArray:
+    return np.array(array, dtype=np.float64).reshape(-1)

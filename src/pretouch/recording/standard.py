@@ -1,0 +1,118 @@
+"""The standard ROS 2 topics of a recording: a copy of what was measured, for tools that do not know our messages."""
+
+import math
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from pretouch.controller import Controller
+from pretouch.recording.codec import decode_inputs
+from pretouch.recording.messages import Item, encoded, make
+from pretouch.sensing.unit import CONE_ANGLE, MAX_DISTANCE, MIN_DISTANCE
+from pretouch.types import ControlStep, FloatArray, RangeReadings, RangeStatus
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+WRENCH = "geometry_msgs/msg/WrenchStamped"
+RANGE = "sensor_msgs/msg/Range"
+IMU = "sensor_msgs/msg/Imu"
+STANDARD = (JOINT_STATE, WRENCH, RANGE, IMU)
+"""Types of what is measured."""
+HEADER, TIME = "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
+VECTOR, QUATERNION = "geometry_msgs/msg/Vector3", "geometry_msgs/msg/Quaternion"
+
+_LATEST = (2**31 - 1) * 10**9
+"""Latest time a ROS message can hold [ns]."""
+_INFRARED = 1
+_ACCURACY_M = 0.025
+"""Ranging error of the VL53L1X, at most [m] (data sheet DS12385)."""
+_SHOWN = (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED)
+_UNKNOWN = np.array([-1.0, *np.zeros(8)])
+"""Covariance that says a quantity is not there (sensor_msgs/Imu)."""
+
+
+def nanoseconds(stamp: float, instead: int) -> int:
+    """Return a stamp [s] in ns, within what ROS and MCAP can hold; one that is no number as `instead`."""
+    if stamp != stamp:
+        return instead
+    return round(min(max(stamp, 0.0), _LATEST / 1e9) * 1e9)
+
+
+def header(time: int, frame: str) -> Any:
+    """Return a ROS header for an instant [ns] and a frame."""
+    return make(HEADER, make(TIME, time // 10**9, time % 10**9), frame)
+
+
+@cache
+def topic_name(name: str) -> str:
+    """Return a unit's id as ROS allows it in a topic: ASCII letters, digits and underscores, no digit first."""
+    plain = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in name)
+    return f"_{plain}" if plain[0].isdigit() else plain
+
+
+class Standard:
+    """Makes what is measured in one controller's cycles into the standard topics."""
+
+    def __init__(self, controller: Controller) -> None:
+        model = controller.model
+        self._ids = controller.skin.ids
+        self._base = model.links[0]
+        self._joints = list(model.joints)
+        self._newest = np.full(len(self._ids), -np.inf)
+
+    def items(self, given: bytes | None, step: ControlStep, sequence: int, time: int) -> Iterator[Item]:
+        """Yield the messages of one cycle; without the inputs, as CDR, those that a step can tell."""
+        at = header(time, self._base)
+        torque = np.zeros(3)
+        qd = effort = np.zeros(0)
+        inputs = None if given is None else decode_inputs(given)[1]
+        if inputs is not None:
+            qd, effort = _fitting(inputs.robot.qd, step.q), _fitting(inputs.robot.tau_ext, step.q)
+            if inputs.robot.wrench is not None and len(inputs.robot.wrench) == 6:
+                torque = inputs.robot.wrench[3:]
+            yield from self._ranges(inputs.readings, sequence, time)
+        joints = make(JOINT_STATE, at, self._joints, step.q, qd, effort)
+        yield Item("/joint_states", JOINT_STATE, sequence, time, encoded(JOINT_STATE, joints))
+        if step.force[0] == step.force[0]:
+            wrench = make("geometry_msgs/msg/Wrench", vector(step.force), vector(torque))
+            yield Item("/wrench", WRENCH, sequence, time, encoded(WRENCH, make(WRENCH, at, wrench)))
+
+    def _ranges(self, readings: RangeReadings, sequence: int, time: int) -> Iterator[Item]:
+        """Yield a message for each unit whose reading is not the one before."""
+        stamps, distances, statuses = readings.stamp, readings.distance, readings.status
+        if not len(stamps) == len(distances) == len(statuses) == len(self._ids):
+            return
+        fresh = np.flatnonzero((stamps != self._newest) & np.isfinite(stamps))
+        self._newest = stamps
+        for k in fresh.tolist():
+            at = header(nanoseconds(float(stamps[k]), time), self._ids[k])
+            shown = _single(float(distances[k])) if statuses[k] in _SHOWN else math.inf
+            message = make(RANGE, at, _INFRARED, CONE_ANGLE, MIN_DISTANCE, MAX_DISTANCE, shown, _ACCURACY_M**2)
+            name = f"/skin/{topic_name(self._ids[k])}/range"
+            yield Item(name, RANGE, sequence, time, encoded(RANGE, message))
+
+    def imu(self, unit_id: str, time: int, acceleration: FloatArray, angular_velocity: FloatArray) -> Item:
+        """Return what a unit's IMU measured at an instant [ns]."""
+        message = make(
+            IMU, header(time, unit_id), make(QUATERNION, 0.0, 0.0, 0.0, 1.0), _UNKNOWN, vector(angular_velocity),
+            np.zeros(9), vector(acceleration), np.zeros(9),
+        )  # fmt: skip
+        return Item(f"/skin/{topic_name(unit_id)}/imu", IMU, 0, time, encoded(IMU, message))
+
+
+def vector(given: FloatArray) -> Any:
+    """Return a (3,) array as geometry_msgs/Vector3."""
+    x, y, z = (float(v) for v in given)
+    return make(VECTOR, x, y, z)
+
+
+def _fitting(array: FloatArray, like: FloatArray) -> FloatArray:
+    """Return an array if it is as long as another one, and else an empty one."""
+    return array if array.shape == like.shape else np.zeros(0)
+
+
+def _single(number: float) -> float:
+    """Return a number that float32 can hold: one beyond is infinite."""
+    with np.errstate(over="ignore"):
+        return float(np.float32(number))

@@ -1,0 +1,178 @@
+"""All the controller remembers, to a message and back, to the bit.
+
+Both ways follow the annotations of `ControllerState`, so a field added there is kept without a change here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from pretouch.controller import ControllerState
+from pretouch.errors import RecordingError
+from pretouch.recording.messages import PACKAGE, decoded, encoded, make, plain_text
+
+STATE = f"{PACKAGE}/msg/State"
+
+_UNREAD = "watch.robot.tau_ext"
+"""Given by the robot and read by no step: it may be anything, and is kept only if it is an array of numbers."""
+
+
+@cache
+def _hints(kind: type) -> tuple[tuple[str, Any], ...]:
+    hints = get_type_hints(kind)
+    return tuple((f.name, hints[f.name]) for f in fields(kind))
+
+
+class _Parts:
+    """The lists of a State message while it is being made."""
+
+    def __init__(self) -> None:
+        self.name: list[str] = []
+        self.kind: list[str] = []
+        self.shape: list[str] = []
+        self.numbers: list[Any] = []
+        self.wholes: list[int] = []
+        self.texts: list[str] = []
+
+    def add(self, name: str, kind: str, shape: str = "") -> None:
+        self.name.append(name)
+        self.kind.append(kind)
+        self.shape.append(shape)
+
+
+def encode_state(sequence: int, state: ControllerState, anew: bool) -> bytes:
+    """Return the state a step begins with as CDR; `anew` if it does not follow from the step before."""
+    parts = _Parts()
+    _take(parts, "", ControllerState, state)
+    numbers = np.concatenate(parts.numbers) if parts.numbers else np.zeros(0)
+    wholes = np.array(parts.wholes, dtype=np.int64)
+    p = parts
+    return encoded(STATE, make(STATE, sequence, anew, p.name, p.kind, p.shape, numbers, wholes, p.texts))
+
+
+def _take(parts: _Parts, name: str, hint: Any, value: Any) -> None:
+    """Add a value annotated with a type to a message."""
+    if name == _UNREAD:
+        value = _readable(value)
+    hint, kind = _kind(hint, value)
+    if kind == "parts":
+        for field, inner in _hints(hint):
+            _take(parts, f"{name}.{field}" if name else field, inner, getattr(value, field))
+    elif kind == "tuple":
+        parts.add(name, kind, str(len(value)))
+        for i, (inner, item) in enumerate(zip(_inner(hint, len(value)), value, strict=True)):
+            _take(parts, f"{name}.{i}", inner, item)
+    elif kind == "array":
+        parts.add(name, kind, " ".join(map(str, value.shape)))
+        parts.numbers.append(value.reshape(-1))
+    else:
+        parts.add(name, kind)
+        if kind == "float":
+            parts.numbers.append(np.array([value], dtype=np.float64))
+        elif kind in ("int", "bool"):
+            parts.wholes.append(int(value))
+        elif kind == "text":
+            parts.texts.append(plain_text(value.value if isinstance(value, Enum) else value))
+
+
+def _readable(value: Any) -> Any:
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return value
+    return np.zeros(0)
+
+
+def _kind(hint: Any, value: Any) -> tuple[Any, str]:
+    """Return the type a value is annotated with, without None, and how it is kept."""
+    if get_origin(hint) in (Union, UnionType):
+        if value is None:
+            return hint, "none"
+        hint = _without_none(hint)
+    if is_dataclass(hint):
+        return hint, "parts"
+    if get_origin(hint) is tuple:
+        return hint, "tuple"
+    if get_origin(hint) is np.ndarray:
+        return hint, "array"
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return hint, "text"
+    return hint, {float: "float", int: "int", bool: "bool", str: "text"}[hint]
+
+
+def _without_none(hint: Any) -> Any:
+    (left,) = (inner for inner in get_args(hint) if inner is not NoneType)
+    return left
+
+
+def _inner(hint: Any, count: int) -> Iterator[Any]:
+    """Types of the items of a tuple."""
+    args = get_args(hint)
+    return iter(args[:1] * count if args[-1] is Ellipsis else args)
+
+
+class _Reading:
+    """The parts of a State message, to be taken in turn."""
+
+    def __init__(self, message: Any) -> None:
+        self._parts = zip(message.name, message.kind, message.shape, strict=True)
+        self._numbers, self._used = message.numbers, 0
+        self._wholes = iter(message.wholes.tolist())
+        self._texts = iter(message.texts)
+
+    def next(self, name: str) -> tuple[str, str]:
+        found, kind, shape = next(self._parts)
+        if found != name:
+            raise ValueError(f"{found!r} where {name!r} belongs")
+        return kind, shape
+
+    def numbers(self, shape: tuple[int, ...]) -> Any:
+        count = int(np.prod(shape))
+        start, self._used = self._used, self._used + count
+        return self._numbers[start : self._used].reshape(shape).copy()
+
+    def whole(self) -> int:
+        return int(next(self._wholes))
+
+    def text(self) -> str:
+        return str(next(self._texts))
+
+
+def decode_state(data: bytes) -> tuple[bool, ControllerState]:
+    """Return the state a step began with, and whether it did not follow from the step before.
+
+    That of a differing version is a RecordingError.
+    """
+    message = decoded(STATE, data)
+    try:
+        return message.anew, _give(_Reading(message), "", ControllerState)
+    except (ValueError, KeyError, StopIteration) as error:
+        raise RecordingError(
+            f"The controller's state in the recording is that of another version ({error}): open it with the version"
+            " that made it."
+        ) from error
+
+
+def _give(parts: _Reading, name: str, hint: Any) -> Any:
+    """Return the next value, annotated with a type."""
+    optional = get_origin(hint) in (Union, UnionType)
+    if optional:
+        hint = _without_none(hint)
+    if is_dataclass(hint):
+        kind = hint if isinstance(hint, type) else type(hint)
+        return kind(**{f: _give(parts, f"{name}.{f}" if name else f, inner) for f, inner in _hints(kind)})
+    kind_name, shape = parts.next(name)
+    if optional and kind_name == "none":
+        return None
+    if kind_name == "tuple":
+        return tuple(_give(parts, f"{name}.{i}", inner) for i, inner in enumerate(_inner(hint, int(shape))))
+    if kind_name == "array":
+        return parts.numbers(tuple(map(int, shape.split())))
+    if kind_name == "text":
+        return hint(parts.text())
+    if kind_name == "float":
+        return float(parts.numbers((1,))[0])
+    return hint(parts.whole())

@@ -1,0 +1,185 @@
+"""A run, recorded as it goes on: one MCAP file that recomputes each control step and opens in the usual viewers."""
+
+import atexit
+import math
+import signal
+import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from time import monotonic
+from types import FrameType, TracebackType
+from typing import Self
+
+import numpy as np
+
+from pretouch.controller import Controller, Cycle
+from pretouch.recording.codec import INPUTS, STEP, TRUTH, encode_inputs, encode_step, encode_truth
+from pretouch.recording.disk import Disk
+from pretouch.recording.messages import TOPICS, Item, prepare
+from pretouch.recording.plain import JSON
+from pretouch.recording.scene import DRAWN, Scene
+from pretouch.recording.setting import RUN, encode_run, is_described
+from pretouch.recording.standard import STANDARD, Standard, nanoseconds
+from pretouch.recording.state_codec import STATE, encode_state
+from pretouch.recording.truth import Truth
+from pretouch.robot.model import RobotModel
+from pretouch.types import ControlStep, FloatArray
+
+SNAPSHOT_S = 3.0
+"""Time between two snapshots of the controller's state [s]."""
+
+_FASTER = 1.2
+"""A run whose time passes this much faster than the clock's is a simulation."""
+
+
+@dataclass(frozen=True)
+class Closed:
+    """What a recording became."""
+
+    place: Path
+    steps: int
+    duration_s: float
+    """From the first step to the last [s]."""
+    size_bytes: int
+    sentence: str
+    """How it ended, for a person to read."""
+
+
+class Recording:
+    """One MCAP file that a run is written to while it goes on; a recorder of `loop.run`, and a context manager.
+
+    `record` encodes and hands over; a thread compresses and writes, about twice a second. A killed process loses what
+    was not written by then. Within `with`, SIGTERM and SIGHUP raise SystemExit where nobody else handles them, so that
+    the file is closed. A file that is there already is never written over: RecordingError.
+    """
+
+    def __init__(self, place: Path, controller: Controller, about: Mapping[str, JSON] | None = None) -> None:
+        """Begin a file for what a controller does.
+
+        Args:
+            place: file to make; its folder must be there.
+            controller: whose cycles will be recorded.
+            about: what else is to be known of the run, as JSON has it; `scene` with `boxes` is drawn by viewers.
+        """
+        self.place = Path(place)
+        self._about = dict(about or {})
+        self._steps = 0
+        self._first = self._last = self._begun_at = math.nan
+        self._log_time = 0
+        self._closed: Closed | None = None
+        self._signals: list[signal.Signals] = []
+        """Those that raise SystemExit for as long as this is a context."""
+        self._model: RobotModel | None = None
+        """For the thread: one model serves one thread."""
+        prepare(TOPICS.values(), STANDARD, DRAWN)
+        self._take(controller)
+        self._disk = Disk(self.place)
+        atexit.register(self.close)
+
+    def _take(self, controller: Controller) -> None:
+        self._begun: bytes | None = encode_run(self._steps, controller, self._about)
+        arm = controller.model.description
+        if self._model is None or self._model.description is not arm:
+            self._model = RobotModel(arm)
+        self._standard, self._scene = Standard(controller), Scene(controller, self._about, self._model)
+        self._snapshot_due = -math.inf
+        self._command: FloatArray | None = None
+        """Of the last step; None where the next one cannot be recomputed from it."""
+        self._path = None if is_described(controller.path) else controller.path
+
+    def change(self, controller: Controller) -> None:
+        """Let the steps from the next one on be those of another controller of the same arm."""
+        self._take(controller)
+
+    def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
+        """Keep one turn of the loop, and what only a simulation knows. Of the disk's troubles it raises none."""
+        if self._closed is not None or self.trouble:
+            return
+        number, step = self._steps, cycle.step
+        self._log_time = time = nanoseconds(step.stamp, self._log_time)
+        items: list[Item] = []
+        if self._begun is not None:
+            items.append(Item("/pretouch/run", RUN, number, time, self._begun))
+            self._begun = None
+        anew = not self._goes_on(cycle)
+        if anew or not self._last <= step.stamp < self._snapshot_due:
+            items.append(Item("/pretouch/state", STATE, number, time, encode_state(number, cycle.before, anew)))
+            self._snapshot_due = step.stamp + SNAPSHOT_S
+        data, whole = encode_inputs(number, cycle.inputs)
+        self._command = step.command if whole else None
+        items.append(Item("/pretouch/inputs", INPUTS, number, time, data))
+        tangent = self._tangent(step.path_phase)
+        items.append(Item("/pretouch/step", STEP, number, time, encode_step(number, step, tangent)))
+        if truth is not None:
+            items.append(Item("/pretouch/truth", TRUTH, number, time, encode_truth(number, truth)))
+        given = data if whole else None
+        self._disk.put(items, partial(_copies, self._standard, self._scene, given, step, number, time))
+        if not self._steps:
+            self._first, self._begun_at = step.stamp, monotonic()
+        elif self._disk.behind() and step.stamp - self._first > _FASTER * (monotonic() - self._begun_at):
+            self._disk.wait()  # a simulation that outruns the clock can wait, a control loop cannot
+        self._steps, self._last = number + 1, step.stamp
+
+    def _goes_on(self, cycle: Cycle) -> bool:
+        """Whether a cycle began with what the one before left, and that can be recomputed."""
+        before, command = cycle.before, self._command
+        return command is not None and before.watch.stamp == self._last and bool((before.command == command).all())
+
+    def _tangent(self, phase: float) -> FloatArray | None:
+        return None if self._path is None else np.array(self._path.tangent(phase), dtype=np.float64)
+
+    def imu(self, unit_id: str, stamp: float, acceleration: FloatArray, angular_velocity: FloatArray) -> None:
+        """Keep what a unit's IMU measured: acceleration (3,) [m/s^2], angular velocity (3,) [rad/s], sensor frame."""
+        if self._closed is None and not self.trouble:
+            time = nanoseconds(stamp, self._log_time)
+            self._disk.put([self._standard.imu(unit_id, time, acceleration, angular_velocity)])
+
+    @property
+    def trouble(self) -> str:
+        """'' or, once nothing more can be written, a sentence that says why and what the file holds."""
+        return self._disk.trouble
+
+    def close(self) -> Closed:
+        """End the file; a second time says the same again."""
+        if self._closed is None:
+            self._disk.close()
+            self._closed = self._summary()
+            atexit.unregister(self.close)
+        return self._closed
+
+    def _summary(self) -> Closed:
+        duration = self._last - self._first if self._steps else 0.0
+        size = self._disk.size()
+        sentence = self.trouble or (
+            f"{self.place} holds {self._steps} control steps, {duration:.1f} s, in {size / 1e6:.1f} MB."
+        )
+        return Closed(self.place, self._steps, duration, size, sentence)
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGTERM, signal.SIGHUP):
+                if signal.getsignal(number) is signal.SIG_DFL:
+                    signal.signal(number, _end)
+                    self._signals.append(number)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+        while self._signals:
+            signal.signal(self._signals.pop(), signal.SIG_DFL)
+
+
+def _copies(
+    standard: Standard, scene: Scene, inputs: bytes | None, step: ControlStep, number: int, time: int
+) -> Iterator[Item]:
+    """Yield what a cycle is to tools that do not know our messages."""
+    yield from standard.items(inputs, step, number, time)
+    yield from scene.drawn(step, number, time)
+
+
+def _end(number: int, _frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)

@@ -1,0 +1,85 @@
+"""Runs to record: an arm that follows commands exactly, what its units and its force estimate say drawn from a seed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.control.path import Circle
+from pretouch.control.path import Path as Course
+from pretouch.controller import Controller, ControllerState, Cycle
+from pretouch.params import PROFILES, Profile
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.recording.writer import Recording
+from pretouch.robot.description import RobotDescription
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import Inputs, RangeReadings, RobotState
+
+SHORT: Profile = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=5))
+"""The paper's profile, with a window that is soon full."""
+
+
+@dataclass
+class Run:
+    """A controller that is turned, and its cycles."""
+
+    controller: Controller
+    seed: int = 0
+    time: float = 0.0
+    cycles: list[Cycle] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.rng = np.random.default_rng(self.seed)
+        self.q = self.controller.model.description.q_ready.copy()
+        self.qd = np.zeros(self.controller.model.n)
+        self.state: ControllerState = self.controller.init(self.inputs().robot)
+
+    def inputs(self) -> Inputs:
+        """What the arm and its units report now; one reading in ten shows no target, a force in twenty is a push."""
+        k, n = len(self.controller.skin), self.controller.model.n
+        wrench = self.rng.normal(scale=0.3, size=6)
+        if self.rng.random() < 0.05:
+            wrench[:3] += self.rng.normal(scale=30.0, size=3)
+        readings = RangeReadings(
+            np.full(k, self.time - self.time % 0.02), self.rng.uniform(0.1, 1.0, k),
+            np.where(self.rng.random(k) < 0.1, 2, 0).astype(np.int64),
+        )  # fmt: skip
+        measured = self.q + self.rng.normal(scale=1e-4, size=n)
+        robot = RobotState(self.time, measured, self.qd.copy(), self.q.copy(), self.qd.copy(), np.ones(n), wrench)
+        return Inputs(self.time, robot, readings, bool(self.rng.random() < 0.1))
+
+    def turn(self, change: Callable[[Inputs], Inputs] = lambda inputs: inputs) -> Cycle:
+        """Turn the controller once, with the inputs changed, and follow its command."""
+        inputs, before = change(self.inputs()), self.state
+        step, self.state = self.controller.step(before, inputs)
+        period = self.controller.profile.task.control_period_s
+        self.qd, self.q = step.command, self.q + step.command * period
+        self.time += period
+        self.cycles.append(Cycle(inputs, before, step))
+        return self.cycles[-1]
+
+
+def controller_of(model: RobotModel, skin: Skin, profile: Profile = SHORT, path: Course | None = None) -> Controller:
+    return Controller(model, skin, no_fixtures(), path or Circle(), profile)
+
+
+def custom_arm(folder: Path) -> RobotDescription:
+    """An arm of two joints that no installation has."""
+    place = folder / "two.xml"
+    place.write_text("""<mujoco><compiler angle="radian"/><worldbody><body name="a">
+      <joint name="j1" range="-2 2" limited="true"/><geom type="capsule" size="0.05 0.1" mass="1"/>
+      <body name="b" pos="0 0 0.3"><joint name="j2" axis="0 1 0" range="-2 2" limited="true"/>
+      <geom type="capsule" size="0.04 0.1" mass="1"/></body></body></worldbody></mujoco>""")
+    two = np.ones(2)
+    return RobotDescription("two", place, "b", 2.1 * two, 3.3 * two, 9.0 * two, 0.1 * two, "a test")
+
+
+def recorded_run(place: Path, controller: Controller, cycles: int, seed: int = 0) -> Run:
+    """Turn a controller, record it, and close the file."""
+    run = Run(controller, seed)
+    with Recording(place, controller, {"seed": seed}) as recording:
+        for _ in range(cycles):
+            recording.record(run.turn())
+    return run

@@ -1,0 +1,317 @@
+"""Files that are cut off, damaged, or not ours: everything whole counts, and no file is worse than one sentence."""
+
+import json
+import os
+import struct
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from rosbags.highlevel import AnyReader
+
+from pretouch.errors import RecordingError
+from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
+from pretouch.recording.messages import TOPICS, decoded, definition, encoded
+from pretouch.recording.reader import Recorded, open_recording
+from pretouch.recording.recover import recover
+from pretouch.recording.setting import RUN
+from pretouch.recording.verify import verify
+from pretouch.recording.writer import Recording
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from tests.fuzz.invariants import same
+from tests.recording.runs import Run, controller_of, custom_arm, recorded_run
+
+
+@pytest.fixture(scope="module")
+def controller(panda_model, paper_skin):
+    return controller_of(panda_model, paper_skin)
+
+
+def rewritten(source: Path, place: Path, per_chunk: int, only: str = "", **options) -> None:
+    """The same messages, of some topics only, in a file of other chunks."""
+    with source.open("rb") as old, place.open("wb") as new:
+        writer = Writer(new, **options)
+        writer.start("ros2", "another tool")
+        channels, schemas = {}, {}
+        for i, (schema, channel, message) in enumerate(make_reader(old).iter_messages(log_time_order=False)):
+            if not channel.topic.startswith(only):
+                continue
+            if schema.id not in schemas:
+                schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
+            if channel.id not in channels:
+                channels[channel.id] = writer.register_channel(channel.topic, "cdr", schemas[schema.id])
+            writer.add_message(channels[channel.id], message.log_time, message.data, message.publish_time)
+            if i % per_chunk == per_chunk - 1:
+                writer.flush()
+        writer.finish()
+
+
+@pytest.fixture(scope="module")
+def tiny(controller, tmp_path_factory) -> tuple[Path, Run]:
+    """Eight cycles in chunks of a few messages."""
+    folder = tmp_path_factory.mktemp("tiny")
+    run = Run(controller)
+    with Recording(folder / "whole.mcap", controller) as recording:
+        for _ in range(8):
+            recording.record(run.turn())
+    rewritten(folder / "whole.mcap", folder / "tiny.mcap", 7)
+    return folder / "tiny.mcap", run
+
+
+def opened(place: Path) -> Recorded | None:
+    """A recording with all of it read, or None of a file that is refused with a sentence."""
+    refused = ""
+    try:
+        recorded = open_recording(place)
+        for _ in recorded:
+            pass
+        _ = recorded.runs[0].profile, recorded.stamps()
+    except RecordingError as error:
+        refused = str(error)
+    assert "\n" not in refused
+    return None if refused else recorded
+
+
+@pytest.mark.parametrize("stride", [17, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_file_cut_off_at_any_byte_gives_its_whole_chunks(tmp_path, stride):
+    model = RobotModel(custom_arm(tmp_path))
+    run = recorded_run(tmp_path / "whole.mcap", controller_of(model, Skin([], model)), 2)
+    place, part = tmp_path / "tiny.mcap", tmp_path / "part.mcap"
+    rewritten(tmp_path / "whole.mcap", place, 2, only="/pretouch/")
+    whole = place.read_bytes()
+    part.write_bytes(whole)
+    refused, kept = 0, {}
+    for size in range(len(whole) - 1, -1, -stride):
+        os.truncate(part, size)
+        try:
+            kept[size] = open_recording(part)
+        except RecordingError:
+            refused = max(refused, size)
+    counts = [len(kept[size]) for size in sorted(kept)]
+    assert refused < min(kept)
+    assert counts == sorted(counts)
+    assert all("the end is missing" in recorded.said for recorded in kept.values())
+    assert len(kept[max(kept)]) == len(run.cycles)
+    assert opened(place).complete
+
+
+def test_a_recovered_file_opens_everywhere_and_holds_what_the_part_held(tiny, tmp_path):
+    place, run = tiny
+    whole = place.read_bytes()
+    for k, size in enumerate(range(len(whole) // 2, len(whole), len(whole) // 12)):
+        part, out = tmp_path / f"{k}.mcap", tmp_path / f"{k}.recovered.mcap"
+        part.write_bytes(whole[:size])
+        found = recover(part)
+        assert found.place == out
+        assert part.read_bytes() == whole[:size]
+        assert opened(out).complete
+        assert found.steps == len(opened(out)) == len(opened(part))
+        with out.open("rb") as file:
+            reader = make_reader(file, validate_crcs=True)
+            count = sum(1 for _ in reader.iter_messages())
+            assert reader.get_summary().statistics.message_count == count
+        with AnyReader([out]) as reader:
+            assert sum(1 for c, _, d in reader.messages() if reader.deserialize(d, c.msgtype)) == count
+        assert all(same(kept.step, c.step) for kept, c in zip(opened(out), run.cycles, strict=False))
+
+
+def test_recovering_what_is_complete_or_there_writes_nothing(tiny, tmp_path):
+    place, _ = tiny
+    found = recover(place)
+    assert found.place == place
+    assert "nothing to recover" in found.said
+    part = tmp_path / "part.mcap"
+    part.write_bytes(place.read_bytes()[:-100])
+    (tmp_path / "there.mcap").write_text("dear")
+    with pytest.raises(RecordingError, match="another name"):
+        recover(part, tmp_path / "there.mcap")
+    assert (tmp_path / "there.mcap").read_text() == "dear"
+    with pytest.raises(RecordingError, match="cannot be written"):
+        recover(part, tmp_path / "nowhere" / "out.mcap")
+
+
+def chunks_of(place: Path) -> list:
+    with place.open("rb") as file:
+        assert begins_as_mcap(file)
+        return list(scan(file, Contents()))
+
+
+@pytest.mark.parametrize("head", [False, True], ids=["content", "length"])
+def test_a_damaged_chunk_in_the_middle_is_left_out_and_said(tiny, tmp_path, head):
+    place, run = tiny
+    data, chunks = bytearray(place.read_bytes()), chunks_of(place)
+    bad = chunks[len(chunks) // 2]
+    data[bad.start + (4 if head else len(bad.record) // 2)] ^= 0xFF
+    (tmp_path / "a.mcap").write_bytes(data)
+    recorded = opened(tmp_path / "a.mcap")
+    assert "1 damaged part left out" in recorded.said
+    assert not recorded.complete
+    assert 0 < len(recorded) < len(run.cycles)
+    left = {m.data for chunk in chunks if chunk is not bad for m in messages(chunk)}
+    stamps = [struct.pack("<d", cycle.step.stamp) for cycle in run.cycles]
+    assert len(recorded) == sum(stamp == data[12:20] and len(data) > 1500 for stamp in stamps for data in left)
+    assert opened(recover(tmp_path / "a.mcap").place).complete
+
+
+def test_a_file_with_any_byte_changed_is_no_worse_than_a_sentence(tiny, tmp_path):
+    place, _ = tiny
+    data, rng, part = place.read_bytes(), np.random.default_rng(0), tmp_path / "part.mcap"
+    for at in rng.choice(len(data), 400, replace=False).tolist():
+        part.write_bytes(data[:at] + bytes([data[at] ^ int(rng.integers(1, 256))]) + data[at + 1 :])
+        opened(part)
+
+
+@pytest.mark.parametrize("options", [{"use_chunking": False}, {"compression": CompressionType.LZ4},
+                                     {"compression": CompressionType.NONE}])  # fmt: skip
+def test_a_file_that_another_tool_wrote_anew_opens_too(tiny, tmp_path, options):
+    place, run = tiny
+    rewritten(place, tmp_path / "a.mcap", 5, **options)
+    recorded = opened(tmp_path / "a.mcap")
+    assert recorded.complete
+    assert all(same(kept.step, c.step) for kept, c in zip(recorded, run.cycles, strict=True))
+    data = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "b.mcap").write_bytes(data[: len(data) // 2])
+    out = recover(tmp_path / "b.mcap").place
+    assert opened(out).complete
+    with out.open("rb") as file:
+        assert list(make_reader(file, validate_crcs=True).iter_messages())
+
+
+def foreign(place: Path, profile: str = "ros2", topic: str = "/scan", kind: str = "sensor_msgs/msg/Range") -> None:
+    with place.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile, "other")
+        schema = writer.register_schema(kind, "ros2msg", definition(kind).encode() if "/" in kind else b"")
+        writer.add_message(writer.register_channel(topic, "cdr", schema), 0, b"\0\1\0\0", 0)
+        writer.finish()
+
+
+def test_what_is_no_recording_of_ours_is_refused_with_the_way_out(tmp_path):
+    place = tmp_path / "a.mcap"
+    with pytest.raises(RecordingError, match="there is none"):
+        open_recording(place)
+    with pytest.raises(RecordingError, match="Is a directory"):
+        open_recording(tmp_path)
+    place.touch()
+    with pytest.raises(RecordingError, match="is empty"):
+        open_recording(place)
+    place.write_text("time,fx\n0,1\n")
+    with pytest.raises(RecordingError, match="pretouch detect"):
+        open_recording(place)
+    foreign(place)
+    with pytest.raises(RecordingError, match=r"no recording of pretouch.*pretouch detect"):
+        open_recording(place)
+    foreign(place, profile="", topic="/pretouch/step", kind="json")
+    with pytest.raises(RecordingError, match="no control step"):
+        open_recording(place)
+    with pytest.raises(RecordingError, match="no control step"):
+        recover(place)
+
+
+def changed(source: Path, place: Path, topic: str, schema=lambda text: text, data=lambda data: data) -> None:
+    """The same file with the definition or the messages of one topic changed."""
+    with source.open("rb") as old, place.open("wb") as new:
+        writer = Writer(new)
+        writer.start("ros2")
+        channels = {}
+        for found, channel, message in make_reader(old).iter_messages(log_time_order=False):
+            hit = channel.topic == topic
+            if channel.topic not in channels:
+                text = schema(found.data.decode()).encode() if hit else found.data
+                number = writer.register_schema(found.name, "ros2msg", text)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
+            writer.add_message(
+                channels[channel.topic], message.log_time, data(message.data) if hit else message.data, message.log_time
+            )
+        writer.finish()
+
+
+def test_messages_of_another_version_are_refused(tiny, tmp_path):
+    changed(tiny[0], tmp_path / "a.mcap", "/pretouch/step", schema=lambda text: text + "float64 more\n")
+    with pytest.raises(RecordingError, match=r"another version.*/pretouch/step"):
+        open_recording(tmp_path / "a.mcap")
+    changed(tiny[0], tmp_path / "b.mcap", "/pretouch/step", schema=lambda text: text.replace("#", "  # of old:"))
+    assert len(open_recording(tmp_path / "b.mcap"))
+
+
+def run_with(tiny, place: Path, **fields) -> Path:
+    """The same file with fields of its Run message changed."""
+
+    def data(given: bytes) -> bytes:
+        message = decoded(RUN, given)
+        for name, value in fields.items():
+            setattr(message, name, value)
+        return encoded(RUN, message)
+
+    changed(tiny[0], place, "/pretouch/run", data=data)
+    return place
+
+
+def test_a_later_format_is_refused(tiny, tmp_path):
+    with pytest.raises(RecordingError, match="format 2"):
+        open_recording(run_with(tiny, tmp_path / "a.mcap", format=2))
+
+
+def test_a_profile_of_another_version_can_be_looked_at_and_not_recomputed(tiny, tmp_path):
+    profile = json.loads(decoded(RUN, raw_run(tiny[0])).profile)
+    profile["task"]["elbow"] = 1
+    del profile["reaction"], profile["threshold"]["alpha"]
+    opened = open_recording(run_with(tiny, tmp_path / "a.mcap", profile=json.dumps(profile)))
+    assert len(opened) == len(open_recording(tiny[0]))
+    assert opened.runs[0].unlike == ("reaction", "task.elbow", "threshold.alpha")
+    assert opened.runs[0].profile.threshold.alpha == 0.1
+    with pytest.raises(RecordingError, match=r"differs in reaction, task\.elbow, threshold\.alpha from .* made it, 0"):
+        verify(opened)
+
+
+def test_a_profile_that_cannot_be_is_refused(tiny, tmp_path):
+    profile = json.loads(decoded(RUN, raw_run(tiny[0])).profile)
+    for group, name, value in (("reduction", "enabled", 1), ("task", "speed_m_s", "fast"), ("task", "speed_m_s", True),
+                               ("task", "speed_m_s", -1.0), ("task", "orientation", 3)):  # fmt: skip
+        wrong = {**profile, group: {**profile[group], name: value}}
+        place = tmp_path / f"{name}-{value}.mcap"
+        with pytest.raises(RecordingError, match=name):
+            open_recording(run_with(tiny, place, profile=json.dumps(wrong)))
+
+
+def raw_run(place: Path) -> bytes:
+    with place.open("rb") as file:
+        return next(m.data for _, c, m in make_reader(file).iter_messages() if c.topic == "/pretouch/run")
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"profile": "{"}, {"profile": "[]"}, {"profile": "[" * 100_000}, {"versions": "3"}, {"about": "x"},
+        {"robot": "{}"}, {"mjcf": "<mujoco"}, {"mjcf": "<mujoco/>"}, {"unit_link": ["elbow"] * 7}, {"unit_id": []},
+        {"unit_pose": np.zeros(112)}, {"path": "circle", "path_numbers": np.zeros(2)}, {"planes": np.zeros(3)},
+        {"path": "way-points", "path_numbers": np.zeros(3)}, {"capsule_radius": -np.ones(1)},
+    ],
+    ids=lambda fields: "-".join(fields),
+)  # fmt: skip
+def test_a_run_that_makes_no_sense_is_one_sentence(tiny, tmp_path, fields):
+    with pytest.raises(RecordingError) as told:
+        open_recording(run_with(tiny, tmp_path / "a.mcap", **fields)).runs[0].controller()
+    assert "\n" not in str(told.value)
+
+
+def test_missing_inputs_are_none_and_said(tiny, tmp_path):
+    recorded = open_recording(tiny[0])
+    recorded._raw["/pretouch/inputs"].pop(3)
+    assert recorded[3].inputs is None
+    assert recorded.unreadable(3) == "they are missing"
+    assert replace(recorded[2], inputs=None).run == 0
+
+
+def test_scanning_goes_on_behind_a_record_of_a_kind_that_is_not_known(tiny):
+    data, (first, *_rest) = tiny[0].read_bytes(), chunks_of(tiny[0])
+    private = struct.pack("<BQ", 0x7F, 3) + b"abc"
+    file = BytesIO(data[: first.start] + private + data[first.start :])
+    assert begins_as_mcap(file)
+    assert len(list(scan(file, Contents()))) == 1 + len(_rest)
+    assert TOPICS

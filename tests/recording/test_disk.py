@@ -1,0 +1,239 @@
+"""Disks that are full, and processes that end while they record."""
+
+import errno
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+
+from pretouch.recording import disk
+from pretouch.recording.reader import open_recording
+from pretouch.recording.recover import recover
+from pretouch.recording.verify import verify
+from pretouch.recording.writer import Recording
+from tests.recording.runs import Run, controller_of
+
+
+@pytest.fixture(scope="module")
+def controller(panda_model, paper_skin):
+    return controller_of(panda_model, paper_skin)
+
+
+@contextmanager
+def small_disk(folder: Path, size: str):
+    """A file system of a few hundred kilobytes."""
+    folder.mkdir()
+    command = [shutil.which("mount") or "mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
+    made = subprocess.run(command, capture_output=True, text=True)
+    if made.returncode:
+        pytest.skip(f"no small file system can be mounted here: {made.stderr.strip()}")
+    try:
+        yield folder
+    finally:
+        subprocess.run([shutil.which("umount") or "umount", str(folder)], check=True)
+
+
+def filled(place: Path, controller, cycles: int) -> tuple[Run, Recording]:
+    """Record more than there is room for."""
+    run = Run(controller)
+    recording = Recording(place, controller)
+    for _ in range(cycles):
+        recording.record(run.turn())
+    recording.close()
+    return run, recording
+
+
+def check_what_is_left(place: Path, run: Run, recording: Recording, cause: str) -> None:
+    assert cause in recording.trouble
+    assert str(place) in recording.trouble
+    assert recording.close().sentence == recording.trouble
+    with place.open("rb") as file:
+        assert list(make_reader(file, validate_crcs=True).iter_messages())
+    with AnyReader([place]) as reader:
+        for connection, _, data in reader.messages():
+            reader.deserialize(data, connection.msgtype)
+    recorded = open_recording(place)
+    assert recorded.complete
+    assert 0 < len(recorded) < len(run.cycles)
+    assert f"up to {recorded.stamps()[-1]:.2f} s" in recording.trouble
+    assert verify(recorded).agrees
+
+
+@pytest.fixture
+def soon(monkeypatch):
+    """Small chunks, so that many fit a small disk."""
+    monkeypatch.setattr(disk, "_FLUSH_S", 0.01)
+
+
+@pytest.mark.usefixtures("soon")
+def test_a_full_disk_leaves_a_whole_file_and_a_sentence(controller, tmp_path):
+    with small_disk(tmp_path / "disk", "400k") as folder:
+        run, recording = filled(folder / "a.mcap", controller, 600)
+        check_what_is_left(folder / "a.mcap", run, recording, "No space left on device")
+        assert "make room" in recording.trouble
+
+
+@pytest.mark.usefixtures("soon")
+def test_a_limit_on_the_size_of_files_leaves_a_whole_file_and_a_sentence(controller, tmp_path):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, before[1]))
+    try:
+        run, recording = filled(tmp_path / "a.mcap", controller, 600)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    check_what_is_left(tmp_path / "a.mcap", run, recording, "File too large")
+
+
+def test_a_disk_without_room_for_anything_is_one_sentence(controller, tmp_path):
+    with small_disk(tmp_path / "disk", "4k") as folder:
+        _, recording = filled(folder / "a.mcap", controller, 50)
+        assert "it holds nothing" in recording.trouble
+        assert (folder / "a.mcap").stat().st_size == 0
+
+
+def test_a_disk_that_fails_is_one_sentence(controller, tmp_path, monkeypatch):
+    def fail(handle, data):
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    run = Run(controller)
+    recording = Recording(tmp_path / "a.mcap", controller)
+    monkeypatch.setattr(disk.os, "write", fail)
+    recording.record(run.turn())
+    assert "Input/output error" in recording.close().sentence
+    recording.record(run.turn())
+
+
+def test_a_message_that_cannot_be_made_ends_the_recording_and_not_the_run(controller, tmp_path, monkeypatch):
+    run = Run(controller)
+    recording = Recording(tmp_path / "a.mcap", controller)
+    recording.record(run.turn())
+
+    def fail(*given):
+        raise ValueError("no")
+
+    monkeypatch.setattr(recording._standard, "items", fail)
+    recording.record(run.turn())
+    assert "ValueError: no" in recording.close().sentence
+
+
+def test_a_disk_that_does_not_keep_up_is_one_sentence(controller, tmp_path, monkeypatch):
+    monkeypatch.setattr(disk, "_MOST_WAITING", 3)
+    held = threading.Event()
+    add = disk.Disk._add
+
+    def wait(self, item):
+        held.wait()
+        add(self, item)
+
+    monkeypatch.setattr(disk.Disk, "_add", wait)
+    run = Run(controller)
+    recording = Recording(tmp_path / "a.mcap", controller)
+    for _ in range(20):
+        recording.record(run.turn())
+    assert "does not keep up" in recording.trouble
+    held.set()
+    assert "does not keep up" in recording.close().sentence
+    assert 0 < len(open_recording(tmp_path / "a.mcap")) < 20
+
+
+def test_a_simulation_that_outruns_the_clock_waits_for_the_disk(controller, tmp_path, monkeypatch):
+    monkeypatch.setattr(disk, "_SOME_WAITING", 10)
+    monkeypatch.setattr(disk, "_MOST_WAITING", 30)
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for _ in range(400):
+            recording.record(run.turn())
+    assert recording.trouble == ""
+    assert len(open_recording(tmp_path / "a.mcap")) == 400
+
+
+PROGRAM = """
+import sys, time
+from pathlib import Path
+from pretouch.recording.writer import Recording
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import paper_skin
+from tests.recording.runs import Run, controller_of
+
+place, how = Path(sys.argv[1]), sys.argv[2]
+model = RobotModel(panda())
+controller = controller_of(model, paper_skin(model))
+run = Run(controller)
+
+def go_on(recording):
+    begun = time.monotonic()
+    while True:
+        recording.record(run.turn())
+        time.sleep(max(0.0, begun + run.time - time.monotonic()))
+        print(run.cycles[-1].step.stamp, flush=True)
+        if how == "exit" and run.time > 1.0:
+            return
+
+if how == "exit":
+    go_on(Recording(place, controller))
+else:
+    with Recording(place, controller) as recording:
+        go_on(recording)
+"""
+
+
+def ended(place: Path, how: str, after: float, number: int | None) -> tuple[float, int, str]:
+    """Let a program record, end it by a signal; return the last stamp it told, its exit code and its errors."""
+    root = Path(__file__).parents[2]
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(place), how], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env=environment,
+    ) as process:  # fmt: skip
+        last = 0.0
+        for told in process.stdout:
+            last = float(told)
+            if number is not None and last >= after:
+                process.send_signal(number)
+                number = None
+        errors = process.stderr.read()
+    return last, process.returncode, errors
+
+
+def test_a_killed_process_loses_at_most_the_last_second(tmp_path):
+    place = tmp_path / "a.mcap"
+    last, code, _ = ended(place, "with", 2.5, signal.SIGKILL)
+    assert code == -signal.SIGKILL
+    recorded = open_recording(place)
+    assert not recorded.complete
+    assert "the end is missing" in recorded.said
+    assert recorded.stamps()[-1] >= last - 1.0
+    assert verify(recorded).agrees
+    out = recover(place).place
+    with out.open("rb") as file:
+        assert list(make_reader(file, validate_crcs=True).iter_messages())
+    assert verify(open_recording(out)).agrees
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, None)])
+def test_ctrl_c_and_sigterm_leave_a_whole_file(tmp_path, number, code):
+    last, returned, errors = ended(tmp_path / "a.mcap", "with", 0.5, number)
+    assert returned == code or "KeyboardInterrupt" in errors
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert recorded.complete
+    assert recorded.stamps()[-1] >= last
+
+
+def test_a_program_that_ends_without_closing_leaves_a_whole_file(tmp_path):
+    last, code, errors = ended(tmp_path / "a.mcap", "exit", 0.0, None)
+    assert (code, errors) == (0, "")
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert recorded.complete
+    assert recorded.stamps()[-1] == last

@@ -1,0 +1,124 @@
+"""The seconds before a latched HOLD, kept without a recording of the whole run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.recording.last_seconds import LastSeconds
+from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
+from pretouch.recording.writer import Recording
+from pretouch.types import Mode
+from tests.fuzz.invariants import same
+from tests.recording.runs import SHORT, Run, controller_of
+
+
+@pytest.fixture(scope="module")
+def controller(panda_model, paper_skin):
+    return controller_of(panda_model, paper_skin)
+
+
+def broken(inputs):
+    return replace(inputs, robot=replace(inputs.robot, q=np.full(7, np.nan)), resume=False)
+
+
+def going_on(inputs):
+    return replace(inputs, resume=False)
+
+
+def resumed(inputs):
+    return replace(inputs, resume=True)
+
+
+def test_a_latched_hold_leaves_its_last_seconds(controller, tmp_path):
+    run, kept = Run(controller), LastSeconds(controller, tmp_path / "holds", seconds=2.0)
+    for i in range(320):
+        kept.record(run.turn(broken if i == 300 else going_on))
+    kept.close()
+    assert kept.written == [tmp_path / "holds" / "hold-1.mcap"]
+    assert kept.trouble == ""
+    recorded = open_recording(kept.written[0])
+    assert recorded.complete
+    last = recorded[len(recorded) - 1]
+    assert same(last.step, run.cycles[300].step)
+    assert last.step.mode is Mode.HOLD
+    assert recorded.stamps()[-1] - recorded.stamps()[0] == pytest.approx(2.0)
+    verdict = verify(recorded)
+    assert verdict.agrees, verdict.said
+    assert verdict.checked == len(recorded) == 201
+
+
+def test_a_hold_that_clears_by_itself_leaves_nothing(controller, tmp_path):
+    run, kept = Run(controller), LastSeconds(controller, tmp_path)
+    for i in range(60):
+        stamp = -1.0 if 20 <= i < 60 else None
+        silent = lambda inputs, stamp=stamp: inputs if stamp is None else replace(  # noqa: E731
+            inputs, readings=replace(inputs.readings, stamp=np.full(7, stamp)))  # fmt: skip
+        kept.record(run.turn(silent))
+    kept.close()
+    assert run.cycles[-1].step.mode is Mode.HOLD
+    assert kept.written == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_ends_with_the_very_step_that_latches_is_kept(controller, tmp_path):
+    run = Run(controller)
+    with LastSeconds(controller, tmp_path) as kept:
+        for i in range(30):
+            kept.record(run.turn(broken if i == 29 else going_on))
+    assert len(open_recording(tmp_path / "hold-1.mcap")) == 30
+
+
+def test_each_hold_has_a_file_but_no_more_than_a_few(controller, tmp_path):
+    (tmp_path / "hold-1.mcap").write_text("dear")
+    run, kept = Run(controller), LastSeconds(controller, tmp_path, most=2)
+    for i in range(100):
+        kept.record(run.turn(broken if i % 20 == 10 else resumed))
+        for thread in kept._writing:
+            thread.join()
+    kept.close()
+    assert [place.name for place in kept.written] == ["hold-2.mcap", "hold-3.mcap"]
+    assert (tmp_path / "hold-1.mcap").read_text() == "dear"
+
+
+def test_what_is_recorded_is_handed_on(controller, tmp_path):
+    run = Run(controller)
+    other = controller_of(controller.model, controller.skin, replace(SHORT, name="other"))
+    with Recording(tmp_path / "all.mcap", controller) as recording:
+        kept = LastSeconds(controller, tmp_path, recording)
+        for i in range(40):
+            if i == 20:
+                kept.change(other)
+                run.state, run.controller = other.adopt(run.state, controller), other
+            kept.record(run.turn(broken if i == 30 else going_on))
+        kept.close()
+    assert len(open_recording(tmp_path / "all.mcap")) == 40
+    held = open_recording(tmp_path / "hold-1.mcap")
+    assert [each.profile.name for each in held.runs] == ["other"]
+    assert len(held) == 11
+    assert verify(held).agrees
+
+
+def test_inputs_that_fit_no_message_and_arrays_used_again_are_no_trouble(controller, tmp_path):
+    run, kept = Run(controller), LastSeconds(controller, tmp_path)
+    for i in range(40):
+        cycle = run.turn(lambda inputs, i=i: replace(inputs, robot=None) if i == 20 else going_on(inputs))
+        kept.record(cycle)
+        if i != 20:
+            cycle.inputs.robot.q[:] = 9.0
+    kept.close()
+    held = open_recording(tmp_path / "hold-1.mcap")
+    assert held[20].inputs is None
+    assert "robot=None" in held.unreadable(20)
+    assert verify(held).agrees
+
+
+def test_a_folder_that_cannot_be_made_is_one_sentence_and_raises_nothing(controller, tmp_path):
+    (tmp_path / "file").touch()
+    run, kept = Run(controller), LastSeconds(controller, tmp_path / "file" / "folder")
+    for i in range(12):
+        kept.record(run.turn(broken if i == 10 else going_on))
+    kept.close()
+    assert kept.written == []
+    assert "were not kept" in kept.trouble

@@ -1,0 +1,253 @@
+"""Recordings recomputed: bit for bit here, within a tolerance elsewhere, and the first difference found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.contact.window import window_init
+from pretouch.control.path import line
+from pretouch.controller import Cycle
+from pretouch.loop import turn
+from pretouch.params import PROFILES
+from pretouch.recording import verify as verifying
+from pretouch.recording.codec import STEP, decode_step, encode_step
+from pretouch.recording.difference import differing
+from pretouch.recording.messages import decoded, encoded
+from pretouch.recording.reader import open_recording
+from pretouch.recording.state_codec import STATE
+from pretouch.recording.verify import verify
+from pretouch.recording.writer import Recording
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.posture import brought_to
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import Box, SceneSpec, fixtures
+from pretouch.types import Mode
+from tests.fuzz.machine import Course, Machine
+from tests.fuzz.worlds import any_world
+from tests.recording.runs import SHORT, Run, controller_of, custom_arm, recorded_run
+from tests.recording.test_writer import Spiral
+
+
+@pytest.fixture(scope="module")
+def controller(panda_model, paper_skin):
+    return controller_of(panda_model, paper_skin)
+
+
+@pytest.fixture
+def made(controller, tmp_path):
+    recorded_run(tmp_path / "a.mcap", controller, 400)
+    return open_recording(tmp_path / "a.mcap")
+
+
+def test_a_run_is_recomputed_bit_for_bit(made):
+    done = []
+    verdict = verify(made, done.append)
+    assert verdict.agrees
+    assert verdict.exact
+    assert (verdict.steps, verdict.checked, verdict.skipped, verdict.differing) == (400, 400, {}, 0)
+    assert verdict.said == "All 400 steps were recomputed and are the same bit for bit."
+    assert done == list(range(1, 401))
+
+
+def test_a_simulated_contact_with_a_board_is_recomputed_bit_for_bit(panda_model, paper_skin, tmp_path):
+    path = line((0.4, -0.1, 0.5), (0.4, 0.5, 0.5))
+    scene = SceneSpec(boxes=(Box("board", (0.5, 0.27, 0.55), (0.15, 0.02, 0.12), 25_000.0),))
+    profile = replace(PROFILES["paper"], restriction=replace(SHORT.restriction, mode="off"))
+    own = controller_of(panda_model, paper_skin, profile, path)
+    own.fixtures = fixtures(scene)
+    plant = Plant(panda_model, scene, PlantParams(), brought_to(panda_model, path.point(0.0)), 1)
+    units = RangeFinders(plant, paper_skin, RangeFinderParams(), 1)
+    plant.advance(0.2)
+    state = own.init(plant.read())
+    with Recording(tmp_path / "a.mcap", own) as recording:
+        for _ in range(600):
+            plant.advance(0.01)
+            cycle, state = turn(own, state, plant, units, plant.time)
+            recording.record(cycle)
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert plant.touches
+    assert any(kept.step.mode is Mode.REACT for kept in recorded)
+    verdict = verify(recorded)
+    assert verdict.agrees, verdict.said
+    assert verdict.checked == 600
+
+
+class RecordedCourse(Course):
+    """A fuzzed course that is recorded instead of checked."""
+
+    recording: Recording
+
+    def step(self, inputs, deep):
+        before = self.state
+        step, self.state = self.controller.step(before, inputs)
+        self.recording.record(Cycle(inputs, before, step))
+        self._follow(step.command)
+        return step
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_comes_in_is_recomputed_bit_for_bit(seed, tmp_path):
+    machine = Machine(seed)
+    course = RecordedCourse(machine, any_world(machine.rng, machine.models[seed % 2]))
+    with Recording(tmp_path / "a.mcap", course.controller) as course.recording:
+        course.run(250)
+    recorded = open_recording(tmp_path / "a.mcap")
+    verdict = verify(recorded)
+    assert verdict.agrees, verdict.said
+    assert verdict.checked == len(recorded) == 250
+
+
+def test_inputs_that_could_not_be_kept_are_skipped_and_the_rest_is_recomputed(controller, tmp_path):
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for i in range(60):
+            recording.record(run.turn(lambda inputs, i=i: replace(inputs, robot=None) if i in (20, 21, 40) else inputs))
+    verdict = verify(open_recording(tmp_path / "a.mcap"))
+    assert verdict.agrees, verdict.said
+    assert verdict.checked == 57
+    assert verdict.skipped == {"inputs that could not be kept": 3}
+    assert "3 steps have inputs that could not be kept" in verdict.said
+
+
+def test_a_change_of_profile_and_path_is_followed(controller, tmp_path):
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for i in range(90):
+            if i in (30, 60):
+                changed = replace(SHORT, name=f"p{i}", threshold=replace(SHORT.threshold, window_samples=i))
+                path = line((0.4, 0.0, 0.5), (0.4, i / 100, 0.4))
+                other = controller_of(controller.model, controller.skin, changed, path)
+                run.state, run.controller = other.adopt(run.state, run.controller), other
+                recording.change(other)
+            recording.record(run.turn())
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert len(recorded.runs) == 3
+    verdict = verify(recorded)
+    assert verdict.agrees, verdict.said
+    assert verdict.checked == 90
+
+
+def test_a_path_of_another_class_is_recomputed_bit_for_bit(controller, tmp_path):
+    model = controller.model
+    path = Spiral(model.kinematics(model.description.q_ready).position[model.ee])
+    recorded_run(tmp_path / "a.mcap", controller_of(model, controller.skin, path=path), 150)
+    verdict = verify(open_recording(tmp_path / "a.mcap"))
+    assert verdict.agrees, verdict.said
+
+
+def test_an_arm_of_ones_own_is_recomputed_bit_for_bit(tmp_path):
+    model = RobotModel(custom_arm(tmp_path))
+    recorded_run(tmp_path / "a.mcap", controller_of(model, Skin([], model)), 60)
+    (tmp_path / "two.xml").unlink()
+    verdict = verify(open_recording(tmp_path / "a.mcap"))
+    assert verdict.agrees, verdict.said
+
+
+def step_changed(recorded, number, change):
+    steps = recorded._raw["/pretouch/step"]
+    _, step, _ = decode_step(steps[number])
+    steps[number] = encode_step(number, change(step))
+
+
+def test_a_bit_that_was_flipped_is_the_first_difference(made):
+    def flip(step):
+        qd = step.qp.qd.copy()
+        qd[3] = np.nextafter(qd[3], 1.0)
+        return replace(step, qp=replace(step.qp, qd=qd))
+
+    step_changed(made, 123, flip)
+    step_changed(made, 200, lambda step: replace(step, ee_position=step.ee_position + np.array([0.0, 0.25, 0.0])))
+    verdict = verify(made)
+    assert not verdict.agrees
+    assert verdict.differing == 2
+    assert (verdict.first.number, verdict.first.field) == (123, "qp.qd[3]")
+    assert verdict.first.stamp == made[123].step.stamp
+    assert np.nextafter(verdict.first.recomputed, 1.0) == verdict.first.recorded
+    assert (verdict.largest, verdict.largest_field) == (pytest.approx(0.25), "ee_position[1]")
+    assert "step 123 at 1.2" in verdict.said
+    assert "qp.qd[3] was" in verdict.said
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "recorded"),
+    [
+        (lambda s: replace(s, mode=Mode.REACT), "mode", "react"),
+        (lambda s: replace(s, reason="Because."), "reason", "Because."),
+        (lambda s: replace(s, path_phase=-s.path_phase), "path_phase", -0.0),
+        (lambda s: replace(s, range_distance=s.range_distance[:2]), "range_distance", "shape (2,)"),
+        (lambda s: replace(s, armed=not s.armed), "armed", False),
+    ],
+)
+def test_a_difference_of_any_kind_is_named(made, change, field, recorded):
+    step_changed(made, 2 if field == "path_phase" else 60, change)
+    first = verify(made).first
+    assert (first.field, first.recorded) == (field, recorded)
+
+
+def test_a_snapshot_that_does_not_follow_is_found(made):
+    raw = made._raw["/pretouch/state"]
+    number = sorted(raw)[1]
+    message = decoded(STATE, raw[number])
+    message.numbers[0] += 1e-9
+    raw[number] = encoded(STATE, message)
+    verdict = verify(made)
+    assert verdict.first.number == number
+    assert verdict.first.field == "state before.watch.stamp"
+
+
+def test_steps_that_are_missing_are_passed_to_the_next_snapshot(made):
+    for number in range(50, 60):
+        for topic in ("/pretouch/step", "/pretouch/inputs"):
+            del made._raw[topic][number]
+    made._numbers = sorted(made._raw["/pretouch/step"])
+    verdict = verify(made)
+    second = sorted(made._raw["/pretouch/state"])[1]
+    assert verdict.agrees
+    assert verdict.skipped == {"no snapshot before": second - 60}
+    assert verdict.checked == 390 - (second - 60)
+
+
+def elsewhere(monkeypatch):
+    monkeypatch.setattr(verifying, "versions", lambda: {"numpy": "9", "machine": "another"})
+
+
+def test_other_versions_are_held_against_a_tolerance_and_named(made, monkeypatch):
+    step_changed(made, 5, lambda s: replace(s, reason="Other words.", path_phase=s.path_phase + 9e-7))
+    elsewhere(monkeypatch)
+    verdict = verify(made)
+    assert verdict.agrees, verdict.said
+    assert not verdict.exact
+    assert "within 1e-06" in verdict.said
+    assert "here 9" in verdict.said
+    step_changed(made, 5, lambda s: replace(s, path_phase=s.path_phase + 2e-6))
+    verdict = verify(made)
+    assert (verdict.first.number, verdict.first.field) == (5, "path_phase")
+
+
+def test_within_a_tolerance_each_snapshot_is_a_new_start(made, monkeypatch):
+    raw = made._raw["/pretouch/state"]
+    second = sorted(raw)[1]
+    message = decoded(STATE, raw[second])
+    message.numbers[0] += 1e-9
+    raw[second] = encoded(STATE, message)
+    elsewhere(monkeypatch)
+    assert verify(made).agrees
+
+
+def test_differences_of_numbers_that_are_none():
+    a = np.array([np.nan, np.inf, -0.0, 1.0, np.nan, 1e9])
+    b = np.array([np.nan, -np.inf, 0.0, 1.0, 2.0, 1e9 + 1])
+    exact = [(part.field, part.size) for part in differing(a, b, True, "x")]
+    assert exact == [("x[1]", np.inf), ("x[2]", 0.0), ("x[4]", np.inf), ("x[5]", 1.0)]
+    assert [part.field for part in differing(a, b, False, "x")] == ["x[1]", "x[4]"]
+    assert list(differing(window_init(3), window_init(3), True)) == []
+    assert [part.field for part in differing((1, 2.0), (1, 2.0, 3), True, "t")] == ["t"]
+    assert [part.field for part in differing(None, np.zeros(3), False, "contact")] == ["contact"]
+
+
+def test_the_type_of_a_step_is_that_of_its_message(made):
+    assert decoded(STEP, made.step_data(3)).sequence == made.number(3) == 3

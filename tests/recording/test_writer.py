@@ -1,0 +1,403 @@
+"""Runs that are recorded: what stands in the file, for us and for everybody else's readers."""
+
+import signal
+import struct
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+
+from pretouch.control.path import Circle, WayPoints, line
+from pretouch.errors import RecordingError
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.recording.messages import TOPICS, typestore
+from pretouch.recording.reader import open_recording
+from pretouch.recording.truth import Truth
+from pretouch.recording.writer import Recording
+from pretouch.robot.body import Capsules
+from pretouch.robot.description import fr3
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin, paper_skin
+from pretouch.sensing.unit import SensorUnit
+from tests.fuzz.invariants import same
+from tests.recording.runs import SHORT, Run, controller_of, custom_arm, recorded_run
+
+
+@pytest.fixture(scope="module")
+def controller(panda_model, paper_skin):
+    return controller_of(panda_model, paper_skin)
+
+
+@pytest.fixture(scope="module")
+def made(controller, tmp_path_factory) -> tuple[Path, Run]:
+    place = tmp_path_factory.mktemp("made") / "run.mcap"
+    return place, recorded_run(place, controller, 700)
+
+
+def test_all_cycles_come_back_to_the_bit(made):
+    place, run = made
+    recorded = open_recording(place)
+    assert recorded.complete
+    assert recorded.said == ""
+    assert len(recorded) == len(run.cycles)
+    for kept, cycle in zip(recorded, run.cycles, strict=True):
+        assert same(kept.step, cycle.step)
+        assert same(kept.inputs, cycle.inputs)
+        assert kept.snapshot is None or same(kept.snapshot, cycle.before)
+    assert np.array_equal(recorded.stamps(), [cycle.step.stamp for cycle in run.cycles])
+
+
+def test_snapshots_come_with_the_first_cycle_and_every_three_seconds(made):
+    recorded = open_recording(made[0])
+    times = [kept.step.stamp for kept in recorded if kept.snapshot is not None]
+    assert times == pytest.approx([0.0, 3.0, 6.0], abs=0.025)
+    assert [kept.anew for kept in recorded if kept.snapshot is not None] == [True, False, False]
+
+
+def test_the_official_reader_opens_it_with_all_checksums(made):
+    place, run = made
+    with place.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert reader.get_header().profile == "ros2"
+        counts, times = Counter[str](), []
+        for schema, channel, message in reader.iter_messages():
+            typestore().deserialize_cdr(message.data, schema.name)
+            counts[channel.topic] += 1
+            times.append(message.log_time)
+        summary = reader.get_summary()
+    assert times == sorted(times)
+    assert counts["/pretouch/step"] == counts["/pretouch/inputs"] == counts["/joint_states"] == len(run.cycles)
+    assert counts["/wrench"] == len(run.cycles)
+    assert counts["/pretouch/run"] == counts["/tf_static"] == counts["/markers/scene"] == 1
+    assert counts["/skin/hand_left/range"] == len(run.cycles) // 2
+    assert 0 < counts["/tf"] == counts["/markers"] <= 30 * 7
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == counts.total()
+
+
+def test_rosbags_opens_it_and_reads_our_messages_by_their_embedded_definition(made):
+    place, run = made
+    with AnyReader([place]) as reader:
+        connections = [c for c in reader.connections if c.topic == "/pretouch/step"]
+        for cycle, (connection, time, data) in zip(run.cycles, reader.messages(connections), strict=True):
+            message = reader.deserialize(data, connection.msgtype)
+            assert time == round(cycle.step.stamp * 1e9)
+            assert message.reason == cycle.step.reason
+            assert message.thresholds.upper.tobytes() == cycle.step.thresholds.upper.tobytes()
+            assert message.range_distance.tobytes() == cycle.step.range_distance.tobytes()
+        for connection, _, data in reader.messages():
+            reader.deserialize(data, connection.msgtype)
+
+
+def spoiled(inputs):
+    """The same inputs with numbers that are none in them."""
+    robot = replace(inputs.robot, wrench=np.array([np.nan, np.inf, -np.inf, -0.0, 5e-324, 1e308]))
+    readings = replace(inputs.readings, distance=np.array([np.nan, np.inf, -np.inf, 1e308, -0.0, 0.3, 4.0]))
+    return replace(inputs, robot=robot, readings=readings)
+
+
+def test_nan_and_infinity_come_back_through_every_reader(controller, tmp_path):
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        recording.record(run.turn(spoiled))
+    given = run.cycles[0].inputs
+    with (tmp_path / "a.mcap").open("rb") as file:
+        (ours,) = (m.data for _, c, m in make_reader(file).iter_messages() if c.topic == "/pretouch/inputs")
+    with AnyReader([tmp_path / "a.mcap"]) as reader:
+        (theirs,) = (reader.deserialize(d, c.msgtype) for c, _, d in reader.messages() if c.topic == "/pretouch/inputs")
+        ranges = [reader.deserialize(d, c.msgtype) for c, _, d in reader.messages() if c.topic.endswith("/range")]
+    for found in (typestore().deserialize_cdr(ours, TOPICS["/pretouch/inputs"]), theirs):
+        assert found.robot.wrench.tobytes() == given.robot.wrench.tobytes()
+        assert found.readings.distance.tobytes() == given.readings.distance.tobytes()
+    assert len(ranges) == 7
+    assert sum(np.isnan(r.range) for r in ranges) == 1
+
+
+def test_arrays_that_a_port_uses_again_are_kept_as_they_were(controller, tmp_path):
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        cycle = run.turn()
+        wanted = cycle.inputs.robot.q.copy(), cycle.inputs.readings.distance.copy()
+        recording.record(cycle)
+        cycle.inputs.robot.q[:] = cycle.inputs.readings.distance[:] = 9.0
+    kept = open_recording(tmp_path / "a.mcap")[0]
+    assert np.array_equal(kept.inputs.robot.q, wanted[0])
+    assert np.array_equal(kept.inputs.readings.distance, wanted[1])
+
+
+def test_truth_is_kept_with_its_step(controller, tmp_path):
+    run = Run(controller)
+    truth = Truth(np.arange(10.0), np.ones((10, 3)), np.array([1.0, 2.0, 3.0]), ((0.5, 4, np.zeros(3)),))
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        recording.record(run.turn())
+        recording.record(run.turn(), truth)
+    first, second = open_recording(tmp_path / "a.mcap")
+    assert first.truth is None
+    assert same(second.truth, truth)
+
+
+def test_the_time_in_the_file_is_clamped_where_ros_has_none(controller, tmp_path):
+    run = Run(controller)
+    stamps = [-5.0, 1.0, 1e11, float("nan"), -1e11, 2.0]
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for stamp in stamps:
+            recording.record(run.turn(lambda inputs, stamp=stamp: replace(inputs, stamp=stamp)))
+    with AnyReader([tmp_path / "a.mcap"]) as reader:
+        assert all(0 <= time < 2**63 for _, time, _ in reader.messages())
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert [kept.step.stamp for kept in recorded] == [cycle.step.stamp for cycle in run.cycles]
+    assert all(same(kept.inputs, cycle.inputs) for kept, cycle in zip(recorded, run.cycles, strict=True))
+
+
+def test_a_snapshot_follows_time_that_went_back(controller, tmp_path):
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for i in range(10):
+            recording.record(run.turn(lambda inputs, i=i: replace(inputs, stamp=inputs.stamp - 0.02 * (i == 5))))
+    assert [i for i, kept in enumerate(open_recording(tmp_path / "a.mcap")) if kept.snapshot] == [0, 5]
+
+
+def test_a_snapshot_follows_inputs_that_fit_no_message(controller, tmp_path):
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for i in range(10):
+            recording.record(run.turn(lambda inputs, i=i: replace(inputs, robot=None) if i == 4 else inputs))
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert [i for i, kept in enumerate(recorded) if kept.snapshot] == [0, 5]
+    assert [i for i, kept in enumerate(recorded) if kept.inputs is None] == [4]
+    assert "robot=None" in recorded.unreadable(4)
+    assert recorded.unreadable(5) == ""
+
+
+def test_a_state_that_was_begun_anew_is_noticed(controller, tmp_path):
+    run, other = Run(controller), Run(controller, seed=5, time=1.0)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for each in (run, run, other, other):
+            recording.record(each.turn())
+    assert [i for i, kept in enumerate(open_recording(tmp_path / "a.mcap")) if kept.anew] == [0, 2]
+
+
+def test_another_profile_begins_another_run(controller, tmp_path):
+    run = Run(controller)
+    path = line((0.4, 0.0, 0.5), (0.5, 0.0, 0.5))
+    other = controller_of(controller.model, controller.skin, replace(SHORT, name="other"), path)
+    with Recording(tmp_path / "a.mcap", controller, {"command": "test"}) as recording:
+        recording.record(run.turn())
+        recording.change(other)
+        run.state, run.controller = other.adopt(run.state, controller), other
+        recording.record(run.turn())
+        recording.record(run.turn())
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert [kept.run for kept in recorded] == [0, 1, 1]
+    assert [each.profile.name for each in recorded.runs] == [SHORT.name, "other"]
+    assert [each.sequence for each in recorded.runs] == [0, 1]
+    assert recorded.runs[0].about == {"command": "test"}
+
+
+class Spiral:
+    """A path of a class that no recording knows."""
+
+    length, closed = 1.0, False
+
+    def __init__(self, start):
+        self.start = start
+
+    def point(self, phase):
+        return self.start + np.array([0.0, 0.5 * phase * np.cos(phase), 0.1 * phase])
+
+    def tangent(self, phase):
+        return np.array([0.0, np.cos(phase), np.sin(phase)])
+
+
+PATHS = [Circle((0.4, 0.1, 0.3), 0.17, 0.3), WayPoints(np.random.default_rng(0).normal(size=(5, 3)), closed=True),
+         line((0.1, 0.2, 0.3), (0.7, 0.1, 0.2))]  # fmt: skip
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_paths_of_ours_are_made_again_to_the_bit(controller, tmp_path, path):
+    own = controller_of(controller.model, controller.skin, path=path)
+    recorded_run(tmp_path / "a.mcap", own, 2)
+    made = open_recording(tmp_path / "a.mcap").runs[0].path
+    assert type(made) is type(path)
+    assert (made.length, made.closed) == (path.length, path.closed)
+    for phase in np.linspace(-0.5, 3.0, 50).tolist():
+        assert same(made.point(phase), path.point(phase))
+        assert same(made.tangent(phase), path.tangent(phase))
+
+
+def test_a_path_of_another_class_is_known_where_it_led(controller, tmp_path):
+    model = controller.model
+    path = Spiral(model.kinematics(model.description.q_ready).position[model.ee])
+    run = recorded_run(tmp_path / "a.mcap", controller_of(controller.model, controller.skin, path=path), 40)
+    made = open_recording(tmp_path / "a.mcap").runs[0].path
+    assert (made.length, made.closed) == (1.0, False)
+    phases = [cycle.step.path_phase for cycle in run.cycles]
+    assert len(set(phases)) > 10
+    for phase in phases:
+        assert same(made.point(phase), path.point(phase))
+        assert same(made.tangent(phase), path.tangent(phase))
+    for phase in (0.2, 0.55, 1.0):
+        assert np.allclose(made.point(phase), path.point(phase), atol=1e-3)
+        assert np.linalg.norm(made.tangent(phase)) == pytest.approx(1.0)
+
+
+def test_arm_skin_and_fixtures_are_made_again_to_the_bit(tmp_path):
+    model = RobotModel(custom_arm(tmp_path))
+    T = np.eye(4)
+    T[:3, 3] = 0.06, 1e-17, 1 / 3 * 0.1
+    skin = Skin([SensorUnit("unit 1/ä", "b", T)], model)
+    capsules = Capsules(np.zeros(1, np.int64), np.array([[0.1, 0.2, 1 / 3]]), np.ones((1, 3)), np.array([0.1]))
+    own = controller_of(model, skin)
+    own.fixtures = Fixtures(np.array([[0.0, 0.0, 1.0, -1 / 3]]), capsules)
+    recorded_run(tmp_path / "a.mcap", own, 2)
+    (tmp_path / "two.xml").unlink()
+    run = open_recording(tmp_path / "a.mcap").runs[0]
+    made = run.controller()
+    assert made.model.links == model.links
+    for name in ("q_ready", "qd_max", "qdd_max", "tau_max", "name", "source", "ee_body", "envelope"):
+        assert same(getattr(made.model.description, name), getattr(model.description, name))
+    assert made.skin.ids == skin.ids
+    assert same(made.skin.T_link_sensor, skin.T_link_sensor)
+    assert same(made.fixtures.planes, own.fixtures.planes)
+    assert same(made.fixtures.capsules.a, capsules.a)
+    assert same(made.fixtures.capsules.radius, capsules.radius)
+    assert made.profile == own.profile
+    recorded_run(tmp_path / "b.mcap", made, 2)  # whoever has it may record with it again
+
+
+def test_the_envelope_of_an_arm_is_made_again(tmp_path):
+    model = RobotModel(fr3())
+    recorded_run(tmp_path / "a.mcap", controller_of(model, paper_skin(model)), 1)
+    made = open_recording(tmp_path / "a.mcap").runs[0].model.description
+    assert same(made.envelope, model.description.envelope)
+    assert made.mjcf == model.description.mjcf
+
+
+def test_a_units_imu_is_kept_in_its_topic(controller, tmp_path):
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        recording.record(run.turn())
+        recording.imu("hand_left", 0.005, np.array([0.0, np.nan, 9.81]), np.array([1.0, 2.0, 3.0]))
+    with AnyReader([tmp_path / "a.mcap"]) as reader:
+        ((connection, _, data),) = (m for m in reader.messages() if m[0].topic == "/skin/hand_left/imu")
+        found = reader.deserialize(data, connection.msgtype)
+    assert (found.linear_acceleration.z, found.angular_velocity.y) == (9.81, 2.0)
+    assert found.header.frame_id == "hand_left"
+    assert found.header.stamp.nanosec == 5_000_000
+
+
+def test_boxes_of_the_scene_and_the_arm_are_drawn(controller, tmp_path):
+    about = {"scene": {"boxes": [{"name": "board", "center": [0.5, 0.3, 0.2], "half_size": (0.1, 0.02, 0.12)}]}}
+    run = Run(controller)
+    with Recording(tmp_path / "a.mcap", controller, about) as recording:
+        for _ in range(20):
+            recording.record(run.turn())
+    with AnyReader([tmp_path / "a.mcap"]) as reader:
+        read = [(c.topic, reader.deserialize(d, c.msgtype)) for c, _, d in reader.messages() if "/markers" in c.topic]
+        links = [reader.deserialize(d, c.msgtype) for c, _, d in reader.messages() if c.topic == "/tf"]
+    (standing,) = (m for topic, m in read if topic == "/markers/scene")
+    (box,) = (m for m in standing.markers if m.ns == "box")
+    assert (box.scale.x, box.pose.position.y) == (0.2, 0.3)
+    assert sum(m.ns == "arm" for m in standing.markers) == 3 * len(controller.model.capsules)
+    q = run.cycles[-1].step.q
+    first = links[0].transforms[-1]
+    hand = controller.model.kinematics(run.cycles[0].step.q).position[-1]
+    assert [first.transform.translation.x, first.transform.translation.z] == pytest.approx([hand[0], hand[2]])
+    assert first.child_frame_id == controller.model.links[-1]
+    assert len(links[0].transforms) == len(controller.model.links) - 1
+    assert np.isfinite(q).all()
+
+
+@pytest.mark.parametrize("boxes", [[{"center": [0, 0, 0]}], [{"center": [0, 0], "half_size": [1, 1, 1]}], 3, ["box"]])
+def test_boxes_that_cannot_be_drawn_are_refused(controller, tmp_path, boxes):
+    with pytest.raises(RecordingError, match="half_size"):
+        Recording(tmp_path / "a.mcap", controller, {"scene": {"boxes": boxes}})
+    assert not (tmp_path / "a.mcap").exists()
+
+
+def test_facts_that_json_cannot_hold_are_refused(controller, tmp_path):
+    with pytest.raises(RecordingError, match="JSON"):
+        Recording(tmp_path / "a.mcap", controller, {"what": {1, 2}})
+    assert not (tmp_path / "a.mcap").exists()
+
+
+def test_what_is_there_is_never_written_over(controller, tmp_path):
+    (tmp_path / "a.mcap").write_text("dear")
+    with pytest.raises(RecordingError, match="another name"):
+        Recording(tmp_path / "a.mcap", controller)
+    assert (tmp_path / "a.mcap").read_text() == "dear"
+    with pytest.raises(RecordingError, match="another name"):
+        Recording(tmp_path, controller)
+
+
+def test_a_folder_that_is_not_there_is_named(controller, tmp_path):
+    with pytest.raises(RecordingError, match=r"folder .*nowhere.* is not there"):
+        Recording(tmp_path / "nowhere" / "a.mcap", controller)
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordingError, match="is not there"):
+        Recording(tmp_path / "file" / "a.mcap", controller)
+
+
+def test_a_place_that_cannot_be_written_is_named_with_the_reason(controller, tmp_path):
+    with pytest.raises(RecordingError, match=r"aaa\.mcap cannot be written: File name too long\."):
+        Recording(tmp_path / f"{'a' * 300}.mcap", controller)
+    with pytest.raises(RecordingError, match=r"/proc/a\.mcap cannot be written"):
+        Recording(Path("/proc/a.mcap"), controller)
+
+
+def test_closing_twice_says_the_same_and_later_cycles_are_left_out(controller, tmp_path):
+    run = Run(controller)
+    recording = Recording(tmp_path / "a.mcap", controller)
+    recording.record(run.turn())
+    recording.record(run.turn())
+    closed = recording.close()
+    recording.record(run.turn())
+    recording.imu("hand_left", 0.0, np.zeros(3), np.zeros(3))
+    assert recording.close() is closed
+    assert (closed.steps, closed.duration_s) == (2, 0.01)
+    assert closed.size_bytes == (tmp_path / "a.mcap").stat().st_size
+    assert "2 control steps" in closed.sentence
+    assert len(open_recording(tmp_path / "a.mcap")) == 2
+
+
+def test_an_exception_in_the_run_leaves_a_whole_file(controller, tmp_path):
+    run = Run(controller)
+
+    def fail(inputs):
+        raise ZeroDivisionError
+
+    def record():
+        with Recording(tmp_path / "a.mcap", controller) as recording:
+            recording.record(run.turn())
+            recording.record(run.turn(fail))
+
+    with pytest.raises(ZeroDivisionError):
+        record()
+    assert open_recording(tmp_path / "a.mcap").complete
+
+
+def test_a_recording_without_a_step_says_so(controller, tmp_path):
+    with Recording(tmp_path / "a.mcap", controller):
+        pass
+    with pytest.raises(RecordingError, match="no control step"):
+        open_recording(tmp_path / "a.mcap")
+    with (tmp_path / "a.mcap").open("rb") as file:
+        assert not list(make_reader(file).iter_messages())
+
+
+def test_signals_are_handled_as_before_once_it_is_closed(controller, tmp_path):
+    before = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGHUP)
+    with Recording(tmp_path / "a.mcap", controller), pytest.raises(SystemExit):
+        signal.raise_signal(signal.SIGTERM)
+    assert (signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGHUP)) == before
+
+
+def test_the_number_of_a_step_is_where_the_reader_looks_for_it(made):
+    with made[0].open("rb") as file:
+        data = [m.data for _, c, m in make_reader(file).iter_messages() if c.topic == "/pretouch/step"]
+    assert [struct.unpack_from("<Q", d, 4)[0] for d in data] == list(range(len(data)))
