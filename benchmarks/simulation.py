@@ -13,7 +13,6 @@ import time
 
 from pretouch.control.path import Circle
 from pretouch.controller import Controller, Cycle
-from pretouch.experiments.posture import brought_to
 from pretouch.loop import run
 from pretouch.params import profile
 from pretouch.robot.description import panda
@@ -21,6 +20,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, fixtures
 

@@ -1,7 +1,7 @@
-import json
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from shutil import copy, copytree
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ from PIL import Image
 
 from pretouch.cli import figure as cli_figure
 from pretouch.cli.figure import draw_figure
-from pretouch.errors import ExperimentError, ParameterError, PretouchError
-from pretouch.experiments.campaign import Request, open_folder, trace_file
+from pretouch.errors import ExperimentError, ParameterError, PretouchError, RecordingError
+from pretouch.experiments.campaign import Request, open_folder, recording_file
 from pretouch.experiments.cell import Cell
 from pretouch.experiments.claims import between
 from pretouch.experiments.figures import framework, marks
@@ -21,8 +21,9 @@ from pretouch.experiments.figures.close_up import close_up_figure
 from pretouch.experiments.figures.force_difference import force_difference_figure
 from pretouch.experiments.figures.interaction import interaction_figure
 from pretouch.experiments.registry import EXPERIMENTS
-from pretouch.experiments.trace import Trace, save_trace, sensed_points, trace_of
+from pretouch.experiments.trace import Trace, sensed_points, trace_of
 from pretouch.params import profile
+from pretouch.sensing.skin import Skin
 
 S, UNITS = 400, tuple("abcdefg")
 PAPER = profile("paper")
@@ -161,10 +162,16 @@ def test_the_framework_names_types_there_are_and_says_each():
 
 
 @pytest.fixture(scope="module")
-def step_and_trace(context):
-    cell = Cell(between.NAME, "paper", {"restrictions": "slack"})
-    _, record = between.trial(cell, 101, context)
-    return record, trace_of(record)
+def recorded(context, tmp_path_factory):
+    """A recorded trial, and its record."""
+    cell, place = Cell(between.NAME, "paper", {"restrictions": "slack"}), tmp_path_factory.mktemp("trial") / "x.mcap"
+    _, record = between.trial(cell, 101, replace(context, recording=place))
+    return place, record
+
+
+@pytest.fixture(scope="module")
+def step_and_trace(recorded):
+    return recorded[1], trace_of(recorded[1])
 
 
 def test_a_trace_keeps_what_each_unit_showed_and_the_limit_of_the_nearest(step_and_trace):
@@ -185,14 +192,14 @@ def test_a_trace_keeps_what_each_unit_showed_and_the_limit_of_the_nearest(step_a
 
 
 @pytest.fixture(scope="module")
-def run_folder(tmp_path_factory):
-    """A folder with two runs in it, as `pretouch demo` leaves it, of made traces."""
+def run_folder(recorded, tmp_path_factory):
+    """A folder with two runs in it, as `pretouch demo` leaves it, all of one trial."""
     out = tmp_path_factory.mktemp("demo")
     for part, names in (("static", ("force-difference",)), ("people", ("circle", "interaction", "close-up"))):
         request = Request(("static",), seeds=1)
         open_folder(request, out / part)
         for cell in (cell for name in names for cell in CATALOGUE[name].cells("paper")):
-            save_trace(made_trace(), trace_file(out / part, cell, 0))
+            copy(recorded[0], recording_file(out / part, cell, 0))
     return out
 
 
@@ -244,10 +251,10 @@ def test_a_figure_is_written_here_by_its_name(tmp_path, monkeypatch):
         ({"run": "/nowhere"}, r"The run /nowhere cannot be read \(No such file or directory\)"),
         (
             {"run": "EMPTY"},
-            "has no trace of avoidance_beside_slack_paper with seed 0 .*`pretouch reproduce avoidance --seeds 1",
+            "has no recording of avoidance_beside_slack_paper with seed 0 .*`pretouch reproduce avoidance --seeds 1",
         ),
         ({"run": "EMPTY", "profile": "blind"}, "avoidance_beside_off_blind .*--profiles blind`"),
-        ({"run": "RUN", "seed": 3}, "no trace of avoidance_beside_slack_paper with seed 3 .runs keep those of seed 0"),
+        ({"run": "RUN", "seed": 3}, "no recording of avoidance_beside_slack_paper with seed 3 .runs keep those of"),
         ({"name": "force-difference", "profile": "blind"}, "cannot show blind, which has no proximity"),
     ],
 )
@@ -266,19 +273,21 @@ def test_what_cannot_be_drawn_is_said_in_a_sentence(run_folder, tmp_path, monkey
 def test_a_damaged_run_is_named(tmp_path):
     (cell,) = CATALOGUE["close-up"].cells("paper")
     open_folder(Request(("static",), seeds=1), tmp_path)
-    file = trace_file(tmp_path, cell, 0)
-    file.write_bytes(b"no archive")
-    with pytest.raises(ExperimentError, match="is damaged"):
+    recording_file(tmp_path, cell, 0).write_bytes(b"no recording")
+    with pytest.raises(RecordingError, match="is no MCAP file"):
         draw_figure("close-up", tmp_path, tmp_path / "x.png")
-    narrow = replace(made_trace(), range_distance=np.ones((S, 2)), sensed_point=np.zeros((S, 2, 3)))
-    save_trace(narrow, file)
-    with pytest.raises(ExperimentError, match="of another skin"):
-        draw_figure("close-up", tmp_path, tmp_path / "x.png")
-    for content in ("[]", "{}", "?", json.dumps({"skin": 5})):
-        (tmp_path / "run.json").write_text(content)
-        with pytest.raises(ExperimentError, match=r"run\.json cannot be read"):
-            draw_figure("close-up", tmp_path, tmp_path / "x.png")
     assert not (tmp_path / "x.png").exists()
+
+
+@pytest.mark.usefixtures("nothing_played")
+def test_recordings_of_several_skins_make_no_figure(run_folder, context, tmp_path):
+    run = copytree(run_folder, tmp_path / "run")
+    other = next((run / "static" / "recordings").glob("static_circle_*blind*.mcap"))
+    other.unlink()
+    few = replace(context, skin=Skin(context.skin.units[:2], context.model), recording=other)
+    between.trial(Cell(between.NAME, "paper", {"restrictions": "slack"}), 101, few)
+    with pytest.raises(ExperimentError, match="are of several skins"):
+        draw_figure("force-difference", run, tmp_path / "x.png")
 
 
 def test_without_a_run_the_trials_are_played_and_told(step_and_trace, tmp_path, monkeypatch, capsys):

@@ -1,21 +1,22 @@
 import json
 from dataclasses import fields, replace
 from html.parser import HTMLParser
-from pathlib import Path
-from shutil import copy, copytree
+from shutil import copytree
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from pretouch.errors import ExperimentError
+from pretouch.errors import ExperimentError, RecordingError
 from pretouch.experiments import dynamic, static
-from pretouch.experiments.campaign import Request, open_folder, trace_file, trial_file, write_json
+from pretouch.experiments.campaign import Request, open_folder, recording_file, trial_file, write_json
 from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.registry import EXPERIMENTS, summarise
 from pretouch.experiments.report import write_report
 from pretouch.experiments.tables import TextTable
-from pretouch.experiments.trace import Trace, load_trace, save_trace, trace_of
+from pretouch.experiments.trace import Trace, read_trace, trace_of
+from pretouch.experiments.trial import record_of
+from pretouch.recording.reader import open_recording
 
 LINE = ("line", "-y")
 
@@ -39,8 +40,8 @@ def request_and_folder(context, tmp_path_factory):
     open_folder(request, out)
     cells = [c for c in static.cells(Grid(("blind", "paper"))) if (c.where["trajectory"], c.where["side"]) == LINE]
     for cell in [*cells, Cell(dynamic.NAME, "paper", {"restrictions": "slack"})]:
-        row, record = (static if cell.experiment == "static" else dynamic).trial(cell, 0, context)
-        save_trace(trace_of(record), trace_file(out, cell, 0))
+        recorded = replace(context, recording=recording_file(out, cell, 0))
+        row, _ = (static if cell.experiment == "static" else dynamic).trial(cell, 0, recorded)
         write_json(row, trial_file(out, cell, 0))
     return request, out
 
@@ -75,54 +76,45 @@ def test_a_page_that_cannot_be_written_is_named(tmp_path):
         write_report([(request, tmp_path / "none")], {}, tmp_path / "none")
 
 
-def test_a_damaged_trace_leaves_its_picture_out(request_and_folder, tmp_path):
+def test_a_recording_that_cannot_be_read_leaves_its_picture_out(request_and_folder, tmp_path):
     request, whole = request_and_folder
     out = copytree(whole, tmp_path / "out")
-    (file,) = (out / "traces").glob("dynamic*.npz")
-    file.write_bytes(file.read_bytes()[:-1000])
+    (file,) = (out / "recordings").glob("dynamic*.mcap")
+    file.write_bytes(file.read_bytes()[:100])
     rows = [json.loads(file.read_text()) for file in (out / "trials").iterdir()]
     links = Links()
     links.feed(write_report([(request, out)], summarise(rows), out).read_text())
     assert links.images == ["static.png", "framework.png"]
 
 
-def _arrays(path, **changes):
-    with np.load(path) as data:
-        arrays = {**data, **changes}
-    np.savez_compressed(path, **{name: value for name, value in arrays.items() if value is not None})
+@pytest.mark.parametrize("content", [b"", b"no recording", b"\x89MCAP0\r\n"])
+def test_what_is_no_recording_is_named(tmp_path, content):
+    path = tmp_path / "x.mcap"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"x\.mcap "):
+        read_trace(path)
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda path: path.write_bytes(b""),
-        lambda path: path.write_bytes(b"no archive"),
-        lambda path: path.write_bytes(path.read_bytes()[:5000] + b"?" * 100 + path.read_bytes()[5100:]),
-        lambda path: _arrays(path, force=None),
-        lambda path: _arrays(path, force=np.zeros((3, 3))),
-        lambda path: _arrays(path, force=np.array(0.0)),
-        lambda path: _arrays(path, sensed_point=None),
-        lambda path: _arrays(path, sensed_point=np.load(path)["sensed_point"][:, :2]),
-        lambda path: _arrays(path, sensed_point=np.load(path)["sensed_point"][:, :, :2]),
-    ],
-)
-def test_a_damaged_trace_is_named(request_and_folder, tmp_path, damage):
-    _, out = request_and_folder
-    path = Path(copy(next((out / "traces").glob("dynamic*.npz")), tmp_path))
-    load_trace(path)
-    damage(path)
-    with pytest.raises(ExperimentError, match=r"The trace .*\.npz is damaged \(.*\): remove it"):
-        load_trace(path)
-
-
-def test_a_trace_is_read_back(request_and_folder, tmp_path):
-    _, out = request_and_folder
-    trace = load_trace(next((out / "traces").glob("dynamic*.npz")))
-    save_trace(trace, tmp_path / "again.npz")
-    again = load_trace(tmp_path / "again.npz")
+def test_a_recorded_trial_has_the_course_of_the_trial_itself(context, tmp_path):
+    where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
+    cell, place = Cell(static.NAME, "paper", where), tmp_path / "x.mcap"
+    _, record = static.trial(cell, 101, replace(context, recording=place))
+    trace, again = trace_of(record), read_trace(place)
+    assert again[1] == context.skin.ids
     for field in fields(Trace):
-        np.testing.assert_array_equal(getattr(again, field.name), getattr(trace, field.name))
-    assert [p.name for p in tmp_path.iterdir()] == ["again.npz"]
+        np.testing.assert_array_equal(getattr(again[0], field.name), getattr(trace, field.name))
+    kept = record_of(open_recording(place))
+    assert [(t.time, t.link, t.velocity.tolist()) for t in kept.touches] == [
+        (t.time, t.link, t.velocity.tolist()) for t in record.touches
+    ]
+    np.testing.assert_array_equal(kept.hand_position, record.hand_position)
+
+
+def test_to_record_a_trial_changes_nothing_of_it(context, tmp_path):
+    where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
+    cell = Cell(static.NAME, "paper", where)
+    row, _ = static.trial(cell, 101, context)
+    assert static.trial(cell, 101, replace(context, recording=tmp_path / "x.mcap"))[0] == row
 
 
 def test_a_trace_has_the_mean_true_force_of_each_step(context):

@@ -261,6 +261,16 @@ def test_without_contact_the_true_force_is_zero_and_logged(panda_model):
     assert not np.any([force for _, force in plant.true_log])
 
 
+def test_a_log_that_is_taken_begins_anew(panda_model):
+    plant = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0)
+    plant.advance(0.003)
+    log, touches = plant.take_log()
+    plant.advance(0.002)
+    assert [time for time, _ in log] == pytest.approx([0.001, 0.002, 0.003])
+    assert [time for time, _ in plant.take_log()[0]] == pytest.approx([0.004, 0.005])
+    assert plant.true_log == plant.touches == touches == []
+
+
 def test_the_clock_lets_one_period_pass(panda_model):
     plant = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0)
     clock, called = PlantClock(plant, 0.01), []

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -52,6 +54,32 @@ def test_a_static_press_finds_the_stiffness_in_newton_per_metre(panda_model, sti
     assert plant.mj_data.ncon == 1
     assert 10.0 / -plant.mj_data.contact[0].dist == pytest.approx(stiffness, rel=0.02)
     assert plant.true_force == pytest.approx(10.0 * BELOW, abs=0.2)
+
+
+CAPSULES = [f"link{i}_{k}" for i, count in enumerate((3, 2, 2, 2, 2, 3, 2, 2)) for k in range(count)]
+"""Of the Panda's links; its hand has three more."""
+
+
+@pytest.mark.parametrize("capsule", [*CAPSULES, "hand_0", "hand_1", "hand_2", "floor", "block", "pedestal"])
+def test_a_hand_held_in_anything_feels_its_own_stiffness(panda_model, capsule):
+    block = Box("block", (1.0, 0.0, 0.5), (0.1, 0.1, 0.1), 40_000.0)
+    bare = build(panda_model, SceneSpec(boxes=(block,)), nominal(panda_model))
+    data = mujoco.MjData(bare)
+    data.qpos[:] = panda_model.description.q_ready
+    mujoco.mj_forward(bare, data)
+    geom, away = bare.geom(capsule).id, data.geom(capsule).xmat.reshape(3, 3)[:, 0]
+    out = {"floor": 0.0, "block": 0.1}.get(capsule, float(bare.geom_size[geom, 0]))
+    if capsule == "floor":
+        away = np.array([0.0, 0.0, 1.0])
+    start = data.geom(capsule).xpos + (out + HandSpec.radius - 1e-3) * away
+    built = build(panda_model, SceneSpec(boxes=(block,), hand=HandSpec(start=tuple(start))), nominal(panda_model))
+    held = mujoco.MjData(built)
+    held.qpos[: panda_model.n] = panda_model.description.q_ready
+    mujoco.mj_inverse(built, held)  # the forces that hold all still, contact forces included
+    held.qfrc_applied[:] = held.qfrc_inverse
+    mujoco.mj_forward(built, held)
+    (touching,) = [c for c in range(held.ncon) if names(built, held, c) == {"hand", capsule}]
+    assert normal_force(built, held, touching) == pytest.approx(75_000.0 * 1e-3, rel=0.02)
 
 
 @pytest.mark.parametrize("penetration", [1e-4, 1e-3, 3e-3])
@@ -120,12 +148,58 @@ def test_only_declared_pairs_touch(panda_model):
     inside = SceneSpec(boxes=(Box("block", (1.0, 0.0, 0.0), (0.2, 0.2, 0.4), 1e4),), hand=HandSpec(start=(1.0, 0, 0)))
     data = mujoco.MjData(built := build(panda_model, inside, nominal(panda_model)))
     mujoco.mj_forward(built, data)
-    assert data.ncon == 0, "hand, block and floor overlap, and neighbouring links do"
+    # block and floor overlap as well, and neighbouring links do
+    assert [names(built, data, c) for c in range(data.ncon)] == [{"block", "hand"}]
+    data.qpos[7:] = [0.0, -2.0, 0.0]
     data.qpos[:7] = [0.0, 1.6, 0.0, -0.07, 0.0, 1.6, 0.0]
     mujoco.mj_forward(built, data)
     pairs = [names(built, data, c) for c in range(data.ncon)]
     assert pairs
     assert all(len(pair & {"block", "floor", "hand"}) == 1 for pair in pairs)
+
+
+@pytest.mark.parametrize(
+    ("thing", "place"),
+    [
+        ("panda_link0", (-0.12, 0.0, 0.06)),
+        ("pedestal", (0.0, 0.12, -0.13)),
+        ("block", (1.0, 0.23, 0.5)),
+        ("floor", (2.0, 0.0, -0.16)),
+    ],
+)
+def test_a_hand_does_not_pass_through_what_stands_still(panda_model, thing, place):
+    block = Box("block", (1.0, 0.0, 0.5), (0.2, 0.2, 0.4), 1e4)
+    spec = SceneSpec(boxes=(block,), hand=HandSpec(start=place))
+    data = mujoco.MjData(built := build(panda_model, spec, nominal(panda_model)))
+    data.qpos[:7] = panda_model.description.q_ready
+    mujoco.mj_forward(built, data)
+    touching = set.union(*(names(built, data, c) for c in range(data.ncon)))
+    its_own = {g.name for g in map(built.geom, range(built.ngeom)) if built.body(g.bodyid[0]).name == thing}
+    assert touching - {"hand"}
+    assert touching <= {"hand"} | (its_own or {thing})
+
+
+def test_a_push_against_what_is_not_the_arm_is_no_force_on_it(panda_model):
+    block = Box("block", (1.0, 0.0, 0.5), (0.2, 0.2, 0.4), 1e4)
+    spec = SceneSpec(boxes=(block,), hand=HandSpec(start=(1.0, 0.249, 0.5)))
+    plant = Plant(panda_model, spec, PlantParams(), panda_model.description.q_ready, seed=0)
+    assert plant.touching
+    plant.advance(0.005)
+    assert not np.any(plant.true_force)
+    assert plant.touches == []
+
+
+@pytest.mark.parametrize("stiffness", [30_000.0, 75_000.0, 150_000.0])
+def test_a_thing_that_is_stiffened_is_as_one_built_so(panda_model, stiffness):
+    block = Box("block", (1.0, 0.0, 0.5), (0.2, 0.2, 0.4), stiffness)
+    asked = SceneSpec(boxes=(block,), hand=HandSpec(stiffness=2 * stiffness))
+    other = SceneSpec(boxes=(replace(block, stiffness=1e4),), hand=HandSpec(stiffness=2e4))
+    q = panda_model.description.q_ready
+    plant = Plant(panda_model, other, PlantParams(), q, seed=0)
+    plant.stiffen("block", stiffness)
+    plant.stiffen("hand", 2 * stiffness)
+    built = Plant(panda_model, asked, PlantParams(), q, seed=0).mj_model
+    np.testing.assert_array_equal(plant.mj_model.pair_solref, built.pair_solref)
 
 
 def test_the_arm_differs_from_its_model_as_asked(panda_model):

@@ -68,7 +68,7 @@ def _keep(parts: list[tuple[Request, Path]], json_file: Path) -> dict[str, Any]:
 def _check_apart(json_file: Path, out: Path) -> None:
     """Refuse a file for the results in the place of one that the run keeps for itself."""
     wanted = Path(os.path.realpath(json_file))
-    for name in ("run.json", "trials", "traces"):
+    for name in ("run.json", "trials", "recordings"):
         if wanted.is_relative_to(os.path.realpath(out / name)):
             raise ExperimentError(f"The file {json_file} would take the place of the run's own {name}: give another.")
 

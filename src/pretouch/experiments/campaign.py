@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from hashlib import sha256
 from multiprocessing import active_children, get_context, parent_process
@@ -19,11 +19,12 @@ from pretouch import __version__
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.registry import EXPERIMENTS
-from pretouch.experiments.trace import save_trace, trace_of
 from pretouch.params import Orientation, RestrictionMode, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
+
+RECORD = ("first", "all")
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,8 @@ class Request:
     """Contact stiffnesses of static objects [N/m]."""
     skin: str | None = None
     """Skin file, or None for the seven units of the paper's experiment."""
+    record: str = "first"
+    """Trials to record: `first`, those of the first seed of which figures are drawn, or `all`."""
 
     def __post_init__(self) -> None:
         for name in self.experiments:
@@ -57,6 +60,7 @@ class Request:
             _check_choice("restriction mode", mode, get_args(RestrictionMode))
         if self.orientation is not None:
             _check_choice("orientation", self.orientation, get_args(Orientation))
+        _check_choice("choice of trials to record", self.record, RECORD)
         for stiffness in self.stiffness:
             if not 100.0 <= stiffness <= 1e6:
                 raise ExperimentError(f"The stiffness is {stiffness:g} N/m: give one from 100 to 1000000 N/m.")
@@ -93,7 +97,7 @@ def open_folder(request: Request, out: Path) -> None:
     wanted = json.loads(json.dumps({"version": __version__, **asdict(request), "sha256": _fingerprints(request)}))
     about = out / "run.json"
     try:
-        for part in ("trials", "traces"):
+        for part in ("trials", "recordings"):
             (out / part).mkdir(parents=True, exist_ok=True)
         if about.exists():
             _check_same(_object(about), wanted, out)
@@ -249,9 +253,9 @@ def trial_file(out: Path, cell: Cell, seed: int) -> Path:
     return out / "trials" / f"{cell.name}_{seed:04d}.json"
 
 
-def trace_file(out: Path, cell: Cell, seed: int) -> Path:
-    """Return where a trial's course is kept, if it is."""
-    return out / "traces" / f"{cell.name}_{seed:04d}.npz"
+def recording_file(out: Path, cell: Cell, seed: int) -> Path:
+    """Return where a trial's recording is kept, if it is recorded."""
+    return out / "recordings" / f"{cell.name}_{seed:04d}.mcap"
 
 
 def finished(request: Request, out: Path) -> list[dict[str, Any]]:
@@ -289,8 +293,14 @@ def _context(request: Request) -> Context:
 
 
 def _work(request: Request, out: Path, cell: Cell, seed: int) -> None:
-    """Run one trial in a worker process and keep its results; the course of the first seed too, for figures."""
-    row, record = EXPERIMENTS[cell.experiment].trial(cell, seed, _context(request))
-    if seed == 0 and record is not None:
-        save_trace(trace_of(record), trace_file(out, cell, seed))
+    """Run one trial in a worker process and keep its results, and its recording if it is wanted."""
+    experiment, context = EXPERIMENTS[cell.experiment], _context(request)
+    place = recording_file(out, cell, seed)
+    unfinished = place.with_suffix(".unfinished")
+    if request.record == "all" or (seed == 0 and experiment.recorded):
+        unfinished.unlink(missing_ok=True)
+        context = replace(context, recording=unfinished)
+    row, _ = experiment.trial(cell, seed, context)
+    if unfinished.exists():  # some trials play nothing
+        os.replace(unfinished, place)
     write_json(row, trial_file(out, cell, seed))

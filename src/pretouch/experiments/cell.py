@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
+from pathlib import Path
 from typing import cast
 
 from pretouch.params import Orientation, Profile, RestrictionMode, profile
@@ -65,6 +66,8 @@ class Context:
     skin: Skin
     orientation: Orientation | None = None
     """Whether the hand's orientation is free or held, or None for the profile's own."""
+    recording: Path | None = None
+    """File to record the trial in, if it is to be recorded."""
 
     def profile(self, cell: Cell) -> Profile:
         """Return a cell's profile with the restriction mode of the cell, if it names one, as this run has it."""

@@ -32,7 +32,7 @@ class Sources:
     summary: Row
     """The experiment's own."""
     trace: Callable[[Cell], Trace | None]
-    """The course of a cell's trial with the first seed, if it was kept."""
+    """The course of a cell's trial with the first seed, if it was recorded."""
     units: tuple[str, ...]
     """Names of the skin's units."""
 
@@ -57,3 +57,5 @@ class Experiment:
     """Makes tables of the summary."""
     draw: Callable[[Sources], list[Picture]] = _nothing
     """Draws what the sources allow."""
+    recorded: bool = True
+    """Whether trials of the first seed are recorded unasked: not where they are long and nothing is drawn of them."""

@@ -6,13 +6,13 @@ from string import Template
 from typing import Any
 
 from pretouch import __version__
-from pretouch.errors import ExperimentError
-from pretouch.experiments.campaign import Request, trace_file
+from pretouch.errors import ExperimentError, PretouchError
+from pretouch.experiments.campaign import Request, recording_file
 from pretouch.experiments.cell import Cell
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.registry import GROUPS
 from pretouch.experiments.tables import TextTable
-from pretouch.experiments.trace import Trace, load_trace
+from pretouch.experiments.trace import Trace, read_trace
 
 _PAGE = Template(
     """<!doctype html>
@@ -102,7 +102,7 @@ def _picture(picture: Picture, folder: Path) -> str:
 
 
 def _pictures(parts: list[tuple[Request, Path]], experiment: Experiment, summary: Row, folder: Path) -> list[str]:
-    """Draw what an experiment's traces of the first seed and its summary allow; return it as HTML."""
+    """Draw what an experiment's recordings of the first seed and its summary allow; return it as HTML."""
     sources = Sources(summary, lambda cell: find_trace([out for _, out in parts], cell), parts[0][0].context().skin.ids)
     return [_picture(picture, folder) for picture in experiment.draw(sources)]
 
@@ -111,8 +111,8 @@ def find_trace(folders: list[Path], cell: Cell) -> Trace | None:
     """Read the course of a cell's trial with the first seed from one of some folders, if it is there and whole."""
     for folder in folders:
         try:
-            return load_trace(trace_file(folder, cell, 0))
-        except ExperimentError:
+            return read_trace(recording_file(folder, cell, 0))[0]
+        except PretouchError:
             continue
     return None
 

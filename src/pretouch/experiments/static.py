@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from pretouch.experiments.summary import static_summary
 from pretouch.experiments.tables import shown_controllers, static_tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
+from pretouch.sim.board import FACE_M, Side, board_beside
 from pretouch.sim.plant import Plant
-from pretouch.sim.scene import Box, SceneSpec
+from pretouch.sim.scene import SceneSpec
 from pretouch.types import ControlStep
 
 NAME = "static"
@@ -25,18 +26,10 @@ DEFAULT_RESTRICTIONS: RestrictionMode = "off"
 TRAJECTORIES = ("circle", "line")
 SIDES = ("-y", "+y")
 
-_FACE_M = 0.25
-"""Distance of the object's face from the plane y = 0 [m]."""
 _FACE_SPREAD_M = 0.05
-"""The seed moves the face by up to this [m]."""
+"""The seed moves the board's face by up to this [m]."""
 _CENTER_SPREAD_M = 0.02
-"""The seed moves the object along x and z by up to this [m]."""
-_HALF_SIZE_M = (0.15, 0.02, 0.12)
-"""Half the size of the object [m]."""
-_OUTWARDS_M = 0.12
-"""Its centre is this much farther from the base in x than the hand that meets it [m]."""
-_HAND_HALF_WIDTH_M, _HAND_ABOVE_TCP_M = 0.102, 0.057
-"""Where the side of the robot's hand is from the end-effector's origin, hand upright [m]."""
+"""The seed moves the board along x and z by up to this [m]."""
 _TIME_LIMIT_S = 40.0
 _AFTER_DETECTION_S = 1.0
 
@@ -64,24 +57,12 @@ def path(trajectory: str, side: str) -> Path:
 
 
 def scene(trajectory: str, side: str, stiffness: float, seed: int) -> SceneSpec:
-    """Return a board on one side, 0.3 m by 0.24 m, at another place with each seed.
-
-    It stands where the hand meets it, and does not reach inwards to where the forearm, which is wider than the hand,
-    would meet it first.
-    """
-    sign = 1.0 if side == "+y" else -1.0
+    """Return a board on one side, at another place with each seed."""
     rng = np.random.default_rng([seed, 10])
-    face = _FACE_M + _FACE_SPREAD_M * rng.uniform(-1, 1)
+    face = FACE_M + _FACE_SPREAD_M * rng.uniform(-1, 1)
     aside, above = _CENTER_SPREAD_M * rng.uniform(-1, 1, 2)
-    course = path(trajectory, side)
-    ahead = np.linspace(0.0, course.length, 2000)
-    meeting = next(p for p in map(course.point, ahead) if sign * p[1] >= face - _HAND_HALF_WIDTH_M)
-    center = (
-        meeting[0] + _OUTWARDS_M + aside,
-        sign * (face + _HALF_SIZE_M[1]),
-        meeting[2] + _HAND_ABOVE_TCP_M + above,
-    )
-    return SceneSpec(boxes=(Box("object", center, _HALF_SIZE_M, stiffness),))
+    board = board_beside(path(trajectory, side), cast(Side, side), stiffness, face, aside, above)
+    return SceneSpec(boxes=(board,))
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
@@ -94,6 +75,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
         path=path(trajectory, side),
         seed=seed,
+        recording=context.recording,
     )
     record = play(setup, _done())
     row = {

@@ -1,13 +1,13 @@
-"""The course of one trial as arrays, kept in a file: what figures are drawn from."""
+"""The course of one trial as arrays: what figures are drawn from."""
 
-import os
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pretouch.errors import ExperimentError
-from pretouch.experiments.trial import Record
+from pretouch.errors import RecordingError
+from pretouch.experiments.trial import Record, record_of
+from pretouch.recording.reader import open_recording
 from pretouch.types import BoolArray, ControlStep, FloatArray, Mode
 
 
@@ -96,23 +96,9 @@ def _nearest_limit(step: ControlStep) -> float:
     return float(step.approach_limit[np.argmin(step.obstacles.body_distance[step.restricted])])
 
 
-def save_trace(trace: Trace, path: Path) -> None:
-    """Write a trace, whole or not at all."""
-    temporary = path.with_suffix(".tmp.npz")
-    np.savez_compressed(temporary, **{f.name: getattr(trace, f.name) for f in fields(trace)})
-    os.replace(temporary, path)
-
-
-def load_trace(path: Path) -> Trace:
-    """Read a trace that `save_trace` wrote; a damaged one is an ExperimentError."""
-    try:
-        with path.open("rb") as file, np.load(file) as data:
-            trace = Trace(**{f.name: data[f.name] for f in fields(Trace)})
-        lengths = {len(getattr(trace, f.name)) for f in fields(Trace)}
-    except Exception as error:  # almost any, from a file that is no archive or has wrong bits in it
-        raise ExperimentError(f"The trace {path} is damaged ({error}): remove it.") from error
-    if len(lengths) != 1 or 0 in lengths:
-        raise ExperimentError(f"The trace {path} is damaged (its arrays differ in length): remove it.")
-    if trace.sensed_point.shape != (*trace.range_distance.shape, 3):
-        raise ExperimentError(f"The trace {path} is damaged (its units differ in number): remove it.")
-    return trace
+def read_trace(place: Path) -> tuple[Trace, tuple[str, ...]]:
+    """Read the course of a recorded trial, and the names of its units; RecordingError for what is no recording."""
+    recorded = open_recording(place)
+    if len(recorded) == 0:
+        raise RecordingError(f"The recording {place} holds no control step: remove it.")
+    return trace_of(record_of(recorded)), recorded.runs[0].skin.ids

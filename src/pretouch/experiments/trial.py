@@ -1,22 +1,28 @@
 """One trial: an arm in a scene under the controller, and everything it left behind."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 
 import numpy as np
 
 from pretouch.control.path import Path
 from pretouch.controller import Controller, Cycle
-from pretouch.experiments.posture import brought_to
+from pretouch.errors import RecordingError
 from pretouch.loop import run
 from pretouch.params import Profile
+from pretouch.recording.reader import Recorded
+from pretouch.recording.truth import Truth
+from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, HandScript
 from pretouch.sim.plant import Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
-from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.sim.scene import SceneSpec, described, fixtures
 from pretouch.types import ControlStep, FloatArray, Mode
 
 TOUCH_N = 1.0
@@ -38,6 +44,8 @@ class Setup:
     hand: HandScript | None = None
     plant: PlantParams = field(default_factory=PlantParams)
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    recording: FilePath | None = None
+    """File to record it in; none, and it is not recorded."""
     prepare: Callable[[Plant, RangeFinders], None] | None = None
     """What else is to happen: may have things done before each physics step, to the arm or to its units."""
 
@@ -79,17 +87,55 @@ class Record:
         return any(s.mode is Mode.HOLD for s in self.steps[start:])
 
 
-class _Recorder:
-    """Keeps each step, and where the hand was."""
+def record_of(recorded: Recorded) -> Record:
+    """What a recorded trial left behind."""
+    kept = list(recorded)
+    truths = [cycle.truth for cycle in kept if cycle.truth is not None]
+    return Record(
+        [cycle.step for cycle in kept],
+        np.concatenate([np.zeros(0), *(t.time for t in truths)]),
+        np.vstack([np.zeros((0, 3)), *(t.force for t in truths)]),
+        [Touch(*touch) for t in truths for touch in t.touches],
+        np.array([np.full(3, np.nan) if cycle.truth is None else cycle.truth.hand for cycle in kept]),
+    )
 
-    def __init__(self, hand: Hand | None) -> None:
-        self._hand = hand
+
+class _Recorder:
+    """Keeps each step, and where the hand was; all of it in a recording too, if there is one."""
+
+    def __init__(self, plant: Plant, hand: Hand | None, recording: Recording | None) -> None:
+        self._plant, self._hand, self._recording = plant, hand, recording
+        self._forces = self._touches = 0
         self.steps: list[ControlStep] = []
         self.hand_position: list[FloatArray] = []
 
     def record(self, cycle: Cycle) -> None:
         self.steps.append(cycle.step)
         self.hand_position.append(self._hand.position.copy() if self._hand else np.full(3, np.nan))
+        if self._recording:
+            self._recording.record(cycle, self._truth())
+
+    def _truth(self) -> Truth:
+        """What the physics did since the last cycle."""
+        plant, hand = self._plant, self.hand_position[-1]
+        forces, touches = plant.true_log[self._forces :], plant.touches[self._touches :]
+        self._forces, self._touches = len(plant.true_log), len(plant.touches)
+        return Truth(
+            np.array([t for t, _ in forces]), np.array([f for _, f in forces]), hand,
+            tuple((t.time, t.link, t.velocity) for t in touches),
+        )  # fmt: skip
+
+
+@contextmanager
+def _recording(setup: Setup, controller: Controller) -> Iterator[Recording | None]:
+    """Open the recording of a trial, if there is to be one. One that could not be kept whole is a RecordingError."""
+    if setup.recording is None:
+        yield None
+        return
+    with Recording(setup.recording, controller, {"seed": setup.seed, "scene": described(setup.scene)}) as recording:
+        yield recording
+    if recording.trouble:
+        raise RecordingError(recording.trouble)
 
 
 def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
@@ -100,11 +146,12 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     hand = Hand(plant, setup.hand) if setup.hand else None
     if setup.prepare:
         setup.prepare(plant, units)
-    recorder = _Recorder(hand)
     controller = Controller(model, setup.skin, fixtures(scene), setup.path, profile)
     clock = PlantClock(plant, profile.task.control_period_s)
     plant.advance(SETTLE_S)
-    run(controller, plant, units, clock, recorder, lambda step: done(step, plant))
+    with _recording(setup, controller) as recording:
+        recorder = _Recorder(plant, hand, recording)
+        run(controller, plant, units, clock, recorder, lambda step: done(step, plant))
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),

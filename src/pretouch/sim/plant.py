@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,7 +12,7 @@ from pretouch.contact.observer import ObserverState, observe, observer_init, wre
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.scene import ArmError, SceneSpec, build
+from pretouch.sim.scene import ArmError, SceneSpec, build, stiffen
 from pretouch.types import FloatArray, RobotState
 
 _NO_FORCE = np.zeros(3)
@@ -58,7 +59,8 @@ class Plant:
         self._reset(q)
 
     def _on_arm(self, geom: int) -> bool:
-        return 0 < int(self.mj_model.geom_bodyid[geom]) < len(self.model.links)
+        body = int(self.mj_model.geom_bodyid[geom])
+        return body < len(self.model.links) and bool(self.model.moved_by[body].any())
 
     def _reset(self, q: FloatArray) -> None:
         n, data = self._n, self.mj_data
@@ -83,14 +85,32 @@ class Plant:
         self.true_force = _NO_FORCE
         """(3,) sum of the contact forces on the arm by everything else, base frame [N], at the last physics step."""
         self.true_log: list[tuple[float, FloatArray]] = []
-        """(time, true_force) of every physics step so far."""
+        """(time, true_force) of every physics step since the log was last taken."""
         self.touches: list[Touch] = []
-        """Each beginning of a contact so far."""
+        """Each beginning of a contact since then."""
         mujoco.mj_forward(self.mj_model, data)
 
     def before_each_step(self, call: Callable[[float], None]) -> None:
         """Have `call(time)` run before each physics step: hands and sensors are driven so."""
         self._before_step.append(call)
+
+    def take_log(self) -> tuple[list[tuple[float, FloatArray]], list[Touch]]:
+        """Return `true_log` and `touches`, and begin both anew: in a run without an end they would fill the memory."""
+        taken, self.true_log, self.touches = (self.true_log, self.touches), [], []
+        return taken
+
+    @property
+    def touching(self) -> bool:
+        """Whether any two things touch, the arm or not."""
+        return bool(self.mj_data.ncon)
+
+    def stiffen(self, thing: str, stiffness: float) -> None:
+        """Give the contacts with a thing of the scene, by name, another stiffness [N/m].
+
+        To be done while nothing is `touching`: a spring that is stiffened while compressed gives more energy than it
+        took.
+        """
+        stiffen(self.mj_model, thing, stiffness, self.scene.damping_ratio)
 
     # the port Robot
 
@@ -145,22 +165,28 @@ class Plant:
 
     def _touch(self, qd: FloatArray) -> Touch:
         """Describe the first contact there is; `qd` (n,) are the joint velocities before it [rad/s]."""
-        contact = self.mj_data.contact[0]
-        geom = int(contact.geom2) if int(contact.geom2) in self._arm_geoms else int(contact.geom1)
+        contact, sign = next(found for found in map(self._on_the_arm, range(self.mj_data.ncon)) if found[1])
+        geom = int(contact.geom2) if sign > 0 else int(contact.geom1)
         link = int(self.mj_model.geom_bodyid[geom])
         kin = self.model.kinematics(self._q)
         return Touch(self.time, link, self.model.jacobian(kin, link, contact.pos.copy())[:3] @ qd)
 
     def _contact_force(self) -> FloatArray:
-        """Sum of contact forces on the arm (3,) [N], base frame."""
-        total, wrench = np.zeros(3), np.zeros(6)
+        """Sum of contact forces on the arm (3,) [N], base frame; `_NO_FORCE` itself if nothing touches it."""
+        total, wrench = _NO_FORCE, np.zeros(6)
         for i in range(self.mj_data.ncon):
-            contact = self.mj_data.contact[i]
-            mujoco.mj_contactForce(self.mj_model, self.mj_data, i, wrench)
-            force = contact.frame.reshape(3, 3).T @ wrench[:3]
-            # MuJoCo's contact force acts on the second geom
-            total += force if int(contact.geom2) in self._arm_geoms else -force
+            contact, sign = self._on_the_arm(i)
+            if sign:
+                mujoco.mj_contactForce(self.mj_model, self.mj_data, i, wrench)
+                total = total + sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
         return total
+
+    def _on_the_arm(self, number: int) -> tuple[Any, int]:
+        """Return a contact, and the sign its force has on the arm: MuJoCo's acts on the second geom; 0 elsewhere."""
+        contact = self.mj_data.contact[number]
+        if int(contact.geom2) in self._arm_geoms:
+            return contact, 1
+        return contact, -1 if int(contact.geom1) in self._arm_geoms else 0
 
 
 @compiled

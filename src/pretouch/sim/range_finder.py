@@ -9,6 +9,7 @@ import numpy as np
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled
+from pretouch.errors import ParameterError
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE, cone_rays
 from pretouch.sim.plant import Plant
@@ -91,6 +92,18 @@ class RangeFinders:
         """Indices of units that no longer send."""
         self._next_due = min(self._due, default=np.inf)
         plant.before_each_step(self._sample)
+
+    @property
+    def params(self) -> RangeFinderParams:
+        """How they err."""
+        return self._params
+
+    def change(self, params: RangeFinderParams) -> None:
+        """Err in another way from the next measurement on; what was settled when they were mounted has to stay."""
+        for name in ("mode", "rings", "offset_max_m"):
+            if getattr(params, name) != getattr(self._params, name):
+                raise ParameterError(f"RangeFinderParams.{name} cannot change while the sensors run: mount them anew.")
+        self._params = params
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""

@@ -11,7 +11,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 _IMPEDANCE = 0.01
-"""Constant solver impedance d of all contacts; with it and an elliptic cone solref means N/m, see `_solref`."""
+"""Constant solver impedance d of all contacts; with it and an elliptic cone solref means N/m, see `stiffen`."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,15 @@ class SceneSpec:
     """Damping of a contact as a fraction of critical for 2 kg."""
 
 
+def described(spec: SceneSpec) -> dict[str, object]:
+    """Return what a recording says of a scene, so that it can be drawn again."""
+    return {
+        "boxes": [{"name": b.name, "center": list(b.center), "half_size": list(b.half_size)} for b in spec.boxes],
+        "hand_radius_m": spec.hand.radius if spec.hand else None,
+        "floor_height_m": spec.floor_height,
+    }
+
+
 def fixtures(spec: SceneSpec) -> Fixtures:
     """What of a scene is declared to the controller: floor and pedestal, not the objects."""
     radius, height = spec.pedestal_radius, spec.floor_height
@@ -82,7 +91,10 @@ class ArmError:
 
 
 def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:
-    """Build the MuJoCo model of a scene. Only declared pairs touch: each moving capsule with floor, boxes and hand."""
+    """Build the MuJoCo model of a scene. Only declared pairs touch.
+
+    Each moving capsule touches floor, boxes and hand; the hand also touches all that stands still.
+    """
     mj = mujoco.MjSpec.from_file(str(model.description.mjcf))
     mj.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     for actuator in list(mj.actuators):
@@ -91,15 +103,18 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
         joint.armature = error.armature
         joint.damping = np.zeros_like(joint.damping)
     arm = [geom.name for geom in mj.geoms if model.moved_by[model.link_index(geom.parent.name)].any()]
+    base = [geom.name for geom in mj.geoms if geom.name not in arm]
     if error.payload > 0:
         body = mj.body(model.description.ee_body).add_body(name="payload")
         body.mass, body.inertia = error.payload, np.full(3, 1e-5)
         body.explicitinertial = True
     stiffness = _add_objects(mj, spec)
     pairs = [(link, thing) for link in arm for thing in stiffness]
-    for link, thing in pairs:
+    if spec.hand:
+        pairs += [(still, "hand") for still in [*base, "pedestal", *stiffness] if still != "hand"]
+    for one, other in pairs:
         mj.add_pair(
-            geomname1=link, geomname2=thing, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
+            geomname1=one, geomname2=other, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
             solimp=[_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0],
         )  # fmt: skip
     built = mj.compile()
@@ -107,8 +122,8 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
     built.body_mass[:links] *= error.mass_factor
     built.body_inertia[:links] *= error.mass_factor[:, None]
     mujoco.mj_setConst(built, mujoco.MjData(built))
-    for i, (link, thing) in enumerate(pairs):
-        built.pair_solref[i] = _solref(built, link, thing, stiffness[thing], spec.damping_ratio)
+    for thing, of_it in stiffness.items():
+        stiffen(built, thing, of_it, spec.damping_ratio)
     return built
 
 
@@ -135,12 +150,13 @@ def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
     return stiffness
 
 
-def _solref(built: mujoco.MjModel, link: str, thing: str, stiffness: float, damping_ratio: float) -> FloatArray:
-    """Direct solref (-K, -B) that makes a contact a spring of `stiffness` [N/m] and a damper.
+def stiffen(built: mujoco.MjModel, thing: str, stiffness: float, damping_ratio: float) -> None:
+    """Make each contact with a thing a spring of `stiffness` [N/m] and a damper; of two things, the later call counts.
 
-    MuJoCo's solref is normalised by the inverse masses w that meet in the contact: K = k (1 - d) w.
+    MuJoCo's direct solref (-K, -B) is normalised by the inverse masses w that meet in the contact: K = k (1 - d) w.
     """
-    bodies = [built.geom_bodyid[built.geom(name).id] for name in (link, thing)]
-    w = sum(float(built.body_invweight0[b, 0]) for b in bodies)
-    damping = damping_ratio * 2.0 * np.sqrt(stiffness * 2.0)
-    return np.array([-stiffness, -damping]) * (1.0 - _IMPEDANCE) * w
+    geom, damping = built.geom(thing).id, damping_ratio * 2.0 * np.sqrt(stiffness * 2.0)
+    for i, pair in enumerate(zip(built.pair_geom1, built.pair_geom2, strict=True)):
+        if geom in pair:
+            w = sum(float(built.body_invweight0[built.geom_bodyid[g], 0]) for g in pair)
+            built.pair_solref[i] = np.array([-stiffness, -damping]) * (1.0 - _IMPEDANCE) * w

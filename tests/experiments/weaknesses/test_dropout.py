@@ -9,10 +9,10 @@ from tests.experiments.width import width
 
 from pretouch.experiments import static
 from pretouch.experiments.cell import Cell, Grid
-from pretouch.experiments.posture import brought_to
 from pretouch.experiments.weaknesses import dropout
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.posture import brought_to
 from pretouch.types import Mode
 
 

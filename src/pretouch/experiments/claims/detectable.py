@@ -116,6 +116,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
         scene=SceneSpec(),
         path=path(str(cell.where["motion"]), seed),
         seed=seed,
+        recording=context.recording,
         prepare=lambda plant, _: apply(plant, events),
     )
     record = play(setup, lambda step, _: step.stamp >= events[-1].end + 2 * _LATE_S)
@@ -217,4 +218,4 @@ def _cost(cell: Cell) -> float:
     return plan(cast(Shape, cell.where["shape"]), float(cell.where["size"]), 0)[-1].end
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, detectable_tables, draw_detectable)
+EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, detectable_tables, draw_detectable, recorded=False)

@@ -153,4 +153,4 @@ def _draw(sources: Sources) -> list[Picture]:
     return [Picture("free-motion", "Thresholds against speed, and false detections against the base force", figure)]
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, lambda _: DURATION_S, summary, free_motion_tables, _draw)
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: DURATION_S, summary, free_motion_tables, _draw, recorded=False)

@@ -66,6 +66,7 @@ def leave_alone(what: Solitude, cell: Cell, seed: int, context: Context) -> Reco
         scene=SceneSpec(),
         path=what.path,
         seed=seed,
+        recording=context.recording,
         plant=what.plant,
     )
     end = SETTLE_S + profile.threshold.window_samples * _PERIOD_S + what.duration_s

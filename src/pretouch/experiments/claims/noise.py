@@ -101,4 +101,4 @@ def _draw(sources: Sources) -> list[Picture]:
     return [Picture("noise", "F_sigma and false detections against the noise of the arm's sensors", figure)]
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, lambda _: DURATION_S, summary, noise_tables, _draw)
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: DURATION_S, summary, noise_tables, _draw, recorded=False)

@@ -67,6 +67,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=SceneSpec(hand=hand),
         path=path(),
         seed=seed,
+        recording=context.recording,
         hand=Visitor(context.model, (visit(seed),)),
     )
     full_speed = setup.profile.task.speed_m_s

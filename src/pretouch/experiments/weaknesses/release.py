@@ -76,6 +76,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         scene=SceneSpec(hand=HandSpec()),
         path=Circle(),
         seed=seed,
+        recording=context.recording,
         hand=person,
     )
     record = play(setup, lambda step, _: _over(person, step.stamp) or stuck(step))

@@ -1,4 +1,4 @@
-"""The posture an experiment starts from."""
+"""The posture an arm starts from."""
 
 import numpy as np
 

@@ -1,0 +1,26 @@
+import pytest
+
+from pretouch.control.path import Circle, line
+from pretouch.errors import PathError
+from pretouch.sim.board import board_beside
+
+PATHS = {"circle": Circle(), "line": line((0.4, -0.5, 0.5), (0.4, 0.5, 0.5))}
+
+
+@pytest.mark.parametrize(("side", "sign"), [("-y", -1.0), ("+y", 1.0)])
+@pytest.mark.parametrize("path", PATHS)
+def test_the_board_faces_the_arm_a_quarter_metre_from_its_middle(path, side, sign):
+    board = board_beside(PATHS[path], side, 25_000.0)
+    (_, y, _), (_, thick, _) = board.center, board.half_size
+    assert sign * y - thick == pytest.approx(0.25)
+    assert board.stiffness == 25_000.0
+
+
+def test_the_board_on_the_line_is_where_the_paths_height_and_distance_say():
+    board = board_beside(PATHS["line"], "+y", 25_000.0, face=0.3, aside=0.01, above=-0.02)
+    assert board.center == pytest.approx((0.4 + 0.12 + 0.01, 0.32, 0.5 + 0.057 - 0.02))
+
+
+def test_a_path_that_never_comes_to_the_board_is_refused():
+    with pytest.raises(PathError, match=r"never comes to the board at y = -0.25 m"):
+        board_beside(Circle(radius=0.1), "-y", 25_000.0)
