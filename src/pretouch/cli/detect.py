@@ -1,0 +1,191 @@
+"""What `pretouch detect` does: the detector of some profiles on a recording of any arm, as tables, figure and file."""
+
+import json
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.errors import ParameterError, RecordingError
+from pretouch.params import Profile, at_rate
+from pretouch.params import profile as find_profile
+from pretouch.recording.compare import Decisions, Found, matched
+from pretouch.recording.foreign import Foreign, read_foreign
+from pretouch.recording.foreign_detect import detect_foreign, units_topics
+from pretouch.recording.foreign_figure import decisions_figure
+from pretouch.recording.foreign_source import Choice
+from pretouch.recording.foreign_summary import Summary, findings, guidance, summary
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin, load_skin
+
+_ENDINGS = (".png", ".pdf", ".svg")
+_DOTS_PER_INCH = 150
+
+Column = tuple[Profile, Decisions, Summary]
+
+
+def detect(
+    place: Path,
+    choice: Choice,
+    profiles: Sequence[str] = ("paper",),
+    skin_file: Path | None = None,
+    rate: float = 0.0,
+    out: Path | None = None,
+    json_file: Path | None = None,
+) -> None:
+    """Run detectors over a recording, show what they found, and write a figure and the numbers where asked.
+
+    Args:
+        place: bag, MCAP or CSV file.
+        choice: what the recording does not say of itself; a skin file asks for its ranges.
+        profiles: names of the profiles to compare.
+        skin_file: skin whose units the recording's ranges are of.
+        rate: of the detector [Hz]; 0 for the profile's own.
+        out: figure to write.
+        json_file: file for the numbers.
+    """
+    used = [_profile(name, rate) for name in profiles]
+    if not used:
+        raise ParameterError("No profile is given: name one or more, separated by commas.")
+    if out and out.suffix not in _ENDINGS:
+        raise RecordingError(f"The figure {out} has no ending that says its format: use {', '.join(_ENDINGS)}.")
+    for what, target in (("figure", out), ("file", json_file)):
+        if target:
+            check_writable(what, target)
+    foreign = read_foreign(place, choice)
+    skin = load_skin(skin_file, _model(foreign)) if skin_file else None
+    columns = [(p, d, summary(d, p)) for p in used for d in [detect_foreign(foreign, p, skin)]]
+    notes = list(dict.fromkeys([*foreign.notes, *_unheard(skin, foreign), *_said(foreign, columns, skin)]))
+    if out:
+        image = BytesIO()
+        figure = decisions_figure([d for _, d, _ in columns], place.name)
+        figure.savefig(image, format=out.suffix[1:], dpi=_DOTS_PER_INCH)
+        with unwritable_said("figure", out):
+            out.write_bytes(image.getvalue())
+    if json_file:
+        text = json.dumps(_plain(_numbers(foreign, columns, notes)), indent=1, allow_nan=False)
+        with unwritable_said("file", json_file):
+            json_file.write_text(text + "\n", encoding="utf-8")
+    _show(foreign, columns, notes)
+    for what, target in (("Figure", out), ("Numbers", json_file)):
+        if target:
+            print(f"{what}: {target}")
+
+
+def _profile(name: str, rate: float) -> Profile:
+    return at_rate(find_profile(name), rate) if rate else find_profile(name)
+
+
+def _model(foreign: Foreign) -> RobotModel:
+    if foreign.model is None:
+        raise RecordingError(f"{foreign.place} was read without ranges: a skin needs them.")
+    return foreign.model
+
+
+def _unheard(skin: Skin | None, foreign: Foreign) -> list[str]:
+    if skin is None:
+        return []
+    silent = [unit for unit, topic in zip(skin.ids, units_topics(skin, foreign.ranges), strict=True) if topic is None]
+    return [f"No range topic is of {', '.join(silent)}: taken as silent."] if silent else []
+
+
+def _said(foreign: Foreign, columns: list[Column], skin: Skin | None) -> list[str]:
+    said = [sentence for p, d, _ in columns for sentence in findings(foreign, d, p)]
+    if skin is None and any(p.perception.enabled and p.threshold.f_d_n for p, _, _ in columns):
+        said.append("Without ranges (--skin) nothing is near: eq. 11 lowers no threshold.")
+    return said
+
+
+def _show(foreign: Foreign, columns: list[Column], notes: list[str]) -> None:
+    console = Console(highlight=False, soft_wrap=True)
+    time = foreign.force.time
+    seconds = (time[-1] - time[0]) / 1e9
+    console.print(f"{foreign.place}: {len(time)} samples in {seconds:.1f} s, {foreign.rate:.4g} Hz.", markup=False)
+    console.print(foreign.said, markup=False)
+    for note in notes:
+        console.print(note, markup=False)
+    console.print("\nContacts, force on the robot [N]", style="bold", markup=False)
+    console.print(contact_table([(d.name, found) for _, d, _ in columns for found in d.contacts]))
+    first = columns[0][1]
+    for _, d, _ in columns[1:]:
+        both, only_first, only_other = matched(first.contacts, d.contacts)
+        console.print(
+            f"{first.name} and {d.name}: {len(both)} contacts of both, {len(only_first)} of {first.name} only,"
+            f" {len(only_other)} of {d.name} only.",
+            markup=False,
+        )
+    console.print("\nFree motion [N]", style="bold", markup=False)
+    console.print(_noise_table(columns))
+    console.print()
+    for p, d, found in columns:
+        console.print(guidance(d, found, p), markup=False)
+
+
+def contact_table(contacts: Sequence[tuple[str, Found]]) -> Table:
+    """Make a table of contacts, each with who found it, in time order."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("", overflow="fold")
+    for name in ("time [s]", "x", "y", "z", "norm", "axes"):
+        table.add_column(escape(name), justify="right", no_wrap=True)
+    for name, found in sorted(contacts, key=lambda pair: pair[1].time):
+        force = [f"{value:.1f}" for value in (*found.force, np.linalg.norm(found.force))]
+        table.add_row(escape(name), f"{found.time:.3f}", *force, axes_shown(found))
+    if not contacts:
+        table.add_row("none")
+    return table
+
+
+def axes_shown(found: Found) -> str:
+    """Name the axes whose threshold a contact crossed."""
+    return "".join(axis for axis, crossed in zip("xyz", found.axes, strict=True) if crossed)
+
+
+def _noise_table(columns: list[Column]) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("", overflow="fold")
+    for name in ("along", "mean", "sigma", "sigma in window", "thresholds at +-"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for _, d, s in columns:
+        name = f"{d.name}, {s.free:.1f} of {s.duration:.1f} s"
+        for axis, *values in zip("xyz", s.mean, s.sigma, s.sigma_window, s.width, strict=True):
+            table.add_row(escape(name) if axis == "x" else "", axis, *(f"{value:.2f}" for value in values))
+    return table
+
+
+def _numbers(foreign: Foreign, columns: list[Column], notes: list[str]) -> dict[str, Any]:
+    time = foreign.force.time
+    return {
+        "recording": str(foreign.place), "assumed": foreign.said, "notes": notes, "samples": len(time),
+        "duration_s": (time[-1] - time[0]) / 1e9, "rate_hz": foreign.rate,
+        "profiles": [
+            {
+                "profile": d.name, "control_rate_hz": 1 / p.task.control_period_s,
+                "contacts": [
+                    {"time_s": c.time, "force_n": c.force, "norm_n": np.linalg.norm(c.force), "axes": axes_shown(c)}
+                    for c in d.contacts
+                ],
+                "armed_s": s.duration, "free_s": s.free, "free_mean_n": s.mean, "free_sigma_n": s.sigma,
+                "free_window_sigma_n": s.sigma_window,
+                "threshold_width_n": s.width, "f_base_no_contact_free_n": s.f_base_free,
+                "f_base_no_contact_n": s.f_base_all,
+            }
+            for p, d, s in columns
+        ],
+    }  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    """Make what JSON can hold: arrays become lists, numbers that are not finite null."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return int(value) if isinstance(value, np.integer) else value

@@ -1,0 +1,146 @@
+"""What `pretouch replay` and `pretouch recover` do: a recording told, recomputed, compared, shown, mended."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress
+from rich.table import Table
+
+from pretouch.cli.detect import axes_shown
+from pretouch.params import profile as find_profile
+from pretouch.recording import recover as recovering
+from pretouch.recording.compare import Comparison, Decisions, Found, compare
+from pretouch.recording.reader import Recorded, open_recording
+from pretouch.recording.verify import verify as recompute
+from pretouch.types import Mode
+
+
+def replay(
+    place: Path, verify: bool = False, profile: str = "", page: bool = True, host: str = "127.0.0.1", port: int = 8080
+) -> int:
+    """Tell of a recording, and check, compare or show it. Return the exit code.
+
+    Args:
+        place: recording, finished or cut off.
+        verify: whether to recompute each step; then there is no page, and the code is 1 if anything differs.
+        profile: one whose decisions on the same data are shown beside the recorded ones, or ''.
+        page: whether to serve the page.
+        host: address to serve it at.
+        port: port to serve it at.
+    """
+    console = Console(highlight=False, soft_wrap=True)
+    other = find_profile(profile) if profile else None
+    recorded = open_recording(place)
+    if recorded.said:
+        console.print(recorded.said, markup=False)
+    with _Progress("Reading", len(recorded)) as advance:
+        console.print(told(recorded, advance), markup=False)
+    if verify:
+        with _Progress("Recomputing", len(recorded)) as advance:
+            verdict = recompute(recorded, advance)
+        console.print(verdict.said, markup=False)
+        return 0 if verdict.agrees else 1
+    comparison = None
+    if other:
+        with _Progress("Comparing", len(recorded)) as advance:
+            comparison = compare(recorded, other, advance)
+        _show(console, comparison)
+    if page:
+        from pretouch.viewer.replay import serve_replay
+        from pretouch.viewer.server import ServeOptions
+
+        serve_replay(recorded, ServeOptions(host, port), comparison)
+    return 0
+
+
+def recover(place: Path, out: Path | None = None) -> None:
+    """Make a recording that was cut off open everywhere, and say what became of it."""
+    print(recovering.recover(place, out).said)
+
+
+def told(recorded: Recorded, advance: Callable[[int], None] = lambda done: None) -> str:
+    """Say in a line what ran, for how long, and what happened; `advance` is told how many steps were read."""
+    contacts = holds = 0
+    before: Mode | None = None
+    for i, kept in enumerate(recorded):
+        contacts += kept.step.contact is not None
+        # the arm begins in HOLD, until its window is full
+        holds += kept.step.mode is Mode.HOLD and before in (Mode.TRACK, Mode.REACT)
+        before = kept.step.mode
+        advance(i + 1)
+    stamps, run = recorded.stamps(), recorded.runs[0]
+    profiles = ", then ".join(run.profile.name for run in recorded.runs)
+    command = run.about.get("command")
+    what = f"{command}: " if isinstance(command, str) else ""
+    return (
+        f"{what}profile {profiles} on {run.model.description.name} with {_many(len(run.skin), 'unit')},"
+        f" {stamps[-1] - stamps[0]:.1f} s, {_many(len(recorded), 'step')}: {_many(contacts, 'contact')},"
+        f" {_many(holds, 'hold')}."
+    )
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+class _Progress:
+    """A bar on standard error for as long as the context lasts; it gives the function that moves it on."""
+
+    def __init__(self, what: str, total: int) -> None:
+        self._bar = Progress(console=Console(stderr=True), transient=True)
+        self._task = self._bar.add_task(what, total=total)
+
+    def __enter__(self) -> Callable[[int], None]:
+        self._bar.start()
+        return lambda done: self._bar.update(self._task, completed=done)
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+
+def _show(console: Console, comparison: Comparison) -> None:
+    mine, other = comparison.recorded, comparison.other
+    console.print(f"\nContacts: {mine.name} as recorded, {other.name} on the same data", style="bold", markup=False)
+    console.print(_table(comparison))
+    console.print(
+        "Thresholds from their middle, median along x / y / z:"
+        f" {_width(mine)} N ({mine.name}), {_width(other)} N ({other.name}).",
+        markup=False,
+    )
+    if comparison.left_out:
+        console.print(f"{_many(comparison.left_out, 'step')} left out: no usable inputs were recorded.", markup=False)
+    console.print(
+        "Detector only: the arm's motion is the recorded one in both; another profile would have moved it otherwise.\n",
+        style="dim", markup=False,
+    )  # fmt: skip
+
+
+def _table(comparison: Comparison) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    for name in ("recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"):
+        table.add_column(escape(name), justify="right")
+    rows: list[tuple[Found | None, Found | None]] = [*comparison.both]
+    rows += [(found, None) for found in comparison.only_recorded]
+    rows += [(None, found) for found in comparison.only_other]
+    for mine, other in sorted(rows, key=lambda row: min(found.time for found in row if found)):
+        later = f"{other.time - mine.time:+.2f}" if mine and other else ""
+        table.add_row(*_cells(mine), *_cells(other), later)
+    if not rows:
+        table.add_row("none", "", "", "none", "", "", "")
+    return table
+
+
+def _cells(found: Found | None) -> tuple[str, str, str]:
+    if found is None:
+        return "-", "", ""
+    return f"{found.time:.3f}", f"{np.linalg.norm(found.force):.1f}", axes_shown(found)
+
+
+def _width(decisions: Decisions) -> str:
+    armed = decisions.armed
+    if not armed.any():
+        return "-"
+    return " / ".join(f"{value:.1f}" for value in np.median((decisions.upper - decisions.lower)[armed] / 2, axis=0))

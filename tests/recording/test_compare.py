@@ -1,0 +1,153 @@
+"""What another profile would have decided: from a recording, held against what its own controller did."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.controller import Controller, Cycle
+from pretouch.errors import RecordingError
+from pretouch.params import PROFILES, at_rate, profile
+from pretouch.recording.compare import Found, compare, matched
+from pretouch.recording.reader import open_recording
+from pretouch.recording.writer import Recording
+from pretouch.types import Inputs
+from tests.following_arm import DT, Arm
+from tests.recording.foreign_files import pushed
+from tests.reference.contact import Touch
+
+PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]
+PUSHES = ((2.0, 0.6, (0.0, 40.0, 0.0)), (5.0, 0.5, (-25.0, 0.0, 3.0)))
+
+
+class Recorded(Arm):
+    """An arm whose cycles are recorded."""
+
+    def __init__(self, model, skin, place, used=PAPER):
+        super().__init__(model, skin, used)
+        self.recording = Recording(place, self.controller)
+        self.steps = []
+
+    def turn(self, force, seen=None, change=lambda robot: robot):
+        inputs = Inputs(self.time, change(self.robot(tuple(force))), self.readings(seen))
+        before = self.state
+        step, self.state = self.controller.step(before, inputs)
+        self.recording.record(Cycle(inputs, before, step))
+        self.qd, self.q, self.time = step.command, self.q + step.command * DT, self.time + DT
+        self.steps.append(step)
+        return step
+
+    def switch(self, used):
+        before = self.controller
+        self.controller = Controller(self.model, self.skin, before.fixtures, before.path, used)
+        self.state = self.controller.adopt(self.state, before)
+        self.recording.change(self.controller)
+
+
+@pytest.fixture
+def arm(panda_model, paper_skin, tmp_path):
+    return Recorded(panda_model, paper_skin, tmp_path / "run.mcap")
+
+
+def played(arm, force=None, seen=None):
+    for sample in pushed(7.0, PUSHES) if force is None else force:
+        arm.turn(sample, seen)
+    arm.recording.close()
+    return open_recording(arm.recording.place)
+
+
+def test_the_same_profile_decides_exactly_what_was_recorded(arm):
+    found = compare(played(arm, seen={0: 0.25}), PAPER)
+    assert len(found.recorded.contacts) == 2
+    assert [(c.time, *c.force) for c in found.other.contacts] == [(c.time, *c.force) for c in found.recorded.contacts]
+    for name in ("time", "force", "compared", "upper", "lower", "sigma", "armed", "reacting"):
+        np.testing.assert_array_equal(getattr(found.recorded, name), getattr(found.other, name))
+    np.testing.assert_array_equal(found.recorded.upper, [s.thresholds.upper for s in arm.steps])
+    assert len(found.both) == 2
+    assert not found.delays().any()
+    assert found.only_recorded == found.only_other == ()
+    assert found.left_out == 0
+
+
+def test_another_profile_decides_what_the_plain_detector_does(arm):
+    force = pushed(7.0, PUSHES)
+    found = compare(played(arm, force, seen={0: 0.25}), profile("blind:threshold.window_samples=60"))
+    touch, nothing = Touch(replace(BLIND.threshold, window_samples=60)), type("Nothing", (), {"point": ()})()
+    limits = [touch.feel(sample, np.zeros(3), nothing)[0] for sample in force]
+    np.testing.assert_allclose(found.other.upper, [t.upper for t in limits], atol=1e-9)
+    np.testing.assert_allclose(found.other.lower, [t.lower for t in limits], atol=1e-9)
+    assert found.other.name == "blind:threshold.window_samples=60"
+    assert np.any(found.recorded.upper < found.other.upper - 1.0) or np.any(
+        found.recorded.lower > found.other.lower + 1.0
+    )
+
+
+def test_a_contact_that_only_one_finds_is_told_apart(arm):
+    deaf = profile("paper:threshold.f_base_n=20")
+    found = compare(played(arm), deaf)
+    assert [round(c.time, 1) for c in found.recorded.contacts] == [2.1, 5.2]
+    assert [round(c.time, 1) for c in found.other.contacts] == [2.2]
+    assert [c.time for c in found.only_recorded] == [found.recorded.contacts[1].time]
+    assert found.only_other == ()
+    assert found.delays()[0] > 0
+
+
+def test_it_goes_on_through_a_change_of_profile(arm):
+    force = pushed(7.0, PUSHES)
+    for sample in force[:400]:
+        arm.turn(sample)
+    arm.switch(replace(BLIND, threshold=replace(BLIND.threshold, f_base_n=30.0)))
+    found = compare(played(arm, force[400:]), PAPER)
+    assert len(found.recorded.time) == len(found.other.time) == 700
+    assert [round(c.time, 1) for c in found.recorded.contacts] == [2.1]
+    assert [round(c.time, 1) for c in found.other.contacts] == [2.1, 5.2]
+    assert found.recorded.name == "paper, blind"
+
+
+def test_a_recording_that_begins_with_a_full_window_is_not_filled_anew(arm):
+    for sample in pushed(3.0, ()):
+        arm.turn(sample)
+    second = Recording(arm.recording.place.with_name("later.mcap"), arm.controller)
+    arm.recording.close()
+    arm.recording = second
+    found = compare(played(arm, pushed(1.0, (), seed=8)), BLIND)
+    assert found.other.armed.all()
+    np.testing.assert_array_equal(found.recorded.upper, found.other.upper)
+
+
+def test_a_profile_for_another_rate_is_brought_to_that_of_the_run(arm):
+    found = compare(played(arm), at_rate(PAPER, 1000.0))
+    np.testing.assert_allclose(found.other.upper, found.recorded.upper, atol=1e-9)
+
+
+def test_cycles_without_inputs_are_left_out_and_counted(arm):
+    for i, sample in enumerate(pushed(7.0, PUSHES)):
+        arm.turn(sample, change=lambda robot, i=i: None if i == 300 else robot)
+    found = compare(played(arm, ()), PAPER)
+    assert found.left_out == 1
+    assert len(found.other.time) == 699
+
+
+def test_a_recording_without_a_usable_cycle_is_refused(arm):
+    arm.turn((0, 0, 0), change=lambda robot: None)
+    with pytest.raises(RecordingError, match="no cycle with a usable robot state"):
+        compare(played(arm, ()), PAPER)
+
+
+def at(*times):
+    return [Found(t, np.zeros(3), np.zeros(3, np.bool_)) for t in times]
+
+
+def test_contacts_are_paired_with_the_nearest_within_three_tenths_of_a_second():
+    first, second = at(1.0, 5.0, 9.0), at(1.25, 1.4, 5.2, 4.9, 9.31)
+    both, only_first, only_second = matched(first, second)
+    assert [(a.time, b.time) for a, b in both] == [(1.0, 1.25), (5.0, 4.9)]
+    assert [c.time for c in only_first] == [9.0]
+    assert [c.time for c in only_second] == [1.4, 5.2, 9.31]
+
+
+def test_a_contact_is_paired_once():
+    both, only_first, only_second = matched(at(1.0, 1.1), at(1.05))
+    assert [(a.time, b.time) for a, b in both] in ([(1.0, 1.05)], [(1.1, 1.05)])
+    assert len(only_first) == 1
+    assert only_second == ()

@@ -1,0 +1,108 @@
+"""`pretouch detect`: what is printed, drawn and written."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from pretouch.cli.detect import detect
+from pretouch.controller import Cycle
+from pretouch.errors import ParameterError, PretouchError, RecordingError
+from pretouch.recording.foreign_source import Choice
+from pretouch.recording.writer import Recording
+from pretouch.sensing.skin import PAPER_SKIN
+from pretouch.types import Inputs
+from tests.following_arm import DT, Arm
+from tests.recording.foreign_files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
+
+
+@pytest.fixture
+def file(tmp_path):
+    return write_csv(tmp_path / "mine.csv", force_columns(pushed(14.0, PUSHES)))
+
+
+def test_what_was_read_assumed_and_found_is_printed(capsys, file):
+    detect(file, Choice())
+    said = capsys.readouterr().out
+    assert "mine.csv: 1400 samples in 14.0 s, 100 Hz." in said
+    assert "taken as the force on the robot (else --sign by-robot) in the base frame (else --frame ee)" in said
+    assert "Without ranges (--skin) nothing is near" in said
+    rows = [line.split() for line in said.splitlines() if line.startswith("paper ")]
+    assert [row[-1] for row in rows[:3]] == ["y", "x", "z"]
+    assert "paper: if nobody touched the arm, 3 false contacts in 0.2 min" in said
+
+
+def test_profiles_stand_side_by_side(capsys, file):
+    detect(file, Choice(), ("paper", "paper:threshold.f_base_n=31"))
+    said = capsys.readouterr().out
+    assert "paper and paper:threshold.f_base_n=31: 0 contacts of both, 3 of paper only, 0 of" in said
+    assert "paper:threshold.f_base_n=31: no contact in 0.2 min" in said
+    assert "time [s]" in said
+
+
+def test_the_figure_and_the_numbers_are_written(capsys, file, tmp_path):
+    figure, numbers = tmp_path / "new" / "a.png", tmp_path / "a.json"
+    detect(file, Choice(), ("paper", "blind"), out=figure, json_file=numbers)
+    said = capsys.readouterr().out
+    assert f"Figure: {figure}" in said
+    assert f"Numbers: {numbers}" in said
+    assert imread(figure).std() > 0.05
+    told = json.loads(numbers.read_text())
+    assert [p["profile"] for p in told["profiles"]] == ["paper", "blind"]
+    assert [c["axes"] for c in told["profiles"][0]["contacts"]] == ["y", "x", "z"]
+    assert told["rate_hz"] == pytest.approx(100.0)
+    push = told["profiles"][0]["contacts"][0]
+    assert push["norm_n"] == pytest.approx(np.linalg.norm(push["force_n"]))
+    assert 3.0 < push["time_s"] < 3.4
+
+
+def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
+    bag = write_bag(tmp_path / "slow", wrenches(pushed(14.0, PUSHES, rate=30.0), rate=30.0))
+    detect(bag, Choice())
+    assert "--rate 30 runs it at the data's own rate" in capsys.readouterr().out
+    numbers = tmp_path / "a.json"
+    detect(bag, Choice(), rate=30.0, json_file=numbers)
+    assert "repeated samples" not in capsys.readouterr().out
+    assert json.loads(numbers.read_text())["profiles"][0]["control_rate_hz"] == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "words"),
+    [
+        ({"profiles": ("brave",)}, ParameterError, "The profile 'brave' is unknown"),
+        ({"profiles": ()}, ParameterError, "No profile is given"),
+        ({"rate": 10.0}, ParameterError, "The rate is 10 Hz"),
+        ({"out": "a.gif"}, RecordingError, "a.gif has no ending that says its format"),
+        ({"out": "/dev/null/a.png"}, PretouchError, "/dev/null/a.png cannot be written"),
+        ({"json_file": "/dev/null/a.json"}, PretouchError, "/dev/null/a.json cannot be written"),
+        ({"place": "gone.csv"}, RecordingError, "There is no file gone.csv"),
+        ({"choice": Choice(ranges=True), "skin_file": PAPER_SKIN}, RecordingError, "tells no ranges"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_nothing_is_printed(capsys, file, given, error, words):
+    paths = {k: Path(v) if k in ("out", "json_file", "place") else v for k, v in given.items()}
+    with pytest.raises(error, match=words) as caught:
+        detect(**{"place": file, "choice": Choice()} | paths)
+    assert "\n" not in str(caught.value)
+    assert capsys.readouterr().out == ""
+
+
+def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, tmp_path, panda_model, paper_skin):
+    arm, place, numbers = Arm(panda_model, paper_skin), tmp_path / "ours.mcap", tmp_path / "a.json"
+    steps = []
+    with Recording(place, arm.controller) as recording:
+        for sample in pushed(6.0, PUSHES[:1]):
+            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings({0: 0.2})), arm.state
+            step, arm.state = arm.controller.step(before, inputs)
+            recording.record(Cycle(inputs, before, step))
+            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
+            steps.append(step)
+    detect(place, Choice(ranges=True), ("paper", "blind"), PAPER_SKIN, json_file=numbers)
+    assert "The arm is taken as panda" in capsys.readouterr().out
+    paper, _ = json.loads(numbers.read_text())["profiles"]
+    contacts = [s for s in steps if s.contact is not None]
+    assert len(contacts) == 1
+    assert [c["time_s"] for c in paper["contacts"]] == pytest.approx([s.stamp + 0.005 for s in contacts])
+    assert paper["contacts"][0]["force_n"] == pytest.approx(list(contacts[0].contact.force), abs=0.05)

@@ -1,0 +1,146 @@
+"""`pretouch replay` and `pretouch recover`: what is said of a recording, exit codes, and what the page is given."""
+
+import re
+import sys
+from types import SimpleNamespace
+
+import pytest
+from rosbags.highlevel import AnyReader
+
+from pretouch.cli.replay import recover, replay
+from pretouch.controller import Cycle
+from pretouch.errors import ParameterError, RecordingError, ViewerError
+from pretouch.recording.writer import Recording
+from pretouch.types import Inputs
+from tests.following_arm import DT, Arm
+from tests.recording.foreign_files import pushed
+
+PUSHES = ((2.0, 0.6, (0.0, 40.0, 0.0)),)
+
+
+@pytest.fixture(scope="module")
+def whole(panda_model, paper_skin, tmp_path_factory):
+    """Five seconds with a push after 2 s, and silent units from 4.5 s on, recorded."""
+    arm, place = Arm(panda_model, paper_skin), tmp_path_factory.mktemp("recordings") / "run.mcap"
+    with Recording(place, arm.controller, {"command": "pretouch test", "seed": 3}) as recording:
+        for sample in pushed(5.0, PUSHES):
+            silent = {0: arm.time - 4.5} if arm.time > 4.5 else None
+            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings(silent=silent)), arm.state
+            step, arm.state = arm.controller.step(before, inputs)
+            recording.record(Cycle(inputs, before, step))
+            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
+    return place
+
+
+@pytest.fixture
+def cut(whole, tmp_path):
+    """The same, of a process that was killed."""
+    place = tmp_path / "cut.mcap"
+    content = whole.read_bytes()
+    place.write_bytes(content[: 2 * len(content) // 3])
+    return place
+
+
+@pytest.fixture
+def page(monkeypatch):
+    """Take the page's place, and keep what it was given."""
+    given = []
+    stand_in = SimpleNamespace(serve_replay=lambda *args: given.append(args))
+    monkeypatch.setitem(sys.modules, "pretouch.viewer.replay", stand_in)
+    return given
+
+
+def test_a_line_says_what_ran_for_how_long_and_what_happened(capsys, whole):
+    assert replay(whole, page=False) == 0
+    said = capsys.readouterr().out
+    assert said == "pretouch test: profile paper on panda with 7 units, 5.0 s, 500 steps: 1 contact, 1 hold.\n"
+
+
+def test_of_a_killed_run_it_is_said_what_is_missing(capsys, cut):
+    assert replay(cut, page=False) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert "the end is missing" in said[0]
+    assert "pretouch recover" in said[0]
+    assert said[1].startswith("pretouch test: profile paper")
+
+
+def test_a_recording_that_can_be_recomputed_ends_with_code_0_and_no_page(capsys, whole, page):
+    assert replay(whole, verify=True) == 0
+    assert "All 500 steps were recomputed and are the same bit for bit." in capsys.readouterr().out
+    assert page == []
+
+
+def test_a_difference_ends_with_code_1(capsys, whole, monkeypatch):
+    from pretouch.controller import Controller
+
+    step = Controller.step
+
+    def otherwise(self, state, inputs):
+        made, after = step(self, state, inputs)
+        made.speed_scale += 0.25 * (inputs.stamp > 3.0)
+        return made, after
+
+    monkeypatch.setattr(Controller, "step", otherwise)
+    assert replay(whole, verify=True) == 1
+    said = capsys.readouterr().out
+    assert "speed_scale" in said
+    assert "steps differ" in said
+
+
+def test_another_profile_is_shown_beside_the_recorded_one(capsys, whole):
+    assert replay(whole, profile="paper:threshold.f_base_n=35", page=False) == 0
+    said = capsys.readouterr().out
+    assert "Contacts: paper as recorded, paper:threshold.f_base_n=35 on the same data" in said
+    (row,) = [line.split() for line in said.splitlines() if line.strip().startswith("2.1")]
+    assert row[2:] == ["y", "-"]
+    assert re.search(r"35\.\d / 35\.\d / 35\.\d N \(paper:threshold\.f_base_n=35\)", said)
+    assert "Detector only: the arm's motion is the recorded one in both" in said
+
+
+def test_the_same_profile_is_later_by_nothing(capsys, whole):
+    replay(whole, profile="paper", page=False)
+    (row,) = [line.split() for line in capsys.readouterr().out.splitlines() if line.strip().startswith("2.1")]
+    assert row[0] == row[3]
+    assert row[-1] == "+0.00"
+
+
+def test_the_page_is_given_recording_place_and_comparison(whole, page):
+    assert replay(whole, profile="blind", host="127.0.0.1", port=8123) == 0
+    ((recorded, options, comparison),) = page
+    assert recorded.place == whole
+    assert (options.host, options.port) == ("127.0.0.1", 8123)
+    assert comparison.other.name == "blind"
+    replay(whole)
+    assert page[1][2] is None
+
+
+def test_without_the_extra_the_page_is_one_sentence(whole, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(ViewerError, match="extra 'viewer'") as error:
+        replay(whole)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["gone.mcap", "text.mcap", "empty.mcap"])
+def test_what_is_no_recording_is_one_sentence(capsys, tmp_path, name):
+    if not name.startswith("gone"):
+        (tmp_path / name).write_text("time_s\n" if name.startswith("text") else "")
+    with pytest.raises(RecordingError, match=name) as error:
+        replay(tmp_path / name)
+    assert "\n" not in str(error.value)
+    assert capsys.readouterr().out == ""
+
+
+def test_an_unknown_profile_is_said_before_the_file_is_read(tmp_path):
+    with pytest.raises(ParameterError, match="'brave' is unknown"):
+        replay(tmp_path / "gone.mcap", profile="brave")
+
+
+def test_a_recovered_recording_opens_in_foreign_readers(capsys, cut, tmp_path):
+    recover(cut, tmp_path / "mended.mcap")
+    said = capsys.readouterr().out
+    assert "mended.mcap" in said
+    assert said.count("\n") == 1
+    with AnyReader([tmp_path / "mended.mcap"]) as reader:
+        assert "/wrench" in reader.topics
+    assert replay(tmp_path / "mended.mcap", page=False) == 0
