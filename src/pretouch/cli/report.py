@@ -1,0 +1,53 @@
+"""What `pretouch report` does: one page of what recordings tell."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.errors import RecordingError
+from pretouch.recording.reader import open_recording
+from pretouch.reporting.measures import Measures, measure
+from pretouch.reporting.orientation import ISO_TS_15066, load_limits
+from pretouch.reporting.page import page
+
+
+def write_page(files: Sequence[Path], out: Path, limits: Path | None = None) -> Path:
+    """Write the report of some recordings, and return the page's path.
+
+    Args:
+        files: recordings, each once.
+        out: HTML file to write.
+        limits: TOML file with force limits of body regions, in place of those of ISO/TS 15066.
+    """
+    if not files:
+        raise RecordingError("No recording is given: give at least one file.")
+    twice = [place for place, times in Counter(place.resolve() for place in files).items() if times > 1]
+    if twice:
+        raise RecordingError(f"The recording {twice[0]} is given more than once: give each once.")
+    if out.resolve() in [place.resolve() for place in files]:
+        raise RecordingError(f"The report {out} would be written over the recording: give another --out.")
+    regions = load_limits(limits) if limits else ISO_TS_15066
+    check_writable("report", out)
+    text = page(_measured(files), regions)
+    with unwritable_said("report", out):
+        out.write_bytes(text.encode("utf-8", errors="replace"))  # a file name may be no text
+    return out
+
+
+def _measured(files: Sequence[Path]) -> Iterator[Measures]:
+    for place, title in zip(files, titles(files), strict=True):
+        yield measure(open_recording(place), title)
+
+
+def titles(files: Sequence[Path]) -> list[str]:
+    """Name of each file, with as many of its folders as tell it from the others."""
+    whole = [place.absolute().parts for place in files]
+    lengths = [1] * len(files)
+    while True:
+        shown = ["/".join(parts[-length:]) for parts, length in zip(whole, lengths, strict=True)]
+        again = [i for i, title in enumerate(shown) if shown.count(title) > 1 and lengths[i] < len(whole[i])]
+        if not again:
+            return shown
+        for i in again:
+            lengths[i] += 1

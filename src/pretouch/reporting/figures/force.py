@@ -1,0 +1,57 @@
+"""Force estimate with the moving thresholds of each axis."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pretouch.reporting.course import Course
+from pretouch.reporting.figures.marks import BLUE, GREEN, GREY, INK, RED, draw, legend, panels
+from pretouch.types import FloatArray
+
+AXES = "xyz"
+_BEFORE_S, _AFTER_S = 0.3, 0.7
+"""Time shown about a contact [s]."""
+
+
+def force_figure(course: Course) -> Figure:
+    """One panel an axis: estimate, value of eq. 8, thresholds, true force where it is known, and detections."""
+    figure, made = panels(3, course, (1, 1, 1), 7.6)
+    for k, axes in enumerate(made):
+        _along(axes, course, k, slice(None), slice(None))
+    legend(made[0], 7)
+    return figure
+
+
+def close_up_figure(course: Course, time: float, force: FloatArray) -> Figure:
+    """The same about one contact [s], along the axis to which its force (3,) points most."""
+    span = time - _BEFORE_S, time + _AFTER_S
+    truth = np.zeros(0) if course.truth is None else course.truth.time
+    figure, (axes,) = panels(1, course, (1,), 3.2)
+    _along(axes, course, int(np.abs(np.nan_to_num(force)).argmax()), _within(course.time, span), _within(truth, span))
+    axes.set_xlim(span)
+    legend(axes, 7)
+    return figure
+
+
+def _along(axes: Axes, course: Course, k: int, shown: slice, known: slice) -> None:
+    """Draw the force along an axis of the base frame, of some steps and some instants of the physics."""
+    time = course.time[shown]
+    if course.truth is not None:
+        draw(
+            axes, course.truth.time[known], course.truth.force[known, k], color=GREEN, lw=0.9, ls="--",
+            label="true force",
+        )  # fmt: skip
+    draw(axes, time, course.force[shown, k], color=GREY, lw=0.9, label="estimate")
+    draw(axes, time, course.filtered[shown, k], color=BLUE, lw=1.3, label="value of eq. 8")
+    draw(axes, time, course.upper[shown, k], color=INK, lw=1.0, label="thresholds")
+    draw(axes, time, course.lower[shown, k], color=INK, lw=1.0)
+    first, past, _ = shown.indices(len(course))
+    at = np.array([i for i, contact, _ in course.contacts if contact.axes[k] and first <= i < past], dtype=np.int64)
+    axes.plot(course.time[at], course.filtered[at, k], "v", color=RED, mec="white", mew=0.6, ms=7, label="detected")
+    axes.set_ylabel(f"force along {AXES[k]} [N]")
+
+
+def _within(time: FloatArray, span: tuple[float, float]) -> slice:
+    """Which of some instants (S,) [s] lie in a span."""
+    first, past = np.searchsorted(time, span).tolist()
+    return slice(first, past)

@@ -1,0 +1,145 @@
+import numpy as np
+import pytest
+
+from pretouch.experiments import static
+from pretouch.reporting.course import Truth
+from pretouch.reporting.measures import measure
+from pretouch.reporting.touches import touches_of
+from pretouch.types import Mode
+from tests.reporting import made
+
+
+def true_course(*pushes):
+    """True force of 3 s at 1 kHz: (start [s], end [s], force [N]) each."""
+    time = 0.001 * np.arange(3000)
+    force = np.zeros(3000)
+    for start, end, size in pushes:
+        force[round(1000 * start) : round(1000 * end)] = size
+    return time, force
+
+
+def truth_of(*pushes, touches=()):
+    time, force = true_course(*pushes)
+    return Truth(time, np.stack([0 * force, -force, 0 * force], axis=1), touches)
+
+
+def test_a_true_touch_is_from_1_newton_until_it_is_over():
+    (touch,) = touches_of(truth_of((1.0, 1.4, 20.0), touches=((0.999, "hand", np.array([0.0, 0.2, 0.0])),)))
+    assert (touch.start, touch.end) == pytest.approx((1.0, 1.399))
+    assert touch.peak == 20.0
+    assert touch.peak_20ms == pytest.approx(20.0)
+    assert touch.link == "hand"
+    assert np.isnan(touch.held)
+
+
+def test_a_spike_is_much_less_as_a_mean_over_20_ms():
+    (touch,) = touches_of(truth_of((1.0, 1.005, 100.0)))
+    assert touch.peak == 100.0
+    assert touch.peak_20ms == pytest.approx(25.0)
+
+
+def test_what_is_held_counts_from_half_a_second_on():
+    (touch,) = touches_of(truth_of((1.0, 1.3, 100.0), (1.3, 2.0, 30.0)))
+    assert touch.peak == 100.0
+    assert touch.held == pytest.approx(30.0)
+
+
+def test_bounces_are_one_touch_and_later_ones_another():
+    touches = touches_of(truth_of((1.0, 1.1, 20.0), (1.15, 1.2, 40.0), (2.0, 2.1, 10.0)))
+    assert [t.start for t in touches] == pytest.approx([1.0, 2.0])
+    assert [t.peak for t in touches] == [40.0, 10.0]
+
+
+def test_no_truth_is_no_touch():
+    assert touches_of(None) == []
+    assert touches_of(truth_of()) == []
+
+
+@pytest.fixture(scope="session")
+def pushed(panda_model, paper_skin):
+    """Three seconds at 100 Hz: pushes at 0.5 s, felt at 0.55 s, at 1 s while reacting, at 2.2 s, missed.
+
+    At 2.8 s a contact is felt that nothing made.
+    """
+    time, force = true_course((0.5, 0.7, 30.0), (1.0, 1.1, 50.0), (2.2, 2.3, 5.0))
+    steps, truths = [], []
+    for i in range(300):
+        stamp, changes = round(0.01 * i, 2), {}
+        if 55 <= i < 155 or i >= 280:
+            changes["mode"] = Mode.REACT
+        if i in (55, 280):
+            changes["contact"] = made.contact([0.0, -8.0, 6.0], [False, True, False])
+            changes["reaction_velocity"] = np.array([0.0, -0.24, 0.18])
+            changes["filtered_force"] = np.array([1.0, -9.0, 6.0])
+        if 50 <= i < 75:
+            changes["force"] = np.array([0.0, -25.0 if i == 60 else -20.0, 3.0])
+        steps.append(made.step(panda_model, stamp=stamp, **changes))
+        part = slice(10 * i, 10 * i + 10)
+        truths.append(made.truth(time[part], force[part]))
+    return measure(made.recorded(panda_model, paper_skin, steps, truths=truths), "pushed")
+
+
+def test_a_detection_tells_force_axes_delay_and_reaction(pushed):
+    first = pushed.detections[0]
+    assert first.time == 0.55
+    assert list(first.axes) == [False, True, False]
+    assert list(first.filtered) == [1.0, -9.0, 6.0]
+    assert list(first.raw) == [0.0, -20.0, 3.0]
+    assert list(first.peak) == [0.0, -25.0, 3.0]
+    assert first.peak_norm == pytest.approx(np.hypot(25.0, 3.0))
+    assert first.delay == pytest.approx(0.05)
+    assert first.reaction_speed == pytest.approx(0.3)
+    assert first.reaction_s == pytest.approx(1.0)
+    assert first.touch == 0
+
+
+def test_a_touch_while_yielding_is_not_missed_and_a_later_one_is(pushed):
+    assert [u.mode for u in pushed.unanswered] == [Mode.REACT, Mode.TRACK]
+    assert [u.touch.peak for u in pushed.missed] == [5.0]
+
+
+def test_a_detection_without_a_touch_is_told(pushed):
+    assert [d.time for d in pushed.without_touch] == [2.8]
+    assert pushed.detections[1].delay is None
+
+
+def test_the_largest_true_force_counts_felt_or_not(pushed):
+    assert pushed.peak == 50.0
+    assert pushed.held is None
+
+
+def test_without_truth_the_peak_is_that_of_the_estimate(panda_model, paper_skin):
+    steps = [made.step(panda_model, stamp=0.01 * i) for i in range(100)]
+    felt = made.contact([12.0, 0.0, 0.0], [True, False, False])
+    for i in range(40, 60):
+        changes = {"contact": felt} if i == 40 else {}
+        steps[i] = made.step(
+            panda_model, stamp=0.01 * i, mode=Mode.REACT, force=np.array([3.0 * (i - 39), 0.0, 0.0]), **changes
+        )
+    m = measure(made.recorded(panda_model, paper_skin, steps), "felt")
+    assert not m.truth_known
+    assert m.detections[0].touch is None
+    assert m.peak == pytest.approx(60.0)
+    assert m.without_touch == ()
+    assert m.missed == ()
+
+
+@pytest.mark.parametrize(("side", "push"), [("-y", 1.0), ("+y", -1.0)])
+@pytest.mark.parametrize("profile", ["blind", "paper"])
+def test_numbers_are_those_of_the_static_experiment(panda_model, paper_skin, profile, side, push):
+    recorded, record = made.played(panda_model, paper_skin, profile, side, seconds=8.0, until_reaction=1.0)
+    row = static.results(record, push, panda_model.links)
+    m = measure(recorded, "static")
+    touch, detection = m.touches[0], m.detections[0]
+    assert row["contact"]
+    assert touch.link == row["touched_link"]
+    assert round(-push * touch.velocity[1], 4) == row["impact_speed_m_s"]
+    assert round(detection.delay, 4) == row["detection_delay_s"]
+    assert round(push * detection.filtered[1], 3) == row["filtered_at_detection_n"]
+    assert round(push * detection.raw[1], 3) == row["raw_at_detection_n"]
+    assert round(push * detection.peak[1], 3) == row["peak_estimate_n"]
+    assert round(m.peak, 3) == row["true_peak_n"]
+    assert round(touch.peak_20ms, 3) == row["true_peak_20ms_n"]
+    assert len(m.without_touch) == row["false_detections"]
+    nearest = m.distances.body
+    assert (round(nearest.distance, 4) if nearest else None) == row["least_sensed_m"]

@@ -1,0 +1,105 @@
+"""The command, on files that the recorder wrote."""
+
+import os
+
+import pytest
+
+from pretouch import cli
+from pretouch.cli.report import titles, write_page
+from pretouch.controller import Controller, Cycle
+from pretouch.errors import ExperimentError, ParameterError, RecordingError
+from pretouch.params import profile
+from pretouch.recording.reader import open_recording
+from pretouch.recording.writer import Recording
+from pretouch.reporting.measures import measure
+from pretouch.sim.scene import SceneSpec, fixtures
+from tests.reporting import made
+
+
+@pytest.fixture(scope="module")
+def folder(panda_model, paper_skin, tmp_path_factory):
+    """A folder with a recording of a trial whose profile changes after 3 s, and what was recorded."""
+    place = tmp_path_factory.mktemp("recordings")
+    played, _ = made.played(panda_model, paper_skin, "blind", seconds=6.0)
+    played.runs[0].profile = profile("blind")
+    fixed, path = fixtures(SceneSpec()), played.runs[0].path
+    before = Controller(panda_model, paper_skin, fixed, path, profile("blind"))
+    state = before.init(played[0].inputs.robot)
+    with Recording(place / "trial.mcap", before, {"command": "test"}) as recording:
+        for i, kept in enumerate(played):
+            if i == 300:
+                changed = profile("blind:threshold.f_base_n=9")
+                recording.change(Controller(panda_model, paper_skin, fixed, path, changed))
+            recording.record(Cycle(kept.inputs, state, kept.step), kept.truth)
+    return place, played
+
+
+def test_a_report_of_a_file_is_that_of_what_was_recorded(folder):
+    place, played = folder
+    told, expected = measure(open_recording(place / "trial.mcap"), ""), measure(played, "")
+    assert len(expected.detections) == len(expected.touches) == 1
+    assert told.detections[0].delay == expected.detections[0].delay
+    assert told.touches[0].peak == expected.touches[0].peak
+    assert repr(told.units) == repr(expected.units)
+    assert repr(told.states) == repr(expected.states)
+    assert repr(told.joints) == repr(expected.joints)
+
+
+def test_the_command_writes_a_page_of_several_files(folder, tmp_path, capsys):
+    place, _ = folder
+    other = tmp_path / "trial.mcap"
+    other.write_bytes((place / "trial.mcap").read_bytes())
+    out = tmp_path / "new" / "page.html"
+    assert cli.main(["report", str(place / "trial.mcap"), str(other), "--out", str(out)]) == 0
+    assert str(out) in capsys.readouterr().out
+    text = out.read_text()
+    assert f"{tmp_path.name}/trial.mcap" in text
+    assert f"{place.name}/trial.mcap" in text
+    assert "blind:threshold.f_base_n=9" in text
+
+
+def test_a_killed_file_makes_a_page_that_says_so(folder, tmp_path):
+    place, _ = folder
+    whole = (place / "trial.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: 2 * len(whole) // 3])
+    said = open_recording(cut).said
+    assert said
+    text = write_page([cut], tmp_path / "cut.html").read_text()
+    assert '<span class="bad">' in text
+    assert said.replace("&", "&amp;").split("'")[0][:40] in text
+
+
+def test_what_is_wrong_with_a_request_is_one_sentence(folder, tmp_path):
+    trial = folder[0] / "trial.mcap"
+    with pytest.raises(RecordingError, match="No recording is given"):
+        write_page([], tmp_path / "page.html")
+    with pytest.raises(RecordingError, match="is given more than once"):
+        write_page([trial, trial.parent / "." / "trial.mcap"], tmp_path / "page.html")
+    with pytest.raises(RecordingError, match="would be written over the recording"):
+        write_page([trial], trial)
+    with pytest.raises(RecordingError, match=r"nowhere\.mcap cannot be read"):
+        write_page([tmp_path / "nowhere.mcap"], tmp_path / "page.html")
+    with pytest.raises(ExperimentError, match="cannot be written"):
+        write_page([trial], tmp_path)
+    with pytest.raises(ParameterError, match=r"limits\.toml cannot be read"):
+        write_page([trial], tmp_path / "page.html", tmp_path / "limits.toml")
+
+
+def test_limits_of_ones_own_stand_in_the_page(folder, tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text('source = "our table"\n[[region]]\nname = "Thumb"\nquasi_static_n = 40\ntransient_n = 50\n')
+    text = write_page([folder[0] / "trial.mcap"], tmp_path / "page.html", limits).read_text()
+    assert "our table" in text
+    assert "Thumb" in text
+    assert "Hands and fingers" not in text
+
+
+def test_a_name_that_is_no_text_can_be_reported(folder, tmp_path):
+    odd = tmp_path / os.fsdecode(b"odd\xff.mcap")
+    odd.write_bytes((folder[0] / "trial.mcap").read_bytes())
+    assert "odd?.mcap" in write_page([odd], tmp_path / "page.html").read_text()
+
+
+def test_titles_tell_files_apart_by_as_little_as_they_can(tmp_path):
+    assert titles([tmp_path / "a" / "x", tmp_path / "b" / "x", tmp_path / "y"]) == ["a/x", "b/x", "y"]
