@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test test-slow lint bench peers format clean
+.PHONY: setup demo live browser test test-slow lint bench peers format clean
 
 setup: $(STAMP)
 
@@ -12,12 +12,19 @@ $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed: say make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,viewer]'
 	$(BIN)/pretouch warm-up
 	@touch $@
 
 demo: setup
 	$(BIN)/pretouch demo
+
+live: setup
+	$(BIN)/pretouch live
+
+# what the tests of the page need beside a Chromium of the system's; without both they are skipped
+browser: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
 
 test: setup
 	$(BIN)/pytest -n 2 -m "not slow"

@@ -50,7 +50,7 @@ def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, args, wor
     assert said.out == ""
 
 
-@pytest.mark.parametrize("name", ["run.json", "trials/x.json", "traces/a/b.json", "trials", "../link/run.json"])
+@pytest.mark.parametrize("name", ["run.json", "trials/x.json", "recordings/a/b.json", "trials", "../link/run.json"])
 def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
     out = tmp_path / "out"
     (tmp_path / "link").symlink_to(out)

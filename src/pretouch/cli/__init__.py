@@ -3,126 +3,34 @@
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from types import FrameType
-from typing import Annotated
 
 import tyro
 from rich.console import Console
 
+from pretouch.cli.commands import (
+    Bench,
+    Command,
+    Cycle,
+    Demo,
+    Detect,
+    Figure,
+    FreeMotion,
+    Live,
+    Recover,
+    Replay,
+    Report,
+    Reproduce,
+    WarmUp,
+)  # fmt: skip
 from pretouch.errors import ParameterError, PretouchError
 
 # the rest of the package takes a second to import: only the functions that run something do
 
 _USAGE, _INTERRUPTED = 2, 130
 _TERMINATED = 143
-
-
-@dataclass(frozen=True)
-class Demo:
-    """Play a small part of the paper's three experiments, blind and with proximity, and show what came out."""
-
-    seeds: int = 4
-    """Trials of each cell of the static experiment; the other two take one."""
-    out: str = ""
-    """Folder for results, figures and page; by default a new one under runs/."""
-
-
-@dataclass(frozen=True)
-class Reproduce:
-    """Run the paper's experiments in full. A run that was stopped goes on where it was, with the same parameters."""
-
-    experiment: tyro.conf.Positional[str] = "all"
-    """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), one of the studies of its claims and weaknesses, or all of
-    them, which takes about three quarters of an hour on two processors."""
-    seeds: int = 12
-    """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
-    profiles: str = "blind,paper"
-    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. With `all`,
-    and where only the force estimate is studied, the studies have their own."""
-    restrictions: str = ""
-    """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
-    orientation: str = ""
-    """free or hold: whether the task keeps the hand's orientation; by default the profile's own, hold."""
-    stiffness: str = "25000"
-    """Contact stiffness of the static object [N/m], or several, separated by commas."""
-    skin: str = ""
-    """Skin file; by default the seven units that come with the package."""
-    out: str = ""
-    """Folder for results, figures and page; by default runs/reproduce-EXPERIMENT."""
-    json: str = ""
-    """File for all trials and their summary; by default results.json in the folder."""
-
-
-@dataclass(frozen=True)
-class Figure:
-    """Draw one figure of the paper, from a run that is there or from trials played for it."""
-
-    name: tyro.conf.Positional[str]
-    """circle (Fig. 4), interaction (Fig. 5), close-up (Fig. 6), force-difference (Fig. 7) or framework (Fig. 2)."""
-    run: str = ""
-    """Folder of a run of `reproduce` or `demo` to draw it from; by default what is needed is played first."""
-    out: str = ""
-    """File to write, ending in .png, .pdf or .svg; by default NAME.png."""
-    profile: str = "paper"
-    """Profile that is shown."""
-    seed: int = 0
-    """Seed of the trials that are played; runs keep the course of seed 0."""
-
-
-@dataclass(frozen=True)
-class FreeMotion:
-    """How far the force estimate of an arm left alone is off, and which detectors take that for a contact."""
-
-    seeds: int = 10
-    """Simulated arms; each is left alone for twenty minutes, a quarter of them standing."""
-    out: str = ""
-    """Folder for results, figures and page; by default runs/bench-free-motion."""
-    json: str = ""
-    """File for all trials and their summary; by default results.json in the folder."""
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """How long a control step takes: processor and wall time at a rate, overruns, and the share of each stage."""
-
-    points: str = "7,32,128,1000"
-    """Numbers of sensed points, separated by commas, each shown by a unit 50 times a second."""
-    rate: float = 1000.0
-    """Cycles a second; everything the profile counts in cycles is brought to it."""
-    cycles: int = 20_000
-    """Steps measured for each number of points."""
-    profile: str = "paper"
-    """Profile of the controller, or PROFILE:GROUP.FIELD=VALUE."""
-    json: str = ""
-    """File for the numbers; by default they are only shown."""
-    priority: int | None = None
-    """Real-time priority, 1 to 99 (80 is usual); by default the process keeps its own."""
-    cpu: int | None = None
-    """Number of the processor to stay on; by default the system decides."""
-
-
-@dataclass(frozen=True)
-class Bench:
-    """Measure something: the force estimate of many simulated arms, or the time of a control step."""
-
-    what: Annotated[FreeMotion, tyro.conf.subcommand("free-motion")] | Annotated[Cycle, tyro.conf.subcommand("cycle")]
-
-
-@dataclass(frozen=True)
-class WarmUp:
-    """Compile a control step, once after an installation: what comes later then starts within a second."""
-
-
-Command = (
-    Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
-    | Annotated[Figure, tyro.conf.subcommand("figure")]
-    | Annotated[Bench, tyro.conf.subcommand("bench")]
-    | Annotated[WarmUp, tyro.conf.subcommand("warm-up")]
-)
 
 
 class _Terminated(BaseException):
@@ -161,6 +69,16 @@ def main(args: list[str] | None = None) -> int:
                     _free_motion(what)
                 case Bench(Cycle() as what):
                     _cycle(what)
+                case Live():
+                    _live(command)
+                case Replay():
+                    return _replay(command)
+                case Recover():
+                    _recover(command)
+                case Detect():
+                    _detect(command)
+                case Report():
+                    _report(command)
                 case WarmUp():
                     _warm_up()
     except PretouchError as error:
@@ -202,6 +120,7 @@ def _reproduce(command: Reproduce) -> None:
         orientation=command.orientation or None,
         stiffness=tuple(map(_number, _words(command.stiffness))),
         skin=command.skin or None,
+        record=command.record,
     )
     out = Path(command.out or f"runs/reproduce-{command.experiment}")
     runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
@@ -231,6 +150,43 @@ def _cycle(command: Cycle) -> None:
 
     request = CycleRequest(command.rate, command.cycles, command.profile, command.priority, command.cpu)
     bench_cycle(_counts(command.points), request, Path(command.json) if command.json else None)
+
+
+def _detect(command: Detect) -> None:
+    from pretouch.cli.detect import detect
+    from pretouch.recording.foreign_source import Choice
+
+    c = command
+    choice = Choice(c.wrench, c.joints, c.sign, c.frame, c.zeros, c.arm, ranges=bool(c.skin))
+    skin, out, json = (Path(text) if text else None for text in (c.skin, c.out, c.json))
+    detect(Path(c.file), choice, _words(c.profiles), skin, c.rate, out, json)
+
+
+def _replay(command: Replay) -> int:
+    from pretouch.cli.replay import replay
+
+    c = command
+    return replay(Path(c.file), c.verify, c.profile, c.page, c.host, c.port)
+
+
+def _recover(command: Recover) -> None:
+    from pretouch.cli.replay import recover
+
+    recover(Path(command.file), Path(command.out) if command.out else None)
+
+
+def _live(command: Live) -> None:
+    from pretouch.cli.live import live
+
+    c = command
+    live(c.profile, c.path, c.seed, c.record, c.host, c.port)
+
+
+def _report(command: Report) -> None:
+    from pretouch.cli.report import write_page
+
+    limits = Path(command.limits) if command.limits else None
+    print(f"Report: {write_page([Path(file) for file in command.files], Path(command.out), limits)}")
 
 
 def _warm_up() -> None:

@@ -1,0 +1,50 @@
+"""What a page shows: the world that stands still, and one instant in it."""
+
+from dataclasses import dataclass
+
+from pretouch.control.path import Path
+from pretouch.params import Profile
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, FloatArray
+
+
+@dataclass(frozen=True)
+class BoxShape:
+    """A box in the room."""
+
+    name: str
+    center: FloatArray
+    """(3,) [m], base frame."""
+    half_size: FloatArray
+    """(3,) [m]"""
+
+
+@dataclass(frozen=True)
+class World:
+    """What stays the same from one frame to the next, until a person changes it: then there is another `World`."""
+
+    model: RobotModel
+    skin: Skin
+    path: Path
+    profile: Profile
+    boxes: tuple[BoxShape, ...]
+    hand_radius: float | None
+    """Radius of the person's hand [m], None without one."""
+    floor_height: float
+    """[m], base frame."""
+    stiffness: float
+    """Of what the arm can touch, the hand and the boxes [N/m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One instant to be drawn."""
+
+    step: ControlStep
+    hand: FloatArray | None
+    """(3,) centre of the person's hand [m], base frame."""
+    hand_target: FloatArray | None
+    """(3,) where the mouse asks the hand to be [m], base frame."""
+    true_force: FloatArray | None
+    """(3,) contact force on the arm by everything else [N], base frame; None where only the estimate is known."""

@@ -1,0 +1,54 @@
+"""How a control of a page reaches the loop: what a person does becomes an action in the queue."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from pretouch.viewer.commands import Commands
+from pretouch.viewer.scene import PARTS
+
+if TYPE_CHECKING:
+    from viser import GuiApi, ViserServer
+
+
+def dress(server: "ViserServer") -> None:
+    """Give a page its colours, and put its controls to the right."""
+    server.gui.configure_theme(brand_color=(49, 104, 196), show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
+    server.gui.main_panel.set_width(330)
+
+
+def when_changed(handle: Any, commands: Commands, act: Callable[[Any], object], kind: str = "") -> None:
+    """Queue an action on the value a person gives a control; not on those the program sets."""
+
+    @handle.on_update
+    async def _(event: Any) -> None:
+        if event.client_id is not None:
+            value = event.target.value
+            commands.put(lambda: act(value), kind)
+
+
+def add_button(gui: "GuiApi", commands: Commands, label: str, act: Callable[[], object], **more: Any) -> Any:
+    """Add a button that queues an action; `more` goes to viser's `add_button`, but `icon` is a name."""
+    from viser import Icon
+
+    icon = more.pop("icon", None)
+    button = gui.add_button(label, icon=getattr(Icon, icon) if icon else None, **more)
+
+    @button.on_click
+    async def _(_: Any) -> None:
+        commands.put(act)
+
+    return button
+
+
+def add_view_boxes(gui: "GuiApi", commands: Commands, show: Callable[[str, bool], None]) -> None:
+    """Add a box for each part of the scene that can be hidden."""
+    for name in PARTS:
+        box = gui.add_checkbox(name.capitalize(), True)
+        when_changed(box, commands, partial(show, name), f"view {name}")
+
+
+def put(handle: Any, value: object) -> None:
+    """Have a control show a value; mypy takes viser's property for read-only."""
+    handle.value = value

@@ -1,0 +1,154 @@
+"""The live page: a simulated arm in a browser, and a hand to touch it with."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pretouch.errors import PretouchError
+from pretouch.loop import MonotonicClock
+from pretouch.types import FloatArray, Mode
+from pretouch.viewer.commands import Action, Commands
+from pretouch.viewer.controls import Controls
+from pretouch.viewer.gui import dress
+from pretouch.viewer.pacing import Pace
+from pretouch.viewer.plots import History, Plots
+from pretouch.viewer.scene import Scene
+from pretouch.viewer.server import ServeOptions, served, url_of
+from pretouch.viewer.simulation import LiveSimulation
+from pretouch.viewer.status import Status, legend
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+PERIOD_S = 1.0 / 30.0
+"""Time between two updates of the page [s]."""
+
+
+class LivePage:
+    """A page over a simulation, turned by `turn`; people's commands wait in a queue until then."""
+
+    def __init__(self, server: "ViserServer", simulation: LiveSimulation) -> None:
+        self._server, self._simulation = server, simulation
+        self._world, self._time = simulation.world, simulation.time
+        self.pace = Pace()
+        self._commands = Commands()
+        self._pointed: FloatArray | None = None
+        dress(server)
+        self._status = Status(server.gui)
+        server.gui.add_html(legend())
+        self.controls = Controls(server.gui, simulation, self._commands)
+        self._scene = Scene(server, simulation.world)
+        self._status.notice = self._scene.said
+        self.controls.on_view = self._scene.show
+        self._scene.on_hand(self._drag)
+        self._history = History(len(simulation.skin))
+        panel = server.gui.add_panel()
+        with panel.add_tab("Last 10 s"):
+            self._plots = Plots(server.gui, self._history, simulation.skin.ids)
+        panel.dock_left()
+        panel.set_width(310)
+
+    @property
+    def notice(self) -> str:
+        """What people are told, or ''."""
+        return self._status.notice
+
+    def ask(self, action: Action, kind: str = "") -> None:
+        """Have something done between two ticks, from any thread; of one kind only the newest."""
+        self._commands.put(action, kind)
+
+    def _drag(self, target: FloatArray) -> None:
+        self.ask(lambda: self._move_hand(target), "hand")
+
+    def _move_hand(self, target: FloatArray) -> None:
+        self._simulation.move_hand(target)
+        self.controls.show_hand(target)  # also while the arm is paused
+
+    def turn(self, now: float) -> None:
+        """Do what people asked for, let time pass, and draw; `now` is the time of the machine [s]."""
+        self._obey()
+        running = self.controls.running
+        before = self._simulation.time
+        steps = []
+        if running.single:
+            running.single = False
+            steps = [self._simulation.single_step()]
+        elif not running.paused:
+            steps = self._simulation.advance(running.speed * PERIOD_S)
+        self.pace.tick(now, max(0.0, self._simulation.time - before), 0.0 if running.paused else running.speed)
+        for step in steps:
+            self._history.add(step)
+            self._scene.trail.add(step)
+        if self._simulation.notice:
+            self._status.notice, self._simulation.notice = self._simulation.notice, ""
+            self.controls.refresh()
+        if self._server.get_clients():
+            self._draw(now)
+
+    def _obey(self) -> None:
+        actions = self._commands.take()
+        for action in actions:
+            self._status.notice = ""
+            try:
+                action()
+            except PretouchError as error:
+                self._status.notice = f"Not done: {error}"
+        if actions:
+            self.controls.refresh()
+        if self._simulation.time < self._time:
+            self._scene.trail.clear()
+            self._history.clear()
+        self._time = self._simulation.time
+        if self._simulation.world is not self._world:
+            self._world = self._simulation.world
+            self._scene.show_world(self._world)
+
+    def _draw(self, now: float) -> None:
+        frame, pace = self._simulation.frame, self.pace
+        with self._server.atomic():
+            self._scene.draw(frame, now, self.controls.silenced)
+            self._follow_target(frame.hand_target)
+            self._plots.draw(now)
+            recording = self._simulation.recording
+            recorded = f" · recording {recording.place.name}" if recording else ""
+            rates = (
+                "paused" if self.controls.running.paused
+                else f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
+            )  # fmt: skip
+            self._status.draw(frame.step, f"t = {frame.step.stamp:.2f} s · {rates}{recorded}", pace.sentence(), now)
+            self.controls.offer_resume(frame.step.mode is Mode.HOLD)
+
+    def _follow_target(self, target: FloatArray | None) -> None:
+        """Have gizmo and sliders show where the hand is to be, wherever that came from."""
+        if target is None or (self._pointed is not None and np.array_equal(target, self._pointed)):
+            return
+        self.controls.show_hand(target)
+        if self._scene.place_target(target):
+            self._pointed = target.copy()
+
+
+def serve_live(
+    simulation: LiveSimulation,
+    options: ServeOptions,
+    until: Callable[[], bool] = lambda: False,
+    say: Callable[[str], None] = print,
+) -> None:
+    """Show a simulation as a page until told to stop; however it ends, a recording under way is closed.
+
+    A ViewerError says that the port is taken or the extra is missing.
+    """
+    with served(options, "Pretouch") as server:
+        try:
+            page = LivePage(server, simulation)
+            say(f"The arm is at {url_of(options)} (Ctrl-C ends it).")
+            clock, slow = MonotonicClock(PERIOD_S), False
+            while not until():
+                page.turn(clock.tick())
+                if page.pace.slow is not slow:
+                    slow = page.pace.slow
+                    say(page.pace.sentence() or "The machine keeps up with real time again.")
+        finally:
+            closed = simulation.stop_recording()
+            if closed:
+                say(closed.sentence)

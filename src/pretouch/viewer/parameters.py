@@ -1,0 +1,78 @@
+"""The parameters of Table I as a page offers them: names, units, and what each does."""
+
+import ast
+import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from types import MappingProxyType
+
+from pretouch import params
+from pretouch.params import Profile
+
+
+@dataclass(frozen=True)
+class TableEntry:
+    """One row of Table I: the fields it sets, one for each use in the paper."""
+
+    symbol: str
+    unit: str
+    fields: tuple[tuple[str, str], ...]
+    """(group of the profile, field) of each."""
+    step: float
+    """By how much a click changes it."""
+
+    def read(self, profile: Profile) -> float:
+        """Return its value in a profile."""
+        group, name = self.fields[0]
+        return float(getattr(getattr(profile, group), name))
+
+    def write(self, profile: Profile, value: float) -> Profile:
+        """Return the profile with another value; a ParameterError says what is wrong with it."""
+        groups: dict[str, dict[str, float | int]] = {}
+        for group, name in self.fields:
+            kind = type(getattr(getattr(profile, group), name))
+            groups.setdefault(group, {})[name] = round(value) if kind is int else float(value)
+        return replace(profile, **{g: replace(getattr(profile, g), **new) for g, new in groups.items()})
+
+    @property
+    def label(self) -> str:
+        """Symbol and unit."""
+        return f"{self.symbol} [{self.unit}]" if self.unit else self.symbol
+
+    def hint(self) -> str:
+        """What it does, from the documentation of its fields."""
+        groups = {f.name: f.default_factory for f in Profile.__dataclass_fields__.values()}
+        return " ".join(field_docs().get((groups[g].__name__, name), "") for g, name in self.fields)  # type: ignore[union-attr]
+
+
+TABLE_1: tuple[TableEntry, ...] = (
+    TableEntry("d_max", "m", (("reduction", "d_max_m"), ("threshold", "d_max_m")), 0.05),
+    TableEntry("d_min", "m", (("threshold", "d_min_m"),), 0.01),
+    TableEntry("l_max", "cycles", (("reduction", "l_max_cycles"),), 10),
+    TableEntry("V_max", "m/s", (("restriction", "v_max_m_s"),), 0.01),
+    TableEntry("d_repulse", "m", (("restriction", "d_repulse_m"),), 0.01),
+    TableEntry("d_crit", "m", (("restriction", "d_crit_m"),), 0.01),
+    TableEntry("d_notice", "m", (("restriction", "d_notice_m"),), 0.05),
+    TableEntry("alpha", "", (("threshold", "alpha"),), 0.05),
+    TableEntry("beta", "", (("restriction", "beta"),), 1.0),
+    TableEntry("lambda", "", (("threshold", "lambda_"),), 0.05),
+    TableEntry("F_std", "N", (("threshold", "f_std_n"),), 0.5),
+    TableEntry("F_d", "N", (("threshold", "f_d_n"),), 0.5),
+    TableEntry("F_b", "N", (("threshold", "f_base_n"),), 0.5),
+    TableEntry("sigma_max", "N", (("threshold", "sigma_max_n"),), 0.5),
+)
+
+
+@cache
+def field_docs() -> Mapping[tuple[str, str], str]:
+    """What the source says of each field of the parameters, by (class, field), on one line."""
+    docs: dict[tuple[str, str], str] = {}
+    for node in ast.parse(inspect.getsource(params)).body:
+        if not isinstance(node, ast.ClassDef):
+            continue
+        for field, text in zip(node.body, node.body[1:], strict=False):
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr):
+                said = ast.literal_eval(text.value)
+                docs[node.name, field.target.id] = " ".join(str(said).split())
+    return MappingProxyType(docs)

@@ -1,0 +1,146 @@
+"""The last seconds as plots: distances of the units, force with its moving thresholds, speed."""
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pretouch.types import ControlStep, FloatArray
+from pretouch.viewer import palette
+
+if TYPE_CHECKING:
+    from viser import GuiApi, GuiUplotHandle
+
+SPAN_S = 10.0
+"""Time that is shown [s]."""
+SAMPLE_S = 0.06
+"""Time from one shown sample to the next [s]; of the forces in it, the one farthest from the mean is shown."""
+PERIOD_S = 0.125
+"""Time between two updates of a page [s]."""
+_ROUNDING_S = 1e-6
+_NOTHING_M = 9.0
+"""Where a unit that shows nothing is drawn [m]: out of sight."""
+SAMPLES = int(SPAN_S / SAMPLE_S)
+
+
+class History:
+    """Samples of the last `SPAN_S`: time, distances (K), then force, upper and lower threshold (3 each), two speeds."""
+
+    def __init__(self, units: int, more: int = 0) -> None:
+        """Take the number of units, and of further columns that `add` is given."""
+        self._units, self._width = units, 1 + units + 9 + 2 + more
+        self._rows: deque[FloatArray] = deque(maxlen=SAMPLES)
+        self._open: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def clear(self) -> None:
+        """Forget all samples."""
+        self._rows.clear()
+        self._open = None
+
+    def add(self, step: ControlStep, more: Sequence[float] = ()) -> None:
+        """Take a step in; one from before the last begins anew."""
+        if self._open is not None and step.stamp < self._open[0]:
+            self.clear()
+        thresholds, force = step.thresholds, slice(1 + self._units, 4 + self._units)
+        distance = np.nan_to_num(step.range_distance, nan=_NOTHING_M)
+        row = np.concatenate(
+            [
+                [step.stamp], distance, step.force, thresholds.upper, thresholds.lower,
+                [np.linalg.norm(step.ee_velocity), np.linalg.norm(step.desired_velocity)], more,
+            ]
+        )  # fmt: skip
+        if self._open is None:
+            self._open = row
+        elif step.stamp - self._open[0] >= SAMPLE_S - _ROUNDING_S:
+            self._rows.append(self._open)
+            self._open = row
+        else:
+            far = np.abs(self._open[force] - thresholds.mean) > np.abs(row[force] - thresholds.mean)
+            row[force] = np.where(far, self._open[force], row[force])
+            row[0] = self._open[0]
+            self._open = row
+
+    def columns(self) -> FloatArray:
+        """All samples, one column after the other (columns, samples); before the first time, nothing (NaN)."""
+        if self._open is None:
+            return np.vstack([np.arange(2.0), np.full((self._width - 1, 2), np.nan)])
+        rows = np.array([*self._rows, self._open])
+        if len(rows) < 2:
+            rows = np.repeat(rows, 2, axis=0)
+            rows[0, 0] -= SAMPLE_S
+        return rows.T
+
+
+class Plots:
+    """Five plots of a history, one below the other."""
+
+    def __init__(self, gui: "GuiApi", history: History, ids: Sequence[str], other: str = "") -> None:
+        """`other` names a second profile, whose thresholds (upper 3, lower 3) are the history's further columns."""
+        self._history, self._units, self._other = history, len(ids), bool(other)
+        self._sent = -np.inf
+        colours = [palette.css(palette.UNITS[i % len(palette.UNITS)]) for i in range(len(ids))]
+        gui.add_html(_caption("Distance [m]", zip(ids, colours, strict=True)))
+        self._distance = _plot(gui, colours, 130, (0.0, 1.0))
+        grey, force, second = (palette.css(c) for c in (palette.FOLLOWING, palette.FORCE, palette.REACTING))
+        marks = [("force", force), ("thresholds", grey)] + ([(f"of {other}", second)] if other else [])
+        lines = [force, grey, grey] + ([second] * 2 if other else [])
+        self._force = []
+        for axis in "xyz":
+            gui.add_html(_caption(f"Force {axis} [N]", marks if axis == "x" else ()))
+            self._force.append(_plot(gui, lines, 96, dashed=3))
+        blue = palette.css(palette.PATH)
+        gui.add_html(_caption("Speed [m/s]", [("end-effector", blue), ("desired", grey)]))
+        self._speed = _plot(gui, [blue, grey], 96, (0.0, 0.4), dashed=1)
+
+    def draw(self, now: float) -> None:
+        """Send the history, at a time [s]; not more often than eight times a second."""
+        if now - self._sent < PERIOD_S:
+            return
+        self._sent = now
+        rows, k = self._history.columns(), self._units
+        time = rows[0]
+        self._distance.data = (time, *rows[1 : 1 + k])
+        for axis, plot in enumerate(self._force):
+            at = [1 + k + axis, 4 + k + axis, 7 + k + axis]
+            at += [12 + k + axis, 15 + k + axis] if self._other else []
+            plot.data = (time, *rows[at])
+        self._speed.data = (time, *rows[10 + k : 12 + k])
+
+
+def _plot(
+    gui: "GuiApi", colours: Sequence[str], height: int, values: tuple[float, float] | None = None,
+    dashed: int | None = None,
+) -> "GuiUplotHandle":  # fmt: skip
+    """A plot with a line of each colour over time; from the `dashed`th on they are dashed."""
+    lines: list[Any] = [{}]
+    for i, colour in enumerate(colours):
+        late = dashed is not None and i >= dashed
+        lines.append({"stroke": colour, "width": 1.5, "points": {"show": False}, **({"dash": (4, 3)} if late else {})})
+    scales: dict[str, Any] = {"x": {"time": False}}
+    if values:
+        scales["y"] = {"range": values}
+    small: dict[str, Any] = {"size": 18, "font": "10px system-ui", "ticks": {"size": 3}, "gap": 2}
+    axes: Any = (small, {**small, "size": 34, "space": 24})
+    return gui.add_uplot(
+        tuple(np.full(2, np.nan) if i else np.arange(2.0) for i in range(len(colours) + 1)), tuple(lines),
+        height=height, scales=scales, legend={"show": False}, cursor={"show": False},
+        axes=axes, padding=(6, 8, 0, 0),
+    )  # fmt: skip
+
+
+def _caption(title: str, marks: Iterable[tuple[str, str]]) -> str:
+    """A title, and what the colours mean."""
+    shown = "".join(
+        f"<span style='white-space:nowrap'><span style='display:inline-block;width:8px;height:8px;border-radius:4px;"
+        f"background:{colour};margin-right:4px'></span>{escape(name)}</span>"
+        for name, colour in marks
+    )
+    return (
+        "<div style='display:flex;flex-wrap:wrap;gap:0 9px;font-size:11px;line-height:1.35;padding:0 12px;"
+        f"margin-bottom:-8px'><b>{title}</b>{shown}</div>"
+    )

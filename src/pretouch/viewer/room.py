@@ -1,0 +1,80 @@
+"""The simulated room of a live session: arm, sensor units, object and a person's hand."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pretouch.control.path import Circle, Path, WayPoints
+from pretouch.errors import ParameterError
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sim.board import Side, board_beside
+from pretouch.sim.hand import Hand
+from pretouch.sim.plant import Plant, PlantClock
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.posture import brought_to
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch.viewer.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
+from pretouch.viewer.settings import Faults, LiveSettings
+
+_SETTLE_S = 0.2
+"""Time the arm stands before the controller starts [s]: the observer's transient is over."""
+
+
+def live_path(settings: LiveSettings) -> Path:
+    """Return the path by its name, begun on the side away from the object."""
+    far = -1.0 if settings.object == "board +y" else 1.0
+    if settings.path == "circle":
+        return Circle(start_angle=np.pi if far < 0 else 0.0)
+    return WayPoints(np.array([(0.4, 0.5 * far, 0.5), (0.4, -0.5 * far, 0.5)]), closed=True)
+
+
+class Room:
+    """All that is simulated, at rest where the path begins."""
+
+    def __init__(self, settings: LiveSettings, path: Path, model: RobotModel, skin: Skin) -> None:
+        """Build it; a control period that is no whole number of physics steps is a ParameterError."""
+        q, hand = brought_to(model, path.point(0.0)), HandSpec(stiffness=settings.stiffness)
+        boxes: tuple[Box, ...] = ()
+        if settings.object != "none":
+            side: Side = "+y" if settings.object == "board +y" else "-y"
+            boxes = (board_beside(path, side, settings.stiffness),)
+        scene = SceneSpec(boxes=boxes, hand=hand)
+        self.mouse = Mouse(np.array(settings.hand_start), scene, hand)
+        start = clear_place(model, q, scene, self.mouse.target, hand.radius + GAP_M)
+        self.mouse.move(start)
+        self.scene = replace(scene, hand=replace(hand, start=tuple(start.tolist())))
+        self.plant = Plant(model, self.scene, PlantParams(), q, settings.seed)
+        self.units = RangeFinders(self.plant, skin, RangeFinderParams(), settings.seed)
+        self.hand = Hand(self.plant, self.mouse, speed_max=HAND_SPEED_M_S)
+        self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
+        self.stiffness = self._wanted = settings.stiffness
+        self._skin, self._sound = skin, self.units.params
+        self.fail(settings.faults)
+        self.plant.advance(_SETTLE_S)
+
+    def fail(self, faults: Faults) -> None:
+        """Have the units err so, from the next measurement on; an id that no unit has is a ParameterError."""
+        unknown = sorted(faults.silenced - set(self._skin.ids))
+        if unknown:
+            known = ", ".join(self._skin.ids)
+            raise ParameterError(f"There is no unit {', '.join(unknown)} to be silenced: choose from {known}.")
+        sound = self._sound
+        self.units.silenced = {i for i, name in enumerate(self._skin.ids) if name in faults.silenced}
+        self.units.change(replace(
+            sound, noise_floor_m=sound.noise_floor_m * faults.noise_factor,
+            noise_rate=sound.noise_rate * faults.noise_factor, latency_s=sound.latency_s + faults.latency_s,
+        ))  # fmt: skip
+
+    def stiffen(self, stiffness: float) -> None:
+        """Give hand and object another stiffness [N/m], as soon as nothing touches."""
+        self._wanted = stiffness
+
+    def tick(self) -> float:
+        """Let one control period pass and return the time [s]."""
+        if self._wanted != self.stiffness and not self.plant.touching:
+            self.stiffness = self._wanted
+            for thing in ("hand", *(box.name for box in self.scene.boxes)):
+                self.plant.stiffen(thing, self.stiffness)
+        return self.clock.tick()

@@ -1,0 +1,204 @@
+"""What a page shows in space: the room, the arm, what it senses, does and feels, and a person's hand."""
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pretouch.robot.model import Kinematics
+from pretouch.types import ControlStep, FloatArray
+from pretouch.viewer import palette
+from pretouch.viewer.arm import Arm, capsule_surfaces
+from pretouch.viewer.expectation import expectation, in_levels
+from pretouch.viewer.frame import Frame, World
+from pretouch.viewer.trail import Trail, binding
+from pretouch.viewer.units import Units
+from pretouch.viewer.vendor import vendor_surfaces
+
+if TYPE_CHECKING:
+    from viser import ArrowsHandle, SceneNodeHandle, TransformControlsHandle, ViserServer
+
+CAMERA_FROM, CAMERA_AT = (1.75, 0.95, 0.85), (0.3, 0.0, 0.27)
+"""Where the page looks from at first and at what [m]: from the arm's front right."""
+CAMERA_FOV = math.radians(42.0)
+"""Vertical angle of what is seen [rad]."""
+
+GIZMO_M = 0.15
+"""Length of the arrows that the hand is dragged by [m]."""
+
+ARROW_M_PER_N, ARROW_MOST_M, ARROW_LEAST_N = 0.012, 0.45, 1.0
+"""Length of a force arrow [m/N] and at most [m], and the force below which none is drawn [N]."""
+
+PARTS = ("cones", "points", "pairs", "path", "trail", "forces")
+"""What can be shown and hidden."""
+
+_APART_M = 0.015
+"""Distance between hand and target from which the target is shown [m]."""
+
+
+class Scene:
+    """Draws worlds and frames; `now` is the time of the machine [s], which bounds how much is sent."""
+
+    def __init__(self, server: "ViserServer", world: World) -> None:
+        self._server, self._world = server, world
+        scene = server.scene
+        scene.configure_default_lights(cast_shadow=False)
+        scene.set_background_image(_sky())
+        server.initial_camera.position, server.initial_camera.look_at = CAMERA_FROM, CAMERA_AT
+        server.initial_camera.fov = CAMERA_FOV
+        found, self.said = vendor_surfaces(world.model)
+        """One sentence on what the arm is drawn by, where it is not the vendor's surfaces."""
+        self._arm = Arm(scene, world.model, world.skin, found or capsule_surfaces(world.model))
+        self.units = Units(scene, world.skin, world.model.links)
+        self.trail = Trail(scene)
+        _room(server, world)
+        self._boxes: list[SceneNodeHandle] = []
+
+        self.path = scene.add_line_segments(
+            "/path", _segments(world), palette.PATH, thickness=5.0, thickness_units="screen"
+        )
+        self.pairs = scene.add_line_segments(
+            "/pairs", np.zeros((1, 2, 3)), palette.PAIR, thickness=3.0, thickness_units="screen", visible=False
+        )
+        self._shows_pairs = self._shows_forces = True
+        self._ee = scene.add_frame("/ee", show_axes=False)
+        self._force = self._arrow("/ee/force", palette.FORCE)
+        self._true_force = self._arrow("/ee/true_force", palette.TRUE_FORCE)
+        self._hand, self._target = self._person(world)
+        self._dragged = False
+        self.show_world(world)
+
+    def _arrow(self, name: str, colour: palette.Colour) -> "ArrowsHandle":
+        return self._server.scene.add_arrows(
+            name, np.zeros((1, 2, 3)), colour, shaft_radius=0.007, head_radius=0.018, head_length=0.04, visible=False
+        )
+
+    def _person(self, world: World) -> "tuple[SceneNodeHandle | None, TransformControlsHandle | None]":
+        if world.hand_radius is None:
+            return None, None
+        scene, radius = self._server.scene, world.hand_radius
+        plain: dict[str, Any] = {"subdivisions": 3, "cast_shadow": False, "receive_shadow": False}
+        hand = scene.add_icosphere("/hand", radius, color=palette.HAND, **plain)
+        target = scene.add_transform_controls(
+            "/hand_target", scale=GIZMO_M, line_width=3.0, disable_rotations=True, depth_test=False
+        )
+        self._ghost = scene.add_icosphere(
+            "/hand_target/ghost", 0.8 * radius, color=palette.HAND, opacity=0.35, visible=False, **plain
+        )
+        return hand, target
+
+    def on_hand(self, act: Callable[[FloatArray], None]) -> None:
+        """Have a function told where the hand is dragged to (3,) [m], from the page's own thread."""
+        if self._target is None:
+            return
+
+        @self._target.on_update
+        async def _(event: Any) -> None:
+            self._dragged = event.phase != "end"
+            act(np.array(event.target.position, dtype=np.float64))
+
+    def show(self, name: str, visible: bool) -> None:
+        """Show or hide one of `PARTS`."""
+        match name:
+            case "cones":
+                self.units.show_cones(visible)
+            case "points":
+                self.units.points.visible = visible
+            case "trail":
+                self.trail.show(visible)
+            case "path":
+                self.path.visible = visible
+            case "pairs":
+                self._shows_pairs = visible
+            case "forces":
+                self._shows_forces = visible
+
+    def show_world(self, world: World) -> None:
+        """Draw what has changed in a world: its path and boxes."""
+        self._world = world
+        self.path.points = _segments(world).astype(np.float32)
+        while self._boxes:
+            self._boxes.pop().remove()
+        for i, box in enumerate(world.boxes):
+            self._boxes.append(
+                self._server.scene.add_box(
+                    f"/box/{i}", color=palette.BOARD, dimensions=tuple((2 * box.half_size).tolist()), opacity=0.85,
+                    position=box.center, cast_shadow=False, receive_shadow=False,
+                )
+            )  # fmt: skip
+
+    def draw(self, frame: Frame, now: float, silenced: frozenset[str] = frozenset()) -> None:
+        """Draw one instant."""
+        step, world = frame.step, self._world
+        kin = world.model.kinematics(step.q)
+        self._arm.place(kin)
+        self._arm.paint(in_levels(expectation(step.obstacles, len(world.skin), world.profile.threshold)), now)
+        self.units.draw(step, silenced)
+        self.trail.draw(now)
+        self._draw_pairs(step)
+        self._draw_forces(frame, kin)
+        self._draw_hand(frame)
+
+    def _draw_pairs(self, step: ControlStep) -> None:
+        held = step.restricted[binding(step)]
+        self.pairs.visible = self._shows_pairs and len(held) > 0
+        if len(held):
+            ends = [step.obstacles.body_point[held], step.obstacles.point[held]]
+            self.pairs.points = np.stack(ends, axis=1).astype(np.float32)
+
+    def _draw_forces(self, frame: Frame, kin: Kinematics) -> None:
+        self._ee.position = kin.position[self._world.model.ee]
+        for handle, force in ((self._force, frame.step.force), (self._true_force, frame.true_force)):
+            size = 0.0 if force is None else float(np.linalg.norm(force))
+            handle.visible = self._shows_forces and size >= ARROW_LEAST_N
+            if handle.visible and force is not None:
+                tip = force * (min(ARROW_M_PER_N * size, ARROW_MOST_M) / size)
+                handle.points = np.array([[np.zeros(3), tip]], dtype=np.float32)
+
+    def _draw_hand(self, frame: Frame) -> None:
+        if self._hand is None or self._target is None:
+            return
+        there = frame.hand is not None and bool(np.all(np.isfinite(frame.hand)))
+        self._hand.visible = there
+        self._target.visible = there and frame.hand_target is not None
+        if there and frame.hand is not None:
+            self._hand.position = frame.hand
+            if frame.hand_target is not None:
+                self._ghost.visible = float(np.linalg.norm(frame.hand_target - frame.hand)) > _APART_M
+
+    def place_target(self, target: FloatArray) -> bool:
+        """Move the gizmo of the hand to a place (3,) [m], unless somebody has it at the mouse; returns whether."""
+        if self._target is None or self._dragged:
+            return False
+        self._target.position = target
+        return True
+
+
+def _segments(world: World, dashes: int = 80) -> FloatArray:
+    """The desired path as dashes (dashes, 2, 3) [m]."""
+    points = np.array([world.path.point(s) for s in np.linspace(0.0, world.path.length, 2 * dashes)])
+    return points.reshape(dashes, 2, 3)
+
+
+def _room(server: "ViserServer", world: World) -> None:
+    """Floor, pedestal and base frame."""
+    scene, low = server.scene, world.floor_height
+    scene.add_grid(
+        "/floor", 4.0, 4.0, position=(0.0, 0.0, low), cell_size=0.1, section_size=0.5, cell_color=(222, 226, 231),
+        section_color=(196, 203, 212), plane_color=(246, 247, 249), plane_opacity=1.0, shadow_opacity=0.0,
+        fade_distance=6.0,
+    )  # fmt: skip
+    if low < -0.01:
+        scene.add_cylinder(
+            "/pedestal", 0.1, -low, color=palette.PEDESTAL, position=(0.0, 0.0, low / 2), cast_shadow=False,
+            receive_shadow=False,
+        )  # fmt: skip
+    scene.add_frame("/base", axes_length=0.16, axes_radius=0.004, origin_radius=0.008)
+
+
+def _sky(height: int = 128) -> FloatArray:
+    """A light gradient (height, 2, 3) behind everything."""
+    share = np.linspace(0.0, 1.0, height)[:, None, None]
+    top, bottom = np.array([236, 240, 245]), np.array([252, 252, 253])
+    return np.broadcast_to(top + share * (bottom - top), (height, 2, 3)).astype(np.uint8)

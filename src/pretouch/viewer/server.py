@@ -1,0 +1,103 @@
+"""The web server of a page: on this machine alone unless asked, on the port that was asked for, and quiet."""
+
+import errno
+import logging
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pretouch.errors import ViewerError
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+_PORTS_TRIED = 100
+_EVERYWHERE = {"0.0.0.0": "localhost", "::": "localhost"}  # noqa: S104  # named to be replaced
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """Where a page is to be found."""
+
+    host: str = "127.0.0.1"
+    """Address to listen on: by default this machine alone can open the page, 0.0.0.0 lets everybody."""
+    port: int = 8080
+    """Port to listen on."""
+
+
+def url_of(options: ServeOptions) -> str:
+    """What to type into a browser."""
+    return f"http://{_EVERYWHERE.get(options.host, options.host)}:{options.port}"
+
+
+@contextmanager
+def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
+    """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
+    check_extra()
+    check_port(options)
+    import viser
+
+    with _quiet():
+        server = viser.ViserServer(options.host, options.port, label=title, verbose=False)
+        try:
+            if server.get_port() != options.port:
+                raise _busy(options, server.get_port())
+            yield server
+        finally:
+            server.stop()
+
+
+def check_extra() -> None:
+    """Refuse to go on without the extra, saying how to install it."""
+    try:
+        import viser  # noqa: F401
+    except ImportError as error:
+        raise ViewerError("The page needs the extra 'viewer': pip install 'pretouch[viewer]'") from error
+
+
+def check_port(options: ServeOptions) -> None:
+    """Refuse a port that is taken, naming the next free one, and a host that is not this machine's."""
+    if not 1 <= options.port <= 65535:
+        raise ViewerError(f"The port is {options.port}: give one from 1 to 65535.")
+    if _free(options.host, options.port):
+        return
+    following = range(options.port + 1, min(options.port + _PORTS_TRIED, 65536))
+    raise _busy(options, next((port for port in following if _free(options.host, port)), None))
+
+
+def _busy(options: ServeOptions, free: int | None) -> ViewerError:
+    way_out = f"--port {free} is free" if free else "choose another with --port"
+    return ViewerError(f"Port {options.port} on {options.host} is taken, perhaps by another page: {way_out}.")
+
+
+def _free(host: str, port: int) -> bool:
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as tried:
+            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            tried.bind(address)
+            return True
+    except PermissionError as error:
+        raise ViewerError(f"Port {port} is not allowed to this user: choose one from 1024 on with --port.") from error
+    except OSError as error:
+        if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
+            raise ViewerError(f"The host {host!r} is no address of this machine: leave it out, or give one.") from error
+        return False
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the server from printing its own banner, and what it thinks of visitors who do not speak its protocol."""
+    import rich
+
+    console, log = rich.get_console(), logging.getLogger("websockets")
+    before, console.quiet = console.quiet, True
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        console.quiet = before
+        log.setLevel(level)

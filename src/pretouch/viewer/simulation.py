@@ -1,0 +1,197 @@
+"""A simulated arm that a person can touch, change and watch: no page, no thread, no clock.
+
+`LiveSimulation.advance` turns the same loop over the same simulation as the experiments do. What a person does comes in
+between two control cycles: the same commands before the same cycles give the same run, bit for bit.
+"""
+
+from dataclasses import replace
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from pretouch.controller import Controller, Cycle
+from pretouch.errors import ParameterError
+from pretouch.loop import turn
+from pretouch.params import Profile
+from pretouch.recording.truth import Truth
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin, paper_skin
+from pretouch.sim.scene import described, fixtures
+from pretouch.types import ControlStep, FloatArray
+from pretouch.viewer.frame import BoxShape, Frame, World
+from pretouch.viewer.room import Room, live_path
+from pretouch.viewer.settings import Faults, LiveSettings, PathName
+
+if TYPE_CHECKING:
+    from pretouch.recording.writer import Closed, Recording
+
+
+class LiveSimulation:
+    """An arm on its path, its skin, an object and a person's hand, to be advanced and interfered with.
+
+    All methods are called from one thread: whoever takes a person's commands from another one queues them. A command
+    counts from the next control cycle on.
+    """
+
+    world: World
+    """What stands still; another object after each change of it."""
+    frame: Frame
+    """The newest instant."""
+
+    def __init__(
+        self, settings: LiveSettings | None = None, model: RobotModel | None = None, skin: Skin | None = None
+    ) -> None:
+        """Begin with the first control cycle done. Without others, the arm is a Panda with the paper's skin."""
+        self.model = model or RobotModel(panda())
+        self.skin = skin or paper_skin(self.model)
+        self.recording: Recording | None = None
+        """The recording under way."""
+        self.notice = ""
+        """The last thing a person should be told, as a sentence; whoever shows it may empty it."""
+        self._begin(settings or LiveSettings())
+
+    def _begin(self, settings: LiveSettings) -> None:
+        path = live_path(settings)
+        room = Room(settings, path, self.model, self.skin)
+        closed = self.stop_recording()
+        if closed:
+            self.notice = closed.sentence
+        self.settings = settings
+        """As it is set by now: what a reset begins with."""
+        self.controller = Controller(self.model, self.skin, fixtures(room.scene), path, settings.profile)
+        self._room, self._state = room, self.controller.init(room.plant.read())
+        self._resume, self._owed = False, 0.0
+        self._look()
+        self.single_step()
+
+    @property
+    def time(self) -> float:
+        """Time in the simulation [s]."""
+        return self._room.plant.time
+
+    # time passes
+
+    def advance(self, duration: float) -> list[ControlStep]:
+        """Let a duration [s] pass in whole control cycles and return their steps; the rest of it counts next time."""
+        period = self.controller.limits.period
+        self._owed += duration
+        cycles = max(0, int(self._owed / period + 1e-9))
+        self._owed -= cycles * period
+        return [self.single_step() for _ in range(cycles)]
+
+    def single_step(self) -> ControlStep:
+        """Let one control cycle pass and return its step."""
+        room, resume = self._room, self._resume
+        self._resume = False
+        tick = room.tick()
+        if room.stiffness != self.world.stiffness:
+            self._look()
+        cycle, self._state = turn(self.controller, self._state, room.plant, room.units, tick, resume)
+        hand = room.hand.position
+        self.frame = Frame(cycle.step, hand, room.mouse.target, room.plant.true_force)
+        self._keep(cycle, hand)
+        return cycle.step
+
+    # what a person does
+
+    def move_hand(self, target: FloatArray) -> None:
+        """Draw the hand to a place (3,) [m], base frame, or the nearest to it in the workspace."""
+        self._room.mouse.move(target)
+
+    def set_profile(self, profile: Profile) -> None:
+        """Go on with other parameters; another control period is a ParameterError."""
+        period = self.controller.limits.period
+        if profile.task.control_period_s != period:
+            raise ParameterError(
+                f"The control period is {profile.task.control_period_s:g} s: it stays {period:g} s until a reset."
+            )
+        self._go_on(replace(self.settings, profile=profile))
+
+    def set_speed(self, speed: float) -> None:
+        """Follow the path at another speed [m/s]."""
+        profile = self.settings.profile
+        self.set_profile(replace(profile, task=replace(profile.task, speed_m_s=speed)))
+
+    def set_path(self, name: str) -> None:
+        """Go on along another path, 'circle' or 'line', from where it is nearest."""
+        if name != self.settings.path:
+            self._go_on(replace(self.settings, path=cast(PathName, name)))
+
+    def set_stiffness(self, stiffness: float) -> None:
+        """Give the person's hand and the object another stiffness [N/m], as soon as nothing touches."""
+        self.settings = replace(self.settings, stiffness=stiffness)
+        self._room.stiffen(stiffness)
+
+    def set_faults(
+        self, silenced: frozenset[str] = frozenset(), noise_factor: float = 1.0, latency_s: float = 0.0
+    ) -> None:
+        """Have the units of these ids silent, all noisier by a factor, and all later by some time [s]."""
+        faults = Faults(frozenset(silenced), noise_factor, latency_s)
+        self._room.fail(faults)
+        self.settings = replace(self.settings, faults=faults)
+
+    def resume(self) -> None:
+        """Ask to leave a latched HOLD, once."""
+        self._resume = True
+
+    def reset(self, **changes: Any) -> None:
+        """Begin again at time 0 with all as it is set by now, but for changes of `LiveSettings`; ends a recording."""
+        self._begin(replace(self.settings, **changes))
+
+    # recordings
+
+    def start_recording(self, place: File) -> None:
+        """Record from the next control cycle on; ends a recording under way. An unusable place is a RecordingError."""
+        from pretouch.recording.writer import Recording
+
+        begun = Recording(place, self.controller, self._about())
+        self.stop_recording()
+        self.recording = begun
+
+    def stop_recording(self) -> "Closed | None":
+        """End the recording and say what is in it; None if there was none."""
+        recording, self.recording = self.recording, None
+        return recording.close() if recording else None
+
+    def _go_on(self, settings: LiveSettings) -> None:
+        """Let a controller with other settings take over."""
+        path = self.controller.path if settings.path == self.settings.path else live_path(settings)
+        after = Controller(self.model, self.skin, self.controller.fixtures, path, settings.profile)
+        self._state = after.adopt(self._state, self.controller)
+        self.controller, self.settings = after, settings
+        if self.recording:
+            self.recording.change(after)
+        self._look()
+
+    def _look(self) -> None:
+        scene = self._room.scene
+        boxes = tuple(BoxShape(box.name, np.array(box.center), np.array(box.half_size)) for box in scene.boxes)
+        self.world = World(
+            self.model, self.skin, self.controller.path, self.controller.profile, boxes,
+            scene.hand.radius if scene.hand else None, scene.floor_height, self._room.stiffness,
+        )  # fmt: skip
+
+    def _keep(self, cycle: Cycle, hand: FloatArray) -> None:
+        """Empty the plant's log, into the recording if there is one."""
+        log, touches = self._room.plant.take_log()
+        if self.recording is None:
+            return
+        time, force = np.array([t for t, _ in log]), np.array([f for _, f in log])
+        self.recording.record(cycle, Truth(time, force, hand, tuple((t.time, t.link, t.velocity) for t in touches)))
+        if self.recording.trouble:
+            self.notice = self.recording.trouble
+            self.stop_recording()
+
+    def _about(self) -> dict[str, Any]:
+        """What a recording should say of the session."""
+        settings = self.settings
+        return {
+            "command": "pretouch live",
+            "seed": settings.seed,
+            "path": settings.path,
+            "object": settings.object,
+            "stiffness_n_m": self.world.stiffness,
+            "scene": described(self._room.scene),
+        }

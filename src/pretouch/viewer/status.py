@@ -1,0 +1,73 @@
+"""The lines at the top of a page: what the arm does and why, and how well the page keeps up."""
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from pretouch.types import ControlStep, Mode
+from pretouch.viewer import palette
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+PERIOD_S = 0.2
+"""Time between two updates of a page [s], unless the mode changes."""
+
+_HEIGHT_PX = 150
+
+
+class Status:
+    """Mode and reason, then time and rates, then what a person should be told."""
+
+    def __init__(self, gui: "GuiApi") -> None:
+        self._html = gui.add_html("")
+        self._sent = float("-inf")
+        self._shown: tuple[object, ...] = ()
+        self.notice = ""
+        """What a person should be told, until something else is to be said."""
+
+    def draw(self, step: ControlStep, rates: str, warning: str, now: float) -> None:
+        """Show a step, at a time [s]; not more often than five times a second unless there is something new to say."""
+        news = (step.mode, warning, self.notice)
+        if news == self._shown and now - self._sent < PERIOD_S:
+            return
+        self._sent, self._shown = now, news
+        self._html.content = _page(step.mode, step.reason, rates, warning, self.notice)
+
+
+def _page(mode: Mode, reason: str, rates: str, warning: str, notice: str) -> str:
+    colour = palette.css(palette.MODES[mode])
+    said = notice or warning
+    name, tint = ("notice", palette.PATH) if notice else ("warning", palette.HOLDING)
+    # of fixed height, so that the controls below do not move under a person's mouse
+    lines = [
+        f"<div style='border-left:5px solid {colour};padding:2px 0 2px 10px'>"
+        f"<span id='mode' style='color:{colour};font-weight:700;letter-spacing:.06em'>{mode.name}</span>"
+        f"<div id='reason' style='min-height:2.8em;line-height:1.4'>{escape(reason)}</div></div>",
+        f"<div id='rates' style='opacity:.65;margin-top:6px;font-variant-numeric:tabular-nums'>{escape(rates)}</div>",
+    ]
+    if said:
+        lines.append(
+            f"<div id='{name}' style='margin-top:5px;padding:4px 8px;border-radius:6px;font-size:12px;line-height:1.3;"
+            f"background:{palette.css(tint)}1f;overflow-wrap:anywhere'>{escape(said)}</div>"
+        )
+    return f"<div style='padding:6px 12px;font-size:13px;min-height:{_HEIGHT_PX}px'>{''.join(lines)}</div>"
+
+
+def legend() -> str:
+    """What the colours in space mean."""
+    going = [
+        ("path", palette.PATH), ("followed", palette.FOLLOWING), ("avoiding", palette.AVOIDING),
+        ("recovering", palette.RECOVERING), ("reacting", palette.REACTING), ("holding", palette.HOLDING),
+        ("force estimate", palette.FORCE), ("true force", palette.TRUE_FORCE),
+    ]  # fmt: skip
+    marks = "".join(
+        f"<span style='white-space:nowrap'><span style='display:inline-block;width:14px;height:4px;border-radius:2px;"
+        f"background:{palette.css(colour)};margin:0 5px 3px 0'></span>{name}</span>"
+        for name, colour in going
+    )
+    ramp = ",".join(palette.css(colour) for colour in palette.EXPECTED)
+    return (
+        f"<div style='padding:4px 12px 10px;font-size:11px;display:flex;flex-wrap:wrap;gap:3px 12px'>{marks}"
+        f"<span style='white-space:nowrap'><span style='display:inline-block;width:46px;height:8px;border-radius:4px;"
+        f"background:linear-gradient(90deg,{ramp});margin:0 5px 0 0'></span>contact expected</span></div>"
+    )

@@ -1,0 +1,123 @@
+"""The sensor units of the page: where they sit, what their cones cover, and what they see."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, FloatArray, IntArray
+from pretouch.viewer import palette
+from pretouch.viewer.arm import quaternions
+
+if TYPE_CHECKING:
+    from viser import BatchedMeshHandle, SceneApi
+
+FIELD_OF_VIEW = math.radians(27.0)
+"""Full angle of a unit's cone [rad] (VL53L1X data sheet)."""
+
+_IDLE_M = 0.12
+"""Length at which a cone is drawn that shows nothing [m]."""
+_FAINT, _CLEAR = 0.25, 0.55
+_UNIT_HALF_M = np.array([0.010, 0.007, 0.002])
+_POINT_M = 0.014
+_GONE = 1e-6
+"""Scale of what is not to be seen: the number of instances stays, so that the page keeps its buffers."""
+
+
+class Units:
+    """All units of a skin, each as a plate and a cone on its link, and a sphere where it senses something."""
+
+    def __init__(self, scene: "SceneApi", skin: Skin, links: Sequence[str]) -> None:
+        """Put the units under the nodes `/arm/LINK` of their links, whose names are given in order of their index."""
+        self._ids, count = skin.ids, len(skin)
+        self._plates: list[tuple[IntArray, BatchedMeshHandle]] = []
+        self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
+        plain: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False, "lod": "off"}
+        for link in np.unique(skin.link):
+            units = np.flatnonzero(skin.link == link)
+            pose = skin.T_link_sensor[units]
+            place = quaternions(pose[:, :3, :3]), pose[:, :3, 3]
+            node, idle = f"/arm/{links[link]}", np.full(len(units), _IDLE_M)
+            plates = scene.add_batched_meshes_simple(
+                f"{node}/units", *_plate(), *place, batched_colors=_all(palette.UNIT, units), flat_shading=True, **plain
+            )
+            cones = scene.add_batched_meshes_simple(
+                f"{node}/cones", *_cone(), *place, batched_scales=idle, batched_colors=_all(palette.CONE, units),
+                batched_opacities=np.full(len(units), _FAINT), opacity=0.5, side="double", **plain,
+            )  # fmt: skip
+            self._plates.append((units, plates))
+            self._cones.append((units, cones))
+        self.points = scene.add_batched_meshes_simple(
+            "/points", *_ball(), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
+            batched_scales=np.full(count, _GONE), batched_colors=_all(palette.SENSED, np.arange(count)), **plain,
+        )  # fmt: skip
+
+    def show_cones(self, visible: bool) -> None:
+        """Show or hide the fields of view."""
+        for _, cones in self._cones:
+            cones.visible = visible
+
+    def draw(self, step: ControlStep, silenced: frozenset[str]) -> None:
+        """Show what the units see; `silenced` are the ids of those known to be dropped."""
+        seen = np.zeros(len(self._ids), dtype=np.bool_)
+        seen[step.obstacles.unit] = True
+        off = np.array([i in silenced for i in self._ids])[:, None]
+        plates, cones = (palette.as_vertex(np.where(off, palette.UNIT_SILENT, c)) for c in (palette.UNIT, palette.CONE))
+        lengths = np.where(seen, np.nan_to_num(np.round(step.range_distance, 2), nan=_IDLE_M), _IDLE_M).astype(
+            np.float32
+        )
+        for units, handle in self._plates:
+            handle.batched_colors = plates[units]
+        for units, handle in self._cones:
+            handle.batched_colors, handle.batched_scales = cones[units], lengths[units]
+            handle.batched_opacities = np.where(seen[units], _CLEAR, _FAINT).astype(np.float32)
+        points, size = np.zeros((len(seen), 3), dtype=np.float32), np.full(len(seen), _GONE, dtype=np.float32)
+        points[step.obstacles.unit], size[step.obstacles.unit] = step.obstacles.point, _POINT_M
+        self.points.batched_positions, self.points.batched_scales = points, size
+
+
+def _all(colour: palette.Colour, units: IntArray) -> NDArray[np.uint8]:
+    return np.tile(palette.as_vertex(colour), (len(units), 1))
+
+
+def _plate() -> tuple[FloatArray, IntArray]:
+    """A flat box on the surface."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * _UNIT_HALF_M
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
+
+
+def _cone(around: int = 28) -> tuple[FloatArray, IntArray]:
+    """The field of view out to 1 m along z, without a lid."""
+    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    radius = math.tan(FIELD_OF_VIEW / 2)
+    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.ones(around)], axis=1)
+    after = np.roll(np.arange(around), -1)
+    faces = np.stack([np.zeros(around, dtype=int), after + 1, np.arange(around) + 1], axis=1)
+    return np.vstack([np.zeros(3), rim]), faces
+
+
+def _ball(rings: int = 8, around: int = 14) -> tuple[FloatArray, IntArray]:
+    """A sphere of radius 1 m."""
+    tilt = np.linspace(0, np.pi, rings + 1)[1:-1]
+    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    grid = np.stack(
+        [
+            np.outer(np.sin(tilt), np.cos(turn)),
+            np.outer(np.sin(tilt), np.sin(turn)),
+            np.outer(np.cos(tilt), np.ones(around)),
+        ],
+        axis=-1,
+    )
+    vertices = np.vstack([[0, 0, 1.0], grid.reshape(-1, 3), [0, 0, -1.0]])
+    here, after = np.arange(around), np.roll(np.arange(around), -1)
+    faces = [np.stack([np.zeros(around, dtype=int), 1 + here, 1 + after], axis=1)]
+    for ring in range(rings - 2):
+        a, b = 1 + ring * around + here, 1 + ring * around + after
+        faces += [np.stack([a, a + around, b + around], axis=1), np.stack([a, b + around, b], axis=1)]
+    last = 1 + (rings - 2) * around
+    faces.append(np.stack([last + here, np.full(around, len(vertices) - 1), last + after], axis=1))
+    return vertices, np.concatenate(faces)

@@ -1,0 +1,90 @@
+"""The vendor's surfaces of an arm, made coarse enough for a page; from the extra `meshes`, if it is installed."""
+
+from importlib.metadata import PackageNotFoundError, files
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pretouch.robot.model import RobotModel
+from pretouch.types import FloatArray, IntArray
+from pretouch.viewer.surface import Mesh, normals_of
+
+CELL_M = 0.006
+"""Size of the cells whose vertices are merged into one [m]."""
+
+_EDGE_M = 0.015
+"""Longest edge [m]: flat faces of a few large triangles could not be coloured in between."""
+
+_FINGER_HEIGHT_M = 0.0584
+"""Height of a finger's frame over the hand's (the vendor's URDF)."""
+
+MISSING = "The arm is drawn by its capsules: for the vendor's surfaces, pip install 'pretouch[meshes]'."
+
+
+def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
+    """Surfaces by link index, link frame, and a sentence: none and why, or all and ''."""
+    if model.description.name != "panda":
+        return {}, f"The arm is drawn by its capsules: there are no surfaces for {model.description.name}."
+    folder = _folder()
+    if folder is None:
+        return {}, MISSING
+    try:
+        import trimesh
+    except ImportError:
+        return {}, MISSING
+    if find_spec("collada") is None:  # by which trimesh reads the files
+        return {}, MISSING
+
+    divided: Any = trimesh.remesh.subdivide_to_size
+
+    def read(name: str) -> tuple[FloatArray, IntArray]:
+        mesh = trimesh.load_scene(folder / f"{name}.dae").to_mesh()
+        vertices, faces = divided(mesh.vertices, mesh.faces, max_edge=_EDGE_M)
+        return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+
+    found = {i: coarse(*read(link.removeprefix("panda_"))) for i, link in enumerate(model.links) if _has_one(link)}
+    hand, finger = model.links.index("panda_hand"), read("finger")
+    found[hand] = _joined(found[hand], *(coarse(finger[0] @ turn + (0, 0, _FINGER_HEIGHT_M), finger[1])
+                                         for turn in (np.eye(3), np.diag([-1.0, -1.0, 1.0]))))  # fmt: skip
+    return found, ""
+
+
+def coarse(vertices: FloatArray, faces: IntArray, cell: float = CELL_M) -> Mesh:
+    """Merge the vertices (V, 3) [m] in each cell [m] into their mean, and drop the triangles that vanish."""
+    _, place, count = np.unique(np.rint(vertices / cell), axis=0, return_inverse=True, return_counts=True)
+    total = np.zeros((len(count), 3))
+    np.add.at(total, place.ravel(), vertices)
+    merged = total / count[:, None]
+    corners = place.ravel()[faces]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    kept = corners[whole]
+    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
+    kept = kept[np.sort(first)]
+    used, renumbered = np.unique(kept, return_inverse=True)
+    corners = renumbered.reshape(-1, 3).astype(np.int64)
+    return Mesh(merged[used], corners, normals_of(merged[used], corners))
+
+
+def _has_one(link: str) -> bool:
+    return link == "panda_hand" or (link.startswith("panda_link") and link != "panda_link8")
+
+
+def _joined(*meshes: Mesh) -> Mesh:
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return Mesh(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+    )
+
+
+def _folder() -> Path | None:
+    """Where the package keeps the surfaces; it is no Python package, only files."""
+    try:
+        listed = files("example-robot-data") or []
+    except PackageNotFoundError:
+        return None
+    found = [f for f in listed if f.name == "link0.dae" and "panda_description/meshes/visual" in f.as_posix()]
+    return Path(str(found[0].locate())).parent if found else None

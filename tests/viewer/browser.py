@@ -1,0 +1,177 @@
+"""A page and somebody at it: serves it in a thread, and drives a headless Chromium."""
+
+import shutil
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pretouch.types import FloatArray
+from pretouch.viewer.scene import CAMERA_AT, CAMERA_FOV, CAMERA_FROM
+from pretouch.viewer.server import ServeOptions, url_of
+
+PATIENCE_S = 120
+"""Time a page in software WebGL on a busy machine is given [s]."""
+SCREENSHOTS = Path("build/screenshots")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Served:
+    """A page served in a thread until the context ends, and what was printed meanwhile."""
+
+    def __init__(self, serve: Callable[[ServeOptions, Callable[[], bool], Callable[[str], None]], None]) -> None:
+        self.options = ServeOptions(port=free_port())
+        self.said: list[str] = []
+        self._ready, self._end = threading.Event(), threading.Event()
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, args=(serve,), daemon=True)
+
+    def _run(self, serve: Callable[..., None]) -> None:
+        try:
+            serve(self.options, self._end.is_set, self._say)
+        except BaseException as error:  # told to the test that waits
+            self._error = error
+        finally:
+            self._ready.set()
+
+    def _say(self, line: str) -> None:
+        self.said.append(line)
+        self._ready.set()
+
+    def __enter__(self) -> "Served":
+        self._thread.start()
+        assert self._ready.wait(PATIENCE_S)
+        if self._error:
+            raise self._error
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end.set()
+        self._thread.join(PATIENCE_S)
+        assert not self._thread.is_alive()
+        if self._error:
+            raise self._error
+
+
+@contextmanager
+def chromium(width: int = 1280, height: int = 800) -> Iterator["Visitor"]:
+    """A person's browser; the test is skipped where there is none."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="the browser test needs the extra 'browser'")
+    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if found is None:
+        pytest.skip("the browser test needs a Chromium on the PATH")
+    software = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", *software])
+        try:
+            yield Visitor(browser.new_page(viewport={"width": width, "height": height}))
+        finally:
+            browser.close()
+
+
+class Visitor:
+    """Somebody at a page."""
+
+    def __init__(self, page) -> None:  # type: ignore[no-untyped-def]
+        self.page = page
+        self.received = 0
+        """Bytes the page was sent."""
+        page.set_default_timeout(1000 * PATIENCE_S)
+        page.on("websocket", lambda socket: socket.on("framereceived", self._count))
+
+    def _count(self, data: str | bytes) -> None:
+        self.received += len(data)
+
+    def open(self, served: Served) -> None:
+        """Wait until the page shows the arm's mode and its scene, and close viser's warning."""
+        self.page.goto(url_of(served.options))
+        self.page.wait_for_selector("#mode")
+        self.page.wait_for_selector("canvas")
+        self.page.locator("text=Software WebGL").locator("xpath=../..").locator("button").first.click()
+
+    def text(self, name: str) -> str:
+        """One of mode, reason, rates, warning, notice."""
+        return str(self.page.locator(f"#{name}").inner_text())
+
+    def wait_for(self, name: str, contained: str) -> None:
+        """Wait until a line of the status holds some words."""
+        self.page.wait_for_function(
+            "([name, words]) => (document.getElementById(name)?.textContent ?? '').includes(words)",
+            arg=[name, contained],
+        )
+
+    def wait_until(self, true: Callable[[], bool]) -> None:
+        """Wait until something holds outside of the page."""
+        deadline = time.monotonic() + PATIENCE_S
+        while not true():
+            assert time.monotonic() < deadline, "it has not come to pass"
+            self.page.wait_for_timeout(100)
+
+    def press(self, label: str) -> None:
+        self.page.get_by_role("button", name=label, exact=True).click()
+
+    def tab(self, name: str) -> None:
+        self.page.get_by_text(name, exact=True).first.click()
+
+    def type(self, label: str, value: float) -> None:
+        """Type a number into a field, or the field of a slider."""
+        row = self.page.locator("label", has_text=label).first.locator("xpath=../../..")
+        field = row.locator("input:not([type=hidden])").last
+        field.fill(f"{value:g}")
+        field.press("Enter")
+        field.blur()
+
+    def value(self, label: str) -> str:
+        row = self.page.locator("label", has_text=label).first.locator("xpath=../../..")
+        return str(row.locator("input:not([type=hidden])").last.input_value())
+
+    def choose(self, label: str, option: str) -> None:
+        self.page.get_by_label(label, exact=True).first.click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def tick(self, label: str) -> None:
+        self.page.get_by_label(label, exact=True).click()
+
+    def drag(self, start: FloatArray, end: FloatArray) -> None:
+        """Drag with the mouse from where a point (3,) [m] is seen to where another one is."""
+        box = self.page.locator("canvas").first.bounding_box()
+        (x, y), (to_x, to_y) = (_seen_at(point, box) for point in (start, end))
+        mouse = self.page.mouse
+        mouse.move(x, y)
+        mouse.move(x + 1, y)
+        mouse.down()
+        for share in np.linspace(0.1, 1.0, 10):
+            mouse.move(x + share * (to_x - x), y + share * (to_y - y))
+        mouse.up()
+
+    def keep(self, name: str, folder: Path) -> Path:
+        """Keep a picture for a person to look at, in a folder of the test's and where they are gathered."""
+        place = folder / f"{name}.png"
+        self.page.screenshot(path=place)
+        SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+        shutil.copy(place, SCREENSHOTS / place.name)
+        return place
+
+
+def _seen_at(point: FloatArray, box: dict[str, float]) -> tuple[float, float]:
+    """Pixel where a point is seen by the camera the page begins with: a pinhole, z up."""
+    forward = np.subtract(CAMERA_AT, CAMERA_FROM)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right = right / np.linalg.norm(right)
+    seen = np.array([right, -np.cross(right, forward), forward]) @ np.subtract(point, CAMERA_FROM)
+    scale = box["height"] / 2 / np.tan(CAMERA_FOV / 2)
+    return (
+        box["x"] + box["width"] / 2 + scale * seen[0] / seen[2],
+        box["y"] + box["height"] / 2 + scale * seen[1] / seen[2],
+    )

@@ -1,0 +1,111 @@
+"""The pages as a person meets them: in a headless Chromium, by mouse and controls."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.viewer.browser import Served, chromium
+
+from pretouch.params import profile
+from pretouch.recording.compare import compare
+from pretouch.recording.reader import open_recording
+from pretouch.types import FloatArray, Mode
+from pretouch.viewer.live import serve_live
+from pretouch.viewer.replay import serve_replay
+from pretouch.viewer.scene import GIZMO_M
+from pretouch.viewer.settings import LiveSettings
+from pretouch.viewer.simulation import LiveSimulation
+
+pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
+pytestmark = pytest.mark.slow
+
+
+def live(simulation: LiveSimulation) -> Served:
+    return Served(lambda options, until, say: serve_live(simulation, options, until, say))
+
+
+def test_a_hand_dragged_into_the_arm_by_mouse_leads_to_a_reaction_and_back_to_the_path(tmp_path: Path) -> None:
+    start = np.array([0.85, 0.25, 0.25])
+    simulation = LiveSimulation(LiveSettings(profile=profile("blind"), hand_start=tuple(start)))
+    with live(simulation) as served, chromium() as visitor:
+        visitor.open(served)
+        visitor.wait_for("mode", Mode.TRACK.name)
+        arrow = start + np.array([0.7 * GIZMO_M, 0.0, 0.0])
+        visitor.drag(arrow, arrow - (0.35, 0.0, 0.0))
+        # the hand is drawn onto the circle, where the arm comes by
+        visitor.wait_until(lambda: abs(target(simulation)[0] - 0.5) < 0.05)
+        assert np.allclose(target(simulation)[1:], start[1:], atol=1e-6)
+        visitor.wait_for("mode", Mode.REACT.name)
+        visitor.keep("reacting", tmp_path)
+        visitor.type("x [m]", 1.2)
+        visitor.wait_for("mode", Mode.TRACK.name)
+        assert target(simulation)[0] == 1.2
+
+
+def target(simulation: LiveSimulation) -> FloatArray:
+    """Where the hand is to be (3,) [m]."""
+    assert simulation.frame.hand_target is not None
+    return simulation.frame.hand_target
+
+
+def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(tmp_path: Path) -> None:
+    simulation = LiveSimulation()
+    with live(simulation) as served, chromium() as visitor:
+        visitor.open(served)
+        visitor.tab("Controller")
+        visitor.choose("Profile", "blind")
+        visitor.wait_until(lambda: simulation.world.profile.name == "blind")
+        visitor.wait_until(lambda: visitor.value("Restrictions") == "off")
+
+        visitor.choose("Profile", "paper")
+        visitor.type("d_crit [m]", 0.9)
+        visitor.wait_for("notice", "Not done: RestrictionParams.d_notice_m")
+        assert simulation.world.profile.restriction.d_crit_m == 0.1
+        visitor.wait_until(lambda: visitor.value("d_crit [m]") == "0.1")
+        visitor.type("F_b [N]", 8)
+        visitor.wait_until(lambda: simulation.world.profile.name == "paper:threshold.f_base_n=8")
+        visitor.tab("World")
+        visitor.tick("hand_left")
+        visitor.wait_for("reason", "No usable reading from hand_left")
+        visitor.keep("dropped", tmp_path)
+        visitor.tick("hand_left")
+        visitor.wait_for("mode", Mode.TRACK.name)
+
+
+def test_one_page_keeps_its_traffic_bounded(tmp_path: Path) -> None:
+    simulation = LiveSimulation()
+    with live(simulation) as served, chromium() as visitor:
+        visitor.open(served)
+        before, time = visitor.received, simulation.time
+        visitor.wait_until(lambda: simulation.time > time + 5.0)
+        assert visitor.received - before < 5 * 1_000_000
+
+
+def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
+    simulation = LiveSimulation(LiveSettings(profile=profile("blind")))
+    simulation.move_hand(np.array([0.5, 0.0, 0.5]))  # on the circle
+    simulation.start_recording(tmp_path / "session.mcap")
+    simulation.advance(12.0)
+    simulation.stop_recording()
+    recorded = open_recording(tmp_path / "session.mcap")
+    contacts = [kept.step for kept in recorded if kept.step.contact is not None]
+    assert contacts
+    comparison = compare(recorded, profile("paper"))
+    with (
+        Served(lambda options, until, say: serve_replay(recorded, options, comparison, until, say)) as served,
+        chromium() as visitor,
+    ):
+        visitor.open(served)
+        visitor.wait_for("mode", Mode.HOLD.name)
+        visitor.press("Next event")
+        visitor.wait_for("notice", "HOLD to TRACK")
+        visitor.press("Next event")
+        visitor.wait_for("notice", f"contact of {np.linalg.norm(contacts[0].contact.force):.1f} N")
+        visitor.wait_for("mode", Mode.REACT.name)
+        visitor.keep("replay", tmp_path)
+        visitor.type("Time [s]", 5.0)
+        visitor.wait_for("rates", "5.00 of ")
+        visitor.press("Step on")
+        visitor.wait_for("rates", "5.01 of ")
+        visitor.press("Play")
+        visitor.wait_for("rates", f"{recorded.stamps()[-1] - recorded.stamps()[0]:.2f} of ")

@@ -1,0 +1,59 @@
+from dataclasses import fields
+
+import pytest
+
+from pretouch.errors import ParameterError
+from pretouch.params import PROFILES, Profile, profile
+from pretouch.viewer.controls import named
+from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs
+
+TABLE_I = {
+    "d_max": 0.8, "d_min": 0.05, "l_max": 200, "V_max": 0.04, "d_repulse": 0.1, "d_crit": 0.1, "d_notice": 0.6,
+    "alpha": 0.1, "beta": -10, "lambda": 0.75, "F_std": 3, "F_d": 4, "F_b": 10, "sigma_max": 3,
+}  # fmt: skip
+"""Table I of the paper."""
+
+
+def test_the_page_offers_table_i_with_the_papers_values() -> None:
+    assert {entry.symbol: entry.read(PROFILES["paper"]) for entry in TABLE_1} == TABLE_I
+
+
+@pytest.mark.parametrize("entry", TABLE_1, ids=lambda entry: entry.symbol)
+def test_what_is_written_is_read_back_and_nothing_else_changes(entry: TableEntry) -> None:
+    before = PROFILES["paper"]
+    after = entry.write(before, entry.read(before) + entry.step)
+    assert entry.read(after) == pytest.approx(entry.read(before) + entry.step)
+    changed = {
+        (group.name, field.name)
+        for group in fields(Profile) if group.name != "name"
+        for field in fields(getattr(before, group.name))
+        if getattr(getattr(before, group.name), field.name) != getattr(getattr(after, group.name), field.name)
+    }  # fmt: skip
+    assert changed == set(entry.fields)
+
+
+@pytest.mark.parametrize("entry", TABLE_1, ids=lambda entry: entry.symbol)
+def test_each_has_a_hint_from_the_documentation(entry: TableEntry) -> None:
+    assert "Table I" in entry.hint()
+
+
+def test_a_value_that_is_not_allowed_is_refused_with_the_way_out() -> None:
+    (d_crit,) = (entry for entry in TABLE_1 if entry.symbol == "d_crit")
+    with pytest.raises(ParameterError, match=r"d_notice_m is 0\.6: it must be greater than d_crit_m, 0\.9"):
+        d_crit.write(PROFILES["paper"], 0.9)
+
+
+def test_the_documentation_of_every_parameter_is_found() -> None:
+    groups = [field.default_factory for field in fields(Profile) if field.name != "name"]
+    for group in groups:
+        for field in fields(group):  # type: ignore[arg-type]
+            assert field_docs()[group.__name__, field.name]  # type: ignore[union-attr]
+
+
+def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
+    (f_b,) = (entry for entry in TABLE_1 if entry.symbol == "F_b")
+    (l_max,) = (entry for entry in TABLE_1 if entry.symbol == "l_max")
+    changed = named(l_max.write(f_b.write(PROFILES["paper"], 8.5), 150), "paper")
+    assert changed.name == "paper:reduction.l_max_cycles=150:threshold.f_base_n=8.5"
+    assert profile(changed.name) == changed
+    assert named(PROFILES["blind"], "blind") == PROFILES["blind"]

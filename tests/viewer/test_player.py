@@ -1,0 +1,71 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.types import Contact, ControlStep, Mode
+from pretouch.viewer.player import Happenings, Player
+
+STAMPS = 100.0 + np.arange(101) / 100
+
+
+def test_playing_takes_as_long_as_it_took() -> None:
+    player = Player(STAMPS)
+    player.play()
+    for _ in range(15):
+        player.advance(1 / 30)
+    assert player.time == pytest.approx(0.5)
+    assert player.index == 50
+    player.speed = 2.0
+    for _ in range(15):
+        player.advance(1 / 30)
+    assert player.ended
+    assert not player.playing
+    assert player.index == 100
+
+
+def test_a_paused_player_stands() -> None:
+    player = Player(STAMPS)
+    player.advance(1.0)
+    assert player.index == 0
+
+
+def test_from_the_end_it_plays_from_the_start() -> None:
+    player = Player(STAMPS)
+    player.seek(9.0)
+    assert player.time == pytest.approx(1.0)
+    player.play()
+    assert player.time == 0.0
+
+
+@pytest.mark.parametrize("index", range(0, 101, 7))
+def test_steps_on_and_back_are_single(index: int) -> None:
+    player = Player(STAMPS)
+    player.seek_index(index)
+    assert player.index == index
+    player.step(1)
+    assert player.index == min(index + 1, 100)
+    player.step(-1)
+    player.step(-1)
+    assert player.index == max(0, min(index + 1, 100) - 2)
+
+
+def test_what_happened_is_found_bit_by_bit(some_step: ControlStep) -> None:
+    contact = Contact(np.array([12.0, 0.0, 0.0]), np.array([True, False, False]))
+    steps = [
+        replace(some_step, mode=Mode.REACT if 40 <= i < 60 else Mode.TRACK, contact=contact if i == 40 else None)
+        for i in range(100)
+    ]
+    happenings = Happenings(steps.__getitem__, len(steps))
+    happenings.look(45)
+    assert [h.index for h in happenings.found] == [40]
+    assert happenings.share == 0.45
+    happenings.look(100)
+    assert happenings.done
+    assert [(h.index, h.what) for h in happenings.found] == [(40, "contact of 12.0 N"), (60, "REACT to TRACK")]
+    first, second = happenings.found
+    assert happenings.after(0) is first
+    assert happenings.after(40) is second
+    assert happenings.after(60) is None
+    assert happenings.before(60) is first
+    assert happenings.before(40) is None

@@ -1,0 +1,61 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.types import ControlStep
+from pretouch.viewer.plots import SAMPLES, SPAN_S, History
+
+K = 7
+
+
+def test_a_history_holds_the_last_seconds_and_no_more(some_step: ControlStep) -> None:
+    history = History(K)
+    for i in range(6000):
+        history.add(replace(some_step, stamp=i / 100))
+    time = history.columns()[0]
+    assert len(time) <= SAMPLES + 1
+    assert time[-1] == pytest.approx(59.99, abs=0.1)
+    assert SPAN_S - 0.2 <= time[-1] - time[0] <= SPAN_S + 0.2
+    assert np.all(np.diff(time) > 0)
+
+
+def test_a_short_peak_of_force_is_not_lost(some_step: ControlStep) -> None:
+    history = History(K)
+    for i in range(500):
+        force = np.array([0.0, -40.0 if i == 251 else 0.0, 0.0])
+        history.add(replace(some_step, stamp=i / 100, force=force))
+    assert history.columns()[1 + K + 1].min() == -40.0
+
+
+def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
+    history = History(K, more=1)
+    for i in range(50):
+        history.add(replace(some_step, stamp=i / 100), (5.0,))
+    last = history.columns()[:, -1]
+    np.testing.assert_array_equal(last[1 + K : 4 + K], some_step.force)
+    np.testing.assert_array_equal(last[4 + K : 7 + K], some_step.thresholds.upper)
+    np.testing.assert_array_equal(last[7 + K : 10 + K], some_step.thresholds.lower)
+    speeds = [np.linalg.norm(some_step.ee_velocity), np.linalg.norm(some_step.desired_velocity)]
+    np.testing.assert_array_equal(last[10 + K : 12 + K], speeds)
+    assert last[-1] == 5.0
+
+
+def test_time_going_back_begins_anew(some_step: ControlStep) -> None:
+    history = History(K)
+    for stamp in (*np.arange(0, 5, 0.01), *np.arange(0, 1, 0.01)):
+        history.add(replace(some_step, stamp=float(stamp)))
+    time = history.columns()[0]
+    assert time[0] == 0.0
+    assert time[-1] < 1.0
+
+
+@pytest.mark.parametrize("samples", [0, 1])
+def test_a_history_of_little_can_be_drawn(some_step: ControlStep, samples: int) -> None:
+    history = History(K)
+    for _ in range(samples):
+        history.add(some_step)
+    columns = history.columns()
+    assert columns.shape[0] == 1 + K + 11
+    assert columns.shape[1] >= 2
+    assert np.all(np.isfinite(columns[0]))

@@ -1,0 +1,138 @@
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from tests.viewer.fake_scene import FakeScene
+
+from pretouch.types import ControlStep, Obstacles
+from pretouch.viewer import palette
+from pretouch.viewer.frame import Frame
+from pretouch.viewer.scene import ARROW_MOST_M, PARTS, Scene
+from pretouch.viewer.simulation import LiveSimulation
+
+
+@pytest.fixture(scope="module")
+def world():  # type: ignore[no-untyped-def]
+    return LiveSimulation().world
+
+
+@pytest.fixture
+def nodes() -> FakeScene:
+    return FakeScene()
+
+
+@pytest.fixture
+def scene(world, nodes: FakeScene) -> Scene:  # type: ignore[no-untyped-def]
+    return Scene(SimpleNamespace(scene=nodes, initial_camera=SimpleNamespace()), world)  # type: ignore[arg-type]
+
+
+def seen_by(unit: int, point: tuple[float, float, float], step: ControlStep) -> ControlStep:
+    """A step in which one unit senses one point, 0.2 m off the body."""
+    distance = np.full(7, np.nan)
+    distance[unit] = 0.2
+    at = np.array([point])
+    obstacles = Obstacles(
+        np.array([unit]), at, np.array([0.2]), at - [0.2, 0.0, 0.0], np.array([10]), np.array([[1.0, 0.0, 0.0]]),
+        np.array([0.2]),
+    )  # fmt: skip
+    return replace(step, obstacles=obstacles, range_distance=distance)
+
+
+def frame(step: ControlStep, **more: object) -> Frame:
+    return Frame(**{"step": step, "hand": None, "hand_target": None, "true_force": None, **more})  # type: ignore[arg-type]
+
+
+def test_a_sensed_point_is_a_sphere_where_it_is_and_others_are_not_to_be_seen(
+    scene: Scene, nodes: FakeScene, some_step: ControlStep
+) -> None:
+    scene.draw(frame(seen_by(2, (0.7, 0.1, 0.3), some_step)), 0.0)
+    points = nodes.nodes["/points"]
+    np.testing.assert_allclose(points.batched_positions[2], (0.7, 0.1, 0.3), atol=1e-6)
+    assert (points.batched_scales > 1e-3).tolist() == [False, False, True, False, False, False, False]
+
+
+def test_the_cone_of_a_unit_that_senses_reaches_as_far(scene: Scene, nodes: FakeScene, some_step: ControlStep) -> None:
+    scene.draw(frame(seen_by(2, (0.7, 0.1, 0.3), some_step)), 0.0)
+    cones = nodes.nodes["/arm/panda_hand/cones"]
+    assert cones.batched_scales[2] == pytest.approx(0.2)
+    assert cones.batched_opacities[2] > cones.batched_opacities[0]
+
+
+def test_a_dropped_unit_is_red(scene: Scene, nodes: FakeScene, some_step: ControlStep) -> None:
+    scene.draw(frame(some_step), 0.0, frozenset({"hand_right"}))
+    colours = nodes.nodes["/arm/panda_hand/units"].batched_colors
+    red = palette.as_vertex(palette.UNIT_SILENT)
+    assert [np.array_equal(colour, red) for colour in colours] == [False, True, False, False]
+
+
+@pytest.mark.parametrize("size", [5.0, 20.0, 5000.0])
+def test_a_force_is_an_arrow_of_bounded_length_at_the_end_effector(
+    scene: Scene, nodes: FakeScene, some_step: ControlStep, size: float
+) -> None:
+    force = np.array([0.0, 0.6 * size, -0.8 * size])
+    scene.draw(frame(replace(some_step, force=force), true_force=force), 0.0)
+    for name in ("/ee/force", "/ee/true_force"):
+        start, end = nodes.nodes[name].points[0]
+        assert nodes.nodes[name].visible
+        assert not start.any()
+        np.testing.assert_allclose(end / np.linalg.norm(end), force / size, atol=1e-6)
+        assert np.linalg.norm(end) <= ARROW_MOST_M + 1e-6
+    np.testing.assert_allclose(nodes.nodes["/ee"].position, some_step.ee_position, atol=1e-9)
+
+
+@pytest.mark.parametrize("force", [np.zeros(3), np.full(3, np.nan), None])
+def test_without_a_force_there_is_no_arrow(
+    scene: Scene, nodes: FakeScene, some_step: ControlStep, force: np.ndarray | None
+) -> None:
+    step = some_step if force is None else replace(some_step, force=force)
+    scene.draw(frame(step, true_force=force), 0.0)
+    assert not nodes.nodes["/ee/true_force"].visible
+    if force is not None:
+        assert not nodes.nodes["/ee/force"].visible
+
+
+def test_the_hand_is_drawn_where_it_is_and_its_target_when_that_is_elsewhere(
+    scene: Scene, nodes: FakeScene, some_step: ControlStep
+) -> None:
+    hand = np.array([0.8, 0.1, 0.4])
+    scene.draw(frame(some_step, hand=hand, hand_target=hand + 0.001), 0.0)
+    np.testing.assert_array_equal(nodes.nodes["/hand"].position, hand)
+    assert not nodes.nodes["/hand_target/ghost"].visible
+    scene.draw(frame(some_step, hand=hand, hand_target=hand + 0.2), 0.1)
+    assert nodes.nodes["/hand_target/ghost"].visible
+    scene.draw(frame(some_step), 0.2)
+    assert not nodes.nodes["/hand"].visible
+    assert not nodes.nodes["/hand_target"].visible
+
+
+def test_every_part_can_be_hidden_and_shown(scene: Scene, nodes: FakeScene, some_step: ControlStep) -> None:
+    def shown() -> set[str]:
+        return {name for name, node in nodes.nodes.items() if node.visible and not name.endswith(("/front", "/back"))}
+
+    step = replace(some_step, force=np.array([20.0, 0.0, 0.0]), restricted=np.array([0]))
+    step = seen_by(2, (0.7, 0.1, 0.3), step)
+    pushed = np.append(np.zeros(len(step.q)), 0.5)
+    step = replace(step, qp=replace(step.qp, slack=np.zeros(1), multipliers=pushed))
+    for x in (0.0, 0.1, 0.2):
+        scene.trail.add(replace(step, ee_position=step.ee_position + np.array([x, 0.0, 0.0])))
+    scene.draw(frame(step), 0.0)
+    before = shown()
+    for i, part in enumerate(PARTS):
+        scene.show(part, False)
+        scene.draw(frame(step), 2.0 * i + 1.0)
+        assert shown() < before, part
+        scene.show(part, True)
+        scene.draw(frame(step), 2.0 * i + 2.0)
+        assert shown() == before, part
+
+
+def test_another_world_has_its_own_boxes_and_path(scene: Scene, nodes: FakeScene) -> None:
+    simulation = LiveSimulation()
+    simulation.reset(object="board -y", path="line")
+    scene.show_world(simulation.world)
+    assert sum(name.startswith("/box/") for name in nodes.nodes) == 1
+    ends = nodes.nodes["/path"].points
+    assert np.ptp(ends[..., 0]) < 1e-6  # the paper's line is at x = 0.4 m
+    scene.show_world(LiveSimulation().world)
+    assert not any(name.startswith("/box/") for name in nodes.nodes)

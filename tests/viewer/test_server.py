@@ -1,0 +1,63 @@
+import socket
+import sys
+
+import pytest
+from tests.viewer.browser import free_port
+
+from pretouch.errors import ViewerError
+from pretouch.viewer.server import ServeOptions, check_extra, check_port, served, url_of
+
+
+def test_a_busy_port_is_one_sentence_with_the_next_free_one() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(ViewerError) as caught:
+            check_port(ServeOptions(port=port))
+    said = str(caught.value)
+    assert said.startswith(f"Port {port} on 127.0.0.1 is taken")
+    assert "\n" not in said
+    named = int(said.split("--port ")[1].split()[0])
+    assert named > port
+    check_port(ServeOptions(port=named))
+
+
+def test_a_second_page_on_the_same_port_is_refused_and_the_first_goes_on(capfd: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
+    options = ServeOptions(port=free_port())
+    with served(options, "first") as server:
+        with (
+            pytest.raises(ViewerError, match=rf"Port {options.port} on 127\.0\.0\.1 is taken"),
+            served(options, "second"),
+        ):
+            pass
+        assert server.get_port() == options.port
+    check_port(options)
+    assert capfd.readouterr().out == ""
+
+
+def test_a_page_is_for_this_machine_alone_unless_asked() -> None:
+    assert ServeOptions().host == "127.0.0.1"
+    assert url_of(ServeOptions(port=1234)) == "http://127.0.0.1:1234"
+    assert url_of(ServeOptions("0.0.0.0", 1234)) == "http://localhost:1234"  # noqa: S104
+
+
+@pytest.mark.parametrize("port", [0, -1, 65536])
+def test_what_is_no_port_is_refused(port: int) -> None:
+    with pytest.raises(ViewerError, match="from 1 to 65535"):
+        check_port(ServeOptions(port=port))
+
+
+def test_a_host_that_is_not_this_machine_is_refused() -> None:
+    with pytest.raises(ViewerError, match=r"192\.0\.2\.1"):
+        check_port(ServeOptions("192.0.2.1", free_port()))
+
+
+def test_a_missing_extra_is_one_sentence_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(ViewerError) as caught:
+        check_extra()
+    assert str(caught.value) == "The page needs the extra 'viewer': pip install 'pretouch[viewer]'"
+    with pytest.raises(ViewerError, match="extra 'viewer'"), served(ServeOptions(port=free_port()), "page"):
+        pass

@@ -1,0 +1,128 @@
+"""A live session that is recorded."""
+
+import numpy as np
+import pytest
+from tests.viewer.sessions import ARMED_S, poke
+
+from pretouch.errors import RecordingError
+from pretouch.params import PROFILES, profile
+from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
+from pretouch.viewer.settings import LiveSettings
+from pretouch.viewer.simulation import LiveSimulation
+
+
+@pytest.fixture
+def session(panda_model, paper_skin):
+    """A session on its way."""
+    session = LiveSimulation(LiveSettings(object="board -y"), panda_model, paper_skin)
+    session.advance(ARMED_S)
+    return session
+
+
+def switched(session: LiveSimulation) -> list:
+    """Steps in which a person changes all there is to change."""
+    steps = session.advance(0.3)
+    session.set_profile(PROFILES["blind"])
+    steps += session.advance(0.3)
+    session.set_profile(profile("paper:threshold.window_samples=40"))
+    session.set_path("line")
+    steps += session.advance(0.8)
+    steps += poke(session)
+    session.set_speed(0.2)
+    steps += session.advance(0.3)
+    session.set_faults(frozenset({session.skin.ids[1]}))
+    return steps + session.advance(0.7)
+
+
+def test_each_step_is_kept_with_what_only_the_simulation_knows(session, tmp_path):
+    place = tmp_path / "live.mcap"
+    session.start_recording(place)
+    steps = switched(session)
+    closed = session.stop_recording()
+    assert session.recording is None
+    assert closed.steps == len(steps)
+    recorded = open_recording(place)
+    assert len(recorded) == len(steps)
+    assert [run.profile.perception.enabled for run in recorded.runs] == [True, False, True, True]
+    assert [run.profile.threshold.window_samples for run in recorded.runs] == [100, 100, 40, 40]
+    assert [run.profile.task.speed_m_s for run in recorded.runs] == [0.3, 0.3, 0.3, 0.2]
+    assert [run.path.length for run in recorded.runs][-1] == pytest.approx(2.0)
+    for kept, step in zip(recorded, steps, strict=True):
+        assert kept.step.stamp == step.stamp
+        np.testing.assert_array_equal(kept.step.command, step.command)
+        assert kept.truth.time == pytest.approx(step.stamp + 0.001 * np.arange(-9, 1))
+    forces = np.vstack([kept.truth.force for kept in recorded])
+    assert np.linalg.norm(forces, axis=1).max() > 10.0
+    assert sum(len(kept.truth.touches) for kept in recorded) > 0
+    hands = np.array([kept.truth.hand for kept in recorded])
+    assert np.ptp(hands[:, 1]) > 0.05
+    scene = recorded.runs[0].about["scene"]
+    assert [box["name"] for box in scene["boxes"]] == ["object"]
+    assert scene["hand_radius_m"] == 0.05
+
+
+def test_a_recording_with_switches_verifies_bit_for_bit(session, tmp_path):
+    session.start_recording(tmp_path / "live.mcap")
+    steps = switched(session)
+    session.stop_recording()
+    verdict = verify(open_recording(tmp_path / "live.mcap"))
+    assert verdict.agrees, verdict.said
+    assert verdict.exact
+    assert (verdict.checked, verdict.skipped) == (len(steps), {})
+
+
+def test_a_recording_does_not_change_the_run(session, panda_model, paper_skin, tmp_path):
+    other = LiveSimulation(session.settings, panda_model, paper_skin)
+    other.advance(ARMED_S)
+    session.start_recording(tmp_path / "live.mcap")
+    for mine, theirs in zip(switched(session), switched(other), strict=True):
+        np.testing.assert_array_equal(mine.command, theirs.command)
+    session.stop_recording()
+
+
+def test_a_reset_ends_the_recording_and_says_so(session, tmp_path):
+    session.start_recording(tmp_path / "live.mcap")
+    session.advance(0.2)
+    session.reset()
+    assert session.recording is None
+    assert "holds 20 control steps" in session.notice
+    assert len(open_recording(tmp_path / "live.mcap")) == 20
+    assert session.stop_recording() is None
+
+
+def test_another_recording_ends_the_one_before(session, tmp_path):
+    for name in ("a", "b"):
+        session.start_recording(tmp_path / f"{name}.mcap")
+        session.advance(0.1)
+    session.stop_recording()
+    assert [len(open_recording(tmp_path / f"{name}.mcap")) for name in ("a", "b")] == [10, 10]
+
+
+def test_a_place_that_cannot_be_written_is_refused_and_the_session_goes_on(session, tmp_path):
+    with pytest.raises(RecordingError):
+        session.start_recording(tmp_path / "no" / "such" / "folder.mcap")
+    assert session.recording is None
+    assert session.advance(0.1)
+
+
+def test_a_recording_in_trouble_ends_with_its_sentence_and_the_session_goes_on(session, tmp_path):
+    session.start_recording(tmp_path / "live.mcap")
+    session.advance(0.1)
+
+    class Full:
+        trouble = "The disk is full."
+        closed = False
+
+        def record(self, cycle, truth) -> None:
+            pass
+
+        def close(self) -> None:
+            self.closed = True
+
+    session.stop_recording()
+    session.recording = full = Full()
+    assert len(session.advance(0.1)) == 10
+    assert session.notice == "The disk is full."
+    assert session.recording is None
+    assert full.closed
