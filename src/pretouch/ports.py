@@ -31,4 +31,3 @@ class Clock(Protocol):
     def tick(self) -> float:
         """Wait for the next control period and return its instant [s]."""
         ...
-
