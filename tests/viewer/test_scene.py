@@ -66,6 +66,20 @@ def test_a_dropped_unit_is_red(scene: Scene, nodes: FakeScene, some_step: Contro
     assert [np.array_equal(colour, red) for colour in colours] == [False, True, False, False]
 
 
+@pytest.mark.parametrize(("multiplier", "colour"), [(0.0, palette.PAIR), (0.5, palette.PAIR_BINDING)])
+def test_each_point_is_joined_to_the_body_and_the_line_says_whether_it_binds(
+    scene: Scene, nodes: FakeScene, some_step: ControlStep, multiplier: float, colour: palette.Colour
+) -> None:
+    step = seen_by(2, (0.7, 0.1, 0.3), replace(some_step, restricted=np.array([0])))
+    multipliers = np.append(np.zeros(len(step.q)), multiplier)
+    step = replace(step, qp=replace(step.qp, slack=np.zeros(1), multipliers=multipliers))
+    scene.draw(frame(step), 0.0)
+    pairs = nodes.nodes["/pairs"]
+    assert pairs.visible
+    np.testing.assert_allclose(pairs.points, [[(0.5, 0.1, 0.3), (0.7, 0.1, 0.3)]], atol=1e-6)
+    np.testing.assert_array_equal(pairs.colors, np.tile(palette.as_vertex(colour), (1, 2, 1)))
+
+
 @pytest.mark.parametrize("size", [5.0, 20.0, 5000.0])
 def test_a_force_is_an_arrow_of_bounded_length_at_the_end_effector(
     scene: Scene, nodes: FakeScene, some_step: ControlStep, size: float

@@ -223,9 +223,9 @@ class Controls:
         self._pause.label = "Go on" if self.running.paused else "Pause"
         self._record.label = "Stop recording" if self._simulation.recording else "Record"
 
-    def offer_resume(self, held: bool) -> None:
-        """Let the button to resume be pressed while the arm holds."""
-        self._resume.disabled = not held
+    def offer_resume(self, latched: bool) -> None:
+        """Let the button to resume be pressed while a hold waits for it."""
+        self._resume.disabled = not latched
 
     def show_hand(self, target: FloatArray) -> None:
         """Have the sliders show where the hand is to be (3,) [m]."""

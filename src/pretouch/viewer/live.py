@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock
-from pretouch.types import FloatArray, Mode
+from pretouch.types import FloatArray
 from pretouch.viewer.commands import Action, Commands
 from pretouch.viewer.controls import Controls
 from pretouch.viewer.gui import dress
@@ -117,7 +117,7 @@ class LivePage:
                 else f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
             )  # fmt: skip
             self._status.draw(frame.step, f"t = {frame.step.stamp:.2f} s · {rates}{recorded}", pace.sentence(), now)
-            self.controls.offer_resume(frame.step.mode is Mode.HOLD)
+            self.controls.offer_resume(self._simulation.latched)
 
     def _follow_target(self, target: FloatArray | None) -> None:
         """Have gizmo and sliders show where the hand is to be, wherever that came from."""

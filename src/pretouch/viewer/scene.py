@@ -59,8 +59,9 @@ class Scene:
             "/path", _segments(world), palette.PATH, thickness=5.0, thickness_units="screen"
         )
         self.pairs = scene.add_line_segments(
-            "/pairs", np.zeros((1, 2, 3)), palette.PAIR, thickness=3.0, thickness_units="screen", visible=False
-        )
+            "/pairs", np.zeros((1, 2, 3)), np.zeros((1, 2, 3), dtype=np.uint8), thickness=3.0,
+            thickness_units="screen", visible=False,
+        )  # fmt: skip
         self._shows_pairs = self._shows_forces = True
         self._ee = scene.add_frame("/ee", show_axes=False)
         self._force = self._arrow("/ee/force", palette.FORCE)
@@ -141,11 +142,13 @@ class Scene:
         self._draw_hand(frame)
 
     def _draw_pairs(self, step: ControlStep) -> None:
-        held = step.restricted[binding(step)]
-        self.pairs.visible = self._shows_pairs and len(held) > 0
-        if len(held):
-            ends = [step.obstacles.body_point[held], step.obstacles.point[held]]
-            self.pairs.points = np.stack(ends, axis=1).astype(np.float32)
+        near = step.obstacles
+        self.pairs.visible = self._shows_pairs and len(near.unit) > 0
+        if len(near.unit):
+            colours = np.tile(palette.as_vertex(palette.PAIR), (len(near.unit), 2, 1))
+            colours[step.restricted[binding(step)]] = palette.as_vertex(palette.PAIR_BINDING)
+            self.pairs.points = np.stack([near.body_point, near.point], axis=1).astype(np.float32)
+            self.pairs.colors = colours
 
     def _draw_forces(self, frame: Frame, kin: Kinematics) -> None:
         self._ee.position = kin.position[self._world.model.ee]

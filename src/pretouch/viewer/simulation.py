@@ -71,6 +71,11 @@ class LiveSimulation:
         """Time in the simulation [s]."""
         return self._room.plant.time
 
+    @property
+    def latched(self) -> bool:
+        """Whether the arm is in a hold that lasts until a person resumes."""
+        return self._state.mode.latched
+
     # time passes
 
     def advance(self, duration: float) -> list[ControlStep]:
