@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live browser test test-slow lint bench peers format clean
+.PHONY: setup demo live meshes browser test test-slow lint bench peers format clean
 
 setup: $(STAMP)
 
@@ -21,6 +21,10 @@ demo: setup
 
 live: setup
 	$(BIN)/pretouch live
+
+# the vendor's surfaces of the arm, for the page: 131 MB
+meshes: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[meshes]'
 
 # what the tests of the page need beside a Chromium of the system's; without both they are skipped
 browser: setup

@@ -12,8 +12,8 @@ import sys
 import time
 
 from pretouch.control.path import Circle
-from pretouch.controller import Controller, Cycle
-from pretouch.loop import run
+from pretouch.controller import Controller
+from pretouch.loop import Cycle, run
 from pretouch.params import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel

@@ -9,8 +9,8 @@ with `dataclasses.replace`.
 from dataclasses import replace
 
 from pretouch.control.path import Circle
-from pretouch.controller import Controller, Cycle
-from pretouch.loop import run
+from pretouch.controller import Controller
+from pretouch.loop import Cycle, run
 from pretouch.params import RestrictionParams, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel

@@ -8,14 +8,14 @@ import pytest
 from matplotlib.image import imread
 
 from pretouch.cli.detect import detect
-from pretouch.controller import Cycle
 from pretouch.errors import ParameterError, PretouchError, RecordingError
-from pretouch.recording.foreign_source import Choice
+from pretouch.foreign.source import Choice
+from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
-from tests.recording.foreign_files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
+from tests.foreign.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 
 
 @pytest.fixture
@@ -77,7 +77,7 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
         ({"out": "a.gif"}, RecordingError, "a.gif has no ending that says its format"),
         ({"out": "/dev/null/a.png"}, PretouchError, "/dev/null/a.png cannot be written"),
         ({"json_file": "/dev/null/a.json"}, PretouchError, "/dev/null/a.json cannot be written"),
-        ({"place": "gone.csv"}, RecordingError, "There is no file gone.csv"),
+        ({"place": "gone.csv"}, RecordingError, "The recording gone.csv cannot be read: there is none"),
         ({"choice": Choice(ranges=True), "skin_file": PAPER_SKIN}, RecordingError, "tells no ranges"),
     ],
 )
@@ -96,7 +96,7 @@ def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, 
         for sample in pushed(6.0, PUSHES[:1]):
             inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings({0: 0.2})), arm.state
             step, arm.state = arm.controller.step(before, inputs)
-            recording.record(Cycle(inputs, before, step))
+            recording.record(Cycle(inputs, before, step, arm.state))
             arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
             steps.append(step)
     detect(place, Choice(ranges=True), ("paper", "blind"), PAPER_SKIN, json_file=numbers)

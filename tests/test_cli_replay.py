@@ -8,12 +8,12 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from pretouch.cli.replay import recover, replay
-from pretouch.controller import Cycle
 from pretouch.errors import ParameterError, RecordingError, ViewerError
+from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
-from tests.recording.foreign_files import pushed
+from tests.foreign.files import pushed
 
 PUSHES = ((2.0, 0.6, (0.0, 40.0, 0.0)),)
 
@@ -27,7 +27,7 @@ def whole(panda_model, paper_skin, tmp_path_factory):
             silent = {0: arm.time - 4.5} if arm.time > 4.5 else None
             inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings(silent=silent)), arm.state
             step, arm.state = arm.controller.step(before, inputs)
-            recording.record(Cycle(inputs, before, step))
+            recording.record(Cycle(inputs, before, step, arm.state))
             arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
     return place
 

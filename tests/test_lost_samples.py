@@ -8,7 +8,8 @@ import pytest
 
 from pretouch import loop
 from pretouch.control.path import Circle
-from pretouch.controller import Controller, Cycle
+from pretouch.controller import Controller
+from pretouch.loop import Cycle
 from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.model import RobotModel

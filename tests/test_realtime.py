@@ -14,9 +14,9 @@ import pytest
 
 from pretouch import realtime
 from pretouch.control.path import Circle
-from pretouch.controller import Controller, Cycle
+from pretouch.controller import Controller
 from pretouch.errors import ParameterError
-from pretouch.loop import MonotonicClock
+from pretouch.loop import Cycle, MonotonicClock
 from pretouch.params import PROFILES, at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.model import RobotModel
@@ -286,7 +286,8 @@ import sys, types
 import numpy as np
 from pretouch import realtime
 from pretouch.control.path import Circle
-from pretouch.controller import Controller, Cycle
+from pretouch.controller import Controller
+from pretouch.loop import Cycle
 from pretouch.params import at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import panda

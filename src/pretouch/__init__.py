@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from pretouch.controller import Controller as Controller
     from pretouch.controller import ControllerState as ControllerState
     from pretouch.errors import PretouchError as PretouchError
+    from pretouch.errors import RecordingError as RecordingError
+    from pretouch.loop import Cycle as Cycle
     from pretouch.loop import MonotonicClock as MonotonicClock
+    from pretouch.loop import Recorder as Recorder
     from pretouch.params import Profile as Profile
     from pretouch.params import ReactionParams as ReactionParams
     from pretouch.params import RestrictionParams as RestrictionParams
@@ -33,6 +36,10 @@ if TYPE_CHECKING:
     from pretouch.perception.closest import no_obstacles as no_obstacles
     from pretouch.perception.scene_filter import Fixtures as Fixtures
     from pretouch.perception.scene_filter import no_fixtures as no_fixtures
+    from pretouch.recording.last_seconds import LastSeconds as LastSeconds
+    from pretouch.recording.reader import open_recording as open_recording
+    from pretouch.recording.verify import verify as verify
+    from pretouch.recording.writer import Recording as Recording
     from pretouch.robot.description import RobotDescription as RobotDescription
     from pretouch.robot.description import fr3 as fr3
     from pretouch.robot.description import panda as panda
@@ -56,11 +63,15 @@ _PLACES = {
     "control.path": ("Circle", "WayPoints", "line"),
     "control.restriction": ("approach_rows",),
     "controller": ("Controller", "ControllerState"),
-    "errors": ("PretouchError",),
-    "loop": ("MonotonicClock",),
+    "errors": ("PretouchError", "RecordingError"),
+    "loop": ("Cycle", "MonotonicClock", "Recorder"),
     "params": ("Profile", "ReactionParams", "RestrictionParams", "ThresholdParams", "at_rate", "profile"),
     "perception.closest": ("closest_points", "no_obstacles"),
     "perception.scene_filter": ("Fixtures", "no_fixtures"),
+    "recording.last_seconds": ("LastSeconds",),
+    "recording.reader": ("open_recording",),
+    "recording.verify": ("verify",),
+    "recording.writer": ("Recording",),
     "robot.description": ("RobotDescription", "fr3", "panda"),
     "robot.model": ("RobotModel",),
     "sensing.skin": ("Skin", "load_skin", "paper_skin"),

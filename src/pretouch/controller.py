@@ -45,16 +45,6 @@ class ControllerState:
     """(3, 3) R_O_ee at the start, held if the task asks for it."""
 
 
-@value
-class Cycle:
-    """One turn of the loop: `step(before, inputs)` gives `step` again."""
-
-    inputs: Inputs
-    before: ControllerState
-    """The state the step began with."""
-    step: ControlStep
-
-
 STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motion", "record")
 """What a step is made of, in order."""
 

@@ -13,10 +13,11 @@ from typing import Protocol
 import numpy as np
 
 from pretouch.control.joint_box import box_and_brake
-from pretouch.controller import Controller, ControllerState, Cycle
+from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
 from pretouch.ports import Clock, Robot, Skin
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState
+from pretouch.values import value
 
 _FINEST = 1e-7
 """Shortest time `Durations` tells apart [s]."""
@@ -150,6 +151,16 @@ class MonotonicClock:
         )  # fmt: skip
 
 
+@value
+class Cycle:
+    """One turn of the loop: `controller.step(before, inputs)` gives `step` and `after` again."""
+
+    inputs: Inputs
+    before: ControllerState
+    step: ControlStep
+    after: ControllerState
+
+
 class Recorder(Protocol):
     """Something that keeps what the loop did."""
 
@@ -176,8 +187,8 @@ def run(
     try:
         while True:
             tick = clock.tick()
-            cycle, state = turn(controller, state, robot, skin, tick, resume())
-            sent = cycle.step.command
+            cycle = turn(controller, state, robot, skin, tick, resume())
+            state, sent = cycle.after, cycle.step.command
             recorder.record(cycle)
             if done(cycle.step):
                 return
@@ -188,13 +199,13 @@ def run(
 
 def turn(
     controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float, resume: bool = False
-) -> tuple[Cycle, ControllerState]:
-    """Turn the controller once, at a tick [s]: read, step, command. Returns what was done, and the state after it."""
+) -> Cycle:
+    """Turn the controller once, at a tick [s]: read, step, command."""
     report, readings = robot.read(), skin.read()
     inputs = Inputs(_instant(tick, controller.limits.period, report, readings), report, readings, resume)
     step, after = controller.step(state, inputs)
     robot.command(step.command)
-    return Cycle(inputs, state, step), after
+    return Cycle(inputs, state, step, after)
 
 
 def _instant(tick: float, period: float, report: RobotState, readings: RangeReadings) -> float:

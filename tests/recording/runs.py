@@ -8,7 +8,8 @@ import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.control.path import Path as Course
-from pretouch.controller import Controller, ControllerState, Cycle
+from pretouch.controller import Controller, ControllerState
+from pretouch.loop import Cycle
 from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.writer import Recording
@@ -57,7 +58,7 @@ class Run:
         period = self.controller.profile.task.control_period_s
         self.qd, self.q = step.command, self.q + step.command * period
         self.time += period
-        self.cycles.append(Cycle(inputs, before, step))
+        self.cycles.append(Cycle(inputs, before, step, self.state))
         return self.cycles[-1]
 
 

@@ -7,8 +7,7 @@ import pytest
 
 from pretouch.contact.window import window_init
 from pretouch.control.path import line
-from pretouch.controller import Cycle
-from pretouch.loop import turn
+from pretouch.loop import Cycle, turn
 from pretouch.params import PROFILES
 from pretouch.recording import verify as verifying
 from pretouch.recording.codec import STEP, decode_step, encode_step
@@ -66,7 +65,8 @@ def test_a_simulated_contact_with_a_board_is_recomputed_bit_for_bit(panda_model,
     with Recording(tmp_path / "a.mcap", own) as recording:
         for _ in range(600):
             plant.advance(0.01)
-            cycle, state = turn(own, state, plant, units, plant.time)
+            cycle = turn(own, state, plant, units, plant.time)
+            state = cycle.after
             recording.record(cycle)
     recorded = open_recording(tmp_path / "a.mcap")
     assert plant.touches
@@ -84,7 +84,7 @@ class RecordedCourse(Course):
     def step(self, inputs, deep):
         before = self.state
         step, self.state = self.controller.step(before, inputs)
-        self.recording.record(Cycle(inputs, before, step))
+        self.recording.record(Cycle(inputs, before, step, self.state))
         self._follow(step.command)
         return step
 

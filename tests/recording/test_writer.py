@@ -11,20 +11,13 @@ import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from pretouch.control.path import Circle, WayPoints, line
 from pretouch.errors import RecordingError
-from pretouch.perception.scene_filter import Fixtures
 from pretouch.recording.messages import TOPICS, typestore
 from pretouch.recording.reader import open_recording
 from pretouch.recording.truth import Truth
 from pretouch.recording.writer import Recording
-from pretouch.robot.body import Capsules
-from pretouch.robot.description import fr3
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin, paper_skin
-from pretouch.sensing.unit import SensorUnit
 from tests.fuzz.invariants import same
-from tests.recording.runs import SHORT, Run, controller_of, custom_arm, recorded_run
+from tests.recording.runs import Run, controller_of, recorded_run
 
 
 @pytest.fixture(scope="module")
@@ -180,102 +173,6 @@ def test_a_state_that_was_begun_anew_is_noticed(controller, tmp_path):
         for each in (run, run, other, other):
             recording.record(each.turn())
     assert [i for i, kept in enumerate(open_recording(tmp_path / "a.mcap")) if kept.anew] == [0, 2]
-
-
-def test_another_profile_begins_another_run(controller, tmp_path):
-    run = Run(controller)
-    path = line((0.4, 0.0, 0.5), (0.5, 0.0, 0.5))
-    other = controller_of(controller.model, controller.skin, replace(SHORT, name="other"), path)
-    with Recording(tmp_path / "a.mcap", controller, {"command": "test"}) as recording:
-        recording.record(run.turn())
-        recording.change(other)
-        run.state, run.controller = other.adopt(run.state, controller), other
-        recording.record(run.turn())
-        recording.record(run.turn())
-    recorded = open_recording(tmp_path / "a.mcap")
-    assert [kept.run for kept in recorded] == [0, 1, 1]
-    assert [each.profile.name for each in recorded.runs] == [SHORT.name, "other"]
-    assert [each.sequence for each in recorded.runs] == [0, 1]
-    assert recorded.runs[0].about == {"command": "test"}
-
-
-class Spiral:
-    """A path of a class that no recording knows."""
-
-    length, closed = 1.0, False
-
-    def __init__(self, start):
-        self.start = start
-
-    def point(self, phase):
-        return self.start + np.array([0.0, 0.5 * phase * np.cos(phase), 0.1 * phase])
-
-    def tangent(self, phase):
-        return np.array([0.0, np.cos(phase), np.sin(phase)])
-
-
-PATHS = [Circle((0.4, 0.1, 0.3), 0.17, 0.3), WayPoints(np.random.default_rng(0).normal(size=(5, 3)), closed=True),
-         line((0.1, 0.2, 0.3), (0.7, 0.1, 0.2))]  # fmt: skip
-
-
-@pytest.mark.parametrize("path", PATHS)
-def test_paths_of_ours_are_made_again_to_the_bit(controller, tmp_path, path):
-    own = controller_of(controller.model, controller.skin, path=path)
-    recorded_run(tmp_path / "a.mcap", own, 2)
-    made = open_recording(tmp_path / "a.mcap").runs[0].path
-    assert type(made) is type(path)
-    assert (made.length, made.closed) == (path.length, path.closed)
-    for phase in np.linspace(-0.5, 3.0, 50).tolist():
-        assert same(made.point(phase), path.point(phase))
-        assert same(made.tangent(phase), path.tangent(phase))
-
-
-def test_a_path_of_another_class_is_known_where_it_led(controller, tmp_path):
-    model = controller.model
-    path = Spiral(model.kinematics(model.description.q_ready).position[model.ee])
-    run = recorded_run(tmp_path / "a.mcap", controller_of(controller.model, controller.skin, path=path), 40)
-    made = open_recording(tmp_path / "a.mcap").runs[0].path
-    assert (made.length, made.closed) == (1.0, False)
-    phases = [cycle.step.path_phase for cycle in run.cycles]
-    assert len(set(phases)) > 10
-    for phase in phases:
-        assert same(made.point(phase), path.point(phase))
-        assert same(made.tangent(phase), path.tangent(phase))
-    for phase in (0.2, 0.55, 1.0):
-        assert np.allclose(made.point(phase), path.point(phase), atol=1e-3)
-        assert np.linalg.norm(made.tangent(phase)) == pytest.approx(1.0)
-
-
-def test_arm_skin_and_fixtures_are_made_again_to_the_bit(tmp_path):
-    model = RobotModel(custom_arm(tmp_path))
-    T = np.eye(4)
-    T[:3, 3] = 0.06, 1e-17, 1 / 3 * 0.1
-    skin = Skin([SensorUnit("unit 1/ä", "b", T)], model)
-    capsules = Capsules(np.zeros(1, np.int64), np.array([[0.1, 0.2, 1 / 3]]), np.ones((1, 3)), np.array([0.1]))
-    own = controller_of(model, skin)
-    own.fixtures = Fixtures(np.array([[0.0, 0.0, 1.0, -1 / 3]]), capsules)
-    recorded_run(tmp_path / "a.mcap", own, 2)
-    (tmp_path / "two.xml").unlink()
-    run = open_recording(tmp_path / "a.mcap").runs[0]
-    made = run.controller()
-    assert made.model.links == model.links
-    for name in ("q_ready", "qd_max", "qdd_max", "tau_max", "name", "source", "ee_body", "envelope"):
-        assert same(getattr(made.model.description, name), getattr(model.description, name))
-    assert made.skin.ids == skin.ids
-    assert same(made.skin.T_link_sensor, skin.T_link_sensor)
-    assert same(made.fixtures.planes, own.fixtures.planes)
-    assert same(made.fixtures.capsules.a, capsules.a)
-    assert same(made.fixtures.capsules.radius, capsules.radius)
-    assert made.profile == own.profile
-    recorded_run(tmp_path / "b.mcap", made, 2)  # whoever has it may record with it again
-
-
-def test_the_envelope_of_an_arm_is_made_again(tmp_path):
-    model = RobotModel(fr3())
-    recorded_run(tmp_path / "a.mcap", controller_of(model, paper_skin(model)), 1)
-    made = open_recording(tmp_path / "a.mcap").runs[0].model.description
-    assert same(made.envelope, model.description.envelope)
-    assert made.mjcf == model.description.mjcf
 
 
 def test_a_units_imu_is_kept_in_its_topic(controller, tmp_path):

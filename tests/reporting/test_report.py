@@ -6,8 +6,9 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.report import titles, write_page
-from pretouch.controller import Controller, Cycle
+from pretouch.controller import Controller
 from pretouch.errors import ExperimentError, ParameterError, RecordingError
+from pretouch.loop import Cycle
 from pretouch.params import profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
@@ -30,7 +31,7 @@ def folder(panda_model, paper_skin, tmp_path_factory):
             if i == 300:
                 changed = profile("blind:threshold.f_base_n=9")
                 recording.change(Controller(panda_model, paper_skin, fixed, path, changed))
-            recording.record(Cycle(kept.inputs, state, kept.step), kept.truth)
+            recording.record(Cycle(kept.inputs, state, kept.step, state), kept.truth)
     return place, played
 
 

@@ -154,7 +154,7 @@ def _cycle(command: Cycle) -> None:
 
 def _detect(command: Detect) -> None:
     from pretouch.cli.detect import detect
-    from pretouch.recording.foreign_source import Choice
+    from pretouch.foreign.source import Choice
 
     c = command
     choice = Choice(c.wrench, c.joints, c.sign, c.frame, c.zeros, c.arm, ranges=bool(c.skin))

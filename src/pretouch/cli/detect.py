@@ -13,14 +13,14 @@ from rich.table import Table
 
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ParameterError, RecordingError
+from pretouch.foreign.detect import detect_foreign, units_topics
+from pretouch.foreign.figure import decisions_figure
+from pretouch.foreign.samples import Foreign, read_foreign
+from pretouch.foreign.source import Choice
+from pretouch.foreign.summary import Summary, findings, guidance, summary
 from pretouch.params import Profile, at_rate
 from pretouch.params import profile as find_profile
 from pretouch.recording.compare import Decisions, Found, matched
-from pretouch.recording.foreign import Foreign, read_foreign
-from pretouch.recording.foreign_detect import detect_foreign, units_topics
-from pretouch.recording.foreign_figure import decisions_figure
-from pretouch.recording.foreign_source import Choice
-from pretouch.recording.foreign_summary import Summary, findings, guidance, summary
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin
 

@@ -33,11 +33,19 @@ def replay(
     """
     console = Console(highlight=False, soft_wrap=True)
     other = find_profile(profile) if profile else None
+    if page and not verify:  # what keeps it from being shown is said before the work for it
+        from pretouch.viewer.server import ServeOptions, check_extra, check_port
+
+        check_extra()
+        check_port(ServeOptions(host, port))
     recorded = open_recording(place)
     if recorded.said:
         console.print(recorded.said, markup=False)
-    with _Progress("Reading", len(recorded)) as advance:
-        console.print(told(recorded, advance), markup=False)
+    if page and not verify:
+        console.print(told(recorded), markup=False)
+    else:
+        with _Progress("Reading", len(recorded)) as advance:
+            console.print(f"{told(recorded)[:-1]}: {happened(recorded, advance)}.", markup=False)
     if verify:
         with _Progress("Recomputing", len(recorded)) as advance:
             verdict = recompute(recorded, advance)
@@ -50,7 +58,6 @@ def replay(
         _show(console, comparison)
     if page:
         from pretouch.viewer.replay import serve_replay
-        from pretouch.viewer.server import ServeOptions
 
         serve_replay(recorded, ServeOptions(host, port), comparison)
     return 0
@@ -61,8 +68,8 @@ def recover(place: Path, out: Path | None = None) -> None:
     print(recovering.recover(place, out).said)
 
 
-def told(recorded: Recorded, advance: Callable[[int], None] = lambda done: None) -> str:
-    """Say in a line what ran, for how long, and what happened; `advance` is told how many steps were read."""
+def happened(recorded: Recorded, advance: Callable[[int], None] = lambda done: None) -> str:
+    """Count contacts and holds; `advance` is told how many steps were read."""
     contacts = holds = 0
     before: Mode | None = None
     for i, kept in enumerate(recorded):
@@ -71,14 +78,18 @@ def told(recorded: Recorded, advance: Callable[[int], None] = lambda done: None)
         holds += kept.step.mode is Mode.HOLD and before in (Mode.TRACK, Mode.REACT)
         before = kept.step.mode
         advance(i + 1)
+    return f"{_many(contacts, 'contact')}, {_many(holds, 'hold')}"
+
+
+def told(recorded: Recorded) -> str:
+    """Say in a line what ran, and for how long."""
     stamps, run = recorded.stamps(), recorded.runs[0]
     profiles = ", then ".join(run.profile.name for run in recorded.runs)
     command = run.about.get("command")
     what = f"{command}: " if isinstance(command, str) else ""
     return (
         f"{what}profile {profiles} on {run.model.description.name} with {_many(len(run.skin), 'unit')},"
-        f" {stamps[-1] - stamps[0]:.1f} s, {_many(len(recorded), 'step')}: {_many(contacts, 'contact')},"
-        f" {_many(holds, 'hold')}."
+        f" {stamps[-1] - stamps[0]:.1f} s, {_many(len(recorded), 'step')}."
     )
 
 

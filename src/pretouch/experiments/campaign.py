@@ -13,7 +13,7 @@ from hashlib import sha256
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from threading import Thread
-from typing import Any, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 from pretouch import __version__
 from pretouch.errors import ExperimentError, SkinError
@@ -24,7 +24,8 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
 
-RECORD = ("first", "all")
+Recorded = Literal["first", "all"]
+"""Trials to record: those of the first seed of which figures are drawn, or all."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Request:
     skin: str | None = None
     """Skin file, or None for the seven units of the paper's experiment."""
     record: str = "first"
-    """Trials to record: `first`, those of the first seed of which figures are drawn, or `all`."""
+    """Trials to record, `Recorded`."""
 
     def __post_init__(self) -> None:
         for name in self.experiments:
@@ -60,7 +61,7 @@ class Request:
             _check_choice("restriction mode", mode, get_args(RestrictionMode))
         if self.orientation is not None:
             _check_choice("orientation", self.orientation, get_args(Orientation))
-        _check_choice("choice of trials to record", self.record, RECORD)
+        _check_choice("choice of trials to record", self.record, get_args(Recorded))
         for stiffness in self.stiffness:
             if not 100.0 <= stiffness <= 1e6:
                 raise ExperimentError(f"The stiffness is {stiffness:g} N/m: give one from 100 to 1000000 N/m.")

@@ -8,9 +8,9 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.controller import Controller, Cycle
+from pretouch.controller import Controller
 from pretouch.errors import RecordingError
-from pretouch.loop import run
+from pretouch.loop import Cycle, run
 from pretouch.params import Profile
 from pretouch.recording.reader import Recorded
 from pretouch.recording.truth import Truth

@@ -112,10 +112,6 @@ class Comparison:
     left_out: int
     """Cycles whose inputs are not in the recording."""
 
-    def delays(self) -> FloatArray:
-        """How much later than recorded the other found each contact that both found [s]."""
-        return np.array([other.time - recorded.time for recorded, other in self.both])
-
 
 def compare(recorded: "Recorded", profile: Profile, progress: Callable[[int], None] = lambda done: None) -> Comparison:
     """Let another profile decide on the inputs of a recording, cycle by cycle; its commands go nowhere.

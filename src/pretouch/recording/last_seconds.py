@@ -3,16 +3,28 @@
 import threading
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple, Protocol, Self
 
-from pretouch.controller import Controller, Cycle
-from pretouch.loop import Recorder
+from pretouch.controller import Controller
+from pretouch.loop import Cycle
 from pretouch.recording.codec import decode_inputs, encode_inputs
 from pretouch.recording.plain import JSON
 from pretouch.recording.truth import Truth
 from pretouch.recording.writer import Recording
-from pretouch.types import Mode
+
+
+class Further(Protocol):
+    """Another recorder, as `Recording`."""
+
+    def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
+        """Keep one turn of the loop."""
+        ...
+
+    def change(self, controller: Controller) -> None:
+        """Be told of another controller."""
+        ...
 
 
 class _Passed(NamedTuple):
@@ -26,7 +38,7 @@ class _Passed(NamedTuple):
         if self.inputs is None:
             return self.cycle
         inputs = decode_inputs(self.inputs)[1]
-        return Cycle(inputs, self.cycle.before, self.cycle.step) if inputs is not None else self.cycle
+        return self.cycle if inputs is None else replace(self.cycle, inputs=inputs)
 
 
 class LastSeconds:
@@ -36,7 +48,7 @@ class LastSeconds:
     """
 
     def __init__(
-        self, controller: Controller, folder: Path, recorder: Recorder | None = None, seconds: float = 5.0,
+        self, controller: Controller, folder: Path, recorder: Further | None = None, seconds: float = 5.0,
         most: int = 5, about: Mapping[str, JSON] | None = None,
     ) -> None:  # fmt: skip
         """Keep the cycles of a controller.
@@ -56,40 +68,29 @@ class LastSeconds:
         self._controller, self._folder, self._recorder = controller, Path(folder), recorder
         self._seconds, self._most, self._about = seconds, most, dict(about or {})
         self._ring: deque[_Passed] = deque(maxlen=max(1, round(2 * seconds / controller.limits.period)))
-        self._latched = False
         self._writing: list[threading.Thread] = []
 
     def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
         """Keep one turn of the loop for a while."""
-        if isinstance(self._recorder, Recording):
+        if self._recorder is not None:
             self._recorder.record(cycle, truth)
-        elif self._recorder is not None:
-            self._recorder.record(cycle)
-        latched = cycle.before.mode.latched
-        if latched and not self._latched:
-            self._write()
-        self._latched = latched
         data, whole = encode_inputs(0, cycle.inputs)
         self._ring.append(_Passed(cycle, data if whole else None, truth))
         begin = cycle.step.stamp - self._seconds
         while self._ring[0].cycle.step.stamp < begin:
             self._ring.popleft()
+        if cycle.after.mode.latched and not cycle.before.mode.latched:
+            self._write()
 
     def change(self, controller: Controller) -> None:
         """Let the cycles from the next one on be those of another controller of the same arm."""
-        if isinstance(self._recorder, Recording):
+        if self._recorder is not None:
             self._recorder.change(controller)
         self._controller = controller
         self._ring.clear()
 
     def close(self) -> None:
-        """Write what the very last step calls for, and wait for what is being written."""
-        if self._ring and not self._latched and self._ring[-1].cycle.step.mode is Mode.HOLD:
-            last = self._ring[-1]
-            _, after = self._controller.step(last.cycle.before, last.again().inputs)
-            if after.mode.latched:
-                self._write()
-        self._ring.clear()
+        """Wait for what is being written."""
         for thread in self._writing:
             thread.join()
 

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pretouch.controller import Controller
-from pretouch.errors import RecordingError
 from pretouch.recording.messages import Item, encoded, make
 from pretouch.recording.standard import HEADER, QUATERNION, TIME, VECTOR, header, vector
+from pretouch.recording.surroundings import surroundings
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, FloatArray
@@ -40,7 +40,7 @@ class Scene:
         self._model = model
         self._skin = controller.skin
         self._path = _sampled(controller)
-        self._boxes = _boxes(about)
+        self._boxes = surroundings(about).boxes
         self._drawn: int | None = None
 
     def drawn(self, step: ControlStep, sequence: int, time: int) -> Iterator[Item]:
@@ -88,8 +88,8 @@ class Scene:
         base = header(time, self._model.links[0])
         markers = [_marker(base, "path", 0, _LINE_STRIP, (_LINE_M, 0.0, 0.0), _BLUE, points=self._path)]
         markers += _capsule_markers(self._model.capsules, self._model.links, time)
-        for i, (center, half) in enumerate(self._boxes):
-            markers.append(_marker(base, "box", i, _CUBE, tuple(2 * half), _BROWN, center))
+        for i, box in enumerate(self._boxes):
+            markers.append(_marker(base, "box", i, _CUBE, tuple(2 * box.half_size), _BROWN, box.center))
         return encoded(MARKERS, make(MARKERS, markers))
 
 
@@ -137,19 +137,3 @@ def _quaternions(rotations: FloatArray) -> list[Any]:
 def _sampled(controller: Controller) -> FloatArray:
     phases = np.linspace(0.0, controller.path.length, _PATH_POINTS)
     return np.array([controller.path.point(phase) for phase in phases.tolist()], dtype=np.float64)
-
-
-def _boxes(about: Mapping[str, Any]) -> list[tuple[FloatArray, FloatArray]]:
-    """Return centre and half size of each box in `about["scene"]["boxes"]`."""
-    scene = about.get("scene") or {}
-    boxes = scene.get("boxes", []) if isinstance(scene, Mapping) else []
-    try:
-        found = [(np.array(b["center"], dtype=np.float64), np.array(b["half_size"], dtype=np.float64)) for b in boxes]
-    except (TypeError, KeyError, ValueError) as error:
-        raise RecordingError(_BOXES) from error
-    if any(part.shape != (3,) for box in found for part in box):
-        raise RecordingError(_BOXES)
-    return found
-
-
-_BOXES = "A box of the scene cannot be drawn: give each a name, center (x, y, z) and half_size (x, y, z) [m]."

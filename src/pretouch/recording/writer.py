@@ -14,7 +14,8 @@ from typing import Self
 
 import numpy as np
 
-from pretouch.controller import Controller, Cycle
+from pretouch.controller import Controller
+from pretouch.loop import Cycle
 from pretouch.recording.codec import INPUTS, STEP, TRUTH, encode_inputs, encode_step, encode_truth
 from pretouch.recording.disk import Disk
 from pretouch.recording.messages import TOPICS, Item, prepare

@@ -4,20 +4,10 @@ from dataclasses import dataclass
 
 from pretouch.control.path import Path
 from pretouch.params import Profile
+from pretouch.recording.surroundings import KnownBox
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, FloatArray
-
-
-@dataclass(frozen=True)
-class BoxShape:
-    """A box in the room."""
-
-    name: str
-    center: FloatArray
-    """(3,) [m], base frame."""
-    half_size: FloatArray
-    """(3,) [m]"""
 
 
 @dataclass(frozen=True)
@@ -28,7 +18,7 @@ class World:
     skin: Skin
     path: Path
     profile: Profile
-    boxes: tuple[BoxShape, ...]
+    boxes: tuple[KnownBox, ...]
     hand_radius: float | None
     """Radius of the person's hand [m], None without one."""
     floor_height: float

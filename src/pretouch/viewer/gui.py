@@ -5,10 +5,15 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from pretouch.viewer.commands import Commands
+from pretouch.viewer.plots import History, Plots
 from pretouch.viewer.scene import PARTS
 
 if TYPE_CHECKING:
     from viser import GuiApi, ViserServer
+
+
+PERIOD_S = 1.0 / 30.0
+"""Time between two updates of a page [s]."""
 
 
 def dress(server: "ViserServer") -> None:
@@ -16,6 +21,16 @@ def dress(server: "ViserServer") -> None:
     server.gui.configure_theme(brand_color=(49, 104, 196), show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(330)
+
+
+def add_plots(server: "ViserServer", history: History, units: tuple[str, ...], other: str = "") -> Plots:
+    """Put plots to the left of a page; `other` names the profile whose thresholds are drawn beside those recorded."""
+    panel = server.gui.add_panel()
+    with panel.add_tab("Last 10 s"):
+        plots = Plots(server.gui, history, units, other)
+    panel.dock_left()
+    panel.set_width(310)
+    return plots
 
 
 def when_changed(handle: Any, commands: Commands, act: Callable[[Any], object], kind: str = "") -> None:

@@ -10,9 +10,9 @@ from pretouch.loop import MonotonicClock
 from pretouch.types import FloatArray
 from pretouch.viewer.commands import Action, Commands
 from pretouch.viewer.controls import Controls
-from pretouch.viewer.gui import dress
+from pretouch.viewer.gui import PERIOD_S, add_plots, dress
 from pretouch.viewer.pacing import Pace
-from pretouch.viewer.plots import History, Plots
+from pretouch.viewer.plots import History
 from pretouch.viewer.scene import Scene
 from pretouch.viewer.server import ServeOptions, served, url_of
 from pretouch.viewer.simulation import LiveSimulation
@@ -20,9 +20,6 @@ from pretouch.viewer.status import Status, legend
 
 if TYPE_CHECKING:
     from viser import ViserServer
-
-PERIOD_S = 1.0 / 30.0
-"""Time between two updates of the page [s]."""
 
 
 class LivePage:
@@ -43,11 +40,7 @@ class LivePage:
         self.controls.on_view = self._scene.show
         self._scene.on_hand(self._drag)
         self._history = History(len(simulation.skin))
-        panel = server.gui.add_panel()
-        with panel.add_tab("Last 10 s"):
-            self._plots = Plots(server.gui, self._history, simulation.skin.ids)
-        panel.dock_left()
-        panel.set_width(310)
+        self._plots = add_plots(server, self._history, simulation.skin.ids)
 
     @property
     def notice(self) -> str:

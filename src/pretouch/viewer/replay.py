@@ -1,18 +1,19 @@
 """The page of a recording: the live view with a slider over time."""
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.loop import MonotonicClock
 from pretouch.recording.reader import Kept, Recorded, Run
+from pretouch.recording.surroundings import surroundings
 from pretouch.viewer.commands import Commands
-from pretouch.viewer.frame import BoxShape, Frame, World
-from pretouch.viewer.gui import add_button, add_view_boxes, dress, put, when_changed
+from pretouch.viewer.frame import Frame, World
+from pretouch.viewer.gui import PERIOD_S, add_button, add_plots, add_view_boxes, dress, put, when_changed
 from pretouch.viewer.player import Happening, Happenings, Player
-from pretouch.viewer.plots import SPAN_S, History, Plots
+from pretouch.viewer.plots import SPAN_S, History
 from pretouch.viewer.scene import Scene
 from pretouch.viewer.server import ServeOptions, served, url_of
 from pretouch.viewer.status import Status, legend
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
     from pretouch.recording.compare import Comparison
-
-PERIOD_S = 1.0 / 30.0
-"""Time between two updates of the page [s]."""
 
 _LOOKED = 40
 """Steps looked at for happenings between two updates: about 10 ms."""
@@ -37,19 +35,13 @@ _MOST = 60
 
 def world_of(run: Run) -> World:
     """What stood still while a run was recorded; of what it does not say, a page shows nothing."""
-    scene = run.about.get("scene")
-    said: Mapping[str, Any] = scene if isinstance(scene, dict) else {}
-    floor, hand, planes = said.get("floor_height_m"), said.get("hand_radius_m"), run.fixtures.planes
+    known, planes = surroundings(run.about), run.fixtures.planes
     flat = planes[np.all(planes[:, :3] == (0.0, 0.0, 1.0), axis=1)]
-    boxes = [b for b in said.get("boxes") or [] if isinstance(b, dict)]
+    floor = -float(flat[0, 3]) if len(flat) else 0.0
     return World(
-        model=run.model, skin=run.skin, path=run.path, profile=run.profile,
-        boxes=tuple(
-            BoxShape(str(b.get("name", "box")), np.array(b["center"], float), np.array(b["half_size"], float))
-            for b in boxes if "center" in b and "half_size" in b
-        ),
-        hand_radius=float(hand) if isinstance(hand, int | float) else None,
-        floor_height=float(floor) if isinstance(floor, int | float) else -float(flat[0, 3]) if len(flat) else 0.0,
+        model=run.model, skin=run.skin, path=run.path, profile=run.profile, boxes=known.boxes,
+        hand_radius=known.hand_radius,
+        floor_height=floor if known.floor_height is None else known.floor_height,
         stiffness=float("nan"),
     )  # fmt: skip
 
@@ -91,11 +83,7 @@ class ReplayPage:
         self._scene = Scene(server, worlds[0])
         other = comparison.other.name if comparison else ""
         self._history = History(len(worlds[0].skin), 6 if other else 0)
-        panel = server.gui.add_panel()
-        with panel.add_tab("Last 10 s"):
-            self._plots = Plots(server.gui, self._history, worlds[0].skin.ids, other)
-        panel.dock_left()
-        panel.set_width(310)
+        self._plots = add_plots(server, self._history, worlds[0].skin.ids, other)
 
     def _controls(self, server: "ViserServer") -> None:
         gui, player, commands = server.gui, self.player, self._commands

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from pretouch.controller import Controller, Cycle
+from pretouch.controller import Controller
 from pretouch.errors import ParameterError
-from pretouch.loop import turn
+from pretouch.loop import Cycle, turn
 from pretouch.params import Profile
+from pretouch.recording.surroundings import surroundings
 from pretouch.recording.truth import Truth
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.scene import described, fixtures
 from pretouch.types import ControlStep, FloatArray
-from pretouch.viewer.frame import BoxShape, Frame, World
+from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.room import Room, live_path
 from pretouch.viewer.settings import Faults, LiveSettings, PathName
 
@@ -93,7 +94,8 @@ class LiveSimulation:
         tick = room.tick()
         if room.stiffness != self.world.stiffness:
             self._look()
-        cycle, self._state = turn(self.controller, self._state, room.plant, room.units, tick, resume)
+        cycle = turn(self.controller, self._state, room.plant, room.units, tick, resume)
+        self._state = cycle.after
         hand = room.hand.position
         self.frame = Frame(cycle.step, hand, room.mouse.target, room.plant.true_force)
         self._keep(cycle, hand)
@@ -172,9 +174,9 @@ class LiveSimulation:
 
     def _look(self) -> None:
         scene = self._room.scene
-        boxes = tuple(BoxShape(box.name, np.array(box.center), np.array(box.half_size)) for box in scene.boxes)
         self.world = World(
-            self.model, self.skin, self.controller.path, self.controller.profile, boxes,
+            self.model, self.skin, self.controller.path, self.controller.profile,
+            surroundings({"scene": described(scene)}).boxes,
             scene.hand.radius if scene.hand else None, scene.floor_height, self._room.stiffness,
         )  # fmt: skip
 

@@ -8,12 +8,12 @@ from pretouch.contact.window import window_init
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
+from pretouch.foreign.samples import POSTURE_GAP_S, Foreign
+from pretouch.foreign.source import RangeTopic, Series, interpolated, newest
 from pretouch.modes import Event, mode_init, next_mode
 from pretouch.params import Profile
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.compare import Decided, Decisions
-from pretouch.recording.foreign import POSTURE_GAP_S, Foreign
-from pretouch.recording.foreign_source import RangeTopic, Series, interpolated, newest
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, Inputs, IntArray, Mode, Obstacles, RangeReadings, RangeStatus, RobotState
 

@@ -6,10 +6,10 @@ from rosbags.rosbag2 import StoragePlugin
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import RecordingError
-from pretouch.recording.foreign import read_foreign
-from pretouch.recording.foreign_source import Choice
+from pretouch.foreign.samples import read_foreign
+from pretouch.foreign.source import Choice
 from pretouch.types import RangeStatus
-from tests.recording.foreign_files import (
+from tests.foreign.files import (
     START,
     STORE1,
     joints,
@@ -221,13 +221,13 @@ def test_ranges_that_are_not_there_are_said(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("gone.mcap", None, "There is no file"),
+        ("gone.mcap", None, "cannot be read: there is none"),
         ("empty.mcap", b"", "cannot be read as a bag"),
         ("junk.mcap", b"\x89MCAP0\r\n" + bytes(range(256)) * 4, "cannot be read as a bag"),
         ("junk.db3", b"SQLite format 3\0" + bytes(200), "cannot be read as a bag"),
         ("junk.bag", b"#ROSBAG V2.0\n" + bytes(200), "cannot be read as a bag"),
         ("text.pdf", b"text", "has an ending that is none of .mcap, .db3, .bag, .csv"),
-        ("x" * 300, None, "There is no file"),
+        ("x" * 300, None, "cannot be read: there is none"),
     ],
 )
 def test_files_that_are_no_recording_are_one_sentence(tmp_path, name, content, words):

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.errors import RecordingError
-from pretouch.recording.foreign import read_foreign
-from pretouch.recording.foreign_source import Choice
-from tests.recording.foreign_files import force_columns, write_csv
+from pretouch.foreign.samples import read_foreign
+from pretouch.foreign.source import Choice
+from tests.foreign.files import force_columns, write_csv
 
 FORCE = np.random.default_rng(0).normal(size=(50, 3))
 EE = Choice(frame="ee")

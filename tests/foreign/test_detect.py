@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RecordingError
+from pretouch.foreign.detect import detect_foreign
+from pretouch.foreign.samples import read_foreign
+from pretouch.foreign.source import Choice
+from pretouch.foreign.summary import findings, guidance, summary
 from pretouch.params import PROFILES, at_rate, profile
-from pretouch.recording.foreign import read_foreign
-from pretouch.recording.foreign_detect import detect_foreign
-from pretouch.recording.foreign_source import Choice
-from pretouch.recording.foreign_summary import findings, guidance, summary
 from tests.following_arm import Arm
-from tests.recording.foreign_files import PUSHES, force_columns, joints, pushed, ranging, stamps, write_bag, write_csv
-from tests.recording.foreign_files import wrenches as wrench_messages
+from tests.foreign.files import PUSHES, force_columns, joints, pushed, ranging, stamps, write_bag, write_csv
+from tests.foreign.files import wrenches as wrench_messages
 from tests.reference.contact import Touch
 
 PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.recording.foreign_source import Choice, RangeTopic, Series, Source, in_order, interpolated
+from pretouch.foreign.source import Choice, RangeTopic, Series, Source, in_order, interpolated
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
@@ -70,16 +70,16 @@ def read_foreign(place: Path, choice: Choice) -> Foreign:
 
 def _read(place: Path, choice: Choice) -> Source:
     if not os.path.exists(place):
-        raise RecordingError(f"There is no file {place}: give a recording.")
+        raise RecordingError(f"The recording {place} cannot be read: there is none.")
     ending = place.suffix.lower()
     if place.is_dir() or ending in _BAGS:
         if place.is_dir() and not (place / "metadata.yaml").is_file():
             raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
-        from pretouch.recording.foreign_bag import read_bag
+        from pretouch.foreign.bag import read_bag
 
         return read_bag(place, choice)
     if ending in _TABLES:
-        from pretouch.recording.foreign_csv import read_csv
+        from pretouch.foreign.csv import read_csv
 
         return read_csv(place, choice)
     raise RecordingError(

@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RecordingError
-from pretouch.recording.foreign_source import Arm, Choice, RangeTopic, Series, Source
+from pretouch.foreign.source import Arm, Choice, RangeTopic, Series, Source
 from pretouch.types import RangeStatus
 
 WRENCH, JOINTS, RANGE = "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Range"

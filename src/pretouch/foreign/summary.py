@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from pretouch.foreign.samples import Foreign
 from pretouch.params import Profile
 from pretouch.recording.compare import Decisions
-from pretouch.recording.foreign import Foreign
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
@@ -72,8 +72,9 @@ def guidance(decisions: Decisions, found: Summary, profile: Profile) -> str:
             f"{decisions.name}: no contact in {minutes:.1f} min; an F_b below {found.f_base_all:.1f} N would have given"
             f" one (it is {profile.threshold.f_base_n:g} N)."
         )
+    contacts = "1 false contact" if count == 1 else f"{count} false contacts"
     return (
-        f"{decisions.name}: if nobody touched the arm, {count} false contacts in {minutes:.1f} min; an F_b above"
+        f"{decisions.name}: if nobody touched the arm, {contacts} in {minutes:.1f} min; an F_b above"
         f" {found.f_base_all:.1f} N would have given none, one above {found.f_base_free:.1f} N none but"
         f" {'this' if count == 1 else 'these'} (it is {profile.threshold.f_base_n:g} N)."
     )

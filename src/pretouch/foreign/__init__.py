@@ -1,0 +1,1 @@
+"""Recordings of other programs, and what our thresholds make of them."""
