@@ -1,5 +1,6 @@
 import json
 import os
+import signal
 import subprocess
 import sys
 
@@ -40,6 +41,14 @@ def run(capsys, *args):
         (("bench", "cycle", "--priority", "100"), "The real-time priority is 100: give 1 to 99"),
         (("bench", "cycle", "--cpu", "-1"), "Processor -1 is none this process may use: choose from"),
         (("bench", "cycle", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
+        (("live", "--port", "0"), "The port is 0: give one from 1 to 65535"),
+        (("live", "--path", "square"), "The path is 'square': choose circle or line"),
+        (("replay", "/nowhere.mcap", "--no-page"), "/nowhere.mcap cannot be read: there is none"),
+        (("replay", "/dev/null", "--no-page"), "/dev/null is empty"),
+        (("recover", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
+        (("report", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
+        (("detect", "/nowhere.csv"), "/nowhere.csv cannot be read: there is none"),
+        (("reproduce", "static", "--record", "some"), "The choice of trials to record 'some' is unknown"),
     ],
 )
 def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, args, words):
@@ -113,6 +122,14 @@ def test_ctrl_c_while_words_are_read_ends_in_order(monkeypatch):
 
     monkeypatch.setattr(cli.tyro, "cli", stop)
     assert cli.main(["demo"]) == 130
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_signals_that_end_a_process_end_it_in_order(monkeypatch, number):
+    before = signal.getsignal(number)
+    monkeypatch.setattr(cli.tyro, "cli", lambda *_args, **_options: signal.raise_signal(number))
+    assert cli.main(["demo"]) == 128 + number
+    assert signal.getsignal(number) is before
 
 
 @pytest.mark.parametrize("args", [(), ("dance",), ("reproduce", "--seeds", "many"), ("demo", "--nothing")])

@@ -26,7 +26,7 @@ def file(tmp_path):
 def test_what_was_read_assumed_and_found_is_printed(capsys, file):
     detect(file, Choice())
     said = capsys.readouterr().out
-    assert "mine.csv: 1400 samples in 14.0 s, 100 Hz." in said
+    assert "mine.csv: 1400 samples in 14.0 s, 100 Hz, the first at" in said
     assert "taken as the force on the robot (else --sign by-robot) in the base frame (else --frame ee)" in said
     assert "Without ranges (--skin) nothing is near" in said
     rows = [line.split() for line in said.splitlines() if line.startswith("paper ")]

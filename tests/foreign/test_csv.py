@@ -88,7 +88,7 @@ def test_columns_of_no_use_are_named(tmp_path):
         ("", "is empty"),
         ("\n\n \n", "is empty"),
         ("time_s,force_x_N,force_y_N,force_z_N\n", "has no row with a time"),
-        (GOOD[:46], "has 1 samples"),
+        (GOOD[:46], "has 1 sample of the force"),
         (GOOD.replace("time_s", "t"), "has no column time "),
         (GOOD.replace("force_y_N", "fy"), "has no column force_y "),
         (GOOD.replace("force_y_N", "force_y"), "'force_y' .* has no unit: write force_x_N or force_x_kN"),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
@@ -306,6 +307,37 @@ def test_missing_inputs_are_none_and_said(tiny, tmp_path):
     assert recorded[3].inputs is None
     assert recorded.unreadable(3) == "they are missing"
     assert replace(recorded[2], inputs=None).run == 0
+
+
+def test_a_message_that_is_too_short_to_be_one_is_left_out_by_every_reader(tiny, tmp_path):
+    data, chunks = tiny[0].read_bytes(), chunks_of(tiny[0])
+    place = tmp_path / "a.mcap"
+    place.write_bytes(data[: chunks[0].end] + struct.pack("<BQ", 0x05, 5) + b"abcde")
+    assert "1 damaged part left out" in open_recording(place).said
+    with recover(place).place.open("rb") as file:
+        assert list(make_reader(file, validate_crcs=True).iter_messages())
+
+
+def test_a_chunk_that_unpacks_to_more_than_it_says_is_left_out(tiny):
+    compressed = zstandard.compress(bytes(50_000_000))
+    text = struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", len(compressed)) + compressed
+    body = struct.pack("<QQQI", 0, 0, 100, 0) + text
+    contents = Contents()
+    assert list(scan(BytesIO(struct.pack("<BQ", 0x06, len(body)) + body), contents)) == []
+    assert contents.damaged == 1
+
+
+def test_a_recovery_that_is_interrupted_leaves_nothing(tiny, tmp_path, monkeypatch):
+    place = tmp_path / "a.mcap"
+    place.write_bytes(tiny[0].read_bytes()[:-20])
+
+    def stop(*_given):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pretouch.recording.recover.ending", stop)
+    with pytest.raises(KeyboardInterrupt):
+        recover(place)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mcap"]
 
 
 def test_scanning_goes_on_behind_a_record_of_a_kind_that_is_not_known(tiny):

@@ -15,7 +15,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit
 from tests.fuzz.invariants import same
-from tests.recording.runs import SHORT, Run, controller_of, custom_arm, recorded_run
+from tests.recording.runs import SHORT, Run, Spiral, controller_of, custom_arm, recorded_run
 
 
 @pytest.fixture(scope="module")
@@ -38,21 +38,6 @@ def test_another_profile_begins_another_run(controller, tmp_path):
     assert [each.profile.name for each in recorded.runs] == [SHORT.name, "other"]
     assert [each.sequence for each in recorded.runs] == [0, 1]
     assert recorded.runs[0].about == {"command": "test"}
-
-
-class Spiral:
-    """A path of a class that no recording knows."""
-
-    length, closed = 1.0, False
-
-    def __init__(self, start):
-        self.start = start
-
-    def point(self, phase):
-        return self.start + np.array([0.0, 0.5 * phase * np.cos(phase), 0.1 * phase])
-
-    def tangent(self, phase):
-        return np.array([0.0, np.cos(phase), np.sin(phase)])
 
 
 PATHS = [Circle((0.4, 0.1, 0.3), 0.17, 0.3), WayPoints(np.random.default_rng(0).normal(size=(5, 3)), closed=True),

@@ -27,8 +27,7 @@ from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import Mode
 from tests.fuzz.machine import Course, Machine
 from tests.fuzz.worlds import any_world
-from tests.recording.runs import SHORT, Run, controller_of, custom_arm, recorded_run
-from tests.recording.test_writer import Spiral
+from tests.recording.runs import SHORT, Run, Spiral, controller_of, custom_arm, recorded_run
 
 
 @pytest.fixture(scope="module")
@@ -206,9 +205,18 @@ def test_steps_that_are_missing_are_passed_to_the_next_snapshot(made):
     made._numbers = sorted(made._raw["/pretouch/step"])
     verdict = verify(made)
     second = sorted(made._raw["/pretouch/state"])[1]
-    assert verdict.agrees
-    assert verdict.skipped == {"no snapshot before": second - 60}
+    assert verdict.first is None
+    assert not verdict.agrees
+    assert verdict.skipped == {"gone missing": 10, "no snapshot before": second - 60}
+    assert "10 steps have gone missing" in verdict.said
     assert verdict.checked == 390 - (second - 60)
+
+
+def test_inputs_that_are_missing_are_no_inputs_that_could_not_be_kept(made):
+    del made._raw["/pretouch/inputs"][50]
+    verdict = verify(made)
+    assert not verdict.agrees
+    assert verdict.skipped["no inputs in the file"] == 1
 
 
 def elsewhere(monkeypatch):

@@ -241,7 +241,7 @@ def test_a_folder_that_is_not_there_is_named(controller, tmp_path):
 
 
 def test_a_place_that_cannot_be_written_is_named_with_the_reason(controller, tmp_path):
-    with pytest.raises(RecordingError, match=r"aaa\.mcap cannot be written: File name too long\."):
+    with pytest.raises(RecordingError, match=r"aaa\.mcap cannot be written: File name too long: give another"):
         Recording(tmp_path / f"{'a' * 300}.mcap", controller)
     with pytest.raises(RecordingError, match=r"/proc/a\.mcap cannot be written"):
         Recording(Path("/proc/a.mcap"), controller)

@@ -143,3 +143,9 @@ def test_numbers_are_those_of_the_static_experiment(panda_model, paper_skin, pro
     assert len(m.without_touch) == row["false_detections"]
     nearest = m.distances.body
     assert (round(nearest.distance, 4) if nearest else None) == row["least_sensed_m"]
+
+
+@pytest.mark.parametrize("time", [[0.0, np.nan, 0.002], [np.nan] * 3, [0.0, np.inf, 0.002]])
+def test_a_truth_without_times_knows_no_touch(time):
+    truth = Truth(np.array(time), np.full((3, 3), 20.0), ())
+    assert touches_of(truth) == []

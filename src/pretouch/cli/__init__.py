@@ -30,30 +30,35 @@ from pretouch.errors import ParameterError, PretouchError
 # the rest of the package takes a second to import: only the functions that run something do
 
 _USAGE, _INTERRUPTED = 2, 130
-_TERMINATED = 143
 
 
 class _Terminated(BaseException):
-    """SIGTERM, turned into an exception so that what is under way can end in order."""
+    """SIGTERM, or SIGHUP of a terminal that closed, so that what is under way can end in order."""
+
+    def __init__(self, number: int) -> None:
+        self.code = 128 + number
 
 
 @contextmanager
-def _sigterm_raises() -> Iterator[None]:
-    def handle(_number: int, _frame: FrameType | None) -> None:
-        raise _Terminated
+def _ends_raise() -> Iterator[None]:
+    def handle(number: int, _frame: FrameType | None) -> None:
+        raise _Terminated(number)
 
-    before = signal.signal(signal.SIGTERM, handle)
+    # nohup has SIGHUP ignored, and wants it so
+    ours = [n for n in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, handle) for number in ours}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the command; return its exit code: 2 for bad input, 130 or 143 after Ctrl-C or SIGTERM."""
+    """Run the command; return its exit code: 2 for bad input, 130, 143 or 129 after Ctrl-C, SIGTERM or SIGHUP."""
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
     try:
-        with _sigterm_raises():
+        with _ends_raise():
             command = tyro.cli(
                 Command, prog="pretouch", description="Contact-anticipating robot arms.", args=args,
                 config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
@@ -86,8 +91,8 @@ def main(args: list[str] | None = None) -> int:
         return _USAGE
     except KeyboardInterrupt:
         return _INTERRUPTED
-    except _Terminated:
-        return _TERMINATED
+    except _Terminated as end:
+        return end.code
     return 0
 
 

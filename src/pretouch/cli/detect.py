@@ -106,7 +106,11 @@ def _show(foreign: Foreign, columns: list[Column], notes: list[str]) -> None:
     console = Console(highlight=False, soft_wrap=True)
     time = foreign.force.time
     seconds = (time[-1] - time[0]) / 1e9
-    console.print(f"{foreign.place}: {len(time)} samples in {seconds:.1f} s, {foreign.rate:.4g} Hz.", markup=False)
+    console.print(
+        f"{foreign.place}: {len(time)} samples in {seconds:.1f} s, {foreign.rate:.4g} Hz, the first at"
+        f" {time[0] / 1e9:.3f} s: times below count from it.",
+        markup=False,
+    )
     console.print(foreign.said, markup=False)
     for note in notes:
         console.print(note, markup=False)
@@ -161,7 +165,7 @@ def _noise_table(columns: list[Column]) -> Table:
 def _numbers(foreign: Foreign, columns: list[Column], notes: list[str]) -> dict[str, Any]:
     time = foreign.force.time
     return {
-        "recording": str(foreign.place), "assumed": foreign.said, "notes": notes, "samples": len(time),
+        "recording": str(foreign.place), "assumed": foreign.said, "notes": notes, "samples": len(time), "first_sample_s": time[0] / 1e9,
         "duration_s": (time[-1] - time[0]) / 1e9, "rate_hz": foreign.rate,
         "profiles": [
             {

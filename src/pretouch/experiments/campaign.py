@@ -301,7 +301,10 @@ def _work(request: Request, out: Path, cell: Cell, seed: int) -> None:
     if request.record == "all" or (seed == 0 and experiment.recorded):
         unfinished.unlink(missing_ok=True)
         context = replace(context, recording=unfinished)
-    row, _ = experiment.trial(cell, seed, context)
+    try:
+        row, _ = experiment.trial(cell, seed, context)
+    except SystemExit as end:  # of a signal, the recording is closed; the pool would go on with the next trial
+        os._exit(int(end.code or 1))
     if unfinished.exists():  # some trials play nothing
         os.replace(unfinished, place)
     write_json(row, trial_file(out, cell, seed))

@@ -55,7 +55,8 @@ def read_foreign(place: Path, choice: Choice) -> Foreign:
         notes += more
     ranges = tuple(replace(r, readings=in_order(r.readings, r.topic)[0]) for r in source.ranges)
     if len(force) < 2:
-        raise RecordingError(f"{place} has {len(force)} samples of the force: give a longer recording.")
+        why = " ".join((f"{place} has {len(force)} sample{'' if len(force) == 1 else 's'} of the force.", *notes))
+        raise RecordingError(f"{why} Give a longer recording, with a time of its own for each sample.")
     ours, said = _ours(force, choice)
     notes += said
     if choice.frame == "ee" and joints is not None and model is not None:

@@ -111,6 +111,8 @@ def scan(file: BinaryIO, contents: Contents) -> Iterator[Chunk]:
             break
         if opcode == Opcode.CHUNK:
             last = _chunk(start, head + body, contents)
+        elif opcode == Opcode.MESSAGE and length < _MESSAGE.size:
+            contents.damaged += 1
         elif opcode == Opcode.MESSAGE:
             yield Chunk(start, head + body, "", length, head + body, file.tell())
         else:
@@ -164,7 +166,7 @@ def _unpacked(compression: str, packed: bytes, size: int) -> bytes:
     if compression == "zstd":
         import zstandard
 
-        return zstandard.ZstdDecompressor().decompressobj().decompress(packed)
+        return zstandard.ZstdDecompressor().stream_reader(packed).read(size + 1)
     if compression == "lz4":
         import lz4.frame  # type: ignore[import-untyped]
 

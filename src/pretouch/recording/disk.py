@@ -1,10 +1,12 @@
 """A recording's file and the thread that writes it, so that no disk makes a control loop wait."""
 
 import errno
+import math
 import os
 import threading
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -22,8 +24,8 @@ _FLUSH_S = 0.5
 _CHUNK = 1 << 18
 """Bytes of messages in a chunk at most: to index more of them at once would keep a fast loop waiting."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_SOME_WAITING = 1000
-"""Cycles that wait when a run that is faster than the clock should wait too."""
+_LATE_S = 0.2
+"""Time for which a cycle waits to be written when a run that is faster than the clock should wait too [s]."""
 _PATIENCE_S = 10.0
 """Time it then waits at most [s]."""
 _MOST_WAITING = 20_000
@@ -71,7 +73,9 @@ class Disk:
     def __init__(self, place: Path) -> None:
         self._place = place
         self._file = _opened(place)
-        self._queue: SimpleQueue[tuple[list[Item], More] | None] = SimpleQueue()
+        self._queue: SimpleQueue[tuple[float, list[Item], More] | None] = SimpleQueue()
+        self._oldest = math.inf
+        """When the cycle that is being written was put [s]."""
         self._writer = Writer(self._file, _CHUNK, CompressionType.ZSTD)  # type: ignore[arg-type]
         try:
             self._writer.start("ros2", LIBRARY)
@@ -90,16 +94,16 @@ class Disk:
         """Hand messages over, and what makes more of them, in the thread."""
         if self._queue.qsize() > _MOST_WAITING and not self.trouble:
             self.trouble = f"The recording {self._place} ended early: the disk does not keep up, take a faster one."
-        self._queue.put((items, more))
+        self._queue.put((time.monotonic(), items, more))
 
     def behind(self) -> bool:
-        """Whether much waits to be written."""
-        return self._queue.qsize() > _SOME_WAITING
+        """Whether something has waited to be written for a while."""
+        return time.monotonic() - self._oldest > _LATE_S
 
     def wait(self) -> None:
         """Let the thread catch up for a while."""
         until = time.monotonic() + _PATIENCE_S
-        while self._queue.qsize() > _SOME_WAITING // 2 and self._thread.is_alive() and time.monotonic() < until:
+        while self._queue.qsize() and self._thread.is_alive() and time.monotonic() < until:
             time.sleep(0.002)
 
     def close(self) -> None:
@@ -123,7 +127,7 @@ class Disk:
         except Exception as error:  # the run goes on, whatever failed here
             self.trouble = f"The recording {self._place} ended early: {type(error).__name__}: {error}."
             self._rescue(None)
-        finally:
+        with suppress(OSError):  # of what was written, the system has said by now what it has to say
             self._file.close()
 
     def _write_all(self) -> None:
@@ -136,9 +140,11 @@ class Disk:
             else:
                 if job is None:
                     return
-                items, more = job
+                self._oldest, items, more = job
                 for item in chain(items, more()):
                     self._add(item)
+                if self._queue.empty():
+                    self._oldest = math.inf
                 time.sleep(0)  # lets the control loop have the interpreter, if it waits for it
             if time.monotonic() >= due:
                 self._writer.flush()  # type: ignore[no-untyped-call]
@@ -158,13 +164,14 @@ class Disk:
     def _rescue(self, error: OSError | None) -> None:
         """End the file after as many whole chunks as leave room for the index."""
         contents = Contents()
+        self.trouble = self.trouble or f"The recording {self._place} ended early."  # nobody waits for what follows
         try:
             with self._place.open("rb") as file:
                 begins_as_mcap(file)
                 entries, ends = _indexed(file, contents)
             held = _end(self._file, contents, entries, ends)
-        except OSError as another:
-            held, error = "it cannot be opened", another
+        except (OSError, ValueError) as another:
+            held, error = "it cannot be opened", another if isinstance(another, OSError) else error
         cause = os.strerror(error.errno) if error and error.errno else str(error or "")
         if error is not None:
             remedy = "make room, then record again" if error.errno in _FULL else "see to the disk"
@@ -211,4 +218,4 @@ def _refused(place: Path, error: OSError) -> RecordingError:
         return RecordingError(f"There is something at {place} already: give another name, or move it away.")
     if not place.parent.is_dir():
         return RecordingError(f"The folder {place.parent} for the recording is not there: make it first.")
-    return RecordingError(f"The recording {place} cannot be written: {error.strerror}.")
+    return RecordingError(f"The recording {place} cannot be written: {error.strerror}: give another name or folder.")

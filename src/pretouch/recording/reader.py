@@ -44,6 +44,8 @@ class Kept:
     """Whether that state does not follow from the step before."""
 
 
+MISSING_INPUTS = "they are missing"
+
 Raw = dict[str, dict[int, bytes]]
 """Messages of each of our topics, by the number of the step."""
 
@@ -92,7 +94,7 @@ class Recorded:
     def unreadable(self, i: int) -> str:
         """Say what is known of inputs that could not be kept, or ''."""
         inputs = self._raw["/pretouch/inputs"].get(self._numbers[i])
-        return "they are missing" if inputs is None else decode_inputs(inputs)[2]
+        return MISSING_INPUTS if inputs is None else decode_inputs(inputs)[2]
 
     def step_data(self, i: int) -> bytes:
         """Return a step as it was written."""

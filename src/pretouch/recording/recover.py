@@ -38,7 +38,7 @@ def recover(place: Path, out: Path | None = None) -> Recovered:
         with place.open("rb") as source, out.open("xb") as target:
             try:
                 _copy(source, target)
-            except OSError:
+            except BaseException:
                 out.unlink()
                 raise
     except FileExistsError as error:

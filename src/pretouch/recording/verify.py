@@ -10,12 +10,14 @@ import numpy as np
 from pretouch.controller import Controller, ControllerState
 from pretouch.recording.codec import encode_step
 from pretouch.recording.difference import TOLERANCE, Part, differing
-from pretouch.recording.reader import Recorded
+from pretouch.recording.reader import MISSING_INPUTS, Kept, Recorded
 from pretouch.recording.setting import Run
 from pretouch.recording.versions import versions
 
 _NO_SNAPSHOT = "no snapshot before"
 _NO_INPUTS = "inputs that could not be kept"
+_MISSING = "no inputs in the file"
+_GONE = "gone missing"
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,8 @@ class Verdict:
 
     @property
     def agrees(self) -> bool:
-        """Whether there was something to compare, and nothing differs."""
-        return self.checked > 0 and self.first is None
+        """Whether there was something to compare, nothing differs, and nothing has gone missing from the file."""
+        return self.checked > 0 and self.first is None and not {_MISSING, _GONE} & set(self.skipped)
 
 
 class _Count:
@@ -95,6 +97,8 @@ def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: No
     before: tuple[int, int] | None = None
     for i in range(len(recorded)):
         kept, number = recorded[i], recorded.number(i)
+        if before is not None and number > before[1] + 1:
+            count.skipped[_GONE] += number - before[1] - 1
         if before != (kept.run, number - 1):
             state = None
         before = kept.run, number
@@ -106,7 +110,7 @@ def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: No
                 parts += differing(_judged(kept.snapshot), _judged(state), True, "state before")
             state = kept.snapshot
         if state is None or kept.inputs is None:
-            count.skipped[_NO_SNAPSHOT if state is None else _NO_INPUTS] += 1
+            count.skipped[_unchecked(recorded, i, kept)] += 1
             state = None
         else:
             step, state = controllers[kept.run].step(state, kept.inputs)
@@ -116,6 +120,13 @@ def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: No
         count.note(number, kept.step.stamp, parts)
         progress(i + 1)
     return _verdict(recorded, count, all(exact))
+
+
+def _unchecked(recorded: Recorded, i: int, kept: Kept) -> str:
+    """Say what a step has that keeps it from being recomputed."""
+    if kept.inputs is not None:
+        return _NO_SNAPSHOT
+    return _NO_INPUTS if recorded.unreadable(i) != MISSING_INPUTS else _MISSING
 
 
 def _judged(state: ControllerState) -> ControllerState:

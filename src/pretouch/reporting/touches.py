@@ -39,8 +39,8 @@ class Touch:
 
 
 def touches_of(truth: Truth | None) -> list[Touch]:
-    """All true touches in order; none where nothing is known."""
-    if truth is None or len(truth.time) < 2:
+    """All true touches in order; none where nothing is known, or what is said to be known cannot be."""
+    if truth is None or len(truth.time) < 2 or not np.all(np.isfinite(truth.time)):
         return []
     time, force = truth.time, np.linalg.norm(truth.force, axis=1)
     samples = max(1, round(MEAN_S / max(float(np.median(np.diff(time))), 1e-9)))
