@@ -215,6 +215,44 @@ def test_what_ended_a_worker_is_said(tmp_path, monkeypatch, error, words):
         run_campaign(SMALL, tmp_path, lambda *_: None)
 
 
+def test_a_trial_that_a_signal_ends_ends_its_worker_and_leaves_no_result(tmp_path, monkeypatch):
+    class Ended(Exception):
+        pass
+
+    def end(code):
+        raise Ended(code)
+
+    def terminated(*_args):
+        raise SystemExit(143)
+
+    monkeypatch.setattr(campaign.os, "_exit", end)
+    monkeypatch.setitem(campaign.EXPERIMENTS, "static", replace(campaign.EXPERIMENTS["static"], trial=terminated))
+    request = Request(("static",), seeds=1)
+    campaign.open_folder(request, tmp_path)
+    with pytest.raises(Ended, match="143"):
+        campaign._work(request, tmp_path, *request.tasks()[0])
+    assert list((tmp_path / "trials").iterdir()) == []
+
+
+@pytest.mark.parametrize(("record", "kept"), [("first", [0]), ("all", [0, 1])])
+def test_the_trials_that_are_wanted_are_recorded(tmp_path, monkeypatch, record, kept):
+    def played(_cell, seed, context):
+        if context.recording:
+            context.recording.write_text(str(seed))
+        return {}, None
+
+    monkeypatch.setitem(campaign.EXPERIMENTS, "static", replace(campaign.EXPERIMENTS["static"], trial=played))
+    request = Request(("static",), seeds=2, record=record)
+    campaign.open_folder(request, tmp_path)
+    cell = request.tasks()[0][0]
+    campaign.recording_file(tmp_path, cell, 0).with_suffix(".unfinished").write_text("of a killed worker")
+    for seed in (0, 1):
+        campaign._work(request, tmp_path, cell, seed)
+    assert [seed for seed in (0, 1) if campaign.recording_file(tmp_path, cell, seed).exists()] == kept
+    assert campaign.recording_file(tmp_path, cell, 0).read_text() == "0"
+    assert len(list((tmp_path / "recordings").iterdir())) == len(kept)
+
+
 def test_a_file_is_written_whole_or_not_at_all_however_long_its_name(tmp_path):
     path = tmp_path / ("x" * 255)
     write_json({"a": 1}, path)
