@@ -103,6 +103,10 @@ class Visitor:
         """One of mode, reason, rates, warning, notice."""
         return str(self.page.locator(f"#{name}").inner_text())
 
+    def top(self, name: str) -> float:
+        """Where a line of the status begins, from the top of the window [px]."""
+        return float(self.page.evaluate("name => document.getElementById(name).getBoundingClientRect().top", name))
+
     def wait_for(self, name: str, contained: str) -> None:
         """Wait until a line of the status holds some words."""
         self.page.wait_for_function(
@@ -123,17 +127,25 @@ class Visitor:
     def tab(self, name: str) -> None:
         self.page.get_by_text(name, exact=True).first.click()
 
-    def type(self, label: str, value: float) -> None:
-        """Type a number into a field, or the field of a slider."""
+    def field(self, label: str):  # type: ignore[no-untyped-def]
+        """Where something is typed, or the field of a slider."""
         row = self.page.locator("label", has_text=label).first.locator("xpath=../../..")
-        field = row.locator("input:not([type=hidden])").last
+        return row.locator("input:not([type=hidden])").last
+
+    def type(self, label: str, value: float) -> None:
+        """Have a number in a field at once."""
+        field = self.field(label)
         field.fill(f"{value:g}")
         field.press("Enter")
         field.blur()
 
+    def type_slowly(self, label: str, text: str) -> None:
+        """Type over what a field holds, key by key as a person does."""
+        self.field(label).select_text()
+        self.field(label).press_sequentially(text, delay=300)
+
     def value(self, label: str) -> str:
-        row = self.page.locator("label", has_text=label).first.locator("xpath=../../..")
-        return str(row.locator("input:not([type=hidden])").last.input_value())
+        return str(self.field(label).input_value())
 
     def choose(self, label: str, option: str) -> None:
         self.page.get_by_label(label, exact=True).first.click()
@@ -145,7 +157,7 @@ class Visitor:
     def drag(self, start: FloatArray, end: FloatArray) -> None:
         """Drag with the mouse from where a point (3,) [m] is seen to where another one is."""
         box = self.page.locator("canvas").first.bounding_box()
-        (x, y), (to_x, to_y) = (_seen_at(point, box) for point in (start, end))
+        (x, y), (to_x, to_y) = (seen_at(point, box) for point in (start, end))
         mouse = self.page.mouse
         mouse.move(x, y)
         mouse.move(x + 1, y)
@@ -163,7 +175,7 @@ class Visitor:
         return place
 
 
-def _seen_at(point: FloatArray, box: dict[str, float]) -> tuple[float, float]:
+def seen_at(point: FloatArray, box: dict[str, float]) -> tuple[float, float]:
     """Pixel where a point is seen by the camera the page begins with: a pinhole, z up."""
     forward = np.subtract(CAMERA_AT, CAMERA_FROM)
     forward = forward / np.linalg.norm(forward)

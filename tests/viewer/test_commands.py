@@ -25,6 +25,36 @@ def test_of_one_kind_only_the_newest_waits_and_in_its_own_place() -> None:
     assert done == [-1, 999]
 
 
+def test_what_has_to_settle_waits_until_nothing_newer_came_for_so_long() -> None:
+    commands, done = Commands(), []
+
+    def tick(now: float) -> None:
+        for asked in commands.take(now):
+            asked()
+
+    for i, now in enumerate((0.0, 0.7, 1.4)):
+        commands.put(lambda i=i: done.append(i), "number", settle=0.8)
+        tick(now)
+    tick(2.1)
+    assert done == []
+    assert commands.waits("number")
+    tick(2.2)
+    assert done == [2]
+    assert not commands.waits("number")
+
+
+def test_something_else_asked_for_ends_the_wait_of_what_came_before_and_quiet_things_do_not() -> None:
+    commands = Commands()
+    commands.put(lambda: "typed", "number", settle=0.8)
+    commands.put(lambda: "hand", "hand", quiet=True)
+    assert [asked.action() for asked in commands.take(0.0)] == ["hand"]
+    commands.put(lambda: "button")
+    commands.put(lambda: "typed later", "other number", settle=0.8)
+    assert [asked.action() for asked in commands.take(0.1)] == ["typed", "button"]
+    assert commands.waits("other number")
+    assert [asked.action() for asked in commands.take()] == ["typed later"]
+
+
 def test_nothing_is_lost_between_threads() -> None:
     commands, done, end = Commands(), [], threading.Event()
 

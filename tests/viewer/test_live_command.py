@@ -42,6 +42,12 @@ def test_an_unknown_path_is_refused_with_those_there_are(capsys: pytest.CaptureF
     assert capsys.readouterr().err == "The path is 'spiral': choose circle or line.\n"
 
 
+def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
+    assert main(["live", "--seed", "-1", "--port", str(free_port())]) == 2
+    assert capsys.readouterr().err == "LiveSettings.seed is -1: it must be at least 0.\n"
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_interrupted_it_closes_its_recording_and_says_where_it_is(
     number: signal.Signals, code: int, tmp_path: Path

@@ -58,6 +58,7 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
         visitor.wait_until(lambda: visitor.value("Restrictions") == "off")
 
         visitor.choose("Profile", "paper")
+        visitor.tab("Table I")
         visitor.type("d_crit [m]", 0.9)
         visitor.wait_for("notice", "Not done: RestrictionParams.d_notice_m")
         assert simulation.world.profile.restriction.d_crit_m == 0.1
@@ -70,6 +71,23 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
         visitor.keep("dropped", tmp_path)
         visitor.tick("hand_left")
         visitor.wait_for("mode", Mode.TRACK.name)
+
+
+def test_a_number_typed_key_by_key_is_the_one_that_counts(tmp_path: Path) -> None:
+    simulation = LiveSimulation()
+    with live(simulation) as served, chromium() as visitor:
+        visitor.open(served)
+        visitor.tab("Controller")
+        visitor.tab("Table I")
+        visitor.type_slowly("d_crit [m]", "0.05")
+        visitor.wait_until(lambda: simulation.world.profile.name == "paper:restriction.d_crit_m=0.05")
+        visitor.type_slowly("F_b [N]", "12")
+        visitor.wait_until(lambda: simulation.world.profile.threshold.f_base_n == 12.0)
+        visitor.field("F_b [N]").fill("")
+        visitor.wait_until(lambda: visitor.value("F_b [N]") == "12")
+        visitor.field("sigma_max [N]").scroll_into_view_if_needed()
+        assert visitor.top("mode") > 0  # the status stays above the table
+        visitor.keep("table", tmp_path)
 
 
 def test_one_page_keeps_its_traffic_bounded(tmp_path: Path) -> None:
@@ -99,11 +117,15 @@ def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
         visitor.wait_for("mode", Mode.HOLD.name)
         visitor.press("Next event")
         visitor.wait_for("notice", "HOLD to TRACK")
+        for found in comparison.other.contacts:
+            if found.time < contacts[0].stamp:
+                visitor.press("Next event")
+                visitor.wait_for("notice", f"found by paper at {found.time - recorded.stamps()[0]:.2f} s.")
         visitor.press("Next event")
-        visitor.wait_for("notice", f"contact of {np.linalg.norm(contacts[0].contact.force):.1f} N")
+        visitor.wait_for("notice", f"Contact of {np.linalg.norm(contacts[0].contact.force):.1f} N")
         visitor.wait_for("mode", Mode.REACT.name)
         visitor.keep("replay", tmp_path)
-        visitor.type("Time [s]", 5.0)
+        visitor.type("Time since the start [s]", 5.0)
         visitor.wait_for("rates", "5.00 of ")
         visitor.press("Step on")
         visitor.wait_for("rates", "5.01 of ")

@@ -21,8 +21,10 @@ def test_the_page_offers_table_i_with_the_papers_values() -> None:
 @pytest.mark.parametrize("entry", TABLE_1, ids=lambda entry: entry.symbol)
 def test_what_is_written_is_read_back_and_nothing_else_changes(entry: TableEntry) -> None:
     before = PROFILES["paper"]
-    after = entry.write(before, entry.read(before) + entry.step)
-    assert entry.read(after) == pytest.approx(entry.read(before) + entry.step)
+    value = entry.read(before) * 1.05
+    after = entry.write_text(before, f"{value:.9g}")
+    assert entry.read(after) == pytest.approx(value)
+    assert float(entry.text(after)) == pytest.approx(value)
     changed = {
         (group.name, field.name)
         for group in fields(Profile) if group.name != "name"
@@ -43,6 +45,20 @@ def test_a_value_that_is_not_allowed_is_refused_with_the_way_out() -> None:
         d_crit.write(PROFILES["paper"], 0.9)
 
 
+@pytest.mark.parametrize(
+    ("symbol", "text", "said"),
+    [
+        ("l_max", "2.5", r"l_max_cycles is 2\.5: it must be a whole number"),
+        ("d_crit", "0,05", r"d_crit is '0,05': give a number such as 0\.1\."),
+        ("F_b", "nan", "f_base_n is nan: it must be finite"),
+    ],
+)
+def test_what_is_typed_and_is_no_such_number_is_refused(symbol: str, text: str, said: str) -> None:
+    (entry,) = (entry for entry in TABLE_1 if entry.symbol == symbol)
+    with pytest.raises(ParameterError, match=said):
+        entry.write_text(PROFILES["paper"], text)
+
+
 def test_the_documentation_of_every_parameter_is_found() -> None:
     groups = [field.default_factory for field in fields(Profile) if field.name != "name"]
     for group in groups:
@@ -56,4 +72,6 @@ def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
     changed = named(l_max.write(f_b.write(PROFILES["paper"], 8.5), 150), "paper")
     assert changed.name == "paper:reduction.l_max_cycles=150:threshold.f_base_n=8.5"
     assert profile(changed.name) == changed
+    fine = named(f_b.write(PROFILES["paper"], 8.12345678), "paper")
+    assert profile(fine.name) == fine
     assert named(PROFILES["blind"], "blind") == PROFILES["blind"]

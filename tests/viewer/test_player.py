@@ -62,10 +62,23 @@ def test_what_happened_is_found_bit_by_bit(some_step: ControlStep) -> None:
     assert happenings.share == 0.45
     happenings.look(100)
     assert happenings.done
-    assert [(h.index, h.what) for h in happenings.found] == [(40, "contact of 12.0 N"), (60, "REACT to TRACK")]
+    assert [(h.index, h.what) for h in happenings.found] == [(40, "Contact of 12.0 N"), (60, "REACT to TRACK")]
     first, second = happenings.found
     assert happenings.after(0) is first
     assert happenings.after(40) is second
     assert happenings.after(60) is None
     assert happenings.before(60) is first
     assert happenings.before(40) is None
+
+
+def test_what_is_known_of_a_step_comes_in_its_turn(some_step: ControlStep) -> None:
+    contact = Contact(np.array([12.0, 0.0, 0.0]), np.array([True, False, False]))
+    steps = [replace(some_step, mode=Mode.TRACK, contact=contact if i == 40 else None) for i in range(100)]
+    happenings = Happenings(steps.__getitem__, len(steps), {40: "Contact with another", 70: "Contact with a third"})
+    happenings.look(60)
+    assert happenings.after(40) is None
+    happenings.look(100)
+    assert [(h.index, h.what) for h in happenings.found] == [
+        (40, "Contact of 12.0 N; Contact with another"),
+        (70, "Contact with a third"),
+    ]

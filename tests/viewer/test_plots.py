@@ -1,10 +1,11 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pretouch.types import ControlStep
-from pretouch.viewer.plots import SAMPLES, SPAN_S, History
+from pretouch.viewer.plots import FORCE_N, SAMPLES, SPAN_S, History, Plots
 
 K = 7
 
@@ -59,3 +60,47 @@ def test_a_history_of_little_can_be_drawn(some_step: ControlStep, samples: int) 
     assert columns.shape[0] == 1 + K + 11
     assert columns.shape[1] >= 2
     assert np.all(np.isfinite(columns[0]))
+
+
+def test_time_counts_from_the_start(some_step: ControlStep) -> None:
+    history = History(K, start=100.0)
+    for i in range(100):
+        history.add(replace(some_step, stamp=100.0 + i / 100))
+    time = history.columns()[0]
+    assert time[0] == 0.0
+    assert time[-1] < 1.0
+
+
+def test_a_unit_whose_reading_is_late_shows_nothing(some_step: ControlStep) -> None:
+    history, step = History(K), replace(some_step, range_distance=np.full(K, 0.5))
+    history.add(step, late=np.arange(K) == 3)
+    distances = history.columns()[1 : 1 + K, -1]
+    assert np.flatnonzero(distances > 1.0).tolist() == [3]  # the axis ends at 1 m
+
+
+def test_axes_of_force_are_symmetric_and_grow_with_the_force(some_step: ControlStep) -> None:
+    history, gui = History(K), FakeGui()
+    plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
+    limits = replace(some_step.thresholds, parts=np.zeros((6, 3)))
+    seen = []
+    for i, force in enumerate((3.0, -20.0, 65.0, np.nan)):
+        history.add(replace(some_step, stamp=float(i), force=np.array([0.0, force, 0.0]), thresholds=limits))
+        plots.draw(float(i))
+        seen.append([plot.scales["y"]["range"] for plot in gui.plots[1:4]])
+    at_rest = (-FORCE_N, FORCE_N)
+    assert [forces[1] for forces in seen] == [at_rest, (-30.0, 30.0), (-120.0, 120.0), (-120.0, 120.0)]
+    assert all(forces[0] == forces[2] == at_rest for forces in seen)
+
+
+class FakeGui:
+    """Keeps the plots of a page."""
+
+    def __init__(self) -> None:
+        self.plots: list[SimpleNamespace] = []
+
+    def add_html(self, content: str) -> None:
+        pass
+
+    def add_uplot(self, data: object, series: object, **given: object) -> SimpleNamespace:
+        self.plots.append(SimpleNamespace(data=data, **given))
+        return self.plots[-1]

@@ -1,5 +1,6 @@
 """The page of a recording, without a browser."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,10 @@ import pytest
 from tests.viewer.browser import free_port
 
 from pretouch.params import PROFILES
-from pretouch.recording.compare import compare
+from pretouch.recording.compare import Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.types import Mode
+from pretouch.viewer.compared import compared
 from pretouch.viewer.replay import ReplayPage, frame_of, serve_replay, world_of
 from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
@@ -51,6 +53,17 @@ def test_a_frame_shows_what_was_recorded(recorded: Recorded) -> None:
     assert frame.hand_target is None
 
 
+def test_a_frame_knows_how_old_the_readings_were(recorded: Recorded) -> None:
+    kept = recorded[100]
+    assert kept.inputs is not None
+    age = frame_of(kept).age
+    assert age is not None
+    np.testing.assert_array_equal(age, kept.step.stamp - kept.inputs.readings.stamp)
+    assert np.all((age >= 0.0) & (age < 0.1))
+    assert frame_of(replace(kept, inputs=None)).age is None
+    assert not frame_of(replace(kept, inputs=None)).late(0.0).any()
+
+
 @pytest.mark.parametrize("other", ["", "blind"])
 def test_playing_and_jumping_show_the_steps_at_that_time(recorded: Recorded, other: str) -> None:
     comparison = compare(recorded, PROFILES[other]) if other else None
@@ -64,6 +77,36 @@ def test_playing_and_jumping_show_the_steps_at_that_time(recorded: Recorded, oth
         assert page.draw(2.0).run == 1
         page.player.seek(0.0)
         assert page.draw(3.0).step.mode is Mode.HOLD
+
+
+def test_what_another_profile_finds_is_named_and_can_be_jumped_to(recorded: Recorded) -> None:
+    stamps = recorded.stamps()
+    found = Found(float(stamps[150]), np.array([0.0, 12.0, 9.0]), np.array([False, True, False]))
+    comparison = compare(recorded, PROFILES["blind"])
+    comparison = replace(comparison, other=replace(comparison.other, contacts=(found,)))
+    said = compared(comparison, stamps[0])
+    assert "As recorded, paper: no contact. On the same data blind finds contacts of 15.0 N at 1.50 s." in said
+    with served(ServeOptions(port=free_port()), "test") as server:
+        page = ReplayPage(server, recorded, comparison)
+        while not page.happenings.done:
+            page.turn(0.0, 0.0)
+        assert (150, "Contact of 15.0 N found by blind") in [(h.index, h.what) for h in page.happenings.found]
+
+
+def test_after_a_jump_the_plots_begin_ten_seconds_before_or_at_the_start(recorded: Recorded) -> None:
+    with served(ServeOptions(port=free_port()), "test") as server:
+        page = ReplayPage(server, recorded, None)
+        page.player.seek(2.5)
+        page.draw(0.0)
+        time = page.history.columns()[0]
+        assert time[0] == pytest.approx(0.0, abs=0.05)
+        assert time[-1] == pytest.approx(2.5, abs=0.1)
+
+
+def test_of_several_runs_each_is_named_with_its_path(recorded: Recorded) -> None:
+    with served(ServeOptions(port=free_port()), "test") as server:
+        page = ReplayPage(server, recorded, None)
+        assert page.run_name(1) == "profile paper, part 2 of 2, path of 2.00 m"
 
 
 def test_the_address_is_said_and_the_page_ends_when_told(recorded: Recorded, capfd: pytest.CaptureFixture[str]) -> None:

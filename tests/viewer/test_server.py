@@ -41,6 +41,8 @@ def test_a_page_is_for_this_machine_alone_unless_asked() -> None:
     assert ServeOptions().host == "127.0.0.1"
     assert url_of(ServeOptions(port=1234)) == "http://127.0.0.1:1234"
     assert url_of(ServeOptions("0.0.0.0", 1234)) == "http://localhost:1234"  # noqa: S104
+    assert url_of(ServeOptions("::", 1234)) == "http://localhost:1234"
+    assert url_of(ServeOptions("::1", 1234)) == "http://[::1]:1234"
 
 
 @pytest.mark.parametrize("port", [0, -1, 65536])

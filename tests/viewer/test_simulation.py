@@ -136,11 +136,11 @@ def test_a_target_inside_the_arm_neither_jumps_nor_crushes(live, seed):
 
 def test_the_frame_shows_where_hand_and_target_are_and_what_they_do(live):
     session = live()
-    assert session.frame.hand == pytest.approx(AWAY)
+    assert session.frame.hand == pytest.approx(LiveSettings().hand_start)
     session.move_hand(np.array([0.9, 9.0, 0.5]))
     session.advance(0.3)
     assert session.frame.hand_target == pytest.approx([0.9, 1.2, 0.5])
-    assert session.frame.hand[1] > 0.1
+    assert session.frame.hand[1] > 0.6
     assert session.frame.true_force == pytest.approx(np.zeros(3))
 
 
@@ -185,7 +185,7 @@ def test_a_reset_begins_again_with_all_as_it_is_set(live):
     world = session.world
     session.reset()
     assert session.time == pytest.approx(0.21)
-    assert session.frame.hand == pytest.approx(AWAY)
+    assert session.frame.hand == pytest.approx(LiveSettings().hand_start)
     assert session.world is not world
     assert (session.settings.path, session.settings.profile.task.speed_m_s) == ("line", 0.1)
     session.reset(path="circle", profile=LiveSettings().profile)
@@ -232,3 +232,26 @@ def test_a_long_session_does_not_fill_the_memory(live):
 def test_time_never_repeats_and_never_jumps(live):
     steps = live().advance(1.0)
     assert all(0.0099 < b.stamp - a.stamp < 0.0101 for a, b in pairwise(steps))
+
+
+# What a frame knows
+
+
+def test_a_frame_knows_where_the_arm_is_touched(live):
+    session = live(profile=profile("blind"))
+    session.advance(ARMED_S)
+    assert session.frame.true_point is None
+    poke(session)
+    assert np.linalg.norm(session.frame.true_force) > 1.0
+    assert np.linalg.norm(session.frame.true_point - session.frame.hand) == pytest.approx(HandSpec().radius, abs=0.01)
+
+
+def test_of_a_dropped_unit_a_frame_knows_since_when(live, paper_skin):
+    session = live()
+    session.advance(ARMED_S)
+    assert np.all(session.frame.age < 0.1)
+    session.set_faults(frozenset({paper_skin.ids[2]}))
+    session.advance(0.5)
+    late = session.frame.late(session.world.profile.perception.silent_after_s)
+    assert np.flatnonzero(late).tolist() == [2]
+    assert session.frame.age[2] == pytest.approx(0.5, abs=0.1)

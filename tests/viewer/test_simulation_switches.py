@@ -226,10 +226,10 @@ def test_a_stiffness_is_felt_from_the_next_touch_on(live):
     assert pressed(session) == pytest.approx(40_000.0, rel=0.03)
     session.set_stiffness(15_000.0)
     assert pressed(session) == pytest.approx(40_000.0, rel=0.03), "a compressed spring became another"
-    assert session.world.stiffness == 40_000.0
+    assert session.stiffness == 40_000.0
     session.move_hand(away)
     session.advance(1.0)
-    assert session.world.stiffness == 15_000.0
+    assert session.stiffness == 15_000.0
     session.move_hand(below)
     session.advance(2.0)
     assert pressed(session) == pytest.approx(15_000.0, rel=0.03)

@@ -50,13 +50,15 @@ def test_it_is_sent_five_times_a_second_and_at_once_when_there_is_news(
     assert len(html.sent) == sent + 1
 
 
-def test_what_a_person_is_told_stands_before_the_warning(status: Status, html: Html, some_step: ControlStep) -> None:
+def test_what_a_person_is_told_and_the_warning_are_both_shown(
+    status: Status, html: Html, some_step: ControlStep
+) -> None:
     status.draw(some_step, "", "Too slow.", 0.0)
     assert "id='warning'" in html.sent[-1]
+    assert "id='notice'" not in html.sent[-1]
     status.notice = "Not done."
     status.draw(some_step, "", "Too slow.", 0.0)
-    assert "Not done." in html.sent[-1]
-    assert "Too slow." not in html.sent[-1]
+    assert html.sent[-1].index("Not done.") < html.sent[-1].index("Too slow.")
 
 
 def test_words_are_not_taken_for_markup(status: Status, html: Html, some_step: ControlStep) -> None:
@@ -70,4 +72,11 @@ def test_words_are_not_taken_for_markup(status: Status, html: Html, some_step: C
 def test_the_legend_names_every_colour_of_the_trail() -> None:
     shown = legend()
     for colour in (palette.FOLLOWING, palette.AVOIDING, palette.RECOVERING, palette.REACTING, palette.HOLDING):
+        assert palette.css(colour) in shown
+
+
+def test_the_legend_names_the_marks_of_sensing() -> None:
+    shown = legend()
+    for name, colour in (("sensed", palette.SENSED), ("closest pair", palette.PAIR), ("silent", palette.UNIT_SILENT)):
+        assert name in shown
         assert palette.css(colour) in shown

@@ -165,7 +165,8 @@ def _noise_table(columns: list[Column]) -> Table:
 def _numbers(foreign: Foreign, columns: list[Column], notes: list[str]) -> dict[str, Any]:
     time = foreign.force.time
     return {
-        "recording": str(foreign.place), "assumed": foreign.said, "notes": notes, "samples": len(time), "first_sample_s": time[0] / 1e9,
+        "recording": str(foreign.place), "assumed": foreign.said, "notes": notes, "samples": len(time),
+        "first_sample_s": time[0] / 1e9,
         "duration_s": (time[-1] - time[0]) / 1e9, "rate_hz": foreign.rate,
         "profiles": [
             {

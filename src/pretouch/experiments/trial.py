@@ -13,7 +13,7 @@ from pretouch.errors import RecordingError
 from pretouch.loop import Cycle, run
 from pretouch.params import Profile
 from pretouch.recording.reader import Recorded
-from pretouch.recording.truth import Truth
+from pretouch.recording.truth import Truth, truth_of
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -117,13 +117,10 @@ class _Recorder:
 
     def _truth(self) -> Truth:
         """What the physics did since the last cycle."""
-        plant, hand = self._plant, self.hand_position[-1]
+        plant = self._plant
         forces, touches = plant.true_log[self._forces :], plant.touches[self._touches :]
         self._forces, self._touches = len(plant.true_log), len(plant.touches)
-        return Truth(
-            np.array([t for t, _ in forces]), np.array([f for _, f in forces]), hand,
-            tuple((t.time, t.link, t.velocity) for t in touches),
-        )  # fmt: skip
+        return truth_of(forces, touches, self.hand_position[-1])
 
 
 @contextmanager

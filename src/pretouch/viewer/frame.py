@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from pretouch.control.path import Path
 from pretouch.params import Profile
 from pretouch.recording.surroundings import KnownBox
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, FloatArray
+from pretouch.types import BoolArray, ControlStep, FloatArray
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,6 @@ class World:
     """Radius of the person's hand [m], None without one."""
     floor_height: float
     """[m], base frame."""
-    stiffness: float
-    """Of what the arm can touch, the hand and the boxes [N/m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,3 +38,13 @@ class Frame:
     """(3,) where the mouse asks the hand to be [m], base frame."""
     true_force: FloatArray | None
     """(3,) contact force on the arm by everything else [N], base frame; None where only the estimate is known."""
+    true_point: FloatArray | None = None
+    """(3,) where that force acts [m], base frame; None where it is not known."""
+    age: FloatArray | None = None
+    """(K,) time since the newest reading of each unit [s]; None where it is not known."""
+
+    def late(self, limit: float) -> BoolArray:
+        """Which units (K,) have given no reading for longer than a time [s]."""
+        if self.age is None:
+            return np.zeros(len(self.step.range_distance), dtype=np.bool_)
+        return self.age > limit

@@ -14,13 +14,17 @@ if TYPE_CHECKING:
 
 PERIOD_S = 1.0 / 30.0
 """Time between two updates of a page [s]."""
+SETTLE_S = 0.8
+"""Time without a key from which on a number that is typed counts [s]."""
+LEFT_PX, RIGHT_PX = 310, 330
+"""Widths of the panels of plots and of controls [px]."""
 
 
 def dress(server: "ViserServer") -> None:
     """Give a page its colours, and put its controls to the right."""
     server.gui.configure_theme(brand_color=(49, 104, 196), show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
-    server.gui.main_panel.set_width(330)
+    server.gui.main_panel.set_width(RIGHT_PX)
 
 
 def add_plots(server: "ViserServer", history: History, units: tuple[str, ...], other: str = "") -> Plots:
@@ -29,18 +33,25 @@ def add_plots(server: "ViserServer", history: History, units: tuple[str, ...], o
     with panel.add_tab("Last 10 s"):
         plots = Plots(server.gui, history, units, other)
     panel.dock_left()
-    panel.set_width(310)
+    panel.set_width(LEFT_PX)
     return plots
 
 
-def when_changed(handle: Any, commands: Commands, act: Callable[[Any], object], kind: str = "") -> None:
-    """Queue an action on the value a person gives a control; not on those the program sets."""
+def when_changed(
+    handle: Any,
+    commands: Commands,
+    act: Callable[[Any], object],
+    kind: str = "",
+    settle: float = 0.0,
+    quiet: bool = False,
+) -> None:
+    """Queue an action on the value a person gives a control, as `Commands.put` does; not on those the program sets."""
 
     @handle.on_update
     async def _(event: Any) -> None:
         if event.client_id is not None:
             value = event.target.value
-            commands.put(lambda: act(value), kind)
+            commands.put(lambda: act(value), kind, settle, quiet)
 
 
 def add_button(gui: "GuiApi", commands: Commands, label: str, act: Callable[[], object], **more: Any) -> Any:
@@ -61,7 +72,7 @@ def add_view_boxes(gui: "GuiApi", commands: Commands, show: Callable[[str, bool]
     """Add a box for each part of the scene that can be hidden."""
     for name in PARTS:
         box = gui.add_checkbox(name.capitalize(), True)
-        when_changed(box, commands, partial(show, name), f"view {name}")
+        when_changed(box, commands, partial(show, name), f"view {name}", quiet=True)
 
 
 def put(handle: Any, value: object) -> None:

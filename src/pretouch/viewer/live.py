@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock
-from pretouch.types import FloatArray
+from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.commands import Action, Commands
 from pretouch.viewer.controls import Controls
 from pretouch.viewer.gui import PERIOD_S, add_plots, dress
@@ -23,10 +23,15 @@ if TYPE_CHECKING:
 
 
 class LivePage:
-    """A page over a simulation, turned by `turn`; people's commands wait in a queue until then."""
+    """A page over a simulation, turned by `turn`; people's commands wait in a queue until then.
 
-    def __init__(self, server: "ViserServer", simulation: LiveSimulation) -> None:
-        self._server, self._simulation = server, simulation
+    `say` is told what whoever serves the page should know too.
+    """
+
+    def __init__(
+        self, server: "ViserServer", simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None
+    ) -> None:
+        self._server, self._simulation, self._say = server, simulation, say
         self._world, self._time = simulation.world, simulation.time
         self.pace = Pace()
         self._commands = Commands()
@@ -47,12 +52,12 @@ class LivePage:
         """What people are told, or ''."""
         return self._status.notice
 
-    def ask(self, action: Action, kind: str = "") -> None:
-        """Have something done between two ticks, from any thread; of one kind only the newest."""
-        self._commands.put(action, kind)
+    def ask(self, action: Action, kind: str = "", settle: float = 0.0, quiet: bool = False) -> None:
+        """Have something done between two ticks, from any thread, as `Commands.put` does."""
+        self._commands.put(action, kind, settle, quiet)
 
     def _drag(self, target: FloatArray) -> None:
-        self.ask(lambda: self._move_hand(target), "hand")
+        self.ask(lambda: self._move_hand(target), "hand", quiet=True)
 
     def _move_hand(self, target: FloatArray) -> None:
         self._simulation.move_hand(target)
@@ -60,29 +65,36 @@ class LivePage:
 
     def turn(self, now: float) -> None:
         """Do what people asked for, let time pass, and draw; `now` is the time of the machine [s]."""
-        self._obey()
-        running = self.controls.running
+        self._obey(now)
+        running, recording = self.controls.running, self._simulation.recording
         before = self._simulation.time
-        steps = []
-        if running.single:
-            running.single = False
-            steps = [self._simulation.single_step()]
-        elif not running.paused:
-            steps = self._simulation.advance(running.speed * PERIOD_S)
-        self.pace.tick(now, max(0.0, self._simulation.time - before), 0.0 if running.paused else running.speed)
+        steps = self._pass_time()
+        late = self._simulation.frame.late(self._simulation.world.profile.perception.slow_after_s)
         for step in steps:
-            self._history.add(step)
+            self._history.add(step, late=late)
             self._scene.trail.add(step)
+        self.pace.tick(now, max(0.0, self._simulation.time - before), 0.0 if running.paused else running.speed)
+        if recording and recording.trouble:
+            self._say(recording.trouble)
         if self._simulation.notice:
             self._status.notice, self._simulation.notice = self._simulation.notice, ""
             self.controls.refresh()
         if self._server.get_clients():
             self._draw(now)
 
-    def _obey(self) -> None:
-        actions = self._commands.take()
+    def _pass_time(self) -> list[ControlStep]:
+        """Let the time of one update pass, or as many single steps as were asked for."""
+        running, simulation = self.controls.running, self._simulation
+        single, running.single = running.single, 0
+        if single:
+            return [simulation.single_step() for _ in range(single)]
+        return [] if running.paused else simulation.advance(running.speed * PERIOD_S)
+
+    def _obey(self, now: float) -> None:
+        actions = self._commands.take(now)
         for action in actions:
-            self._status.notice = ""
+            if not action.quiet:
+                self._status.notice = ""
             try:
                 action()
             except PretouchError as error:
@@ -100,7 +112,7 @@ class LivePage:
     def _draw(self, now: float) -> None:
         frame, pace = self._simulation.frame, self.pace
         with self._server.atomic():
-            self._scene.draw(frame, now, self.controls.silenced)
+            self._scene.draw(frame, now)
             self._follow_target(frame.hand_target)
             self._plots.draw(now)
             recording = self._simulation.recording
@@ -133,7 +145,7 @@ def serve_live(
     """
     with served(options, "Pretouch") as server:
         try:
-            page = LivePage(server, simulation)
+            page = LivePage(server, simulation, say)
             say(f"The arm is at {url_of(options)} (Ctrl-C ends it).")
             clock, slow = MonotonicClock(PERIOD_S), False
             while not until():

@@ -8,7 +8,13 @@ from functools import cache
 from types import MappingProxyType
 
 from pretouch import params
+from pretouch.errors import ParameterError
 from pretouch.params import Profile
+
+
+def written(value: float) -> str:
+    """Write a number as a person would."""
+    return f"{value:.12g}"
 
 
 @dataclass(frozen=True)
@@ -19,8 +25,6 @@ class TableEntry:
     unit: str
     fields: tuple[tuple[str, str], ...]
     """(group of the profile, field) of each."""
-    step: float
-    """By how much a click changes it."""
 
     def read(self, profile: Profile) -> float:
         """Return its value in a profile."""
@@ -32,8 +36,20 @@ class TableEntry:
         groups: dict[str, dict[str, float | int]] = {}
         for group, name in self.fields:
             kind = type(getattr(getattr(profile, group), name))
-            groups.setdefault(group, {})[name] = round(value) if kind is int else float(value)
+            groups.setdefault(group, {})[name] = int(value) if kind is int and value % 1 == 0 else value
         return replace(profile, **{g: replace(getattr(profile, g), **new) for g, new in groups.items()})
+
+    def write_text(self, profile: Profile, text: str) -> Profile:
+        """Return the profile with a value that was typed; a ParameterError says what is wrong with it."""
+        try:
+            value = float(text)
+        except ValueError as error:
+            raise ParameterError(f"{self.symbol} is {text!r}: give a number such as {self.text(profile)}.") from error
+        return self.write(profile, value)
+
+    def text(self, profile: Profile) -> str:
+        """Write its value in a profile."""
+        return written(self.read(profile))
 
     @property
     def label(self) -> str:
@@ -47,20 +63,20 @@ class TableEntry:
 
 
 TABLE_1: tuple[TableEntry, ...] = (
-    TableEntry("d_max", "m", (("reduction", "d_max_m"), ("threshold", "d_max_m")), 0.05),
-    TableEntry("d_min", "m", (("threshold", "d_min_m"),), 0.01),
-    TableEntry("l_max", "cycles", (("reduction", "l_max_cycles"),), 10),
-    TableEntry("V_max", "m/s", (("restriction", "v_max_m_s"),), 0.01),
-    TableEntry("d_repulse", "m", (("restriction", "d_repulse_m"),), 0.01),
-    TableEntry("d_crit", "m", (("restriction", "d_crit_m"),), 0.01),
-    TableEntry("d_notice", "m", (("restriction", "d_notice_m"),), 0.05),
-    TableEntry("alpha", "", (("threshold", "alpha"),), 0.05),
-    TableEntry("beta", "", (("restriction", "beta"),), 1.0),
-    TableEntry("lambda", "", (("threshold", "lambda_"),), 0.05),
-    TableEntry("F_std", "N", (("threshold", "f_std_n"),), 0.5),
-    TableEntry("F_d", "N", (("threshold", "f_d_n"),), 0.5),
-    TableEntry("F_b", "N", (("threshold", "f_base_n"),), 0.5),
-    TableEntry("sigma_max", "N", (("threshold", "sigma_max_n"),), 0.5),
+    TableEntry("d_max", "m", (("reduction", "d_max_m"), ("threshold", "d_max_m"))),
+    TableEntry("d_min", "m", (("threshold", "d_min_m"),)),
+    TableEntry("l_max", "cycles", (("reduction", "l_max_cycles"),)),
+    TableEntry("V_max", "m/s", (("restriction", "v_max_m_s"),)),
+    TableEntry("d_repulse", "m", (("restriction", "d_repulse_m"),)),
+    TableEntry("d_crit", "m", (("restriction", "d_crit_m"),)),
+    TableEntry("d_notice", "m", (("restriction", "d_notice_m"),)),
+    TableEntry("alpha", "", (("threshold", "alpha"),)),
+    TableEntry("beta", "", (("restriction", "beta"),)),
+    TableEntry("lambda", "", (("threshold", "lambda_"),)),
+    TableEntry("F_std", "N", (("threshold", "f_std_n"),)),
+    TableEntry("F_d", "N", (("threshold", "f_d_n"),)),
+    TableEntry("F_b", "N", (("threshold", "f_base_n"),)),
+    TableEntry("sigma_max", "N", (("threshold", "sigma_max_n"),)),
 )
 
 

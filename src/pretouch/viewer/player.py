@@ -1,7 +1,7 @@
 """Where in a recording a page is: a position in time that moves on, jumps, and stops at the ends."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,11 @@ class Player:
     @property
     def index(self) -> int:
         """The newest step at this time."""
-        return max(0, bisect_right(self._stamps, self._start + self.time + 1e-9) - 1)
+        return self.index_at(self.time)
+
+    def index_at(self, time: float) -> int:
+        """Return the newest step at a time since the first [s], or the first."""
+        return max(0, bisect_right(self._stamps, self._start + time + 1e-9) - 1)
 
     @property
     def ended(self) -> bool:
@@ -61,7 +65,7 @@ class Player:
 
 @dataclass(frozen=True)
 class Happening:
-    """A contact, or a change of mode."""
+    """A contact, or a change of mode, of the recording or of what it is compared with."""
 
     index: int
     """The step."""
@@ -71,8 +75,9 @@ class Happening:
 class Happenings:
     """What happened in a recording, found bit by bit: to look at each step of a long one takes a while."""
 
-    def __init__(self, step: Callable[[int], ControlStep], count: int) -> None:
-        self._step, self._count = step, count
+    def __init__(self, step: Callable[[int], ControlStep], count: int, known: Mapping[int, str] | None = None) -> None:
+        """Take what returns a step, how many there are, and what else is `known` to have happened in some."""
+        self._step, self._count, self._known = step, count, known or {}
         self._looked = 0
         self._mode: Mode | None = None
         self.found: list[Happening] = []
@@ -91,10 +96,13 @@ class Happenings:
         """Look at some more steps."""
         for i in range(self._looked, min(self._looked + steps, self._count)):
             step = self._step(i)
+            what = [self._known[i]] if i in self._known else []
             if step.contact is not None:
-                self.found.append(Happening(i, f"contact of {np.linalg.norm(step.contact.force):.1f} N"))
+                what.insert(0, f"Contact of {np.linalg.norm(step.contact.force):.1f} N")
             elif self._mode is not None and step.mode is not self._mode:
-                self.found.append(Happening(i, f"{self._mode.name} to {step.mode.name}"))
+                what.insert(0, f"{self._mode.name} to {step.mode.name}")
+            if what:
+                self.found.append(Happening(i, "; ".join(what)))
             self._mode, self._looked = step.mode, i + 1
 
     def after(self, index: int) -> Happening | None:

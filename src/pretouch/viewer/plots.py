@@ -1,5 +1,6 @@
 """The last seconds as plots: distances of the units, force with its moving thresholds, speed."""
 
+import math
 from collections import deque
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pretouch.types import ControlStep, FloatArray
+from pretouch.types import BoolArray, ControlStep, FloatArray
 from pretouch.viewer import palette
 
 if TYPE_CHECKING:
@@ -22,15 +23,17 @@ PERIOD_S = 0.125
 _ROUNDING_S = 1e-6
 _NOTHING_M = 9.0
 """Where a unit that shows nothing is drawn [m]: out of sight."""
+FORCE_N = 15.0
+"""What the axes of force reach to at least, up and down [N]."""
 SAMPLES = int(SPAN_S / SAMPLE_S)
 
 
 class History:
     """Samples of the last `SPAN_S`: time, distances (K), then force, upper and lower threshold (3 each), two speeds."""
 
-    def __init__(self, units: int, more: int = 0) -> None:
-        """Take the number of units, and of further columns that `add` is given."""
-        self._units, self._width = units, 1 + units + 9 + 2 + more
+    def __init__(self, units: int, more: int = 0, start: float = 0.0) -> None:
+        """Take the number of units and of further columns that `add` is given, and the stamp of time 0 [s]."""
+        self._units, self._width, self._start = units, 1 + units + 9 + 2 + more, start
         self._rows: deque[FloatArray] = deque(maxlen=SAMPLES)
         self._open: FloatArray | None = None
 
@@ -42,21 +45,23 @@ class History:
         self._rows.clear()
         self._open = None
 
-    def add(self, step: ControlStep, more: Sequence[float] = ()) -> None:
-        """Take a step in; one from before the last begins anew."""
-        if self._open is not None and step.stamp < self._open[0]:
+    def add(self, step: ControlStep, more: Sequence[float] = (), late: BoolArray | None = None) -> None:
+        """Take a step in; one from before the last begins anew. A `late` unit (K,) shows nothing."""
+        time = step.stamp - self._start
+        if self._open is not None and time < self._open[0]:
             self.clear()
         thresholds, force = step.thresholds, slice(1 + self._units, 4 + self._units)
-        distance = np.nan_to_num(step.range_distance, nan=_NOTHING_M)
+        reading = step.range_distance if late is None else np.where(late, np.nan, step.range_distance)
+        distance = np.nan_to_num(reading, nan=_NOTHING_M)
         row = np.concatenate(
             [
-                [step.stamp], distance, step.force, thresholds.upper, thresholds.lower,
+                [time], distance, step.force, thresholds.upper, thresholds.lower,
                 [np.linalg.norm(step.ee_velocity), np.linalg.norm(step.desired_velocity)], more,
             ]
         )  # fmt: skip
         if self._open is None:
             self._open = row
-        elif step.stamp - self._open[0] >= SAMPLE_S - _ROUNDING_S:
+        elif time - self._open[0] >= SAMPLE_S - _ROUNDING_S:
             self._rows.append(self._open)
             self._open = row
         else:
@@ -92,7 +97,8 @@ class Plots:
         self._force = []
         for axis in "xyz":
             gui.add_html(_caption(f"Force {axis} [N]", marks if axis == "x" else ()))
-            self._force.append(_plot(gui, lines, 96, dashed=3))
+            self._force.append(_plot(gui, lines, 96, (-FORCE_N, FORCE_N), dashed=3))
+        self._reach = [FORCE_N] * 3
         blue = palette.css(palette.PATH)
         gui.add_html(_caption("Speed [m/s]", [("end-effector", blue), ("desired", grey)]))
         self._speed = _plot(gui, [blue, grey], 96, (0.0, 0.4), dashed=1)
@@ -108,29 +114,38 @@ class Plots:
         for axis, plot in enumerate(self._force):
             at = [1 + k + axis, 4 + k + axis, 7 + k + axis]
             at += [12 + k + axis, 15 + k + axis] if self._other else []
+            reach = _reach(rows[at])
+            if reach != self._reach[axis]:  # the page builds a plot anew for it
+                self._reach[axis], plot.scales = reach, _scales((-reach, reach))
             plot.data = (time, *rows[at])
         self._speed.data = (time, *rows[10 + k : 12 + k])
 
 
 def _plot(
-    gui: "GuiApi", colours: Sequence[str], height: int, values: tuple[float, float] | None = None,
-    dashed: int | None = None,
-) -> "GuiUplotHandle":  # fmt: skip
+    gui: "GuiApi", colours: Sequence[str], height: int, values: tuple[float, float], dashed: int | None = None
+) -> "GuiUplotHandle":
     """A plot with a line of each colour over time; from the `dashed`th on they are dashed."""
     lines: list[Any] = [{}]
     for i, colour in enumerate(colours):
         late = dashed is not None and i >= dashed
         lines.append({"stroke": colour, "width": 1.5, "points": {"show": False}, **({"dash": (4, 3)} if late else {})})
-    scales: dict[str, Any] = {"x": {"time": False}}
-    if values:
-        scales["y"] = {"range": values}
     small: dict[str, Any] = {"size": 18, "font": "10px system-ui", "ticks": {"size": 3}, "gap": 2}
     axes: Any = (small, {**small, "size": 34, "space": 24})
     return gui.add_uplot(
         tuple(np.full(2, np.nan) if i else np.arange(2.0) for i in range(len(colours) + 1)), tuple(lines),
-        height=height, scales=scales, legend={"show": False}, cursor={"show": False},
+        height=height, scales=_scales(values), legend={"show": False}, cursor={"show": False},
         axes=axes, padding=(6, 8, 0, 0),
     )  # fmt: skip
+
+
+def _scales(values: tuple[float, float]) -> dict[str, Any]:
+    return {"x": {"time": False}, "y": {"range": values}}
+
+
+def _reach(forces: FloatArray) -> float:
+    """`FORCE_N`, doubled until the axis holds all forces (lines, samples) [N]."""
+    largest = float(np.max(np.abs(forces), initial=0.0, where=np.isfinite(forces)))
+    return FORCE_N * 2.0 ** max(0, math.ceil(math.log2(max(largest, FORCE_N) / FORCE_N)))
 
 
 def _caption(title: str, marks: Iterable[tuple[str, str]]) -> str:

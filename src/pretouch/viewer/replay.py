@@ -1,15 +1,20 @@
 """The page of a recording: the live view with a slider over time."""
 
+import time
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.loop import MonotonicClock
+from pretouch.recording.codec import decode_step
 from pretouch.recording.reader import Kept, Recorded, Run
 from pretouch.recording.surroundings import surroundings
+from pretouch.types import FloatArray
 from pretouch.viewer.commands import Commands
+from pretouch.viewer.compared import compared, found_by_other
 from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.gui import PERIOD_S, add_button, add_plots, add_view_boxes, dress, put, when_changed
 from pretouch.viewer.player import Happening, Happenings, Player
@@ -23,12 +28,11 @@ if TYPE_CHECKING:
 
     from pretouch.recording.compare import Comparison
 
-_LOOKED = 40
-"""Steps looked at for happenings between two updates: about 10 ms."""
+_LOOKED_S, _LOOKED_PLAYING_S = 0.015, 0.005
+"""Time spent on looking for happenings between two updates, at rest and while it plays [s]."""
+_AT_ONCE = 8
 _STRIDE = 4
 """Of the steps before a place jumped to, each how manieth is drawn."""
-_NAMED = 5
-"""Contacts named in a sentence."""
 _MOST = 60
 """Steps drawn in one update: played faster than that, some are left out."""
 
@@ -42,26 +46,23 @@ def world_of(run: Run) -> World:
         model=run.model, skin=run.skin, path=run.path, profile=run.profile, boxes=known.boxes,
         hand_radius=known.hand_radius,
         floor_height=floor if known.floor_height is None else known.floor_height,
-        stiffness=float("nan"),
     )  # fmt: skip
 
 
 def frame_of(kept: Kept) -> Frame:
     """What a page draws of a recorded step."""
-    truth = kept.truth
+    truth, age = kept.truth, _age(kept)
     if truth is None:
-        return Frame(kept.step, None, None, None)
+        return Frame(kept.step, None, None, None, age=age)
     hand = truth.hand if np.all(np.isfinite(truth.hand)) else None
-    return Frame(kept.step, hand, None, truth.force[-1] if len(truth.force) else None)
+    return Frame(kept.step, hand, None, truth.force[-1] if len(truth.force) else None, age=age)
 
 
-def _found_by_other(comparison: "Comparison | None", start: float) -> str:
-    """Say which contacts another profile found on the same data, in time since the start [s]."""
-    if comparison is None:
-        return ""
-    times = [f"{found.time - start:.2f} s" for found in comparison.other.contacts]
-    shown = ", ".join(times[:_NAMED]) + (f" and {len(times) - _NAMED} more" if len(times) > _NAMED else "")
-    return f"On the same data {comparison.other.name} finds " + (f"contacts at {shown}." if times else "no contact.")
+def _age(kept: Kept) -> FloatArray | None:
+    """Time since the newest reading of each unit (K,) [s], where the inputs tell."""
+    if kept.inputs is None or len(kept.inputs.readings.stamp) != len(kept.step.range_distance):
+        return None
+    return kept.step.stamp - kept.inputs.readings.stamp
 
 
 class ReplayPage:
@@ -69,31 +70,33 @@ class ReplayPage:
 
     def __init__(self, server: "ViserServer", recorded: Recorded, comparison: "Comparison | None") -> None:
         self._server, self._recorded, self._comparison = server, recorded, comparison
-        self.player = Player(recorded.stamps())
+        stamps = recorded.stamps()
+        self.player = Player(stamps)
         self._commands = Commands()
-        self._happenings = Happenings(lambda i: recorded[i].step, len(recorded))
+        found = found_by_other(comparison, stamps) if comparison else {}
+        self.happenings = Happenings(lambda i: decode_step(recorded.step_data(i))[1], len(recorded), found)
         self._run, self._drawn = 0, -1
-        worlds: dict[int, World] = {0: world_of(recorded.runs[0])}
-        self._worlds = worlds
+        self._world = cache(lambda run: world_of(recorded.runs[run]))
+        world = self._world(0)
         dress(server)
         self._status = Status(server.gui)
-        self._status.notice = " ".join(filter(None, (recorded.said, _found_by_other(comparison, recorded.stamps()[0]))))
-        server.gui.add_html(legend())
+        self._status.notice = recorded.said
+        server.gui.add_html(legend() + (compared(comparison, stamps[0]) if comparison else ""))
         self._controls(server)
-        self._scene = Scene(server, worlds[0])
+        self._scene = Scene(server, world)
         other = comparison.other.name if comparison else ""
-        self._history = History(len(worlds[0].skin), 6 if other else 0)
-        self._plots = add_plots(server, self._history, worlds[0].skin.ids, other)
+        self.history = History(len(world.skin), 6 if other else 0, stamps[0])
+        self._plots = add_plots(server, self.history, world.skin.ids, other)
 
     def _controls(self, server: "ViserServer") -> None:
         gui, player, commands = server.gui, self.player, self._commands
-        self._slider = gui.add_slider("Time [s]", 0.0, max(player.duration, 0.01), 0.01, 0.0)
-        when_changed(self._slider, commands, lambda time: player.seek(float(time)), "seek")
+        self._slider = gui.add_slider("Time since the start [s]", 0.0, max(player.duration, 0.01), 0.01, 0.0)
+        when_changed(self._slider, commands, lambda chosen: player.seek(float(chosen)), "seek")
         buttons: tuple[tuple[str, Callable[[], None], str], ...] = (
             ("Step on", lambda: player.step(1), "PLAYER_TRACK_NEXT"),
             ("Step back", lambda: player.step(-1), "PLAYER_TRACK_PREV"),
-            ("Next event", lambda: self._jump(self._happenings.after(player.index)), "CHEVRON_RIGHT"),
-            ("Previous event", lambda: self._jump(self._happenings.before(player.index)), "CHEVRON_LEFT"),
+            ("Next event", lambda: self._jump(self.happenings.after(player.index)), "CHEVRON_RIGHT"),
+            ("Previous event", lambda: self._jump(self.happenings.before(player.index)), "CHEVRON_LEFT"),
         )
         self._play = add_button(gui, commands, "Play", player.play, icon="PLAYER_PLAY")
         for label, act, icon in buttons:
@@ -107,22 +110,28 @@ class ReplayPage:
         """Pause at a happening."""
         self.player.playing = False
         if happening is None:
-            left = "" if self._happenings.done else f" yet: {100 * self._happenings.share:.0f} % has been looked at"
+            left = "" if self.happenings.done else f" yet: {100 * self.happenings.share:.0f} % has been looked at"
             self._status.notice = f"There is no other contact or change of mode{left}."
             return
         self.player.seek_index(happening.index)
-        self._status.notice = f"{happening.what} at {self.player.time:.2f} s"
+        self._status.notice = f"{happening.what} at {self.player.time:.2f} s."
 
     def turn(self, now: float, elapsed: float) -> None:
         """Do what people asked for, play on by some real time [s], and draw; `now` is the time of the machine [s]."""
         for action in self._commands.take():
-            self._status.notice = ""
+            if not action.quiet:
+                self._status.notice = ""
             action()
         self.player.advance(elapsed)
-        if not self._happenings.done:
-            self._happenings.look(_LOOKED)
+        self._look()
         if self._server.get_clients():
             self.draw(now)
+
+    def _look(self) -> None:
+        """Look for happenings, as long as that keeps nobody waiting."""
+        end = time.perf_counter() + (_LOOKED_PLAYING_S if self.player.playing else _LOOKED_S)
+        while not self.happenings.done and time.perf_counter() < end:
+            self.happenings.look(_AT_ONCE)
 
     def draw(self, now: float) -> Kept:
         """Draw the step at the player's time, and return it."""
@@ -137,24 +146,21 @@ class ReplayPage:
         """Take the steps up to one into trail and plots: those since the last, or, after a jump, the last seconds."""
         recorded, follows = self._recorded, 0 <= self._drawn <= index <= self._drawn + 10 * _MOST
         if not follows:
-            self._history.clear()
+            self.history.clear()
             self._scene.trail.clear()
-        start = self._drawn + 1 if follows else max(0, index - int(SPAN_S / self._period()))
+        start = self._drawn + 1 if follows else self.player.index_at(self.player.time - SPAN_S)
         stride = max(1, (index + 1 - start) // _MOST) if follows else _STRIDE
         for i in range(index, start - 1, -stride)[::-1]:
-            step = recorded[i].step
-            self._history.add(step, self._other(step.stamp))
+            kept = recorded[i]
+            step, slow = kept.step, self._world(kept.run).profile.perception.slow_after_s
+            self.history.add(step, self._other(step.stamp), frame_of(kept).late(slow))
             self._scene.trail.add(step)
         self._drawn = index
         kept = recorded[index]
         if kept.run != self._run:
             self._run = kept.run
-            self._worlds.setdefault(kept.run, world_of(recorded.runs[kept.run]))
-            self._scene.show_world(self._worlds[kept.run])
+            self._scene.show_world(self._world(kept.run))
         return kept
-
-    def _period(self) -> float:
-        return self._worlds[self._run].profile.task.control_period_s
 
     def _other(self, stamp: float) -> tuple[float, ...]:
         """Thresholds of the other profile at an instant [s]: upper and lower."""
@@ -169,9 +175,14 @@ class ReplayPage:
         if abs(float(self._slider.value) - player.time) > 0.2 or not player.playing:
             put(self._slider, round(player.time, 2))
         self._play.label = "Pause" if player.playing else "Play"
-        profile = self._recorded.runs[kept.run].profile.name
-        rates = f"{player.time:.2f} of {player.duration:.2f} s · stamp {step.stamp:.2f} s · profile {profile}"
+        rates = f"{player.time:.2f} of {player.duration:.2f} s · stamp {step.stamp:.2f} s · {self.run_name(kept.run)}"
         self._status.draw(step, rates, "", now)
+
+    def run_name(self, run: int) -> str:
+        """Name the controller of a run; of several, one may differ from another by nothing but its path."""
+        runs = self._recorded.runs
+        part = f", part {run + 1} of {len(runs)}, path of {runs[run].path.length:.2f} m" if len(runs) > 1 else ""
+        return f"profile {runs[run].profile.name}{part}"
 
 
 def serve_replay(

@@ -15,6 +15,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch.types import FloatArray
 from pretouch.viewer.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
 from pretouch.viewer.settings import Faults, LiveSettings
 
@@ -51,6 +52,7 @@ class Room:
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._wanted = settings.stiffness
         self._skin, self._sound = skin, self.units.params
+        self._moving = np.flatnonzero(model.moved_by.any(axis=1))
         self.fail(settings.faults)
         self.plant.advance(_SETTLE_S)
 
@@ -70,6 +72,15 @@ class Room:
     def stiffen(self, stiffness: float) -> None:
         """Give hand and object another stiffness [N/m], as soon as nothing touches."""
         self._wanted = stiffness
+
+    @property
+    def touched(self) -> FloatArray | None:
+        """Middle (3,) of the points at which something touches the arm [m], base frame; None while nothing does."""
+        data, owner = self.plant.mj_data, self.plant.mj_model.geom_bodyid
+        if not data.ncon:
+            return None
+        on_arm = np.isin(owner[data.contact.geom], self._moving).any(axis=1)
+        return np.mean(data.contact.pos[on_arm], axis=0) if on_arm.any() else None
 
     def tick(self) -> float:
         """Let one control period pass and return the time [s]."""

@@ -27,8 +27,8 @@ CAMERA_FOV = math.radians(42.0)
 GIZMO_M = 0.15
 """Length of the arrows that the hand is dragged by [m]."""
 
-ARROW_M_PER_N, ARROW_MOST_M, ARROW_LEAST_N = 0.012, 0.45, 1.0
-"""Length of a force arrow [m/N] and at most [m], and the force below which none is drawn [N]."""
+ARROW_M_PER_N, ARROW_MOST_M, ARROW_LEAST_N = 0.012, 0.45, 6.0
+"""Length of a force arrow [m/N] and at most [m], and the force below which none is drawn [N]: noise is less."""
 
 PARTS = ("cones", "points", "pairs", "path", "trail", "forces")
 """What can be shown and hidden."""
@@ -54,6 +54,7 @@ class Scene:
         self.trail = Trail(scene)
         _room(server, world)
         self._boxes: list[SceneNodeHandle] = []
+        self._show_boxes(world)
 
         self.path = scene.add_line_segments(
             "/path", _segments(world), palette.PATH, thickness=5.0, thickness_units="screen"
@@ -65,10 +66,10 @@ class Scene:
         self._shows_pairs = self._shows_forces = True
         self._ee = scene.add_frame("/ee", show_axes=False)
         self._force = self._arrow("/ee/force", palette.FORCE)
-        self._true_force = self._arrow("/ee/true_force", palette.TRUE_FORCE)
+        self._touched = scene.add_frame("/touched", show_axes=False)
+        self._true_force = self._arrow("/touched/true_force", palette.TRUE_FORCE)
         self._hand, self._target = self._person(world)
         self._dragged = False
-        self.show_world(world)
 
     def _arrow(self, name: str, colour: palette.Colour) -> "ArrowsHandle":
         return self._server.scene.add_arrows(
@@ -117,8 +118,13 @@ class Scene:
 
     def show_world(self, world: World) -> None:
         """Draw what has changed in a world: its path and boxes."""
-        self._world = world
-        self.path.points = _segments(world).astype(np.float32)
+        before, self._world = self._world, world
+        if world.path is not before.path:
+            self.path.points = _segments(world).astype(np.float32)
+        if world.boxes is not before.boxes:
+            self._show_boxes(world)
+
+    def _show_boxes(self, world: World) -> None:
         while self._boxes:
             self._boxes.pop().remove()
         for i, box in enumerate(world.boxes):
@@ -129,13 +135,14 @@ class Scene:
                 )
             )  # fmt: skip
 
-    def draw(self, frame: Frame, now: float, silenced: frozenset[str] = frozenset()) -> None:
+    def draw(self, frame: Frame, now: float) -> None:
         """Draw one instant."""
         step, world = frame.step, self._world
         kin = world.model.kinematics(step.q)
         self._arm.place(kin)
         self._arm.paint(in_levels(expectation(step.obstacles, len(world.skin), world.profile.threshold)), now)
-        self.units.draw(step, silenced)
+        perception = world.profile.perception
+        self.units.draw(step, kin, frame.late(perception.silent_after_s), perception.enabled)
         self.trail.draw(now)
         self._draw_pairs(step)
         self._draw_forces(frame, kin)
@@ -151,7 +158,9 @@ class Scene:
             self.pairs.colors = colours
 
     def _draw_forces(self, frame: Frame, kin: Kinematics) -> None:
-        self._ee.position = kin.position[self._world.model.ee]
+        ee = kin.position[self._world.model.ee]
+        self._ee.position = ee
+        self._touched.position = ee if frame.true_point is None else frame.true_point
         for handle, force in ((self._force, frame.step.force), (self._true_force, frame.true_force)):
             size = 0.0 if force is None else float(np.linalg.norm(force))
             handle.visible = self._shows_forces and size >= ARROW_LEAST_N

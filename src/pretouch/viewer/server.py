@@ -29,7 +29,8 @@ class ServeOptions:
 
 def url_of(options: ServeOptions) -> str:
     """What to type into a browser."""
-    return f"http://{_EVERYWHERE.get(options.host, options.host)}:{options.port}"
+    host = _EVERYWHERE.get(options.host, options.host)
+    return f"http://[{host}]:{options.port}" if ":" in host else f"http://{host}:{options.port}"
 
 
 @contextmanager

@@ -44,7 +44,8 @@ class LiveSettings(Checked):
     """Stiffness of what the arm can touch, the person's hand and the object [N/m]."""
     faults: Faults = field(default_factory=Faults)
     """What is wrong with the sensor units."""
-    seed: int = 0
+    seed: Annotated[int, Check(low=0)] = 0
     """Decides the arm's errors and all noise."""
-    hand_start: tuple[float, float, float] = HandSpec.start
-    """Where the person's hand begins [m], base frame; moved aside if that is inside something."""
+    hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
+    """Where the person's hand begins [m], base frame: in view, and clear of both paths; moved aside if that is inside
+    something."""

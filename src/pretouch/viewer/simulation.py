@@ -8,14 +8,12 @@ from dataclasses import replace
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, turn
 from pretouch.params import Profile
 from pretouch.recording.surroundings import surroundings
-from pretouch.recording.truth import Truth
+from pretouch.recording.truth import truth_of
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
@@ -63,6 +61,7 @@ class LiveSimulation:
         """As it is set by now: what a reset begins with."""
         self.controller = Controller(self.model, self.skin, fixtures(room.scene), path, settings.profile)
         self._room, self._state = room, self.controller.init(room.plant.read())
+        self._boxes = surroundings({"scene": described(room.scene)}).boxes
         self._resume, self._owed = False, 0.0
         self._look()
         self.single_step()
@@ -71,6 +70,11 @@ class LiveSimulation:
     def time(self) -> float:
         """Time in the simulation [s]."""
         return self._room.plant.time
+
+    @property
+    def stiffness(self) -> float:
+        """Of the person's hand and the object [N/m], as it is felt now."""
+        return self._room.stiffness
 
     @property
     def latched(self) -> bool:
@@ -92,12 +96,11 @@ class LiveSimulation:
         room, resume = self._room, self._resume
         self._resume = False
         tick = room.tick()
-        if room.stiffness != self.world.stiffness:
-            self._look()
         cycle = turn(self.controller, self._state, room.plant, room.units, tick, resume)
         self._state = cycle.after
         hand = room.hand.position
-        self.frame = Frame(cycle.step, hand, room.mouse.target, room.plant.true_force)
+        age = cycle.step.stamp - cycle.inputs.readings.stamp
+        self.frame = Frame(cycle.step, hand, room.mouse.target, room.plant.true_force, room.touched, age)
         self._keep(cycle, hand)
         return cycle.step
 
@@ -175,9 +178,8 @@ class LiveSimulation:
     def _look(self) -> None:
         scene = self._room.scene
         self.world = World(
-            self.model, self.skin, self.controller.path, self.controller.profile,
-            surroundings({"scene": described(scene)}).boxes,
-            scene.hand.radius if scene.hand else None, scene.floor_height, self._room.stiffness,
+            self.model, self.skin, self.controller.path, self.controller.profile, self._boxes,
+            scene.hand.radius if scene.hand else None, scene.floor_height,
         )  # fmt: skip
 
     def _keep(self, cycle: Cycle, hand: FloatArray) -> None:
@@ -185,8 +187,7 @@ class LiveSimulation:
         log, touches = self._room.plant.take_log()
         if self.recording is None:
             return
-        time, force = np.array([t for t, _ in log]), np.array([f for _, f in log])
-        self.recording.record(cycle, Truth(time, force, hand, tuple((t.time, t.link, t.velocity) for t in touches)))
+        self.recording.record(cycle, truth_of(log, touches, hand))
         if self.recording.trouble:
             self.notice = self.recording.trouble
             self.stop_recording()
@@ -199,6 +200,6 @@ class LiveSimulation:
             "seed": settings.seed,
             "path": settings.path,
             "object": settings.object,
-            "stiffness_n_m": self.world.stiffness,
+            "stiffness_n_m": self.stiffness,
             "scene": described(self._room.scene),
         }

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pretouch.perception.obstacles import locate, sensor_poses
+from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, FloatArray, IntArray
+from pretouch.types import BoolArray, ControlStep, FloatArray, IntArray
 from pretouch.viewer import palette
 from pretouch.viewer.arm import quaternions
 
@@ -32,7 +34,7 @@ class Units:
 
     def __init__(self, scene: "SceneApi", skin: Skin, links: Sequence[str]) -> None:
         """Put the units under the nodes `/arm/LINK` of their links, whose names are given in order of their index."""
-        self._ids, count = skin.ids, len(skin)
+        self._skin, count = skin, len(skin)
         self._plates: list[tuple[IntArray, BatchedMeshHandle]] = []
         self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
         plain: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False, "lod": "off"}
@@ -60,23 +62,33 @@ class Units:
         for _, cones in self._cones:
             cones.visible = visible
 
-    def draw(self, step: ControlStep, silenced: frozenset[str]) -> None:
-        """Show what the units see; `silenced` are the ids of those known to be dropped."""
-        seen = np.zeros(len(self._ids), dtype=np.bool_)
-        seen[step.obstacles.unit] = True
-        off = np.array([i in silenced for i in self._ids])[:, None]
+    def draw(self, step: ControlStep, kin: Kinematics, silent: BoolArray, perceiving: bool) -> None:
+        """Show what the units see, and which of them (K,) are silent.
+
+        A controller that is not `perceiving` has no obstacles: then every reading is a sensed point.
+        """
+        off = silent[:, None]
         plates, cones = (palette.as_vertex(np.where(off, palette.UNIT_SILENT, c)) for c in (palette.UNIT, palette.CONE))
-        lengths = np.where(seen, np.nan_to_num(np.round(step.range_distance, 2), nan=_IDLE_M), _IDLE_M).astype(
-            np.float32
-        )
+        reading = np.where(silent, np.nan, step.range_distance)
+        lengths = np.nan_to_num(np.round(reading, 2), nan=_IDLE_M).astype(np.float32)
+        points = self._sensed(step, kin, reading, perceiving)
+        seen = np.isfinite(points[:, 0])
+        opacities = np.where(seen | np.isfinite(reading), _CLEAR, _FAINT).astype(np.float32)
         for units, handle in self._plates:
             handle.batched_colors = plates[units]
         for units, handle in self._cones:
             handle.batched_colors, handle.batched_scales = cones[units], lengths[units]
-            handle.batched_opacities = np.where(seen[units], _CLEAR, _FAINT).astype(np.float32)
-        points, size = np.zeros((len(seen), 3), dtype=np.float32), np.full(len(seen), _GONE, dtype=np.float32)
-        points[step.obstacles.unit], size[step.obstacles.unit] = step.obstacles.point, _POINT_M
-        self.points.batched_positions, self.points.batched_scales = points, size
+            handle.batched_opacities = opacities[units]
+        self.points.batched_positions = np.nan_to_num(points).astype(np.float32)
+        self.points.batched_scales = np.where(seen, _POINT_M, _GONE).astype(np.float32)
+
+    def _sensed(self, step: ControlStep, kin: Kinematics, reading: FloatArray, perceiving: bool) -> FloatArray:
+        """Where each unit senses something (K, 3) [m], base frame; NaN where it does not."""
+        if not perceiving:
+            return locate(*sensor_poses(self._skin, kin), reading)
+        points = np.full((len(reading), 3), np.nan)
+        points[step.obstacles.unit] = step.obstacles.point
+        return points
 
 
 def _all(colour: palette.Colour, units: IntArray) -> NDArray[np.uint8]:
