@@ -11,7 +11,6 @@ from pretouch import loop
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import RobotStateError
-from pretouch.loop import Cycle
 from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.model import RobotModel
@@ -65,7 +64,7 @@ class FakeRecorder:
     steps: list[ControlStep] = field(default_factory=list)
     on_step: Callable[[int], None] = lambda count: None
 
-    def record(self, cycle: Cycle) -> None:
+    def record(self, cycle: loop.Cycle) -> None:
         self.steps.append(cycle.step)
         self.on_step(len(self.steps))
 

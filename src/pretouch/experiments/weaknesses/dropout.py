@@ -339,9 +339,8 @@ def _figure(part: Row) -> "Figure":
             axes.errorbar(
                 at, middle, (middle - low, high - middle), ls=line_style, marker=marker, capsize=2, label=kept
             )
-        axes.set(xlabel="readings lost in a row", ylabel=label)
+        axes.set(xlabel="readings lost in a row", ylabel=label, ylim=(0, None))
         axes.set_xticks(range(len(READINGS)), [str(count) for count in READINGS])
-        axes.set_ylim(bottom=0)
         axes.grid(alpha=0.3)
     panels[0].legend(fontsize="small", loc="lower right")
     figure.suptitle("Readings of a board are lost")
