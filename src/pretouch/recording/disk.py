@@ -1,10 +1,10 @@
 """A recording's file and the thread that writes it, so that no disk makes a control loop wait."""
 
 import errno
-import math
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from itertools import chain
@@ -73,9 +73,9 @@ class Disk:
     def __init__(self, place: Path) -> None:
         self._place = place
         self._file = _opened(place)
-        self._queue: SimpleQueue[tuple[float, list[Item], More] | None] = SimpleQueue()
-        self._oldest = math.inf
-        """When the cycle that is being written was put [s]."""
+        self._queue: SimpleQueue[tuple[list[Item], More] | None] = SimpleQueue()
+        self._since: deque[float] = deque()
+        """When each cycle was put that is not written yet [s]."""
         self._writer = Writer(self._file, _CHUNK, CompressionType.ZSTD)  # type: ignore[arg-type]
         try:
             self._writer.start("ros2", LIBRARY)
@@ -94,16 +94,20 @@ class Disk:
         """Hand messages over, and what makes more of them, in the thread."""
         if self._queue.qsize() > _MOST_WAITING and not self.trouble:
             self.trouble = f"The recording {self._place} ended early: the disk does not keep up, take a faster one."
-        self._queue.put((time.monotonic(), items, more))
+        self._since.append(time.monotonic())
+        self._queue.put((items, more))
 
     def behind(self) -> bool:
         """Whether something has waited to be written for a while."""
-        return time.monotonic() - self._oldest > _LATE_S
+        try:
+            return time.monotonic() - self._since[0] > _LATE_S
+        except IndexError:  # the thread has just written the last
+            return False
 
     def wait(self) -> None:
         """Let the thread catch up for a while."""
         until = time.monotonic() + _PATIENCE_S
-        while self._queue.qsize() and self._thread.is_alive() and time.monotonic() < until:
+        while self._since and self._thread.is_alive() and time.monotonic() < until:
             time.sleep(0.002)
 
     def close(self) -> None:
@@ -140,11 +144,10 @@ class Disk:
             else:
                 if job is None:
                     return
-                self._oldest, items, more = job
+                items, more = job
                 for item in chain(items, more()):
                     self._add(item)
-                if self._queue.empty():
-                    self._oldest = math.inf
+                self._since.popleft()
                 time.sleep(0)  # lets the control loop have the interpreter, if it waits for it
             if time.monotonic() >= due:
                 self._writer.flush()  # type: ignore[no-untyped-call]
