@@ -158,6 +158,7 @@ class Detect:
     """ROS 2 bag (folder, .mcap, .db3), ROS 1 .bag, or .csv with columns time_s, force_x_N, force_y_N, force_z_N."""
     profiles: str = "paper"
     """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter."""
+    # the choices of pretouch.foreign.source, spelt out: the help is to need none of the heavy packages
     sign: Literal["on-robot", "by-robot"] = "on-robot"
     """Whose force it is: on the robot by its environment, or by the robot, as Franka's O_F_ext_hat_K."""
     frame: Literal["base", "ee"] = "base"
