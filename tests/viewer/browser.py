@@ -139,10 +139,10 @@ class Visitor:
         field.press("Enter")
         field.blur()
 
-    def type_slowly(self, label: str, text: str) -> None:
-        """Type over what a field holds, key by key as a person does."""
+    def type_slowly(self, label: str, text: str, delay: float = 0.3) -> None:
+        """Type over what a field holds, key by key as a person does, with a delay [s] after each."""
         self.field(label).select_text()
-        self.field(label).press_sequentially(text, delay=300)
+        self.field(label).press_sequentially(text, delay=1000 * delay)
 
     def value(self, label: str) -> str:
         return str(self.field(label).input_value())

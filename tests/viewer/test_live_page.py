@@ -13,7 +13,7 @@ from tests.viewer.browser import free_port, seen_at
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.types import Mode
-from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S
+from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage, serve_live
 from pretouch.viewer.recordings import toggle_recording
 from pretouch.viewer.scene import GIZMO_M
@@ -199,6 +199,9 @@ def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: Li
 def test_what_is_no_value_goes_back_to_the_one_that_holds(clock: Clock, typed: str, said: str) -> None:
     give(clock.page, "l_max [cycles]", typed)
     clock.turn(SETTLE_S + 0.1)
+    assert handle(clock.page, "l_max [cycles]").value == typed  # for whoever types on
+    assert clock.page.notice == said
+    clock.turn(TYPED_S - SETTLE_S)
     assert handle(clock.page, "l_max [cycles]").value == "200"
     assert clock.page.notice == said
 

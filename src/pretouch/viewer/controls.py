@@ -11,7 +11,7 @@ from pretouch.params import PROFILES, Profile, RestrictionMode
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
 from pretouch.viewer.commands import Commands
-from pretouch.viewer.gui import SETTLE_S, add_button, add_view_boxes, put, when_changed
+from pretouch.viewer.gui import SETTLE_S, TYPED_S, add_button, add_view_boxes, put, when_changed
 from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs, written
 from pretouch.viewer.recordings import toggle_recording
 from pretouch.viewer.settings import ObjectName, PathName
@@ -108,8 +108,7 @@ class Controls:
             for entry in TABLE_1:
                 # as text: of a field for numbers that is emptied, viser tells nobody
                 field = gui.add_text(entry.label, entry.text(self._mine), hint=entry.hint())
-                act, kind = partial(self._change_entry, entry), f"parameter {entry.symbol}"
-                self._number(field, act, kind, partial(self._text_of, entry))
+                self._typed(field, partial(self._change_entry, entry), entry.symbol, partial(self._text_of, entry))
             self._button("Reset parameters", self._reset_parameters, hint="To those of the profile.")
 
     def _world_tab(self) -> None:
@@ -143,6 +142,12 @@ class Controls:
         """Have a control act when nobody types in it any more; `holds` says what it is to show."""
         when_changed(handle, self._commands, act, kind, SETTLE_S)
         self._shown.append((handle, kind, holds))
+
+    def _typed(self, handle: Any, act: Callable[[Any], object], name: str, holds: Callable[[], object]) -> None:
+        """Have a text act when nobody types in it any more, and leave standing for a while what was refused."""
+        when_changed(handle, self._commands, act, f"parameter {name}", SETTLE_S)
+        when_changed(handle, self._commands, lambda _: None, f"typed {name}", TYPED_S, quiet=True)
+        self._shown.append((handle, f"typed {name}", holds))
 
     def _button(self, label: str, act: Callable[[], object], **more: Any) -> Any:
         return add_button(self._gui, self._commands, label, act, **more)

@@ -16,6 +16,8 @@ PERIOD_S = 1.0 / 30.0
 """Time between two updates of a page [s]."""
 SETTLE_S = 0.8
 """Time without a key from which on a number that is typed counts [s]."""
+TYPED_S = 6.0
+"""Time without a key from which on a field shows what holds again: whoever pauses after 0.0 can type on [s]."""
 LEFT_PX, RIGHT_PX = 310, 330
 """Widths of the panels of plots and of controls [px]."""
 
