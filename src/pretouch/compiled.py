@@ -10,7 +10,7 @@ from numba import njit
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-_NOT_COMPILED = ("cli", "reporting", "viewer", "experiments", "foreign", "recording")
+_NOT_COMPILED = ("cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording")
 
 
 def digest(folder: Path) -> str:

@@ -122,7 +122,7 @@ class Controller:
         # what is near: eq. 1 and the closest points of the body
         known = track_init(len(self.skin)) if Event.TIME_BACKWARDS in events else state.tracks
         seen, tracks = perceive(known, model, self.skin, self.fixtures, kin, readings, now, p.perception)
-        heard, silent = silent_units(self.skin, tracks, seen.longest_silence, now, p.perception)
+        heard, silent = silent_units(self.skin, tracks, readings.status, seen.longest_silence, now, p.perception)
         mark("perception")
 
         # what is felt: eqs. 8-11

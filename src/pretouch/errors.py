@@ -40,5 +40,9 @@ class RecordingError(PretouchError, ValueError):
     """A recording cannot be made, opened or used as asked."""
 
 
+class HardwareError(PretouchError, RuntimeError):
+    """Sensor units, their keys, or the network between cannot be used as asked."""
+
+
 class ViewerError(PretouchError, RuntimeError):
     """The page cannot be shown."""

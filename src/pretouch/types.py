@@ -22,7 +22,10 @@ WHOLE = np.dtype(np.int64)
 
 
 class RangeStatus(IntEnum):
-    """Range status codes of the VL53L1X (ST, UM2356); 255 is set by the driver before the first measurement."""
+    """Range status codes of the VL53L1X (ST, UM2356); 255 is set by the driver before the first measurement.
+
+    254 is no code of the sensor's: whoever receives its readings sets it when they repeat to the last digit.
+    """
 
     OK = 0
     SIGMA = 1
@@ -37,6 +40,7 @@ class RangeStatus(IntEnum):
     MERGED = 11
     MIN_RANGE = 13
     INVALID = 14
+    STUCK = 254
     NONE = 255
 
 

@@ -235,12 +235,16 @@ def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
 
 # Silent units
 
-FAILURES = [RangeStatus.HARDWARE, RangeStatus.CROSSTALK, RangeStatus.SYNC, RangeStatus.INVALID, RangeStatus.NONE]
+FAILURES = [
+    RangeStatus.HARDWARE, RangeStatus.CROSSTALK, RangeStatus.SYNC, RangeStatus.INVALID, RangeStatus.STUCK,
+    RangeStatus.NONE,
+]  # fmt: skip
 NO_TARGET = [RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED]
 
 
-def _silent(watcher, now: float) -> tuple[float, str]:
-    return silent_units(watcher.skin, watcher.state, watcher.seen.longest_silence, now, PARAMS)
+def _silent(watcher, now: float, status: RangeStatus = RangeStatus.OK) -> tuple[float, str]:
+    reported = np.full(len(watcher.skin), int(status))
+    return silent_units(watcher.skin, watcher.state, reported, watcher.seen.longest_silence, now, PARAMS)
 
 
 def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, distance=0.5, ahead=0.0) -> tuple[float, str]:
@@ -268,6 +272,16 @@ def test_a_unit_that_falls_silent_slows_the_arm_and_is_named(watcher, age, facto
     left, silent = _silent(watcher, 10.0)
     assert left == pytest.approx(factor)
     assert silent == names
+
+
+@pytest.mark.parametrize(
+    ("status", "why"),
+    [(RangeStatus.STUCK, " (it repeats the same reading)"), (RangeStatus.HARDWARE, " (it reports a hardware failure)")],
+)
+def test_a_unit_that_reports_a_failure_of_its_own_is_named_with_it(watcher, status, why):
+    watcher.take(watcher.readings(10.0, **dict.fromkeys(watcher.skin.ids, 0.5)), 10.0)
+    _go_on(watcher, 10.0, status=status)
+    assert _silent(watcher, 10.4, status) == (0.0, f"wrist_front{why}")
 
 
 def test_all_units_never_heard_are_named(watcher):

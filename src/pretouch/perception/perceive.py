@@ -22,7 +22,7 @@ from pretouch.perception.scene_filter import RAYS, Fixtures, leave_out, leave_ou
 from pretouch.perception.vectors import placed_ends, rotate
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings
+from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus
 from pretouch.values import value
 
 
@@ -141,15 +141,23 @@ def _perceive(
     return found, nearest, oldest
 
 
+_FAILURES = {
+    int(RangeStatus.HARDWARE): " (it reports a hardware failure)",
+    int(RangeStatus.STUCK): " (it repeats the same reading)",
+}
+
+
 def silent_units(
-    skin: Skin, state: TrackState, silence: float, now: float, params: PerceptionParams
+    skin: Skin, state: TrackState, status: IntArray, silence: float, now: float, params: PerceptionParams
 ) -> tuple[float, str]:
     """Factor in [0, 1] on the speed for units that fall silent, and the names of those that are.
 
     Silence is never free space, and neither is a failure: from `slow_after_s` without a reading that tells anything the
-    arm slows, at `silent_after_s` it stands. `silence` [s] is the longest of any unit.
+    arm slows, at `silent_after_s` it stands. `silence` [s] is the longest of any unit, `status` (K,) what the units
+    reported last.
     """
     if silence <= params.slow_after_s:
         return 1.0, ""
-    names = ", ".join(skin.ids[k] for k in np.flatnonzero(now - state.heard >= params.silent_after_s))
+    silent = np.flatnonzero(now - state.heard >= params.silent_after_s).tolist()
+    names = ", ".join(skin.ids[k] + _FAILURES.get(int(status[k]), "") for k in silent)
     return max(0.0, (params.silent_after_s - silence) / (params.silent_after_s - params.slow_after_s)), names

@@ -1,0 +1,266 @@
+"""The datagrams between sensor units and their receiver, version 1 (docs/hardware/wire.md). Bytes to values and back.
+
+Three kinds, all little-endian, each ended by the first 16 bytes of an HMAC-SHA256:
+
+- HELLO, unit to receiver: "I have no session"; carries a random challenge. Under the unit's own key.
+- BEACON, receiver to unit: opens a session by its random nonce, and is the time signal from then on. Under the unit's
+  own key, and mixed with the unit's challenge: a beacon of an earlier session or of before a reboot never verifies.
+- SAMPLE, unit to receiver: what was measured. Under the session's key, made of key, challenge and nonce: a sample of an
+  earlier session never verifies.
+"""
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from hashlib import sha256
+from hmac import compare_digest
+
+import numpy as np
+
+from pretouch.types import FloatArray
+
+MAGIC = b"PT"
+VERSION = 1
+TAG_SIZE = 16
+CHALLENGE_SIZE = NONCE_SIZE = 8
+KEY_SIZE = 32
+
+PREFIX = struct.Struct("<2sBBH")
+"""Magic, version, kind, number of the unit."""
+HELLO = struct.Struct("<HBB8sQ")
+"""After the prefix: firmware version, cause of the last reset, 0, challenge, time since the reset [us]."""
+BEACON = struct.Struct("<HI8s")
+"""After the prefix: 0, number of the beacon, nonce of the session."""
+SAMPLE = struct.Struct("<HIQIIHhHBBHIHHHHBBHII")
+"""After the prefix: the fields of `Sample` in their order, to `imu_age_us`; `imu_count` IMU samples follow."""
+IMU_SAMPLE = struct.Struct("<6h")
+"""Gyroscope x, y, z, accelerometer x, y, z, as the sensor's FIFO has them."""
+IMU_MOST = 32
+"""Most IMU samples in a datagram."""
+
+HELLO_SIZE = PREFIX.size + HELLO.size + TAG_SIZE
+BEACON_SIZE = PREFIX.size + BEACON.size + TAG_SIZE
+SAMPLE_LEAST = PREFIX.size + SAMPLE.size + TAG_SIZE
+"""Size of a sample without any of the IMU [B]."""
+SAMPLE_MOST = SAMPLE_LEAST + IMU_MOST * IMU_SAMPLE.size
+
+NO_TEMPERATURE = -32768
+LONGEST_US = 0xFFFFFFFF
+"""Largest age or hold a field can tell [us]; what is longer reads as this."""
+
+_HELLO_LABEL, _BEACON_LABEL, _SESSION_LABEL = b"PT1HELLO", b"PT1BEACN", b"PT1SESSN"
+_BLOCK = 64
+
+
+class Kind(IntEnum):
+    """What a datagram is."""
+
+    HELLO = 1
+    BEACON = 2
+    SAMPLE = 3
+
+
+class Flag(IntFlag):
+    """What a sample says of its unit."""
+
+    RANGE_NEW = 1
+    """It holds a range measured since the last one."""
+    RANGE_BUS_ERROR = 2
+    """The range finder did not answer on the bus in this cycle."""
+    IMU_BUS_ERROR = 4
+    """The IMU did not answer on the bus in this cycle."""
+    IMU_LOST = 8
+    """The IMU's FIFO ran over: samples before these are lost."""
+    RANGE_RESTARTED = 16
+    """The range finder was initialised anew in this cycle."""
+    IMU_RESTARTED = 32
+    """The IMU was initialised anew in this cycle."""
+    RANGE_LATE = 64
+    """The range finder has had nothing new for more than two of its periods."""
+
+
+class Reset(IntEnum):
+    """Why a unit began anew."""
+
+    UNKNOWN = 0
+    POWER_ON = 1
+    HARD = 2
+    WATCHDOG = 3
+    DEEP_SLEEP = 4
+    SOFT = 5
+
+
+class Mac:
+    """HMAC-SHA256 of one key, first 16 bytes; the key is hashed once."""
+
+    def __init__(self, key: bytes) -> None:
+        padded = key.ljust(_BLOCK, b"\0") if len(key) <= _BLOCK else sha256(key).digest().ljust(_BLOCK, b"\0")
+        self._inner = sha256(bytes(b ^ 0x36 for b in padded))
+        self._outer = sha256(bytes(b ^ 0x5C for b in padded))
+
+    def whole(self, *parts: bytes | memoryview) -> bytes:
+        """All 32 bytes, of parts one after the other."""
+        inner, outer = self._inner.copy(), self._outer.copy()
+        for part in parts:
+            inner.update(part)
+        outer.update(inner.digest())
+        return outer.digest()
+
+    def tag(self, *parts: bytes | memoryview) -> bytes:
+        """The tag of parts one after the other."""
+        return self.whole(*parts)[:TAG_SIZE]
+
+
+def session_mac(key: Mac, challenge: bytes, nonce: bytes) -> Mac:
+    """Mac of the samples of one session."""
+    return Mac(key.whole(_SESSION_LABEL, challenge, nonce))
+
+
+@dataclass(slots=True)
+class Hello:
+    """A unit asks for a session."""
+
+    unit: int
+    firmware: int
+    """Major version * 256 + minor version."""
+    reset: int
+    """A `Reset`."""
+    challenge: bytes
+    uptime_us: int
+
+    def encode(self, key: Mac) -> bytes:
+        """As a datagram under the unit's key."""
+        body = PREFIX.pack(MAGIC, VERSION, Kind.HELLO, self.unit) + HELLO.pack(
+            self.firmware, self.reset, 0, self.challenge, self.uptime_us
+        )
+        return body + key.tag(_HELLO_LABEL, body)
+
+
+def decode_hello(datagram: bytes | memoryview, key: Mac) -> Hello | None:
+    """Return what a datagram of the right size, magic, version and kind says; None if its tag is wrong."""
+    body = datagram[:-TAG_SIZE]
+    if not compare_digest(key.tag(_HELLO_LABEL, body), datagram[-TAG_SIZE:]):
+        return None
+    firmware, reset, _, challenge, uptime = HELLO.unpack_from(body, PREFIX.size)
+    return Hello(PREFIX.unpack_from(body)[3], firmware, reset, challenge, uptime)
+
+
+@dataclass(slots=True)
+class Beacon:
+    """The receiver opens or continues a session of one unit."""
+
+    unit: int
+    number: int
+    """Grows with each beacon of a session, from 1."""
+    nonce: bytes
+
+    def encode(self, key: Mac, challenge: bytes) -> bytes:
+        """As a datagram under the unit's key, for the unit that sent this challenge."""
+        body = PREFIX.pack(MAGIC, VERSION, Kind.BEACON, self.unit) + BEACON.pack(0, self.number, self.nonce)
+        return body + key.tag(_BEACON_LABEL, challenge, body)
+
+
+def decode_beacon(datagram: bytes, key: Mac, challenge: bytes) -> Beacon | None:
+    """Return what a datagram says to a unit that sent a challenge; None if it is no beacon, or its tag is wrong."""
+    if len(datagram) != BEACON_SIZE:
+        return None
+    body = datagram[:-TAG_SIZE]
+    magic, version, kind, unit = PREFIX.unpack_from(body)
+    if (magic, version, kind) != (MAGIC, VERSION, Kind.BEACON):
+        return None
+    if not compare_digest(key.tag(_BEACON_LABEL, challenge, body), datagram[-TAG_SIZE:]):
+        return None
+    _, number, nonce = BEACON.unpack_from(body, PREFIX.size)
+    return Beacon(unit, number, nonce)
+
+
+@dataclass(slots=True)
+class Sample:
+    """What a unit measured since its last sample. Integers as on the wire; properties in SI units."""
+
+    unit: int
+    flags: int
+    """`Flag`s."""
+    sequence: int
+    """Grows by 1 with each sample of a session, from 1."""
+    time_us: int
+    """The unit's clock when the datagram was made: time since its reset [us]."""
+    beacon: int
+    """Number of the last beacon it heard."""
+    beacon_hold_us: int
+    """How long ago it heard it [us]."""
+    battery_mv: int
+    """Voltage of its battery [mV]; 0 if it cannot tell."""
+    temperature_cdeg: int
+    """Temperature of its IMU [0.01 degrees C]; `NO_TEMPERATURE` if it cannot tell."""
+    bus_errors: int
+    """Failed transfers on its bus since the reset; stays at 65535."""
+    range_stream: int
+    """The range finder's own count of measurements, from 0 to 255 and then from 128 on again."""
+    range_status: int
+    """A `RangeStatus`; 255 if nothing was measured."""
+    range_mm: int
+    """Distance [mm]."""
+    range_age_us: int
+    """From the middle of the measurement to `time_us` [us]."""
+    range_sigma: int
+    """Standard deviation of the distance, estimated by the sensor [mm / 4]."""
+    range_signal: int
+    """Rate of the signal [Mcps / 128]."""
+    range_ambient: int
+    """Rate of ambient light [Mcps / 128]."""
+    range_spads: int
+    """SPADs in use [1 / 256]."""
+    imu_count: int
+    """IMU samples in this datagram."""
+    imu_scale: int
+    """Full scales: accelerometer in bits 0-1 (2, 4, 8, 16 g), gyroscope in bits 4-6 (125, 245, 500, 1000, 2000 dps)."""
+    imu_rate_hz: int
+    """Nominal rate of the IMU [Hz]."""
+    imu_index: int
+    """Number of the first IMU sample in this datagram since the reset; lost ones are counted, as far as known."""
+    imu_age_us: int
+    """From the newest IMU sample to `time_us` [us]."""
+    imu: bytes = b""
+    """`imu_count` times `IMU_SAMPLE`."""
+
+    def encode(self, session: Mac) -> bytes:
+        """As a datagram of a session."""
+        body = PREFIX.pack(MAGIC, VERSION, Kind.SAMPLE, self.unit) + SAMPLE.pack(
+            self.flags, self.sequence, self.time_us, self.beacon, self.beacon_hold_us, self.battery_mv,
+            self.temperature_cdeg, self.bus_errors, self.range_stream, self.range_status, self.range_mm,
+            self.range_age_us, self.range_sigma, self.range_signal, self.range_ambient, self.range_spads,
+            self.imu_count, self.imu_scale, self.imu_rate_hz, self.imu_index, self.imu_age_us,
+        )  # fmt: skip
+        body += self.imu
+        return body + session.tag(body)
+
+
+def decode_sample(datagram: bytes | memoryview, session: Mac) -> Sample | None:
+    """Return what a datagram of the right size, magic, version and kind says; None if its tag or its count is wrong."""
+    body = datagram[:-TAG_SIZE]
+    if not compare_digest(session.tag(body), datagram[-TAG_SIZE:]):
+        return None
+    unit: int = PREFIX.unpack_from(body)[3]
+    sample = Sample(unit, *SAMPLE.unpack_from(body, PREFIX.size), bytes(body[PREFIX.size + SAMPLE.size :]))
+    return sample if len(sample.imu) == sample.imu_count * IMU_SAMPLE.size else None
+
+
+GRAVITY = 9.80665
+"""Standard gravity [m/s^2]."""
+ACCELERATION_LSB = tuple(mg * 1e-3 * GRAVITY for mg in (0.061, 0.122, 0.244, 0.488))
+"""One count of the LSM6DS3's accelerometer at 2, 4, 8, 16 g [m/s^2] (data sheet, LA_So)."""
+ANGULAR_RATE_LSB = tuple(np.deg2rad(1e-3 * mdps) for mdps in (4.375, 8.75, 17.5, 35.0, 70.0))
+"""One count of its gyroscope at 125, 245, 500, 1000, 2000 degrees a second [rad/s] (data sheet, G_So)."""
+
+
+def imu_values(imu: bytes, scale: int) -> tuple[FloatArray, FloatArray]:
+    """Return accelerations (M, 3) [m/s^2] and angular velocities (M, 3) [rad/s], sensor frame, of a sample's IMU data.
+
+    Full scales there are not are a ValueError.
+    """
+    acceleration_code, rate_code = scale & 3, scale >> 4 & 7
+    if rate_code >= len(ANGULAR_RATE_LSB):
+        raise ValueError(f"the gyroscope's full scale has the code {rate_code}: there are 0 to 4")
+    counts = np.frombuffer(imu, dtype="<i2").reshape(-1, 6).astype(np.float64)
+    return counts[:, 3:] * ACCELERATION_LSB[acceleration_code], counts[:, :3] * ANGULAR_RATE_LSB[rate_code]

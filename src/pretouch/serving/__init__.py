@@ -1,0 +1,1 @@
+"""The simulated skin on a real wire."""
