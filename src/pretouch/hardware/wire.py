@@ -242,7 +242,8 @@ def decode_sample(datagram: bytes | memoryview, session: Mac) -> Sample | None:
     if not compare_digest(session.tag(body), datagram[-TAG_SIZE:]):
         return None
     unit: int = PREFIX.unpack_from(body)[3]
-    sample = Sample(unit, *SAMPLE.unpack_from(body, PREFIX.size), bytes(body[PREFIX.size + SAMPLE.size :]))
+    fields = *SAMPLE.unpack_from(body, PREFIX.size), bytes(body[PREFIX.size + SAMPLE.size :])
+    sample = Sample(unit, *fields)
     return sample if len(sample.imu) == sample.imu_count * IMU_SAMPLE.size else None
 
 
