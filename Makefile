@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live meshes browser test test-slow lint bench peers format clean
+.PHONY: setup demo live meshes browser micropython test test-slow lint bench peers format clean
 
 setup: $(STAMP)
 
@@ -29,6 +29,11 @@ meshes: setup
 # what the tests of the page need beside a Chromium of the system's; without both they are skipped
 browser: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
+
+# MicroPython in Node, which the tests of the firmware run in beside CPython; without it that half is skipped
+micropython:
+	@mkdir -p build/micropython && cp firmware/package.json build/micropython/
+	npm install --prefix build/micropython --no-package-lock --no-audit --no-fund --silent
 
 test: setup
 	$(BIN)/pytest -n 2 -m "not slow"

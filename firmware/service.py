@@ -1,0 +1,77 @@
+"""The life of a unit from one reset to the next: told who it is, in its network, measuring until something fails."""
+
+import io
+import sys
+import time
+
+from board import address, open_socket, this_board
+from clock import Clock
+from config import ConfigError, load
+from console import Console
+from link import Link
+from lsm6ds3 import LSM6DS3
+from micropython import const
+from provisioning import Provisioning
+from sensors import Bus, Imu, RangeFinder
+from unit import Unit
+from vl53l1x import VL53L1X
+from wifi import Datagrams, Station
+
+VERSION = "0.1"
+_VERSION_ON_WIRE = const(1)
+_WINDOW_US = const(3_000_000)
+
+
+def run():
+    """Serve until something fails, note what, and begin anew. Ctrl-C leads to the prompt."""
+    board = this_board()
+    try:
+        clock = Clock(time)
+        config = provision(board, clock, Console())
+        serve(board, clock, config)
+    except Exception as error:
+        try:
+            board.note(trace(error))
+        finally:
+            board.reset()
+
+
+def provision(board, clock, console):
+    """Return the configuration, after whoever is on the serial line had time to give another."""
+    config, fault = None, board.noted()
+    try:
+        config = load()
+    except ConfigError as error:
+        fault = str(error)
+    provisioning = Provisioning(config, {"firmware": VERSION, "board": sys.platform, "last_error": fault})
+    provisioning.listen(console, clock, _WINDOW_US)
+    return provisioning.config
+
+
+def serve(board, clock, config):
+    """Measure and send for ever. The watchdog is fed once a pass, so a pass that never ends begins the unit anew."""
+    watchdog = board.open_watchdog()
+    board.full_speed()
+    station = Station(board.open_wlan(), config.ssid, config.password, clock)
+    unit = build(board, clock, config)
+    while True:
+        watchdog.feed()
+        station.step(clock.ticks())
+        unit.step()
+        time.sleep_ms(1)
+
+
+def build(board, clock, config):
+    """Return the unit of a configuration."""
+    port = Datagrams(open_socket, address(config.host, config.port))
+    link = Link(config.unit, config.key, port, clock, board.draw, _VERSION_ON_WIRE, board.reset_cause())
+    i2c, bus = board.open_bus(), Bus()
+    range_finder, imu = RangeFinder(VL53L1X(i2c), clock, bus), Imu(LSM6DS3(i2c), clock, bus)
+    return Unit(config.unit, link, range_finder, imu, bus, clock, board.open_battery(config.battery_full_mv))
+
+
+def trace(error):
+    """Return what an error says of itself and where it came from; no error here knows key or password."""
+    text = io.StringIO()
+    sys.print_exception(error, text)
+    return text.getvalue()

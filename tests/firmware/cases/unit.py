@@ -1,0 +1,245 @@
+"""The loop of a unit on sensors that are well, slow, wrong, away and back."""
+
+from fake_receiver import steps
+from fake_unit import FakeUnit
+
+NEW, RANGE_ERROR, IMU_ERROR, IMU_LOST, RANGE_RESTARTED, IMU_RESTARTED, LATE = 1, 2, 4, 8, 16, 32, 64
+SECOND = 1_000_000
+
+
+def _well(start_us=0):
+    """A unit that has run for a second."""
+    unit = FakeUnit(start_us)
+    unit.run(SECOND)
+    return unit
+
+
+def _all_flags(samples):
+    flags = 0
+    for sample in samples:
+        flags |= sample["flags"]
+    return flags
+
+
+def _gaps(samples):
+    return steps([s["time_us"] for s in samples])
+
+
+def says_each_range_as_soon_as_it_is_there():
+    samples = _well().run(2 * SECOND)
+    assert 98 <= len(samples) <= 101, len(samples)
+    assert all(s["flags"] == NEW for s in samples)
+    ages = [s["age"] for s in samples]
+    assert 7_500 <= min(ages) <= max(ages) < 13_000, "half of the budget, a pass, and 3 ms of the bus"
+    assert [s["sequence"] for s in samples] == list(range(samples[0]["sequence"], samples[-1]["sequence"] + 1))
+
+
+def nearly_every_sample_has_a_new_range():
+    samples = _well().run(4 * SECOND)
+    new = [s for s in samples if s["flags"] & NEW]
+    assert len(new) >= 190, len(new)
+    assert _all_flags(samples) == NEW
+    assert {(s["mm"], s["status"], s["sigma"], s["signal"], s["ambient"], s["spads"]) for s in new} == {
+        (500, 0, 10, 3000, 100, 40 << 8)
+    }
+    streams = [s["stream"] for s in new]
+    assert set(steps(streams)) <= {1, 2, -127, -126}, "from 255 it goes on with 128"
+
+
+def a_range_is_told_as_old_as_it_is_or_a_little_older():
+    unit = _well()
+    middles = {}
+
+    def note():
+        middles[unit.vl53l1x._stream] = unit.vl53l1x.middle_us
+
+    samples = unit.run(2 * SECOND, note)[2:]
+    older = [middles[s["stream"]] - (s["time_us"] - s["age"]) for s in samples if s["flags"] & NEW]
+    assert len(older) > 90
+    assert -200 <= min(older) <= max(older) <= 6_000, (min(older), max(older))
+
+
+def more_than_400_imu_samples_a_second_none_twice():
+    samples = _well().run(4 * SECOND)
+    assert sum(s["count"] for s in samples) >= 1600
+    index = samples[0]["index"]
+    for sample in samples:
+        assert sample["index"] == index
+        index += sample["count"]
+    assert {s["rate"] for s in samples} == {416}
+    assert all(0 < s["imu_age"] < 5_000 for s in samples)
+
+
+def temperature_and_battery_are_told():
+    unit = _well()
+    unit.battery_mv = 3700
+    sample = unit.run(2 * SECOND)[-1]
+    assert sample["battery"] == 3700
+    assert sample["temperature"] == 2500
+
+
+def a_dead_range_finder_does_not_stop_the_imu():
+    unit = _well()
+    unit.vl53l1x.power_off()
+    unit.run(SECOND)
+    samples = unit.run(2 * SECOND)
+    assert 78 <= len(samples) <= 80, len(samples)
+    assert min(_gaps(samples)) >= 25_000
+    assert all(s["flags"] & (RANGE_ERROR | LATE | NEW) == RANGE_ERROR | LATE for s in samples)
+    assert sum(s["count"] for s in samples) >= 800
+    assert samples[-1]["bus_errors"] > samples[0]["bus_errors"] >= 3
+
+
+def its_last_range_grows_old_and_is_forgotten_after_10_s():
+    unit = _well()
+    unit.vl53l1x.power_off()
+    samples = unit.run(12 * SECOND, pass_us=15_000)
+    old = [s for s in samples if not s["flags"] & NEW and s["status"] == 0]
+    assert 9 * SECOND < old[-1]["age"] < 10 * SECOND
+    assert (samples[-1]["status"], samples[-1]["age"]) == (255, 0xFFFFFFFF)
+
+
+def a_range_finder_that_lost_power_is_begun_anew():
+    unit = _well()
+    unit.vl53l1x.power_off()
+    unit.run(SECOND)
+    unit.vl53l1x.power_on()
+    assert _all_flags(unit.run(3 * SECOND)) & RANGE_RESTARTED
+    assert _all_flags(unit.run(SECOND)) == NEW
+
+
+def a_blink_of_power_is_found_too():
+    unit = _well()
+    unit.vl53l1x.power_off()
+    unit.vl53l1x.power_on()
+    unit.lsm6ds3.power_off()
+    unit.lsm6ds3.power_on()
+    flags = _all_flags(unit.run(SECOND))
+    assert flags & (RANGE_RESTARTED | IMU_RESTARTED) == RANGE_RESTARTED | IMU_RESTARTED, flags
+    assert _all_flags(unit.run(SECOND)) == NEW
+
+
+def ranges_that_come_too_fast_wait_for_10_ms_to_pass():
+    unit = _well()
+    take = unit.unit._range_finder.step
+
+    def step(now):
+        take(now)
+        unit.unit._range_finder.new = True
+
+    unit.unit._range_finder.step = step
+    samples = unit.run(SECOND)
+    assert 90 <= len(samples) <= 100, len(samples)
+
+
+def a_dead_imu_does_not_stop_the_range_finder():
+    unit = _well()
+    unit.lsm6ds3.power_off()
+    unit.run(SECOND)
+    samples = unit.run(2 * SECOND)
+    assert 98 <= len(samples) <= 102
+    assert all(s["flags"] & IMU_ERROR and s["count"] == 0 and s["imu_age"] == 0xFFFFFFFF for s in samples)
+    assert sum(s["flags"] & NEW for s in samples) >= 94
+
+
+def an_imu_that_was_away_counts_what_is_missing():
+    unit = _well()
+    unit.lsm6ds3.power_off()
+    unit.run(2 * SECOND)
+    unit.lsm6ds3.power_on()
+    samples = unit.run(4 * SECOND)
+    assert _all_flags(samples) & IMU_LOST
+    for sample in samples:
+        if sample["count"]:
+            assert abs(sample["index"] - sample["time_us"] * 416e-6) < 60, sample
+
+
+def an_overrun_is_told_and_counted():
+    unit = _well()
+    before = unit.run(SECOND)[-1]
+    unit.now.advance(1_900_000)
+    after = unit.run(SECOND)
+    assert _all_flags(after) & IMU_LOST, "its FIFO holds less than 1.7 s"
+    elapsed = after[-1]["time_us"] - before["time_us"]
+    assert abs(after[-1]["index"] - before["index"] - elapsed * 416e-6) < 40
+
+
+def a_backlog_is_told_in_parts_with_its_age():
+    unit = _well()
+    unit.run(SECOND)
+    unit.now.advance(400_000)
+    samples = unit.run(SECOND)
+    assert samples[0]["count"] == 32
+    assert samples[0]["imu_age"] > 300_000
+    assert samples[-1]["count"] < 12
+    assert samples[-1]["imu_age"] < 5_000
+    assert not _all_flags(samples) & IMU_LOST
+
+
+def a_few_errors_on_the_bus_are_told_and_nothing_is_begun_anew():
+    unit = _well()
+    before = unit.errors.errors
+    unit.bus.fail_next(2)
+    samples = unit.run(SECOND)
+    flags = _all_flags(samples)
+    assert flags & (RANGE_ERROR | IMU_ERROR)
+    assert not flags & (RANGE_RESTARTED | IMU_RESTARTED)
+    assert samples[-1]["bus_errors"] - before == 2
+
+
+def a_stuck_bus_silences_both_and_samples_go_on():
+    unit = _well()
+    unit.bus.stuck = True
+    unit.run(SECOND)
+    samples = unit.run(SECOND)
+    assert 39 <= len(samples) <= 40, len(samples)
+    assert all(s["flags"] == RANGE_ERROR | IMU_ERROR | LATE for s in samples)
+    unit.bus.stuck = False
+    unit.run(6 * SECOND, pass_us=15_000)
+    assert _all_flags(unit.run(SECOND)) == NEW
+
+
+def attempts_on_what_is_dead_become_rare():
+    unit = _well()
+    unit.vl53l1x.power_off()
+    unit.run(20 * SECOND, pass_us=15_000)
+    before = unit.errors.errors
+    unit.run(20 * SECOND, pass_us=15_000)
+    assert 3 <= unit.errors.errors - before <= 5
+
+
+def bus_errors_stay_at_65535():
+    unit = _well()
+    unit.errors.errors = 65534
+    unit.bus.fail_next(5)
+    assert unit.run(SECOND)[-1]["bus_errors"] == 65535
+
+
+def after_a_late_pass_nothing_is_made_up_for():
+    unit = _well()
+    before = unit.run(SECOND)
+    unit.now.advance(123_000)
+    after = unit.run(SECOND)
+    assert 49 <= len(after) <= 51, len(after)
+    assert min(_gaps(after)) >= 9_000, _gaps(after)
+    assert after[0]["sequence"] == before[-1]["sequence"] + 1
+
+
+def all_goes_on_over_the_wrap_of_the_ticks():
+    unit = _well((1 << 30) - 2 * SECOND)
+    samples = unit.run(4 * SECOND)
+    assert 199 <= len(samples) <= 201
+    assert _all_flags(samples) == NEW
+    assert min(steps([s["time_us"] for s in samples])) > 0
+
+
+def a_silent_receiver_gets_hellos_and_the_next_session_fresh_samples():
+    unit = _well()
+    unit._next_beacon = unit.now.now_us + 3 * SECOND
+    unit.run(3 * SECOND)
+    assert len(unit.receiver.hellos) > 5
+    unit.receiver.session = None
+    samples = unit.run(SECOND)
+    assert samples[0]["sequence"] == 1
+    assert samples[-1]["imu_age"] < 5_000
+    assert not _all_flags(samples) & IMU_LOST

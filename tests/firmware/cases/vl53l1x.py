@@ -1,0 +1,321 @@
+"""The driver of the range finder on a fake one. Runs in both interpreters."""
+
+from fake_bus import Bus, Clock, Refused
+from fake_vl53l1x import FakeVl53l1x
+from vl53l1x import LONG, SHORT, VL53L1X
+
+
+def _made(**faults):
+    clock = Clock()
+    bus = Bus(clock)
+    device = FakeVl53l1x(clock, **faults)
+    bus.add(device)
+    clock.advance(10_000)
+    return clock, bus, device, VL53L1X(bus, sleep_ms=clock.sleep_ms)
+
+
+def _readings(clock, sensor, seconds, poll_us=2_000):
+    """Poll; return (time, stream) of each reading."""
+    found = []
+    end = clock.now_us + int(seconds * 1e6)
+    while clock.now_us < end:
+        if sensor.ready():
+            sensor.read()
+            found.append((clock.now_us, sensor.stream))
+        clock.advance(poll_us)
+    return found
+
+
+def _error(action, *arguments, kind=OSError):
+    try:
+        action(*arguments)
+    except kind as error:
+        return error.args[0]
+    raise AssertionError("no error")
+
+
+def it_ranges_at_fifty_hertz_started_once():
+    clock, _, device, sensor = _made()
+    sensor.begin()
+    before = device.measured
+    starts = device.starts
+    found = _readings(clock, sensor, 10)
+    rate = (len(found) - 1) * 1e6 / (found[-1][0] - found[0][0])
+    assert 49 < rate < 51, rate
+    assert device.starts == starts
+    assert len(found) == device.measured - before
+
+
+def no_start_is_missed_whatever_its_clocks_are_off_by():
+    for slow in (0.97, 1.03):
+        for fast in (0.95, 1.05):
+            clock, _, _, sensor = _made(slow=slow, fast=fast)
+            sensor.begin()
+            found = _readings(clock, sensor, 1)
+            gaps = [found[i + 1][0] - found[i][0] for i in range(len(found) - 1)]
+            assert max(gaps) < 24_000, (slow, fast, max(gaps))
+
+
+def a_budget_of_20_ms_in_a_period_of_20_ms_would_halve_the_rate():
+    clock, _, device, sensor = _made()
+    assert "a period of 20 ms" in _error(sensor.begin, SHORT, 20, 20, kind=ValueError)
+    sensor.begin(SHORT, 20, 24)
+    sensor.stop()
+    counts = int.from_bytes(device.read(0x6C, 4), "big") * 20 // 24
+    device.write(0x6C, counts.to_bytes(4, "big"))
+    device.write(0x87, b"\x40")
+    found = _readings(clock, sensor, 2)
+    assert 45 < len(found) < 52, len(found)
+
+
+def every_budget_is_kept_in_both_modes():
+    for mode in (SHORT, LONG):
+        for budget in (15, 20, 33, 50, 100, 200, 500):
+            clock, _, device, sensor = _made()
+            if mode == LONG and budget == 15:
+                assert "15 ms in short mode" in _error(sensor.begin, mode, budget, 40, kind=ValueError)
+                continue
+            sensor.begin(mode, budget, budget + 10)
+            assert 0.75 * budget < device.duration_us() / 1000 <= budget, (mode, budget, device.duration_us())
+            assert sensor.budget_us == 1000 * budget
+            found = _readings(clock, sensor, 0.021 * (budget + 10))
+            assert 18 <= len(found) <= 22, (mode, budget, len(found))
+
+
+def an_unknown_budget_is_an_error():
+    for budget in (0, 10, 21, 1000):
+        _, _, _, sensor = _made()
+        assert "budgets are" in _error(sensor.begin, SHORT, budget, 2000, kind=ValueError)
+
+
+def a_reading_has_the_values_of_the_registers():
+    clock, _, device, sensor = _made()
+    device.target = lambda us: (9, 1234, 0x0123, 0x4567, 0x0089, 0xABCD)
+    sensor.begin()
+    clock.advance(20_000)
+    assert sensor.status == 255
+    sensor.read()
+    assert (sensor.status, sensor.stream, sensor.mm) == (0, 0, 1234)
+    assert (sensor.sigma, sensor.signal, sensor.ambient, sensor.spads) == (0x0123, 0x4567, 0x0089, 0xABCD)
+
+
+def every_status_of_the_device_is_translated():
+    expected = {1: 5, 2: 5, 3: 5, 4: 2, 5: 4, 6: 1, 7: 7, 8: 3, 9: 0, 12: 9, 13: 13, 18: 10, 19: 6, 22: 11}
+    clock, _, device, sensor = _made()
+    sensor.begin()
+    for code in range(1, 32):
+        device.target = lambda us, code=code: (code, 500, 10, 3000, 100, 10240)
+        clock.advance(25_000)
+        sensor.read()
+        assert sensor.status == expected.get(code, 14), (code, sensor.status)
+
+
+def the_stream_counts_to_255_and_on_from_128():
+    clock, _, _, sensor = _made()
+    sensor.begin()
+    streams = [stream for _, stream in _readings(clock, sensor, 8)]
+    assert streams[:256] == list(range(256))
+    assert streams[256:384] == list(range(128, 256))
+
+
+def it_is_ready_once_for_each_measurement():
+    clock, _, _, sensor = _made()
+    sensor.begin()
+    assert not sensor.ready()
+    clock.advance(16_000)
+    assert sensor.ready()
+    assert sensor.ready()
+    sensor.read()
+    assert not sensor.ready()
+
+
+def a_reader_that_was_away_gets_the_newest():
+    clock, _, device, sensor = _made()
+    sensor.begin()
+    device.target = lambda us: (9, us // 1000, 10, 3000, 100, 10240)
+    clock.advance(110_000)
+    assert sensor.ready()
+    sensor.read()
+    assert sensor.stream >= 4
+    assert sensor.mm == device.middle_us // 1000
+    assert not sensor.ready()
+
+
+def the_middle_of_a_measurement_is_half_a_budget_before_it_is_ready():
+    clock, _, device, sensor = _made()
+    sensor.begin()
+    _readings(clock, sensor, 0.1)
+    while not sensor.ready():
+        clock.advance(100)
+    assert abs(clock.now_us - sensor.budget_us // 2 - device.middle_us) < 500
+
+
+def another_chip_is_an_error():
+    _, _, _, sensor = _made(model=0xEEAA)
+    assert _error(sensor.begin) == 19
+
+
+def no_device_is_an_error():
+    _, _, device, sensor = _made()
+    device.power_off()
+    assert _error(sensor.begin) == 19
+
+
+def a_bus_held_down_is_an_error():
+    _, bus, _, sensor = _made()
+    sensor.begin()
+    bus.stuck = True
+    assert _error(sensor.ready) == 110
+    assert _error(sensor.read) == 110
+    bus.stuck = False
+    sensor.ready()
+
+
+def a_failed_transfer_is_told_and_does_no_harm():
+    clock, bus, _, sensor = _made()
+    sensor.begin()
+    clock.advance(20_000)
+    bus.fail_next(1)
+    assert _error(sensor.ready) == 19
+    bus.fail_next(1)
+    assert _error(sensor.read) == 19
+    assert sensor.status == 255
+    sensor.read()
+    assert sensor.status == 0
+
+
+def a_bus_that_fails_for_a_time_comes_back():
+    clock, bus, _, sensor = _made()
+    sensor.begin()
+    bus.fail_for(30_000)
+    assert _error(sensor.ready) == 19
+    clock.advance(20_000)
+    assert _error(sensor.read) == 19
+    clock.advance(20_000)
+    sensor.read()
+    assert sensor.status == 0
+
+
+def a_transfer_that_breaks_off_does_no_harm():
+    clock, bus, _, sensor = _made()
+    sensor.begin()
+    _readings(clock, sensor, 0.1)
+    clock.advance(20_000)
+    before = sensor.stream
+    bus.break_next(1)
+    assert _error(sensor.read) == 110
+    assert sensor.stream == before
+    found = _readings(clock, sensor, 0.5)
+    assert [stream for _, stream in found] == list(range(found[0][1], found[0][1] + len(found)))
+
+
+def a_failure_anywhere_in_its_set_up_is_told_and_the_next_try_works():
+    _, bus, _, sensor = _made()
+    sensor.begin()
+    survived = []
+    for at in range(bus.transfers):
+        clock, bus, _, sensor = _made()
+        _fail_at(bus, at)
+        try:
+            sensor.begin()
+            survived.append(at)
+        except OSError:
+            sensor.begin()
+        clock.advance(20_000)
+        assert sensor.ready(), at
+    assert survived == [2, 3], survived  # whether it has booted is asked again
+
+
+def _fail_at(bus, at):
+    transfer = bus._transfer
+
+    def failing(*arguments):
+        if bus.transfers == at:
+            bus.transfers += 1
+            raise OSError(19)
+        return transfer(*arguments)
+
+    bus._transfer = failing
+
+
+def a_register_that_does_not_keep_its_value_is_an_error():
+    _, _, device, sensor = _made()
+    write = device._write_one
+    device._write_one = lambda at, value: write(at, 1 if at == 0x6F else value)
+    assert _error(sensor.begin) == 5
+
+
+def a_device_that_never_measures_is_an_error():
+    _, _, device, sensor = _made()
+    device._measure = lambda: None
+    assert _error(sensor.begin) == 110
+
+
+def a_device_that_never_boots_is_an_error():
+    clock, _, device, sensor = _made()
+    device.read = lambda register, count: bytearray(count)
+    assert _error(sensor.begin) == 110
+    assert clock.now_us < 100_000
+
+
+def lost_power_never_reads_as_a_range():
+    clock, _, device, sensor = _made()
+    sensor.begin()
+    _readings(clock, sensor, 0.1)
+    device.power_off()
+    assert _error(sensor.ready) == 19
+    clock.advance(50_000)
+    device.power_on()
+    clock.advance(50_000)
+    assert _error(sensor.read) == 5
+    sensor.begin()
+    assert len(_readings(clock, sensor, 0.5)) > 23
+
+
+def a_sensor_found_ranging_is_set_up_anew():
+    clock, bus, _, sensor = _made()
+    sensor.begin()
+    clock.advance(123_456)
+    again = VL53L1X(bus, sleep_ms=clock.sleep_ms)
+    again.begin()
+    found = _readings(clock, again, 1)
+    assert len(found) > 48
+    assert found[0][1] == 0
+
+
+def it_stops_and_recalibrates():
+    clock, _, device, sensor = _made()
+    sensor.begin()
+    sensor.recalibrate()
+    assert bytes(device.read(8, 1)) + bytes(device.read(0x0B, 1)) == b"\x09\x00"
+    assert len(_readings(clock, sensor, 0.5)) > 23
+    sensor.stop()
+    measured = device.measured
+    clock.advance(1_000_000)
+    assert not sensor.ready()
+    assert device.measured == measured
+
+
+def limits_are_in_their_registers():
+    clock, _, device, sensor = _made()
+    sensor.begin()
+    sensor.set_limits(15, 1024)
+    assert bytes(device.read(0x64, 4)) == b"\x00\x3c\x00\x83"
+    assert len(_readings(clock, sensor, 0.5)) > 23
+    assert "limits are" in _error(sensor.set_limits, 0, 1024, kind=ValueError)
+    assert "limits are" in _error(sensor.set_limits, 15, 600_000, kind=ValueError)
+
+
+def the_fake_refuses_what_the_device_would_not_take():
+    _, bus, device, sensor = _made()
+    for action in (
+        lambda: bus.readfrom_mem(0x29, 0x89, 17),
+        lambda: bus.readfrom_mem(0x29, 0x200, 1, addrsize=16),
+        lambda: bus.writeto_mem(0x29, 0x89, b"\x00", addrsize=16),
+        lambda: bus.writeto_mem(0x29, 0x87, b"\x40", addrsize=16),
+    ):
+        assert _error(action, kind=Refused)
+    sensor.begin()
+    assert _error(device.write, 0x5E, b"\x00", kind=Refused)
+    sensor.stop()
+    device.write(0x5E, b"\x00")

@@ -1,0 +1,123 @@
+"""A clock that tests advance, and an I2C bus with fake devices on it, as `machine.I2C` shows them.
+
+    clock = Clock()
+    bus = Bus(clock)
+    bus.add(FakeVl53l1x(clock))
+    clock.advance(20_000)
+
+A device has `addresses` it answers to, `address_bits` of its registers (8 or 16), `answers()`, `read(register, count)`
+and `write(register, data)`. What a real device would take without a word and do wrong, a fake refuses: `Refused`, which
+is no OSError, so that no driver can swallow it.
+"""
+
+NO_ANSWER = 19
+"""ENODEV: what MicroPython raises where nobody acknowledges."""
+TIMED_OUT = 110
+"""ETIMEDOUT: what it raises where the bus is held down."""
+
+
+class Refused(Exception):
+    """A driver did what the data sheet forbids."""
+
+
+class Clock:
+    """Time since the start of the test."""
+
+    PERIOD = 1 << 30
+
+    def __init__(self, start_us=0):
+        self.now_us = start_us
+
+    def advance(self, us):
+        self.now_us += us
+
+    def sleep_ms(self, ms):
+        """In place of `time.sleep_ms`."""
+        self.now_us += 1000 * ms
+
+    def ticks_us(self):
+        """In place of `time.ticks_us`; wraps as on the ESP8266."""
+        return self.now_us % self.PERIOD
+
+    def ticks_add(self, ticks, delta):
+        return (ticks + delta) % self.PERIOD
+
+    def ticks_diff(self, end, start):
+        """In place of `time.ticks_diff`."""
+        return (end - start + self.PERIOD // 2) % self.PERIOD - self.PERIOD // 2
+
+
+class Bus:
+    """The bus. Each transfer takes its time; faults are there on demand."""
+
+    def __init__(self, clock, us_per_byte=25):
+        """A byte takes 9 bits: 22.5 us at 400 kHz."""
+        self.clock = clock
+        self.us_per_byte = us_per_byte
+        self.transfers = self.bytes = self.failed = 0
+        self.stuck = False
+        self._devices = []
+        self._fail_next, self._fail_until, self._errno = 0, -1, NO_ANSWER
+        self._break_next = 0
+
+    def add(self, device):
+        self._devices.append(device)
+
+    def fail_next(self, count, errno=NO_ANSWER):
+        """Let so many transfers fail."""
+        self._fail_next, self._errno = count, errno
+
+    def fail_for(self, us, errno=NO_ANSWER):
+        """Let all transfers fail for a time."""
+        self._fail_until, self._errno = self.clock.now_us + us, errno
+
+    def break_next(self, count):
+        """Let so many transfers fail at their end: the device has done its part, the driver gets nothing."""
+        self._break_next = count
+
+    def scan(self):
+        return sorted(a for device in self._devices if device.answers() for a in device.addresses)
+
+    def readfrom_mem(self, address, register, count, *, addrsize=8):
+        buffer = bytearray(count)
+        self.readfrom_mem_into(address, register, buffer, addrsize=addrsize)
+        return bytes(buffer)
+
+    def readfrom_mem_into(self, address, register, buffer, *, addrsize=8):
+        device = self._transfer(address, register, len(buffer), addrsize)
+        data = device.read(register, len(buffer))
+        self._break_off()
+        for i in range(len(buffer)):
+            buffer[i] = data[i]
+
+    def writeto_mem(self, address, register, data, *, addrsize=8):
+        self._transfer(address, register, len(data), addrsize).write(register, bytes(data))
+        self._break_off()
+
+    def _break_off(self):
+        if self._break_next:
+            self._break_next -= 1
+            raise self._failure(TIMED_OUT)
+
+    def _transfer(self, address, register, count, addrsize):
+        self.transfers += 1
+        if self.stuck:
+            raise self._failure(TIMED_OUT)
+        self.clock.advance(self.us_per_byte)
+        if self._fail_next or self.clock.now_us < self._fail_until:
+            self._fail_next = max(self._fail_next - 1, 0)
+            raise self._failure(self._errno)
+        for device in self._devices:
+            if address in device.addresses and device.answers():
+                if addrsize != device.address_bits:
+                    raise Refused(f"registers of 0x{address:02x} have {device.address_bits} bits")
+                if count == 0 or not 0 <= register < 1 << addrsize:
+                    raise Refused(f"register 0x{register:x}, {count} bytes")
+                self.bytes += count
+                self.clock.advance(self.us_per_byte * (count + 2))
+                return device
+        raise self._failure(NO_ANSWER)
+
+    def _failure(self, errno):
+        self.failed += 1
+        return OSError(errno)

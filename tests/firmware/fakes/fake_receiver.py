@@ -1,0 +1,106 @@
+"""Time for `clock.Clock`, and a receiver at the other end of a unit's port that has a network of any mood between."""
+
+import struct
+
+from wire import BEACON_SIZE, Mac, session_mac
+
+PERIOD = 1 << 30
+SAMPLE = "<2sBBHHIQIIHhHBBHIHHHHBBHII"
+FIELDS = (
+    "magic", "version", "kind", "unit", "flags", "sequence", "time_us", "beacon", "hold", "battery", "temperature",
+    "bus_errors", "stream", "status", "mm", "age", "sigma", "signal", "ambient", "spads", "count", "scale", "rate",
+    "index", "imu_age",
+)  # fmt: skip
+
+
+class FakeTime:
+    """In place of the module `time`, by a clock of fake_bus."""
+
+    def __init__(self, clock):
+        self.ticks_us = clock.ticks_us
+
+    @staticmethod
+    def ticks_add(ticks, delta):
+        return (ticks + delta) % PERIOD
+
+    @staticmethod
+    def ticks_diff(end, start):
+        return (end - start + PERIOD // 2) % PERIOD - PERIOD // 2
+
+
+def steps(values):
+    """Differences of neighbours."""
+    return [values[i + 1] - values[i] for i in range(len(values) - 1)]
+
+
+class Draw:
+    """Random bytes that can be told apart: 0, 1, 2 ... in place of the hardware's."""
+
+    def __init__(self):
+        self.drawn = 0
+
+    def __call__(self, size):
+        self.drawn += 1
+        return bytes([self.drawn & 0xFF] * size)
+
+
+class FakeReceiver:
+    """The port of one unit and the receiver behind it. It keeps the hellos and the samples (dictionaries) it gets."""
+
+    def __init__(self, unit, key):
+        self.unit = unit
+        self.mac = Mac(key)
+        self.inbox = []
+        self.hellos = []
+        self.samples = []
+        self.session = None
+        self.number = 0
+
+    def send(self, datagram):
+        datagram = bytes(datagram)
+        (self._hello if datagram[3] == 1 else self._sample)(datagram)
+
+    def receive(self, buffer):
+        if not self.inbox:
+            return 0
+        datagram = self.inbox.pop(0)[: len(buffer)]
+        buffer[: len(datagram)] = datagram
+        return len(datagram)
+
+    @property
+    def challenge(self):
+        return self.hellos[-1][3]
+
+    def beacon(self, number, nonce, challenge, unit=None):
+        body = struct.pack("<2sBBHHI8s", b"PT", 1, 2, unit or self.unit, 0, number, nonce)
+        datagram = body + self.mac.whole(b"PT1BEACN", challenge, body)[:16]
+        assert len(datagram) == BEACON_SIZE
+        return datagram
+
+    def open(self, nonce=b"nonce..1"):
+        """Answer the last hello."""
+        self.nonce, self.number = nonce, 0
+        self.session = session_mac(self.mac, self.challenge, nonce)
+        self._of = self.challenge
+        self.go_on()
+
+    def go_on(self):
+        """Send the next beacon of the session."""
+        self.number += 1
+        self.inbox.append(self.beacon(self.number, self.nonce, self._of))
+
+    def _hello(self, datagram):
+        _, version, _, unit, firmware, reset, zero, challenge, uptime = struct.unpack("<2sBBHHBB8sQ", datagram[:-16])
+        assert (version, unit, zero) == (1, self.unit, 0)
+        assert datagram[-16:] == self.mac.whole(b"PT1HELLO", datagram[:-16])[:16]
+        self.hellos.append((firmware, reset, uptime, challenge))
+
+    def _sample(self, datagram):
+        body = datagram[:-16]
+        assert self.session, "a sample without a session"
+        assert datagram[-16:] == self.session.whole(body)[:16], "a sample of another session"
+        values = struct.unpack_from(SAMPLE, body)
+        sample = {FIELDS[i]: values[i] for i in range(len(FIELDS))}
+        sample["imu"] = body[struct.calcsize(SAMPLE) :]
+        assert len(sample["imu"]) == 12 * sample["count"]
+        self.samples.append(sample)

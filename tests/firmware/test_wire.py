@@ -1,0 +1,100 @@
+"""The unit's datagrams against the receiver's own code."""
+
+import dataclasses
+import json
+
+import numpy as np
+
+from pretouch.hardware import wire
+from tests.firmware.harness import Run
+
+KEY, CHALLENGE, NONCE = bytes(range(32)), b"challeng", b"nonce678"
+SESSION = wire.session_mac(wire.Mac(KEY), CHALLENGE, NONCE)
+START = f"""
+import json, wire
+from binascii import hexlify, unhexlify
+mac = wire.Mac({KEY!r})
+session = wire.session_mac(mac, {CHALLENGE!r}, {NONCE!r})
+"""
+SAY_SAMPLES = """
+for fields in json.load(open(FILE)):
+    sample = wire.Sample(fields["unit"])
+    for name in fields:
+        if name not in ("unit", "imu"):
+            setattr(sample, name, fields[name])
+    imu = unhexlify(fields["imu"])
+    sample.imu[:len(imu)] = imu
+    print(hexlify(sample.seal(session)).decode())
+"""
+OPEN_BEACONS = f"""
+for line in open(FILE):
+    print(wire.open_beacon(unhexlify(line.strip()), 7, {CHALLENGE!r}, mac))
+"""
+
+
+def in_unit(run: Run, content: str, script: str) -> list[str]:
+    start = f"{START}\nimport sys\nFILE = sys.path[0].rstrip('/') + '/given'\n"
+    return run({"given": content}, start + script)
+
+
+def samples() -> list[wire.Sample]:
+    """Samples with random fields and with all fields at their least and most."""
+    rng = np.random.default_rng(6)
+    limits = {"H": (0, 2**16 - 1), "I": (0, 2**32 - 1), "Q": (0, 2**63 - 1), "B": (0, 255), "h": (-(2**15), 2**15 - 1)}
+    bounds = [limits[code] for code in wire.SAMPLE.format[1:]]
+    rows = [[low for low, _ in bounds], [high for _, high in bounds]]
+    rows += [[int(rng.integers(low, high, endpoint=True)) for low, high in bounds] for _ in range(20)]
+    made = []
+    for row in rows:
+        sample = wire.Sample(int(rng.integers(1, 65536)), *row)
+        sample.imu_count = int(rng.integers(0, wire.IMU_MOST + 1))
+        sample.imu = rng.bytes(sample.imu_count * wire.IMU_SAMPLE.size)
+        made.append(sample)
+    return made
+
+
+def test_samples_are_the_bytes_the_receiver_encodes(unit_python: Run) -> None:
+    made = samples()
+    content = json.dumps([dataclasses.asdict(sample) | {"imu": sample.imu.hex()} for sample in made])
+    said = [bytes.fromhex(line) for line in in_unit(unit_python, content, SAY_SAMPLES)]
+    assert said == [sample.encode(SESSION) for sample in made]
+    assert [wire.decode_sample(datagram, SESSION) for datagram in said] == made
+
+
+def test_a_hello_is_what_the_receiver_decodes(unit_python: Run) -> None:
+    script = f"print(hexlify(wire.hello(7, 0x0102, 3, {CHALLENGE!r}, 1 << 40, mac)).decode())"
+    (line,) = in_unit(unit_python, "", script)
+    hello = wire.Hello(unit=7, firmware=0x0102, reset=wire.Reset.WATCHDOG, challenge=CHALLENGE, uptime_us=1 << 40)
+    assert bytes.fromhex(line) == hello.encode(wire.Mac(KEY))
+    assert wire.decode_hello(bytes.fromhex(line), wire.Mac(KEY)) == hello
+
+
+def test_a_beacon_opens_only_whole_for_its_unit_challenge_and_key(unit_python: Run) -> None:
+    beacon = wire.Beacon(unit=7, number=0xF1234567, nonce=NONCE)
+    good = beacon.encode(wire.Mac(KEY), CHALLENGE)
+    bad = [bytes(b ^ (1 << bit % 8) * (at == bit // 8) for at, b in enumerate(good)) for bit in range(8 * len(good))]
+    bad += [good[:size] for size in range(1, len(good))] + [good + b"\0"]
+    bad += [dataclasses.replace(beacon, unit=8).encode(wire.Mac(KEY), CHALLENGE)]
+    bad += [beacon.encode(wire.Mac(KEY), b"another1"), beacon.encode(wire.Mac(bytes(32)), CHALLENGE)]
+    lines = in_unit(unit_python, "\n".join(each.hex() for each in [good, *bad]), OPEN_BEACONS)
+    assert lines == [str((0xF1234567, NONCE))] + ["None"] * len(bad)
+
+
+def test_keys_of_any_length_up_to_a_block_make_the_same_mac(unit_python: Run) -> None:
+    keys = [bytes(range(200, 200 - length, -1)) for length in (1, 31, 32, 63, 64)]
+    script = f"for key in {keys!r}: print(hexlify(wire.Mac(key).whole(b'one', b'', b'two')).decode())"
+    assert in_unit(unit_python, "", script) == [wire.Mac(key).whole(b"onetwo").hex() for key in keys]
+
+
+def test_bytes_of_version_1_stay_as_they_are(unit_python: Run) -> None:
+    (line,) = in_unit(unit_python, "", "print(hexlify(wire.Sample(7).seal(session)).decode())")
+    assert line == (
+        "505401030700"
+        + "00" * 24
+        + "0080"
+        + "0000"
+        + "00ff0000ffffffff"
+        + "00" * 16
+        + "ffffffff"
+        + "4275fe96ca4f2d30cf0af69bdf050af6"
+    )
