@@ -1,0 +1,234 @@
+"""How well a sensor unit does: numbers from what was heard of it in the last seconds."""
+
+import math
+from collections import Counter, deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+
+from pretouch.hardware.traffic import Received, UnitState, UnitTraffic
+from pretouch.hardware.wire import NO_TEMPERATURE, Flag, Reset, Sample
+from pretouch.types import FloatArray, RangeStatus
+
+_MAD_TO_SIGMA = 1.4826
+"""Standard deviation over median absolute deviation, of a normal distribution."""
+_NEW, _LATE = int(Flag.RANGE_NEW), int(Flag.RANGE_LATE)
+_RESTARTED = int(Flag.RANGE_RESTARTED | Flag.IMU_RESTARTED)
+_BUS_ERROR = int(Flag.RANGE_BUS_ERROR | Flag.IMU_BUS_ERROR)
+_OK = int(RangeStatus.OK)
+_FEW = 5
+"""Fewer readings than this tell no noise."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What a receiver has counted of a unit since it began."""
+
+    accepted: int = 0
+    lost: int = 0
+    reboots: int = 0
+    clock_jumps: int = 0
+
+    @classmethod
+    def of(cls, traffic: UnitTraffic) -> Self:
+        """Return what is counted by now."""
+        return cls(*(getattr(traffic, f.name) for f in fields(cls)))
+
+    def since(self, before: "Counts") -> "Counts":
+        """Return what was counted after an earlier count."""
+        return Counts(*(getattr(self, f.name) - getattr(before, f.name) for f in fields(self)))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What a receiver knows of a unit at an instant."""
+
+    state: UnitState = "never heard"
+    last_arrival: float = -math.inf
+    """When its last sample came [s]."""
+    bound: float = math.inf
+    """Most its clock can be off by [s], infinite while it is not known."""
+    stuck: bool = False
+    """Whether its readings repeat to the last digit."""
+    firmware: int = 0
+    """Major version * 256 + minor version, 0 before it has said."""
+    reset: int = Reset.UNKNOWN
+    """Why it last began anew: a `Reset`."""
+
+    @classmethod
+    def of(cls, traffic: UnitTraffic) -> Self:
+        """Return what is known by now."""
+        return cls(*(getattr(traffic, f.name) for f in fields(cls)))
+
+
+@dataclass(frozen=True)
+class UnitHealth:
+    """One unit over the last seconds. NaN where something is not known."""
+
+    unit: str
+    standing: Standing
+    heard_s: float
+    """Time within the window since its first sample [s]."""
+    silent_s: float
+    """Time since its last sample [s], infinite before the first."""
+    rate_hz: float
+    """Fresh readings a second [Hz]."""
+    loss: float
+    """Share of its samples that were lost on their way."""
+    latency_s: float
+    """Median time from the measurement to its arrival, at most [s]."""
+    latency_late_s: float
+    """The time that one in twenty of these is over [s]."""
+    latency_worst_s: float
+    """Largest of these [s]."""
+    age_s: float
+    """Age of the newest reading, at most [s]."""
+    distance_m: float
+    """Newest reading [m], whatever its status."""
+    status: int
+    """`RangeStatus` of it."""
+    sigma_m: float
+    """Median standard deviation by the sensor's own estimate, of good readings [m]."""
+    noise_m: float
+    """Scatter of successive good readings; a steady motion drops out of it [m]."""
+    statuses: dict[str, int]
+    """Fresh readings by status."""
+    battery_v: float
+    """[V]"""
+    temperature_c: float
+    """[degrees C]"""
+    bus_errors: int
+    """Failed transfers on its bus within the window."""
+    restarts: int
+    """How often it initialised a sensor anew within the window."""
+    range_late: int
+    """Samples that said the range finder was late."""
+    imu_rate_hz: float
+    """IMU samples a second by its own count [Hz]."""
+    imu_loss: float
+    """Share of them that its FIFO lost."""
+    reboots: int
+    """Within the window."""
+    clock_jumps: int
+    """Within the window."""
+
+
+class UnitWindow:
+    """What was heard of one unit within the last seconds."""
+
+    def __init__(self, unit: str, length: float) -> None:
+        """Take the unit's name and the window's length [s]."""
+        self.unit, self._length = unit, length
+        self._heard: deque[Received] = deque()
+        self._counts: deque[tuple[float, Counts]] = deque()
+
+    def take(self, now: float, heard: Iterable[Received], traffic: UnitTraffic) -> None:
+        """Take in what was heard since the last time, and what the receiver has counted by now [s]."""
+        self._heard.extend(heard)
+        self._counts.append((now, Counts.of(traffic)))
+        while self._heard and self._heard[0].arrival <= now - self._length:
+            self._heard.popleft()
+        while len(self._counts) > 1 and self._counts[1][0] <= now - self._length:
+            self._counts.popleft()
+
+    def health(self, now: float, traffic: UnitTraffic) -> UnitHealth:
+        """Return how the unit is at an instant [s]."""
+        counted = self._counts[-1][1].since(self._counts[0][1]) if self._counts else Counts()
+        return unit_health(self.unit, list(self._heard), now, Standing.of(traffic), counted)
+
+
+def unit_health(
+    unit: str, heard: Sequence[Received], now: float, standing: Standing, counted: Counts = Counts()
+) -> UnitHealth:
+    """Make numbers of what was heard.
+
+    Args:
+        unit: its name.
+        heard: its samples within the window, as they came.
+        now: instant [s].
+        standing: what the receiver knows of it.
+        counted: what the receiver counted within the window.
+    """
+    fresh = [h for h in heard if h.sample.flags & _NEW]
+    good = np.array([h.sample.range_mm / 1000 if h.sample.range_status == _OK else np.nan for h in fresh])
+    ages = np.array([h.arrival - h.stamp for h in fresh if math.isfinite(h.stamp)])
+    sigmas = [h.sample.range_sigma / 4000 for h in fresh if h.sample.range_status == _OK]
+    heard_s = now - heard[0].arrival if heard else 0.0
+    boot = _since_reboot([h.sample for h in heard])
+    last = boot[-1] if boot else None
+    newest = fresh[-1] if fresh else None
+    imu_rate_hz, imu_loss = _imu(boot)
+    sent = counted.accepted + counted.lost
+    flags = [s.flags for s in boot]
+    return UnitHealth(
+        unit=unit,
+        standing=standing,
+        heard_s=heard_s,
+        silent_s=now - standing.last_arrival,
+        rate_hz=len(fresh) / heard_s if heard_s > 0 else math.nan,
+        loss=counted.lost / sent if sent else math.nan,
+        latency_s=float(np.median(ages)) if len(ages) else math.nan,
+        latency_late_s=float(np.percentile(ages, 95)) if len(ages) else math.nan,
+        latency_worst_s=float(ages.max()) if len(ages) else math.nan,
+        age_s=now - newest.stamp if newest and math.isfinite(newest.stamp) else math.nan,
+        distance_m=newest.sample.range_mm / 1000 if newest else math.nan,
+        status=newest.sample.range_status if newest else RangeStatus.NONE,
+        sigma_m=float(np.median(sigmas)) if sigmas else math.nan,
+        noise_m=_noise(good),
+        statuses={status_name(s): count for s, count in Counter(h.sample.range_status for h in fresh).items()},
+        battery_v=last.battery_mv / 1000 if last and last.battery_mv else math.nan,
+        temperature_c=last.temperature_cdeg / 100 if last and last.temperature_cdeg != NO_TEMPERATURE else math.nan,
+        # its count ends at 65535, its flags do not
+        bus_errors=max(last.bus_errors - boot[0].bus_errors, sum(bool(f & _BUS_ERROR) for f in flags)) if last else 0,
+        restarts=sum(bool(f & _RESTARTED) for f in flags),
+        range_late=sum(bool(f & _LATE) for f in flags),
+        imu_rate_hz=imu_rate_hz,
+        imu_loss=imu_loss,
+        reboots=counted.reboots,
+        clock_jumps=counted.clock_jumps,
+    )
+
+
+def status_name(code: int) -> str:
+    """Return the name of a `RangeStatus`, or the number of one there is not."""
+    return RangeStatus(code).name if code in RangeStatus._value2member_map_ else str(code)
+
+
+def _since_reboot(samples: Sequence[Sample]) -> list[Sample]:
+    """Return the samples after the last one that began a count anew, by the unit's clock."""
+    begin = 0
+    for i in range(1, len(samples)):
+        # out of step by a second or more is no mere reordering
+        if samples[i].time_us < samples[i - 1].time_us - 1_000_000:
+            begin = i
+    return sorted(samples[begin:], key=lambda s: s.time_us)
+
+
+def _imu(samples: Sequence[Sample]) -> tuple[float, float]:
+    """Return rate [Hz] and loss of the IMU samples in datagrams of one boot, by time."""
+    full = [s for s in samples if s.imu_count]
+    if len(full) < _FEW:
+        return (0.0 if len(samples) >= _FEW else math.nan), math.nan
+    first, last = full[0], full[-1]
+    elapsed = (last.time_us - last.imu_age_us - first.time_us + first.imu_age_us) / 1e6
+    counted = last.imu_index + last.imu_count - first.imu_index - first.imu_count
+    missing = sum(
+        b.imu_index - a.imu_index - a.imu_count for a, b in pairwise(full)
+        if b.sequence == a.sequence + 1
+    )  # fmt: skip
+    if elapsed <= 0 or counted <= 0:
+        return math.nan, math.nan
+    return counted / elapsed, max(0, missing) / counted
+
+
+def _noise(distance: FloatArray) -> float:
+    """Noise [m] of successive distances (R,), NaN where there is none."""
+    bend = np.diff(distance, n=2)
+    bend = bend[np.isfinite(bend)]
+    if len(bend) < _FEW:
+        return math.nan
+    # the second difference of independent errors has 1 + 4 + 1 times their variance
+    return float(_MAD_TO_SIGMA * np.median(np.abs(bend - np.median(bend))) / math.sqrt(6.0))

@@ -1,0 +1,133 @@
+"""The keys of sensor units: one random key of 32 bytes each, in a file that only its owner can read."""
+
+import os
+import secrets
+import stat
+import tempfile
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import tomli_w
+
+from pretouch.errors import HardwareError
+from pretouch.hardware.wire import KEY_SIZE
+
+_LAST_NUMBER = 0xFFFF
+
+
+@dataclass(frozen=True)
+class UnitKey:
+    """Name, number and key of one sensor unit; what cannot be one is a HardwareError."""
+
+    id: str
+    """Its name in the skin."""
+    number: int
+    """Its number in datagrams, 1 to 65535."""
+    key: bytes
+    """32 random bytes that only the unit and its receiver know."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.id, str) or not self.id:
+            raise HardwareError(f"The name of a unit is {self.id!r}: give it one, as it stands in the skin.")
+        if type(self.number) is not int or not 1 <= self.number <= _LAST_NUMBER:
+            raise HardwareError(f"The number of unit {self.id} is {self.number!r}: choose 1 to {_LAST_NUMBER}.")
+        if not isinstance(self.key, bytes) or len(self.key) != KEY_SIZE:
+            size = f"{len(self.key)} bytes" if isinstance(self.key, bytes) else f"of type {type(self.key).__name__}"
+            raise HardwareError(f"The key of unit {self.id} is {size}, not {KEY_SIZE} bytes: make one with new_key().")
+
+    def __repr__(self) -> str:
+        """Without the key: it must not get into logs."""
+        return f"UnitKey(id={self.id!r}, number={self.number})"
+
+
+class Keys(Mapping[str, UnitKey]):
+    """Keys of units by name; two with the same name, number or key are a HardwareError."""
+
+    def __init__(self, units: Iterable[UnitKey] = ()) -> None:
+        by_id: dict[str, UnitKey] = {}
+        by_number: dict[int, UnitKey] = {}
+        by_key: dict[bytes, UnitKey] = {}
+        for unit in units:
+            if unit.id in by_id:
+                raise HardwareError(f"Two units are named {unit.id}: give each its own name.")
+            if unit.number in by_number:
+                raise HardwareError(
+                    f"Units {by_number[unit.number].id} and {unit.id} both have the number {unit.number}: renumber one."
+                )
+            if unit.key in by_key:
+                raise HardwareError(f"Units {by_key[unit.key].id} and {unit.id} have the same key: make a new one.")
+            by_id[unit.id] = by_number[unit.number] = by_key[unit.key] = unit
+        self._by_id = by_id
+        self.by_number: Mapping[int, UnitKey] = MappingProxyType(by_number)
+
+    def __getitem__(self, id: str) -> UnitKey:
+        return self._by_id[id]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_id)
+
+    def __len__(self) -> int:
+        return len(self._by_id)
+
+    def __reduce__(self) -> tuple[type["Keys"], tuple[tuple[UnitKey, ...]]]:
+        return Keys, (tuple(self.values()),)
+
+
+def new_key() -> bytes:
+    """Draw a key."""
+    return secrets.token_bytes(KEY_SIZE)
+
+
+def load_keys(path: Path) -> Keys:
+    """Read a file of keys; one that others may read, or that holds no keys, is a HardwareError."""
+    try:
+        with open(path, "rb") as file:
+            mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
+            if mode & 0o077:
+                raise HardwareError(
+                    f"{path} has the mode {mode:04o}, so that others can get at its keys:"
+                    f" chmod 600 {path}, and make new keys if they may have been read."
+                )
+            tables = tomllib.load(file)
+    except OSError as error:
+        raise HardwareError(f"The keys in {path} cannot be read: {error.strerror}.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise HardwareError(f"{path} is no TOML file of keys: {error}.") from None
+    try:
+        return Keys(_unit(id, table) for id, table in tables.items())
+    except HardwareError as error:
+        raise HardwareError(f"{path}: {error}") from None
+
+
+def _unit(id: str, table: object) -> UnitKey:
+    if not isinstance(table, dict) or set(table) != {"number", "key"}:
+        raise HardwareError(f"Unit {id} must have a number and a key, and nothing else.")
+    if not isinstance(table["key"], str):
+        raise HardwareError(f"The key of unit {id} is no text: write it as {2 * KEY_SIZE} hexadecimal digits.")
+    try:
+        key = bytes.fromhex(table["key"])
+    except ValueError:
+        raise HardwareError(f"The key of unit {id} is not made of hexadecimal digits.") from None
+    return UnitKey(id, table["number"], key)
+
+
+def save_keys(keys: Keys, path: Path) -> None:
+    """Write a file of keys that only its owner can read; it is replaced whole or, with a HardwareError, not at all."""
+    tables = {unit.id: {"number": unit.number, "key": unit.key.hex()} for unit in keys.values()}
+    unfinished = None
+    try:
+        handle, unfinished = tempfile.mkstemp(prefix=f".{Path(path).name}.", dir=Path(path).parent)  # mode 0600
+        with open(handle, "wb") as file:
+            tomli_w.dump(tables, file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished, path)
+        unfinished = None
+    except OSError as error:
+        raise HardwareError(f"The keys cannot be written to {path}: {error.strerror}.") from None
+    finally:
+        if unfinished is not None:
+            os.unlink(unfinished)

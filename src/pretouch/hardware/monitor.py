@@ -1,0 +1,80 @@
+"""A skin watched: what comes from a receiver, judged a few times a second."""
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from pretouch.hardware.findings import Finding, findings
+from pretouch.hardware.health import UnitHealth, UnitWindow
+from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.model_check import ModelCheck
+from pretouch.hardware.receiver import SkinReceiver
+from pretouch.hardware.traffic import Received
+from pretouch.types import FloatArray
+
+TURN_S = 0.25
+"""Time between two judgements [s]: as often as a person can read."""
+_WAIT_S = 0.02
+"""Time for which the socket is waited for at once [s]."""
+_COMPARE_S = 0.04
+"""Time between two comparisons with the model [s]: every other reading at 50 Hz."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What was heard since the turn before, and how the units are."""
+
+    time: float
+    """Instant, by the receiver's clock [s]."""
+    elapsed: float
+    """Since the first turn began [s]."""
+    heard: list[Received]
+    units: tuple[UnitHealth, ...]
+    findings: tuple[Finding, ...]
+    last: bool
+    """Whether the duration is over."""
+
+
+@dataclass(frozen=True)
+class Posture:
+    """An arm that stands still while its units are watched, and the model they are to agree with."""
+
+    q: FloatArray
+    """(n,) joint positions [rad]."""
+    check: ModelCheck
+
+
+def watch(
+    receiver: SkinReceiver, params: HealthParams, duration: float = math.inf, posture: Posture | None = None
+) -> Iterator[Turn]:
+    """Yield a turn every `TURN_S`, for a duration [s] by the receiver's monotonic clock; the last one says so."""
+    windows = [UnitWindow(unit.id, params.window_s) for unit in receiver.units]
+    begun = due = compare_due = time.monotonic()
+    over = False
+    while not over:
+        due = min(due + TURN_S, begun + duration)
+        while (left := due - time.monotonic()) > 0:
+            receiver.receive(min(left, _WAIT_S))
+            if posture is not None and time.monotonic() >= compare_due:
+                compare_due = time.monotonic() + _COMPARE_S
+                posture.check.take(posture.q, receiver.readings())
+        receiver.receive()
+        now = time.monotonic()
+        over = now >= begun + duration
+        heard = receiver.take_samples()
+        receiver.take_imu()
+        health = tuple(_taken(window, receiver, k, now, heard) for k, window in enumerate(windows))
+        found = findings(health, params)
+        if posture is not None:
+            found += posture.check.findings()
+        yield Turn(now, now - begun, heard, health, found, over)
+        due = max(due, time.monotonic() - TURN_S)
+
+
+def _taken(window: UnitWindow, receiver: SkinReceiver, k: int, now: float, heard: list[Received]) -> UnitHealth:
+    """Return the health of unit k after what was heard."""
+    window.take(now, [one for one in heard if one.unit == k], receiver.units[k])
+    health = window.health(now, receiver.units[k])
+    receiver.receive()  # what arrives meanwhile must not look late
+    return health

@@ -1,0 +1,154 @@
+"""The port `Skin` over the network: the receiver in a process of its own, the newest values in shared memory.
+
+A flood, a slow disk or a garbage collection in one process does not stop the other. If the receiver's process dies,
+readings grow old, which the controller names as silence. If the program that started it dies, it ends too, and the
+memory between them has no name that could be left over.
+"""
+
+import os
+import signal
+from collections.abc import Callable, Sequence
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Self
+
+import numpy as np
+
+from pretouch.errors import HardwareError
+from pretouch.hardware.keys import Keys
+from pretouch.hardware.link import LinkParams
+from pretouch.hardware.receiver import keys_of
+from pretouch.hardware.receiver_process import Outlets, Traffic, serve
+from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch
+from pretouch.types import RangeReadings, RangeStatus
+
+_START_S = 60.0
+"""Longest time a process may take to start [s]: it imports everything anew."""
+
+
+class NetworkSkin:
+    """Sensor units on the network, as a `Skin`. `with` closes it."""
+
+    def __init__(
+        self,
+        ids: Sequence[str],
+        keys: Keys,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        params: LinkParams | None = None,
+        *,
+        priority: int | None = None,
+    ) -> None:
+        """Start a receiver; one that cannot listen, or not have its priority, is a HardwareError.
+
+        Args:
+            ids: see `SkinReceiver`.
+            keys: see `SkinReceiver`.
+            host: see `SkinReceiver`.
+            port: see `SkinReceiver`.
+            params: see `SkinReceiver`.
+            priority: of its process in the scheduling class SCHED_FIFO, 1 to 99, below that of the control loop; None
+                leaves the class as it is.
+        """
+        units = keys_of(ids, keys)
+        self._params = params or LinkParams()
+        self._outlets = Outlets(tuple(ids), self._params.samples_most)
+        none = np.full(len(units), int(RangeStatus.NONE))
+        self._nothing = RangeReadings(np.full(len(units), -np.inf), np.zeros(len(units)), none)
+        self._untold = Traffic(tuple(UnitTraffic(unit.id, unit.number) for unit in units), {}, 0)
+        self._imu: list[Received] = []
+        self._samples: list[Received] = []
+        self._untaken = 0
+        context = get_context("spawn")
+        ours, theirs = context.Pipe(duplex=False)
+        arguments = (os.getpid(), units, (host, port), self._params, priority, self._outlets, theirs)
+        self._process = context.Process(target=serve, args=arguments, daemon=True)
+        _start_without_interrupts(self._process.start)
+        theirs.close()
+        try:
+            with ours:
+                self.address, self.buffer_bytes, self.filtered = _greeted(ours)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def alive(self) -> bool:
+        """Whether the receiver's process runs."""
+        return self._process.is_alive()
+
+    @property
+    def pid(self) -> int:
+        """Number of that process, to give it a priority or a processor."""
+        return self._process.pid or 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the receiver; what it received stays."""
+        self._process.kill()
+        self._process.join()
+
+    def read(self) -> RangeReadings:
+        """Return the newest reading of each unit, stamped with the earliest instant it can be of."""
+        value = self._outlets.readings()
+        if value is None:
+            return self._nothing
+        table = np.frombuffer(value).reshape(3, -1)
+        return RangeReadings(table[0].copy(), table[1].copy(), table[2].astype(np.int64))
+
+    def take_samples(self) -> list[Received]:
+        """Return the samples accepted since the last call, in their order of arrival."""
+        self._take()
+        taken, self._samples = self._samples, []
+        return taken
+
+    def take_imu(self) -> list[ImuBatch]:
+        """Return the IMU samples that came since the last call, but for those of no known instant, scale or rate."""
+        self._take()
+        taken, self._imu = self._imu, []
+        return [batch for batch in map(imu_batch, taken) if batch is not None]
+
+    def traffic(self) -> Traffic:
+        """Return what the receiver has counted, not older than 0.6 s while it lives."""
+        return self._outlets.traffic() or self._untold
+
+    @property
+    def untaken(self) -> int:
+        """Samples dropped because nobody took them in time."""
+        return self._untaken + self._outlets.lost
+
+    def _take(self) -> None:
+        """Share what came between the two who take it; what one of them never takes is bounded."""
+        came, most = self._outlets.take_samples(), self._params.samples_most
+        self._samples += came
+        self._imu += [received for received in came if received.sample.imu_count]
+        self._untaken += max(len(self._samples) - most, 0)
+        del self._samples[:-most], self._imu[:-most]
+
+
+def _start_without_interrupts(start: Callable[[], None]) -> None:
+    """Start a process that Ctrl-C does not reach, from its first instruction on: its parent ends it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _greeted(started: Connection) -> tuple[tuple[str, int], int, bool]:
+    """Wait for the receiver to listen: return its address, length of queue [B], and whether the kernel filters."""
+    try:
+        said = started.recv() if started.poll(_START_S) else f"No receiver started within {_START_S:g} s: try again."
+    except EOFError:
+        said = (
+            "The receiver's process ended before it listened: what it printed tells why"
+            ' (a script must start it under `if __name__ == "__main__":`).'
+        )
+    if isinstance(said, str):
+        raise HardwareError(said)
+    return said

@@ -1,0 +1,246 @@
+"""All sensor units of a skin at one UDP socket (docs/hardware/wire.md): who may speak, what was measured, and when."""
+
+import errno
+import secrets
+import select
+import socket
+import struct
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+
+from pretouch.errors import HardwareError
+from pretouch.hardware.keys import Keys, UnitKey
+from pretouch.hardware.link import LinkParams
+from pretouch.hardware.station import Address, Station
+from pretouch.hardware.traffic import REASONS, ImuBatch, Received, UnitTraffic, imu_batch
+from pretouch.hardware.udp import attach_filter, bind
+from pretouch.hardware.wire import (
+    HELLO_SIZE,
+    IMU_MOST,
+    IMU_SAMPLE,
+    MAGIC,
+    PREFIX,
+    SAMPLE,
+    SAMPLE_LEAST,
+    VERSION,
+    Kind,
+)
+from pretouch.types import RangeReadings, RangeStatus
+
+_HEAD = struct.Struct("<4sHHI")
+"""Magic, version and kind as one; number of the unit; and, of a sample, flags and sequence."""
+_SAMPLE = MAGIC + bytes([VERSION, Kind.SAMPLE])
+_HELLO = MAGIC + bytes([VERSION, Kind.HELLO])
+_COUNTS = {SAMPLE_LEAST + n * IMU_SAMPLE.size: n for n in range(IMU_MOST + 1)}
+"""IMU samples in a sample datagram of each size."""
+_COUNT_AT = PREFIX.size + SAMPLE.size - struct.calcsize("<BBHII")
+"""Where a sample says how many."""
+_LEAST = min(HELLO_SIZE, SAMPLE_LEAST)
+_CHORES_S = 0.02
+"""Time between two looks for beacons that are due [s]."""
+_CHECK_EVERY = 256
+"""Datagrams after which a flood makes room for the beacons."""
+
+
+def keys_of(ids: Sequence[str], keys: Keys) -> tuple[UnitKey, ...]:
+    """Return the keys of a skin's units in their order; a unit without one, or named twice, is a HardwareError."""
+    missing = [id for id in ids if id not in keys]
+    if missing:
+        raise HardwareError(f"There is no key for {', '.join(missing)}: add it to the file of keys.")
+    if len(set(ids)) != len(ids):
+        raise HardwareError(f"A unit stands twice in {', '.join(ids)}: name each once.")
+    return tuple(keys[id] for id in ids)
+
+
+class SkinReceiver:
+    """Receives the datagrams of a skin's units, and sends them beacons. One thread; nothing here blocks but `receive`.
+
+    What is not genuine changes nothing but counters. `with` closes it.
+    """
+
+    def __init__(
+        self,
+        ids: Sequence[str],
+        keys: Keys,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        draw: Callable[[int], bytes] = secrets.token_bytes,
+        params: LinkParams | None = None,
+    ) -> None:
+        """Listen.
+
+        Args:
+            ids: the skin's units in their order; one without a key is a HardwareError.
+            keys: of all units.
+            host: address to listen at; 0.0.0.0 for every one of this machine.
+            port: 0 lets the system choose one; one that is taken is a HardwareError.
+            clock: gives the time [s] of all stamps.
+            draw: gives so many random bytes.
+            params: how units are treated.
+        """
+        self._params = params or LinkParams()
+        units = keys_of(ids, keys)
+        self.table = np.array([[-np.inf], [0.0], [float(RangeStatus.NONE)]]).repeat(len(units), axis=1)
+        """Stamps [s], distances [m] and statuses of the newest readings, (3, K); not to be written to."""
+        self._stations = [Station(i, unit, self._params, draw, self.table[:, i]) for i, unit in enumerate(units)]
+        self._by_number = {unit.number: station for unit, station in zip(units, self._stations, strict=True)}
+        self.units: tuple[UnitTraffic, ...] = tuple(station.traffic for station in self._stations)
+        self.rejected: dict[str, int] = dict.fromkeys(REASONS, 0)
+        """How many datagrams were thrown away, by reason (`traffic.REASONS`)."""
+        self.unsent = 0
+        """Beacons the system did not take."""
+        self.untaken = 0
+        """Samples dropped because nobody took them (`take_samples`, `take_imu`) while others did not fit any more."""
+        self.taken = 0
+        """Datagrams that the last call of `receive` took in, genuine or not."""
+        self._samples: deque[Received] = deque(maxlen=self._params.samples_most)
+        self._imu: deque[Received] = deque(maxlen=self._params.samples_most)
+        self._clock, self._next_chores = clock, -np.inf
+        self._buffer = bytearray(2048)
+        self._view = memoryview(self._buffer)
+        self._socket = bind(host, port, 1024 * self._params.buffer_kib)
+        self.filtered = attach_filter(self._socket)
+        """Whether the kernel drops, uncounted, what is not ours by its size, magic, version or kind."""
+        self._poll = select.poll()
+        self._poll.register(self._socket, select.POLLIN)
+        host, port = self._socket.getsockname()[:2]
+        self.address: tuple[str, int] = (host, port)
+        """Where it listens."""
+
+    @property
+    def behind(self) -> bool:
+        """Whether the last call of `receive` left datagrams for the next."""
+        return self.taken == self._params.drain_most
+
+    @property
+    def buffer_bytes(self) -> int:
+        """Size of the queue of arrived datagrams that the system gave [B], bookkeeping included."""
+        return self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Listen no more; what was received stays."""
+        self._socket.close()
+
+    def receive(self, timeout: float = 0.0) -> int:
+        """Take in all that has arrived, and send the beacons that are due; return how many samples were accepted.
+
+        Under a flood, no more than `LinkParams.drain_most` datagrams are taken in.
+
+        Args:
+            timeout: longest time to wait for a datagram if none is there [s].
+        """
+        if self._socket.fileno() < 0:
+            raise HardwareError("The receiver is closed: make another one.")
+        self._chores()
+        accepted, any_came = self._drain()
+        if any_came or timeout <= 0:
+            return accepted
+        end = time.monotonic() + timeout
+        while (left := end - time.monotonic()) > 0:
+            if self._poll.poll(1e3 * min(left, _CHORES_S)):
+                self._chores()
+                return self._drain()[0]
+            self._chores()
+        return 0
+
+    def readings(self) -> RangeReadings:
+        """Return the newest reading of each unit, stamped with the earliest instant it can be of."""
+        stamp, distance, status = self.table
+        return RangeReadings(stamp.copy(), distance.copy(), status.astype(np.int64))
+
+    def take_samples(self) -> list[Received]:
+        """Return the samples accepted since the last call, in their order of arrival."""
+        taken = list(self._samples)
+        self._samples.clear()
+        return taken
+
+    def take_imu(self) -> list[ImuBatch]:
+        """Return the IMU samples that came since the last call, but for those of no known instant, scale or rate."""
+        batches = [imu_batch(received) for received in self._imu]
+        self._imu.clear()
+        return [batch for batch in batches if batch is not None]
+
+    def _drain(self) -> tuple[int, bool]:
+        """Take in what has arrived; return how many samples were accepted, and whether anything came at all."""
+        take, buffer, view, clock = self._socket.recvfrom_into, self._buffer, self._view, self._clock
+        accepted = 0
+        for k in range(self._params.drain_most):
+            try:
+                size, address = take(buffer)
+            except BlockingIOError:
+                self.taken = k
+                return accepted, k > 0
+            except OSError as error:  # news of an earlier beacon that found nobody
+                if error.errno in (errno.EBADF, errno.ENOTSOCK):
+                    raise HardwareError("The receiver's socket was closed: make another receiver.") from None
+                continue
+            reason = self._take_in(view[:size], size, address, clock())
+            if reason is None:
+                accepted += 1
+            elif reason:
+                self.rejected[reason] += 1
+            if not k % _CHECK_EVERY:
+                self._chores()
+        self.taken = self._params.drain_most
+        return accepted, True
+
+    def _take_in(self, datagram: memoryview, size: int, address: Address, now: float) -> str | None:
+        """Take in one datagram: return None for a sample, "" for a hello, or why it is thrown away."""
+        if size < _LEAST:
+            return "size"
+        head, number, _, sequence = _HEAD.unpack_from(datagram)
+        if head == _SAMPLE:
+            count = _COUNTS.get(size)
+            if count is None or datagram[_COUNT_AT] != count:
+                return "size"
+        elif head != _HELLO:
+            return "format"
+        elif size != HELLO_SIZE:
+            return "size"
+        station = self._by_number.get(number)
+        if station is None:
+            return "unit"
+        if head == _HELLO:
+            answer = station.hello(datagram, address, now)
+            if isinstance(answer, str):
+                return answer
+            self._send(answer, address)
+            return ""
+        received = station.sample(datagram, sequence, address, now)
+        if isinstance(received, str):
+            return received
+        self.untaken += len(self._samples) == self._samples.maxlen
+        self._samples.append(received)
+        if received.sample.imu_count:
+            self._imu.append(received)
+        return None
+
+    def _chores(self) -> None:
+        """Send the beacons that are due."""
+        now = self._clock()
+        if now < self._next_chores:
+            return
+        self._next_chores = now + _CHORES_S
+        for station in self._stations:
+            beacon = station.beacon(self._clock())
+            if beacon is not None and station.address is not None:
+                self._send(beacon, station.address)
+
+    def _send(self, beacon: bytes, address: Address) -> None:
+        """Send, or count what cannot be sent: another beacon follows."""
+        try:
+            self._socket.sendto(beacon, address)
+        except OSError:
+            self.unsent += 1

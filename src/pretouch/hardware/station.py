@@ -1,0 +1,118 @@
+"""One unit as its receiver sees it: session, clock, newest reading, traffic."""
+
+import math
+from collections.abc import Callable
+
+from pretouch.hardware.keys import UnitKey
+from pretouch.hardware.link import Link, LinkParams, Session
+from pretouch.hardware.stuck import StuckDetector
+from pretouch.hardware.traffic import Latency, Received, UnitTraffic
+from pretouch.hardware.unit_clock import UnitClock
+from pretouch.hardware.wire import LONGEST_US, Flag, Sample
+from pretouch.types import FloatArray, RangeStatus
+
+_RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
+
+Address = tuple[str, int]
+
+
+class Station:
+    """What is known of one unit. Times in seconds of the host's clock."""
+
+    def __init__(
+        self, index: int, unit: UnitKey, params: LinkParams, draw: Callable[[int], bytes], reading: FloatArray
+    ) -> None:
+        """Know nothing yet of the unit with this index in the skin; its stamp, distance and status go to `reading`."""
+        self._reading = reading
+        self.traffic = UnitTraffic(unit.id, unit.number)
+        self.address: Address | None = None
+        """Where its last sample came from, as the socket knows it."""
+        self._index, self._params = index, params
+        self._link = Link(unit.key, params, draw)
+        self._clock = UnitClock(1e-6 * params.drift_ppm, params.clock_window_s)
+        self._stuck = StuckDetector(params.stuck_after_s)
+        self._latency = Latency()
+        self._session: Session | None = None
+        self._echoed = 0
+        """Beacon whose echo was used last: the same one again tells nothing new."""
+        self._trusted_from = 0
+        """First beacon whose echo tells the time: those before were heard before the unit's clock jumped."""
+
+    def hello(self, datagram: memoryview, address: Address, now: float) -> bytes | str:
+        """Return the answer to what looks like a hello, or why there is none."""
+        answer = self._link.hello(datagram, now)
+        if isinstance(answer, bytes):
+            traffic = self.traffic
+            traffic.hellos += 1
+            if traffic.state in ("never heard", "silent"):
+                traffic.state = "greeting"
+            if traffic.address is None:
+                traffic.address = address[:2]
+        return answer
+
+    def sample(self, datagram: memoryview, sequence: int, address: Address, now: float) -> Received | str:
+        """Return what a datagram that looks like a sample brought, or why it is not believed."""
+        verified = self._link.sample(datagram, sequence, now)
+        traffic = self.traffic
+        if isinstance(verified, str):
+            traffic.replayed += verified == "replayed"
+            return verified
+        session, sample, lost = verified
+        if session is not self._session:
+            self._begin(session)
+        traffic.state = "live"
+        traffic.accepted += 1
+        traffic.lost += lost
+        traffic.last_arrival = now
+        traffic.sample = sample
+        if address != self.address:
+            self.address, traffic.address = address, address[:2]
+        self._tell_time(session, sample, now)
+        stamp = self._take_reading(sample, now) if sample.flags & _RANGE_NEW else math.nan
+        return Received(self._index, now, stamp, traffic.offset, traffic.bound, sample)
+
+    def beacon(self, now: float) -> bytes | None:
+        """Return the beacon that is due, to be sent to `address`; do what else time asks for."""
+        traffic = self.traffic
+        if traffic.state == "live" and now - traffic.last_arrival > self._params.silent_after_s:
+            traffic.state = "silent"
+        self._link.expire(now)
+        return self._link.beacon(now) if now >= self._link.beacon_due else None
+
+    def _begin(self, session: Session) -> None:
+        """Another session is live."""
+        traffic, before = self.traffic, self.traffic.sample
+        traffic.sessions += 1
+        traffic.reboots += before is not None and session.hello.uptime_us < before.time_us
+        traffic.firmware, traffic.reset = session.hello.firmware, session.hello.reset
+        self._session, self._trusted_from, self._echoed = session, 0, 0
+        self._clock.forget()
+        self._stuck.forget()
+
+    def _tell_time(self, session: Session, sample: Sample, now: float) -> None:
+        """Renew offset, bound and latency."""
+        clock, traffic = self._clock, self.traffic
+        made, hold = 1e-6 * sample.time_us, sample.beacon_hold_us
+        sent = None
+        if sample.beacon != self._echoed and sample.beacon >= self._trusted_from and hold < LONGEST_US:
+            sent, self._echoed = session.sent.get(sample.beacon), sample.beacon
+        if not clock.heard(made, now, sent, 1e-6 * hold):
+            self._trusted_from = session.number + 1
+            self._link.beacon_due = now
+        traffic.clock_jumps = clock.jumps
+        traffic.offset, traffic.bound = clock.offset, clock.bound
+        if clock.known:
+            self._latency.heard(now - clock.earliest(made), now)
+            traffic.latency, traffic.latency_worst = self._latency.mean, self._latency.worst
+
+    def _take_reading(self, sample: Sample, now: float) -> float:
+        """Keep a reading if it is the newest; return its stamp, NaN if it cannot be told."""
+        traffic = self.traffic
+        traffic.stuck = self._stuck.heard(sample, now)
+        if not self._clock.known:
+            return math.nan
+        stamp = self._clock.earliest(1e-6 * (sample.time_us - sample.range_age_us))
+        if stamp > traffic.last_reading_stamp:
+            traffic.last_reading_stamp = stamp
+            self._reading[:] = stamp, 1e-3 * sample.range_mm, _STUCK if traffic.stuck else sample.range_status
+        return stamp

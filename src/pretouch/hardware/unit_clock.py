@@ -1,0 +1,103 @@
+"""What a unit's clock is on the host's: bounds on the offset that hold whatever the network does.
+
+A beacon sent at t1 [host] is heard at t2 [unit], not before it was sent: offset >= t1 - t2. A sample made at t3 [unit]
+arrives at t4 [host], not before it was made: offset <= t4 - t3. Late packets make the bounds loose, never wrong.
+Between two instants of the unit's clock the offset changes by no more than the drift times the time between them, so
+that older bounds count too, each loosened by its age. Nothing is assumed of the delays, nor that they are alike both
+ways.
+"""
+
+import math
+from collections import deque
+
+TICK = 1e-6
+"""Resolution of the unit's clock [s]: it shows an instant up to this much too early."""
+
+
+class UnitClock:
+    """Offset of one unit's clock, host time = unit time + offset, from its echoes. Times in seconds."""
+
+    def __init__(self, drift: float, window: float) -> None:
+        """Know nothing yet.
+
+        Args:
+            drift: largest difference in rate between host and unit, as a fraction.
+            window: how long a bound counts [s].
+        """
+        self.jumps = 0
+        """How often the bounds contradicted each other: the unit's clock jumped, or drifts more than it should."""
+        self._drift, self._window = drift, window
+        # (instant, bound as of instant 0): all loosen at one rate, so that their order never changes
+        self._lows: deque[tuple[float, float]] = deque()
+        self._highs: deque[tuple[float, float]] = deque()
+        self._newest = -math.inf
+        self.low = -math.inf
+        """Least offset there can be, as of the newest sample [s]."""
+        self.high = math.inf
+        """Largest offset there can be, as of the newest sample [s]."""
+        self.known = False
+        """Whether both bounds are there."""
+
+    @property
+    def offset(self) -> float:
+        """Middle of the bounds [s]; NaN while one is missing."""
+        return 0.5 * (self.low + self.high) if self.known else math.nan
+
+    @property
+    def bound(self) -> float:
+        """Most the true offset can differ from `offset` [s]."""
+        return 0.5 * (self.high - self.low)
+
+    def heard(self, made: float, arrival: float, sent: float | None, hold: float) -> bool:
+        """Take in a sample; return False if it contradicts what was known, which is forgotten then.
+
+        Args:
+            made: when the sample was made [s], unit's clock.
+            arrival: when it arrived, or later [s], host's clock.
+            sent: when the beacon it echoes was sent, or earlier [s], host's clock; None if that is not known.
+            hold: for how long the unit had heard that beacon [s].
+        """
+        newest = self._newest = max(self._newest, made)
+        _insert(self._highs, made, self._drift * made - (arrival - made))
+        if sent is not None:
+            heard = made - hold
+            _insert(self._lows, heard, sent - heard - TICK + self._drift * heard)
+        self.high = self._drift * newest - self._highs[0][1]
+        if not self._lows:
+            _expire(self._highs, newest - self._window)
+            return True
+        self.low = self._lows[0][1] - self._drift * newest
+        if self.low <= self.high:
+            self.known = True
+            _expire(self._lows, newest - self._window)
+            _expire(self._highs, newest - self._window)
+            return True
+        self.jumps += 1
+        self.forget()
+        return False
+
+    def forget(self) -> None:
+        """Know nothing again; what was counted stays."""
+        self._lows.clear()
+        self._highs.clear()
+        self._newest, self.low, self.high, self.known = -math.inf, -math.inf, math.inf, False
+
+    def earliest(self, instant: float) -> float:
+        """Return the earliest host time that an instant of the unit, not after its newest sample, can be [s].
+
+        -inf while that is not known.
+        """
+        return instant - TICK + self.low - self._drift * (self._newest - instant)
+
+
+def _insert(bounds: deque[tuple[float, float]], instant: float, bound: float) -> None:
+    """Add a bound, and drop those that will never again be the largest; the first is the largest."""
+    while bounds and bounds[-1][1] <= bound:
+        bounds.pop()
+    bounds.append((instant, bound))
+
+
+def _expire(bounds: deque[tuple[float, float]], oldest: float) -> None:
+    """Drop what is too old, but for the last one."""
+    while bounds[0][0] < oldest and len(bounds) > 1:
+        bounds.popleft()

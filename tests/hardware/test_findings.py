@@ -1,0 +1,125 @@
+"""What is said to be wrong with a unit: each by traffic that has it, and only it."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pretouch.errors import ParameterError
+from pretouch.hardware.findings import findings
+from pretouch.hardware.health import Counts, Standing, unit_health
+from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.wire import Flag
+from tests.hardware.traffic import NOW, heard, traffic
+
+LIMITS = HealthParams()
+WELL = int(Flag.RANGE_NEW)
+
+
+def found(samples, counted=None, **standing):
+    unit = unit_health("hand-1", samples, NOW, Standing.of(traffic(**standing)), counted or Counts(500))
+    return findings([unit], LIMITS)
+
+
+def wide(number):
+    return round(500 + np.random.default_rng(number).normal(scale=40.0))
+
+
+CASES = {
+    "never heard": (lambda: found([], state="never heard", last_arrival=-np.inf), "fault", "silent", "not been heard"),
+    "greeting": (lambda: found([], state="greeting", last_arrival=-np.inf), "fault", "silent", "opens no session"),
+    "silent": (
+        lambda: found(heard(until=NOW - 2.0), state="silent", last_arrival=NOW - 2.0), "fault", "silent",
+        "nothing for 2.0 s (limit 0.3 s)",
+    ),
+    "stuck": (lambda: found(heard(range_mm=312), stuck=True), "fault", "stuck", "repeats 0.312 m"),
+    "slow": (
+        lambda: found(heard(flags=lambda n: WELL * (n % 2))), "warning", "rate", "readings a second (limit 34)"
+    ),
+    "very slow": (
+        lambda: found(heard(flags=lambda n: WELL * (n % 10 == 0))), "fault", "rate", "readings a second (limit 10)"
+    ),
+    "lossy": (lambda: found(heard(), Counts(440, 60)), "warning", "loss", "loses 12% of its samples"),
+    "very lossy": (lambda: found(heard(), Counts(340, 160)), "fault", "loss", "loses 32% of its samples"),
+    "late": (lambda: found(heard(latency=0.07)), "warning", "latency", "in the median 70 ms (limit 50 ms)"),
+    "clock": (lambda: found(heard(), bound=0.02), "warning", "clock", "known to 20.0 ms only (limit 10 ms)"),
+    "jumps": (lambda: found(heard(), Counts(500, 0, 0, 2)), "warning", "clock jump", "jumped 2 times"),
+    "sigma": (lambda: found(heard(range_sigma=80)), "warning", "sigma", "own error at 20 mm (limit 15 mm)"),
+    "noise": (lambda: found(heard(range_mm=wide)), "warning", "noise", "from reading to reading (limit 20 mm)"),
+    "failing": (
+        lambda: found(heard(range_status=lambda n: 5 if n % 4 == 0 else 0)), "warning", "status",
+        "fails in 25% of its readings (125 HARDWARE; limit 10%)",
+    ),
+    "failed": (lambda: found(heard(range_status=10)), "fault", "status", "fails in 100% of its readings"),
+    "range late": (
+        lambda: found(heard(flags=lambda n: WELL | (64 if n % 100 == 0 else 0))), "warning", "range late",
+        "nothing measured in time 5 times",
+    ),
+    "battery low": (lambda: found(heard(battery_mv=3450)), "warning", "battery", "at 3.45 V (limit 3.5 V)"),
+    "battery flat": (lambda: found(heard(battery_mv=3250)), "fault", "battery", "at 3.25 V (limit 3.3 V)"),
+    "warm": (lambda: found(heard(temperature_cdeg=6500)), "warning", "temperature", "65 degrees C (limit 60)"),
+    "hot": (lambda: found(heard(temperature_cdeg=9000)), "fault", "temperature", "90 degrees C (limit 85)"),
+    "cold": (lambda: found(heard(temperature_cdeg=-2500)), "warning", "temperature", "-25 degrees C (limit -20)"),
+    "bus": (lambda: found(heard(bus_errors=lambda n: n // 100)), "warning", "bus", "failed transfers on its bus"),
+    "imu slow": (lambda: found(heard(imu_index=lambda n: 2 * n, imu_count=2)), "warning", "imu rate", "gives 100 IMU"),
+    "imu dead": (lambda: found(heard(imu_count=0)), "warning", "imu rate", "gives 0 IMU samples a second (limit 375)"),
+    "imu loss": (lambda: found(heard(imu_index=lambda n: 10 * n)), "warning", "imu loss", "loses 20% of its IMU"),
+    "reboot": (lambda: found(heard(), Counts(500, 0, 1), reset=3), "warning", "reboot", "its watchdog ended a hang"),
+    "firmware that was not told": (lambda: found(heard(), firmware=0), None, "", ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_each_trouble_is_named_and_nothing_else(case):
+    make, level, what, words = CASES[case]
+    told = make()
+    if level is None:
+        assert told == ()
+        return
+    (finding,) = told
+    assert (finding.unit, finding.level, finding.what) == ("hand-1", level, what)
+    assert words in finding.sentence
+    assert finding.sentence.startswith("hand-1")
+    assert finding.sentence.endswith(".")
+    assert ":" in finding.sentence  # and what to do
+
+
+def test_nothing_is_said_of_a_unit_that_is_well():
+    assert found(heard()) == ()
+
+
+def test_old_firmware_is_named():
+    unit = unit_health("hand-1", heard(), NOW, Standing.of(traffic(firmware=0x0003)), Counts(500))
+    (finding,) = findings([unit], HealthParams(firmware=0x0102))
+    assert finding.level == "fault"
+    assert "runs firmware 0.3 (oldest that is served: 1.2)" in finding.sentence
+
+
+def test_rates_are_not_judged_before_a_unit_has_settled():
+    assert found(heard(1.0, imu_count=0, latency=0.3)) == ()
+
+
+def test_faults_come_before_warnings():
+    told = found(heard(battery_mv=3200, range_sigma=100))
+    assert [f.level for f in told] == ["fault", "warning"]
+
+
+def test_single_late_readings_are_no_reason_for_a_warning():
+    late = heard(latency=0.3)
+    assert found([late[i] if i % 40 == 0 else one for i, one in enumerate(heard())]) == ()
+
+
+@pytest.mark.parametrize("name", ["window_s", "rate_hz", "battery_v"])
+def test_a_limit_that_makes_no_sense_is_refused(name):
+    with pytest.raises(ParameterError, match=name):
+        HealthParams(**{name: -1.0})
+
+
+def test_every_limit_is_documented():
+    text = (Path(__file__).parents[2] / "docs" / "hardware" / "health.md").read_text()
+    missing = [f.name for f in fields(HealthParams) if f"`{f.name}`" not in text]
+    assert not missing
+    for f in fields(HealthParams):
+        (row,) = (line for line in text.splitlines() if line.startswith(f"| `{f.name}` |"))
+        assert row.split("|")[2].split()[0] == (f"{f.default:g}" if f.name != "firmware" else "0.1"), row

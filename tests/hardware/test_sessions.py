@@ -1,0 +1,226 @@
+"""Nothing old ever counts again, and nobody without a key can do more than be in the way."""
+
+from dataclasses import replace
+
+import pytest
+
+from pretouch.hardware.wire import Hello, Mac, Reset, decode_beacon
+from tests.hardware.fake_unit import KEYS, PLAIN, Bench, FakeUnit
+
+
+@pytest.fixture
+def bench():
+    with Bench() as made:
+        yield made
+
+
+def accepted(bench):
+    return bench.receiver.units[0].accepted
+
+
+def recorded_hellos(count):
+    """What was recorded of the unit before this receiver began: genuine, of challenges it no longer uses."""
+    unit = FakeUnit(KEYS["unit 3"])
+    return [Hello(3, 0x0100, Reset.POWER_ON, b"old %04d" % k, 10**6 + k).encode(unit.mac) for k in range(count)]
+
+
+def test_a_sample_counts_once(bench):
+    bench.join()
+    sample = bench.units[0].sample(bench.now)
+    assert [bench.send(sample) for _ in range(3)] == [1, 0, 0]
+    assert bench.receiver.rejected["replayed"] == bench.receiver.units[0].replayed == 2
+
+
+def test_samples_of_an_earlier_session_never_count_again(bench):
+    bench.join()
+    old = [bench.units[0].sample(bench.now) for _ in range(100)]
+    bench.send(*old[:50])
+    bench.now += 3.0
+    bench.units[0].leave()
+    bench.send(bench.units[0].hello(bench.now))
+    bench.deliver()
+    # while the new session is offered, and once it is live
+    assert bench.send(old[60]) == 1  # still the live one's: it was never used
+    assert bench.send(bench.units[0].sample(bench.now)) == 1
+    assert bench.send(*old) == 0
+    assert bench.send(bench.units[0].sample(bench.now)) == 1
+
+
+def test_samples_from_before_a_reboot_never_count_again(bench):
+    bench.join()
+    old = [bench.units[0].sample(bench.now) for _ in range(100)]
+    bench.units[0].reboot(bench.now)
+    bench.send(bench.units[0].hello(bench.now))
+    bench.deliver()
+    bench.send(bench.units[0].sample(bench.now))
+    assert bench.receiver.units[0].sessions == 2
+    assert bench.send(*old) == 0
+
+
+def test_samples_for_an_earlier_receiver_never_count_for_another(bench):
+    bench.join()
+    old = [bench.units[0].sample(bench.now) for _ in range(100)]
+    with Bench(drawn=1000) as after:
+        assert after.send(*old) == 0
+        assert after.receiver.rejected["no session"] == 100
+        # the recorded hello of that session brings a beacon, but another nonce
+        after.send(bench.units[0].hello(after.now), *old)
+        assert accepted(after) == 0
+
+
+def test_an_old_beacon_is_nothing_to_a_unit(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    first = bench.answers()
+    assert unit.hear(first[0], bench.now)
+    for _ in range(100):
+        bench.now += 0.02
+        bench.send(unit.sample(bench.now))
+        first += [d for d in bench.answers() if unit.hear(d, bench.now)]
+    assert len(first) > 3
+    assert not any(unit.hear(old, bench.now) for old in first)
+    unit.leave()
+    assert not any(unit.hear(old, bench.now) for old in first)
+    unit.reboot(bench.now)
+    assert not any(unit.hear(old, bench.now) for old in first)
+
+
+def test_a_beacon_for_one_unit_is_nothing_to_another(bench):
+    bench.send(bench.units[0].hello(bench.now))
+    [beacon] = bench.answers()
+    assert not bench.units[1].hear(beacon, bench.now)
+    assert decode_beacon(beacon, bench.units[1].mac, bench.units[0].challenge) is None
+
+
+def test_a_recorded_hello_never_ends_a_live_session(bench):
+    hello = bench.units[0].hello(bench.now)
+    bench.join()
+    assert bench.send(hello) == 0
+    assert bench.receiver.rejected["old hello"] == 1
+    for old in recorded_hellos(50):
+        bench.now += 0.1
+        bench.send(old)
+        assert bench.send(bench.units[0].sample(bench.now)) == 1
+        bench.deliver()
+    assert bench.receiver.units[0].sessions == 1
+    assert bench.receiver.units[0].reset == Reset.POWER_ON
+    assert bench.receiver.units[0].firmware == 0x0102
+
+
+@pytest.mark.parametrize("count", [1, 4, 20])
+def test_recorded_hellos_sent_again_and_again_do_not_keep_a_unit_out(bench, count):
+    unit, old = bench.units[0], recorded_hellos(count)
+    began = bench.now
+    while not accepted(bench):
+        bench.now += 0.02
+        bench.send(*[old[k % count] for k in range(200)])  # 10 000 a second
+        if unit.session is not None:
+            bench.send(unit.sample(bench.now))
+        elif round(bench.now / 0.02) % 5 == 0:
+            bench.send(unit.hello(bench.now))
+        bench.deliver()
+        assert bench.now - began < 3.0
+
+
+def test_answers_to_hellos_are_limited(bench):
+    old = recorded_hellos(500)
+    for _ in range(100):
+        bench.now += 0.1
+        bench.send(*old)
+    assert len(bench.answers()) <= 20 * 11
+    assert bench.receiver.rejected["too many hellos"] > 49_000
+
+
+def test_a_unit_that_asks_again_gets_the_same_session_and_a_greater_number(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    [first] = bench.answers()
+    bench.now += 0.1
+    bench.send(unit.hello(bench.now))
+    [second] = bench.answers()
+    told = [decode_beacon(d, unit.mac, unit.challenge) for d in (first, second)]
+    assert told[0].nonce == told[1].nonce
+    assert [beacon.number for beacon in told] == [1, 2]
+
+
+def test_a_session_is_offered_for_five_seconds(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    bench.now += 5.1
+    bench.receiver.receive()
+    assert bench.send(unit.sample(bench.now)) == 0
+    unit.leave()
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    bench.now += 4.0
+    bench.receiver.receive()
+    assert bench.send(unit.sample(bench.now)) == 1
+
+
+def test_order_within_the_window_does_not_matter_and_beyond_it_does(bench):
+    bench.join()
+    samples = [bench.units[0].sample(bench.now) for _ in range(100)]
+    assert bench.send(samples[99]) == 1
+    assert bench.send(*samples[36:99][::-1]) == 63
+    assert bench.send(*samples[:36]) == 0
+
+
+def test_sequences_go_to_the_end_of_their_field_and_no_further(bench):
+    bench.join()
+    unit, last = bench.units[0], 2**32 - 1
+    unit.sequence = last - 2
+    assert [bench.send(unit.sample(bench.now)) for _ in range(2)] == [1, 1]
+    unit.sequence = -1
+    assert bench.send(unit.sample(bench.now), unit.sample(bench.now), unit.sample(bench.now)) == 0
+    assert bench.receiver.units[0].replayed == 3
+    unit.leave()
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    assert bench.send(unit.sample(bench.now)) == 1
+
+
+def test_sequence_zero_never_counts(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    unit.sequence = -1
+    assert bench.send(unit.sample(bench.now)) == 0
+    assert bench.send(unit.sample(bench.now)) == 1
+
+
+def test_after_the_receiver_was_away_units_come_back(bench):
+    bench.join()
+    bench.now += 10.0
+    for unit in bench.units:
+        unit.leave()
+    with Bench(start=bench.now, drawn=500) as after:
+        after.units = bench.units
+        after.join()
+        assert after.run(0.2) == 20
+
+
+def test_offers_nobody_takes_do_not_make_forged_samples_dearer(bench, monkeypatch):
+    bench.join()
+    tried = []
+    monkeypatch.setattr("pretouch.hardware.link.decode_sample", lambda *given: tried.append(given))
+    bench.send(*recorded_hellos(4))
+    forged = replace(PLAIN, sequence=1000).encode(Mac(bytes(32)))
+    for _ in range(10):
+        bench.now += 0.1
+        bench.send(*[forged] * 1000)
+    assert len(tried) <= 10_000 + 4 * 400
+    monkeypatch.undo()
+    assert bench.send(bench.units[0].sample(bench.now)) == 1
+
+
+def test_a_unit_joins_through_a_flood_of_samples_forged_in_its_name(bench):
+    unit = bench.units[0]
+    forged = replace(PLAIN, sequence=1).encode(Mac(bytes(32)))
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    began = bench.now
+    while not accepted(bench):
+        bench.now += 0.02
+        bench.send(*[forged] * 20, unit.sample(bench.now), *[forged] * 30)  # 2500 a second
+        assert bench.now - began < 3.0
