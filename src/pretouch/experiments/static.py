@@ -77,7 +77,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         seed=seed,
         recording=context.recording,
     )
-    record = play(setup, _done())
+    record = play(setup, done_after_contact())
     row = {
         "experiment": NAME,
         **cell.where,
@@ -88,7 +88,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
     return row, record
 
 
-def _done() -> Callable[[ControlStep, Plant], bool]:
+def done_after_contact() -> Callable[[ControlStep, Plant], bool]:
     """End a while after the first reaction that a true contact caused, or at the time limit."""
     detected: list[float] = []
 

@@ -1,7 +1,7 @@
 """One trial: an arm in a scene under the controller, and everything it left behind."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
@@ -10,6 +10,7 @@ import numpy as np
 from pretouch.control.path import Path
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
+from pretouch.hardware.traffic import UnitTraffic
 from pretouch.loop import Cycle, run
 from pretouch.params import Profile
 from pretouch.recording.reader import Recorded
@@ -17,6 +18,8 @@ from pretouch.recording.truth import Truth, truth_of
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.serving.fleet import FleetParams
+from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.hand import Hand, HandScript
 from pretouch.sim.plant import Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
@@ -44,6 +47,8 @@ class Setup:
     hand: HandScript | None = None
     plant: PlantParams = field(default_factory=PlantParams)
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    wire: FleetParams | None = None
+    """Units and network for readings that come over UDP sockets; none, and they come within the process."""
     recording: FilePath | None = None
     """File to record it in; none, and it is not recorded."""
     prepare: Callable[[Plant, RangeFinders], None] | None = None
@@ -63,6 +68,11 @@ class Record:
     """Each beginning of a contact of the arm."""
     hand_position: FloatArray
     """(S, 3) centre of the hand at each control step [m], NaN without a hand."""
+    reading_age: FloatArray | None = None
+    """(S, K) age of each unit's newest reading at each control step [s], infinite before its first; None if it was
+    read from a recording."""
+    traffic: tuple[UnitTraffic, ...] = ()
+    """What the receiver counted of each unit, if readings came over the wire."""
 
     def times(self) -> FloatArray:
         """Instants (S,) of the control steps [s]."""
@@ -108,9 +118,11 @@ class _Recorder:
         self._forces = self._touches = 0
         self.steps: list[ControlStep] = []
         self.hand_position: list[FloatArray] = []
+        self.reading_age: list[FloatArray] = []
 
     def record(self, cycle: Cycle) -> None:
         self.steps.append(cycle.step)
+        self.reading_age.append(cycle.step.stamp - cycle.inputs.readings.stamp)
         self.hand_position.append(self._hand.position.copy() if self._hand else np.full(3, np.nan))
         if self._recording:
             self._recording.record(cycle, self._truth())
@@ -139,20 +151,30 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     """Run a trial until `done` says so of a step."""
     model, scene, profile = setup.model, setup.scene, setup.profile
     plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
-    units = RangeFinders(plant, setup.skin, setup.ranging, setup.seed)
-    hand = Hand(plant, setup.hand) if setup.hand else None
-    if setup.prepare:
-        setup.prepare(plant, units)
-    controller = Controller(model, setup.skin, fixtures(scene), setup.path, profile)
-    clock = PlantClock(plant, profile.task.control_period_s)
-    plant.advance(SETTLE_S)
-    with _recording(setup, controller) as recording:
-        recorder = _Recorder(plant, hand, recording)
-        run(controller, plant, units, clock, recorder, lambda step: done(step, plant))
+    with _mounted(setup, plant) as units:
+        finders, traffic = (units.range_finders, units.receiver.units) if isinstance(units, WireSkin) else (units, ())
+        hand = Hand(plant, setup.hand) if setup.hand else None
+        if setup.prepare:
+            setup.prepare(plant, finders)
+        controller = Controller(model, setup.skin, fixtures(scene), setup.path, profile)
+        clock = PlantClock(plant, profile.task.control_period_s)
+        plant.advance(SETTLE_S)
+        with _recording(setup, controller) as recording:
+            recorder = _Recorder(plant, hand, recording)
+            run(controller, plant, units, clock, recorder, lambda step: done(step, plant))
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),
         np.array([f for _, f in plant.true_log]),
         plant.touches,
         np.array(recorder.hand_position),
+        np.array(recorder.reading_age),
+        traffic,
     )
+
+
+def _mounted(setup: Setup, plant: Plant) -> AbstractContextManager[RangeFinders | WireSkin]:
+    """Mount the skin's units on an arm, for as long as the context lasts."""
+    if setup.wire is None:
+        return nullcontext(RangeFinders(plant, setup.skin, setup.ranging, setup.seed))
+    return WireSkin(plant, setup.skin, setup.ranging, setup.wire, setup.seed)

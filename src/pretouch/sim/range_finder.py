@@ -1,8 +1,9 @@
 """Model of the VL53L1X time-of-flight sensors of a skin, seen through the simulated room."""
 
 import heapq
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import mujoco
 import numpy as np
@@ -65,6 +66,27 @@ class RangeFinderParams(Checked):
     """Probability that a reading is lost on its way."""
 
 
+class RangeSample(NamedTuple):
+    """All that a sensor says of one measurement."""
+
+    unit: int
+    """Index of the unit in the skin."""
+    time: float
+    """When it was measured [s]."""
+    distance: float
+    """[m]; 0 without a target."""
+    status: int
+    """A `RangeStatus`."""
+    sigma: float
+    """Standard deviation of the distance [m]; 0 without a target."""
+    signal: float
+    """Rate of the light that came back [Mcps]."""
+    ambient: float
+    """Rate of other light [Mcps]."""
+    spads: float
+    """SPADs in use."""
+
+
 class RangeFinders:
     """All sensors of a skin in a simulated room: the port `Skin`, sampled and held.
 
@@ -72,10 +94,18 @@ class RangeFinders:
     all. A unit sees everything but its own link: objects, hand, floor, and the rest of the arm.
     """
 
-    def __init__(self, plant: Plant, skin: Skin, params: RangeFinderParams, seed: int) -> None:
-        """Mount the sensors on a simulated arm; the seed decides offsets, phases, noise and losses."""
+    def __init__(
+        self, plant: Plant, skin: Skin, params: RangeFinderParams, seed: int,
+        send: Callable[[RangeSample], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Mount the sensors on a simulated arm; the seed decides offsets, phases, noise and losses.
+
+        With `send`, that is handed each measurement as it is made and has to bring it to where it is read: latency,
+        jitter and dropout are not these sensors' then, and `read` tells nothing. They measure the same either way.
+        """
         self._plant, self._skin, self._params, self._mode = plant, skin, params, MODES[params.mode]
         self._rng = np.random.default_rng([seed, 3])
+        self._send, self._light = send, np.random.default_rng([seed, 4])
         self._rays = cone_rays(params.rings)
         self._calibration = _flat_wall(self._rays[:, 2])
         rays = len(self._rays)
@@ -121,14 +151,18 @@ class RangeFinders:
             if due > time:
                 continue
             self._due[unit] = due + self._mode.period_s * (1.0 + p.period_jitter * rng.standard_normal())
-            distance, status = self._measure(unit)
+            distance, status, sigma, strength = self._measure(unit)
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
             lost = rng.random() < p.dropout
-            if not lost and unit not in self.silenced:
+            if unit in self.silenced:
+                continue
+            if self._send:
+                self._send(RangeSample(unit, time, distance, status, sigma, *_light(strength, self._light)))
+            elif not lost:
                 heapq.heappush(self._arriving, (arrival, unit, time, distance, status))
         self._next_due = min(self._due)
 
-    def _measure(self, unit: int) -> tuple[float, int]:
+    def _measure(self, unit: int) -> tuple[float, int, float, float]:
         p, link = self._params, int(self._skin.link[unit])
         origin, rays = _beams(self._xpos[link], self._xmat[link], self._skin.T_link_sensor[unit], self._rays)
         mujoco.mj_multiRay(
@@ -140,6 +174,26 @@ class RangeFinders:
             self._mode.distance_max_m, p.merge_m, self._calibration, p.noise_floor_m, p.noise_rate, p.sigma_limit_m,
             self._offset[unit], self._rng.standard_normal(),
         )  # fmt: skip
+
+
+_SIGNAL_LIMIT_MCPS = 1.024
+"""Signal of a target that is just detected [Mcps] (data sheet: readings below 1024 kcps are rejected)."""
+_AMBIENT_MCPS = 0.3
+"""Rate of ambient light indoors on all SPADs, of the size that units on a desk report [Mcps]; an assumption."""
+_WANTED_MCPS = 20.0
+"""The sensor uses so many SPADs that all rates together stay below this [Mcps] (its driver's default)."""
+_SPADS = 256
+"""SPADs of the whole array (data sheet)."""
+_COUNTED_S = 0.01
+"""Time in which photons are counted [s]: about half of the 20 ms budget; an assumption."""
+
+
+def _light(strength: float, rng: np.random.Generator) -> tuple[float, float, float]:
+    """Rates of signal and ambient light [Mcps], with the photons' noise, and SPADs in use, at a strength of returns."""
+    rates = np.array([_SIGNAL_LIMIT_MCPS * strength, _AMBIENT_MCPS])
+    share = min(1.0, _WANTED_MCPS / float(rates.sum()))
+    signal, ambient = (rng.poisson(1e6 * share * rates * _COUNTED_S) / (1e6 * _COUNTED_S)).tolist()
+    return signal, ambient, _SPADS * share
 
 
 def _flat_wall(cosines: FloatArray) -> float:
@@ -180,8 +234,10 @@ def _reading(
     distance: FloatArray, rays: FloatArray, normal: FloatArray, reflectance: float, reflectance_limit: float,
     distance_max: float, merge: float, calibration: float, noise_floor: float, noise_rate: float,
     sigma_limit: float, offset: float, draw: float,
-) -> tuple[float, int]:  # fmt: skip
-    """One reading [m] and its status from the returns of a bundle; a ray without a hit has a negative distance.
+) -> tuple[float, int, float, float]:  # fmt: skip
+    """One reading [m], its status, its standard deviation [m], and the strength of what it shows.
+
+    From the returns of a bundle; a ray without a hit has a negative distance.
 
     The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
     distance and the cosine of incidence, relative to a target that is just detected at `distance_max`. A ray that
@@ -204,7 +260,7 @@ def _reading(
             if strength[i] > 0 and start <= distance[i] < nearest:
                 nearest = distance[i]
         if nearest == np.inf:
-            return 0.0, _SIGNAL
+            return 0.0, _SIGNAL, 0.0, strength.sum()
         total, mean = 0.0, 0.0
         for i in range(count):
             if nearest <= distance[i] <= nearest + merge:
@@ -218,7 +274,7 @@ def _reading(
     sigma = noise_floor + noise_rate * mean * np.sqrt(max(1.0, full / total))
     measured = max(0.0, mean + offset + sigma * draw)
     if sigma > sigma_limit:
-        return measured, _SIGMA
+        return measured, _SIGMA, sigma, total
     if measured < MIN_DISTANCE:
-        return measured, _MIN_RANGE
-    return measured, _OK
+        return measured, _MIN_RANGE, sigma, total
+    return measured, _OK, sigma, total

@@ -1,0 +1,132 @@
+"""The simulated units of a skin, each behind its own UDP socket and its own stretch of a simulated network."""
+
+import socket
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+
+import numpy as np
+
+from pretouch.checks import Checked, NonNegative
+from pretouch.errors import HardwareError
+from pretouch.hardware.keys import Keys
+from pretouch.serving.network import NetworkParams, Way
+from pretouch.serving.unit import SimulatedUnit, UnitParams
+from pretouch.sim.imu import ImuParams, ImuSample
+from pretouch.sim.range_finder import RangeSample
+
+_LARGEST = 2048
+_LAST_PORT = 0xFFFF
+
+
+@dataclass(frozen=True)
+class FleetParams(Checked):
+    """Units, and the network between them and their receiver."""
+
+    network: NetworkParams = field(default_factory=NetworkParams)
+    """What becomes of datagrams."""
+    unit: UnitParams = field(default_factory=UnitParams)
+    """How units keep their time and their sessions."""
+    imu: ImuParams | None = None
+    """How their IMUs err; None, and they have none."""
+    reboot_every_s: NonNegative = 0.0
+    """Time from each reboot of a unit to its next one, the first at a random part of it [s]; 0: none."""
+
+
+class Fleet:
+    """All units of a skin. `step` moves them on; nothing happens in between."""
+
+    def __init__(
+        self, ids: Sequence[str], keys: Keys, params: FleetParams, seed: int, address: tuple[str, int]
+    ) -> None:
+        """Switch the units on; the seed decides clocks, challenges, reboots and the network's course.
+
+        A unit without a key, and an address that cannot be found, are a HardwareError.
+        """
+        missing = [name for name in ids if name not in keys]
+        if missing:
+            raise HardwareError(f"There is no key for unit {', '.join(missing)}: make keys for all units of the skin.")
+        family, self._address = _resolved(address)
+        self.ids = tuple(ids)
+        seeds = np.random.SeedSequence([seed, 6]).spawn(len(ids))
+        rngs = [[np.random.default_rng(s) for s in one.spawn(3)] for one in seeds]
+        self.units = tuple(
+            SimulatedUnit(keys[name], params.unit, own, params.imu, _reboots(params.reboot_every_s, own))
+            for name, (own, _, _) in zip(ids, rngs, strict=True)
+        )
+        """In the order of the skin."""
+        self._up = [Way[bytes](params.network.up, rng) for _, rng, _ in rngs]
+        self._down = [Way[bytes](params.network.down, rng) for _, _, rng in rngs]
+        self._sockets = [socket.socket(family, socket.SOCK_DGRAM) for _ in ids]
+        for one in self._sockets:
+            one.setblocking(False)
+        self.sent = 0
+        """Datagrams that reached the socket."""
+        self.lost = 0
+        """Datagrams that the machine would not send, as while its network is down."""
+
+    def take_range(self, sample: RangeSample) -> None:
+        """Let a unit's range finder measure."""
+        self.units[sample.unit].take_range(sample)
+
+    def take_imu(self, sample: ImuSample) -> None:
+        """Let a unit's IMU take a sample."""
+        self.units[sample.unit].take_imu(sample)
+
+    def step(self, clock: Callable[[], float]) -> int:
+        """Hand on what has come, do what is due, send what has arrived by now; return how many were sent.
+
+        `clock` gives the time [s]. It is asked once, after the sockets: no beacon is heard before it was sent.
+        """
+        before, heard = self.sent, [_heard(one) for one in self._sockets]
+        now = clock()
+        for unit, came, down, up, one in zip(self.units, heard, self._down, self._up, self._sockets, strict=True):
+            for datagram in came:
+                down.put(datagram, now)
+            for datagram in down.take(now):
+                unit.heard(datagram, now)
+            for datagram in unit.tick(now):
+                up.put(datagram, now)
+            for datagram in up.take(now):
+                self._send(one, datagram)
+        return self.sent - before
+
+    def _send(self, one: socket.socket, datagram: bytes) -> None:
+        try:
+            one.sendto(datagram, self._address)
+            self.sent += 1
+        except OSError:
+            self.lost += 1
+
+    def close(self) -> None:
+        """Give the sockets back."""
+        for one in self._sockets:
+            one.close()
+
+
+def _reboots(every: float, rng: np.random.Generator) -> "count[float] | tuple[()]":
+    return count(every * float(rng.uniform()), every) if every > 0 else ()
+
+
+def _resolved(address: tuple[str, int]) -> tuple[int, tuple[object, ...]]:
+    """Family and address of a receiver by its name and port."""
+    host, port = address
+    if not 1 <= port <= _LAST_PORT:
+        raise HardwareError(f"The receiver's port is {port}: give one from 1 to {_LAST_PORT}.")
+    try:
+        family, _, _, _, found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+    except (OSError, UnicodeError) as error:
+        raise HardwareError(f"The receiver {host}:{port} cannot be found ({error}): check its name and port.") from None
+    return family, found
+
+
+def _heard(one: socket.socket) -> list[bytes]:
+    """All datagrams that wait at a socket."""
+    heard = []
+    while True:
+        try:
+            heard.append(one.recv(_LARGEST))
+        except BlockingIOError:
+            return heard
+        except ConnectionError:  # nobody listens at the receiver's port; it may begin to
+            continue

@@ -1,0 +1,87 @@
+"""A simulated skin whose readings come as real ones do: units, network, sockets, receiver, all in simulated time."""
+
+from typing import Self
+
+import numpy as np
+
+from pretouch.errors import HardwareError
+from pretouch.hardware.keys import Keys, UnitKey
+from pretouch.hardware.link import LinkParams
+from pretouch.hardware.receiver import SkinReceiver
+from pretouch.hardware.wire import KEY_SIZE
+from pretouch.sensing.skin import Skin
+from pretouch.serving.fleet import Fleet, FleetParams
+from pretouch.sim.imu import Imus
+from pretouch.sim.plant import Plant
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.types import RangeReadings
+
+_PATIENCE_S = 5.0
+"""The machine's own loopback may take this long to hand a datagram over [s]."""
+
+
+class WireSkin:
+    """The port `Skin` of a simulated arm, over loopback, in lockstep with the physics.
+
+    The receiver's clock is the simulated time, and what was sent before a physics step is taken in before it: the same
+    seed gives the same readings, bit for bit. One thread; a context manager, for the sockets.
+    """
+
+    def __init__(
+        self, plant: Plant, skin: Skin, ranging: RangeFinderParams, params: FleetParams, seed: int,
+        link: LinkParams | None = None,
+    ) -> None:  # fmt: skip
+        """Mount the units on an arm and switch them on; measurements are those of `RangeFinders` with this seed."""
+        self._plant = plant
+        keys, rng = made_keys(skin.ids, seed), np.random.default_rng([seed, 8])
+        self.receiver = SkinReceiver(skin.ids, keys, clock=lambda: plant.time, draw=rng.bytes, params=link)
+        """What came of it all: traffic of each unit, what was rejected, samples."""
+        try:
+            self.fleet = Fleet(skin.ids, keys, params, seed, self.receiver.address)
+            """The units, to be silenced, stuck, rebooted."""
+        except BaseException:
+            self.receiver.close()
+            raise
+        self._taken_in = 0
+        plant.before_each_step(self._step)
+        self.range_finders = RangeFinders(plant, skin, ranging, seed, self.fleet.take_range)
+        """What measures; `silenced` ones do not, while their units go on sending."""
+        if params.imu is not None:
+            Imus(plant, skin, params.imu, seed, self.fleet.take_imu)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the sockets back."""
+        self.fleet.close()
+        self.receiver.close()
+
+    def read(self) -> RangeReadings:
+        """Return the newest reading of each unit."""
+        return self.receiver.readings()
+
+    def _step(self, now: float) -> None:
+        self._taken_in += self.fleet.step(lambda: now)
+        self.receiver.receive()
+        while (came := self._came()) < self._taken_in:
+            self.receiver.receive(timeout=_PATIENCE_S)
+            if self._came() == came:
+                raise HardwareError(
+                    f"Of {self._taken_in} datagrams {came} came through this machine's loopback:"
+                    " let nothing drop UDP datagrams to 127.0.0.1."
+                )
+
+    def _came(self) -> int:
+        """Datagrams that reached the receiver, whatever it made of them."""
+        receiver = self.receiver
+        return sum(unit.accepted + unit.hellos for unit in receiver.units) + sum(receiver.rejected.values())
+
+
+def made_keys(ids: tuple[str, ...], seed: int) -> Keys:
+    """Keys that are the same with the same seed: for simulated units alone."""
+    rng = np.random.default_rng([seed, 7])
+    return Keys(UnitKey(name, number, rng.bytes(KEY_SIZE)) for number, name in enumerate(ids, 1))

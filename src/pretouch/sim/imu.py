@@ -1,0 +1,210 @@
+"""Model of the LSM6DS3 inertial sensors of a skin: what each unit's accelerometer and gyroscope put into its FIFO."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
+from pretouch.compiled import compiled
+from pretouch.sensing.skin import Skin
+from pretouch.sim.plant import Plant
+from pretouch.types import FloatArray, IntArray
+
+_GRAVITY = 9.80665
+ACCELERATION_LSB_MG = {2: 0.061, 4: 0.122, 8: 0.244, 16: 0.488}
+"""One count of the accelerometer [mg] by its full scale [g] (data sheet, LA_So)."""
+ANGULAR_RATE_LSB_MDPS = {125: 4.375, 245: 8.75, 500: 17.5, 1000: 35.0, 2000: 70.0}
+"""One count of the gyroscope [mdps] by its full scale [dps] (data sheet, G_So)."""
+
+_SI = np.repeat((np.deg2rad(1.0), _GRAVITY), 3)
+"""(6,) degrees/s and g in SI units, gyroscope first."""
+_DRAWS = 2048
+"""Samples whose noise is drawn at once."""
+
+
+@dataclass(frozen=True)
+class ImuParams(Checked):
+    """How the inertial sensors of a skin err. Where ST gives a typical value, each sensor's is uniform up to it."""
+
+    rate_hz: Annotated[float, Check(low=12.0, high=1666.0)] = 416.0
+    """Nominal rate of samples, of both sensors alike [Hz]: the first of the sensor's rates above 400 Hz."""
+    rate_error: Fraction = 0.03
+    """Each sensor's true rate is off by up to this fraction: its oscillator is trimmed, not a crystal. The data sheet
+    gives no tolerance; an assumption."""
+    acceleration_range_g: Literal[2, 4, 8, 16] = 4
+    """Full scale of the accelerometer [g]."""
+    angular_rate_range_dps: Literal[125, 245, 500, 1000, 2000] = 500
+    """Full scale of the gyroscope [degrees/s]; like the accelerometer's counts, its counts end at 16 bits."""
+    acceleration_bandwidth_hz: Positive = 200.0
+    """First-order low-pass of the accelerometer [Hz]: its analogue filter at 416 Hz (data sheet, BW_XL)."""
+    angular_rate_bandwidth_hz: Positive = 137.0
+    """First-order low-pass of the gyroscope [Hz]: about a third of the rate, as ST's sensors of this family have."""
+    scale_error: Fraction = 0.01
+    """Each axis' scale is off by up to this fraction (data sheet: 1 % over temperature)."""
+    misalignment_deg: NonNegative = 0.5
+    """Each sensor is turned by up to this about each axis [degrees]: how well a board is glued on; an assumption. The
+    data sheet gives no cross-axis sensitivity; it would do the same."""
+    acceleration_bias_mg: NonNegative = 40.0
+    """Each axis' constant error, uniform up to this [mg] (data sheet, zero-g level offset)."""
+    angular_rate_bias_dps: NonNegative = 10.0
+    """Each axis' constant error, uniform up to this [degrees/s] (data sheet, zero-rate level); can be taken off by
+    whoever reads the sensor at rest."""
+    acceleration_noise_ug: NonNegative = 90.0
+    """Density of white noise [ug/sqrt(Hz)] (data sheet, An)."""
+    angular_rate_noise_mdps: NonNegative = 7.0
+    """Density of white noise [mdps/sqrt(Hz)] (data sheet, Rn)."""
+
+
+class ImuSample(NamedTuple):
+    """One sample of one sensor's FIFO."""
+
+    unit: int
+    """Index of the unit in the skin."""
+    time: float
+    """When it was taken [s]."""
+    counts: IntArray
+    """(6,) gyroscope x, y, z, accelerometer x, y, z, in the unit's sensor frame, each of 16 bits."""
+
+
+class Imus:
+    """All inertial sensors of a skin on a simulated arm: `send` is handed each sample as it is taken.
+
+    A sensor measures its own proper acceleration (at rest, that against gravity) and angular velocity, where the unit
+    sits; it samples at its own true rate, with its own errors.
+    """
+
+    def __init__(
+        self, plant: Plant, skin: Skin, params: ImuParams, seed: int, send: Callable[[ImuSample], None]
+    ) -> None:
+        """Mount the sensors; the seed decides errors, rates, phases and noise."""
+        self._plant, self._send = plant, send
+        rng, count, dt = np.random.default_rng([seed, 5]), len(skin), plant.params.period_s
+        self.rate: FloatArray = params.rate_hz * (1.0 + params.rate_error * rng.uniform(-1, 1, count))
+        """(K,) true rate of each sensor [Hz]."""
+        self._due = rng.uniform(0, 1, count) / self.rate
+        self._mix, self._bias = _errors(params, count, rng)
+        self._rng, self._draws, self._drawn = rng, np.zeros((0, 6)), 0
+        density = np.repeat((1e-3 * params.angular_rate_noise_mdps, 1e-6 * params.acceleration_noise_ug), 3) * _SI
+        self._noise = density * np.sqrt(self.rate[:, None] / 2.0)
+        self._lsb = _lsb(params)
+        bandwidth = np.repeat((params.angular_rate_bandwidth_hz, params.acceleration_bandwidth_hz), 3)
+        self._follow = 1.0 - np.exp(-2 * np.pi * bandwidth * dt)
+        most = count * (int(dt * self.rate.max(initial=0.0)) + 2)
+        self._unit, self._time = np.zeros(most, np.int64), np.zeros(most)
+        self._counts = np.zeros((most, 6), np.int64)
+        self._link, self._T = skin.link, skin.T_link_sensor
+        self._center = plant.mj_model.body_rootid[skin.link].astype(np.int64)
+        data = plant.mj_data
+        # views into the simulation's memory, taken once
+        self._motion = data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc
+        self._qvel, self._last_qvel = data.qvel, data.qvel.copy()
+        self._felt = np.full((count, 6), np.nan)
+        plant.before_each_step(self._sample)
+
+    def _sample(self, time: float) -> None:
+        """Take the samples due by one step before `time`: what MuJoCo derives from a state is one step behind it."""
+        plant, most = self._plant, len(self._unit)
+        if self._drawn + most > len(self._draws):
+            self._draws, self._drawn = self._rng.standard_normal((max(_DRAWS, most), 6)), 0
+        dt, qvel = plant.params.period_s, self._qvel.copy()
+        self._qvel[:] = self._last_qvel  # the step has moved it on already
+        mujoco.mj_rnePostConstraint(plant.mj_model, plant.mj_data)
+        self._qvel[:] = self._last_qvel = qvel
+        taken = _take(
+            *self._motion, self._center, self._link, self._T, self._felt, self._follow, time - dt, dt,
+            self._due, self.rate, self._mix, self._bias, self._noise, self._draws[self._drawn :], self._lsb,
+            self._unit, self._time, self._counts,
+        )  # fmt: skip
+        self._drawn += taken
+        for i in range(taken):
+            self._send(ImuSample(int(self._unit[i]), float(self._time[i]), self._counts[i].copy()))
+
+
+def _lsb(params: ImuParams) -> FloatArray:
+    """One count (6,) of gyroscope [rad/s] and accelerometer [m/s^2]."""
+    rate = 1e-3 * ANGULAR_RATE_LSB_MDPS[params.angular_rate_range_dps]
+    return np.repeat((rate, 1e-3 * ACCELERATION_LSB_MG[params.acceleration_range_g]), 3) * _SI
+
+
+def _errors(params: ImuParams, count: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Draw how sensors err: matrices (K, 2, 3, 3) from true to sensed values, and biases (K, 6), gyroscope first."""
+    angle = np.deg2rad(params.misalignment_deg) * rng.uniform(-1, 1, (count, 3))
+    turn = Rotation.from_rotvec(angle.reshape(-1, 3)).as_matrix().reshape(count, 1, 3, 3)
+    scale = 1.0 + params.scale_error * rng.uniform(-1, 1, (count, 2, 3, 1))
+    most = np.repeat((params.angular_rate_bias_dps, 1e-3 * params.acceleration_bias_mg), 3) * _SI
+    return scale * turn, most * rng.uniform(-1, 1, (count, 6))
+
+
+@compiled
+def _take(
+    xpos: FloatArray, xmat: FloatArray, center: FloatArray, cvel: FloatArray, cacc: FloatArray, root: IntArray,
+    link: IntArray, T_link_sensor: FloatArray, felt: FloatArray, follow: FloatArray, now: float, dt: float,
+    due: FloatArray, rate: FloatArray, mix: FloatArray, bias: FloatArray, noise: FloatArray, draws: FloatArray,
+    lsb: FloatArray, unit: IntArray, time: FloatArray, counts: IntArray,
+) -> int:  # fmt: skip
+    """Follow the motion to `now`, `dt` after the last call [s], and take what samples are due; return how many.
+
+    Changes `felt` (K, 6), the filtered signals at `now`, and `due` (K,); writes the last line of arguments.
+    """
+    taken, sensed, before = 0, np.zeros(6), np.zeros(6)
+    for k in range(len(link)):
+        body = link[k]
+        true = _true(
+            xpos[body], xmat[body], center[root[k]], cvel[body], cacc[body], T_link_sensor[k]
+        )  # fmt: skip
+        for i in range(6):
+            begun = not np.isnan(felt[k, i])
+            before[i] = felt[k, i] if begun else true[i]
+            felt[k, i] = before[i] + follow[i] * (true[i] - before[i])
+        while due[k] <= now:
+            part = 1.0 - (now - due[k]) / dt
+            for i in range(6):
+                sensed[i] = before[i] + part * (felt[k, i] - before[i])
+            for i in range(6):
+                kind = i // 3
+                value = bias[k, i] + noise[k, i] * draws[taken, i]
+                for j in range(3):
+                    value += mix[k, kind, i % 3, j] * sensed[3 * kind + j]
+                counts[taken, i] = int(min(max(np.round(value / lsb[i]), -32768.0), 32767.0))
+            unit[taken], time[taken] = k, due[k]
+            taken += 1
+            due[k] += 1.0 / rate[k]
+    return taken
+
+
+@compiled
+def _true(
+    xpos: FloatArray, xmat: FloatArray, center: FloatArray, cvel: FloatArray, cacc: FloatArray,
+    T_link_sensor: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """True angular velocity and proper acceleration (6,) of a sensor, in its own frame.
+
+    MuJoCo gives each body's velocity and acceleration as those of its point at `center` (3,), turning first, along
+    the base frame's axes; the acceleration has gravity taken off, and lacks the part from the velocity's own turning.
+    """
+    R, arm = np.zeros((3, 3)), np.zeros(3)
+    for i in range(3):
+        arm[i] = xpos[i] - center[i]
+        for k in range(3):
+            arm[i] += xmat[3 * i + k] * T_link_sensor[k, 3]
+            for j in range(3):
+                R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
+    w, alpha = cvel[:3], cacc[:3]
+    velocity = cvel[3:] + _cross(w, arm)
+    acceleration = cacc[3:] + _cross(alpha, arm) + _cross(w, velocity)
+    own = np.zeros(6)
+    for i in range(3):
+        for j in range(3):
+            own[i] += R[j, i] * w[j]
+            own[3 + i] += R[j, i] * acceleration[j]
+    return own
+
+
+@compiled
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product (3,)."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
