@@ -1,16 +1,25 @@
 """The pages as a person meets them: in a headless Chromium, by mouse and controls."""
 
 from pathlib import Path
+from threading import Event, Thread
 
 import numpy as np
 import pytest
 from tests.viewer.browser import Served, chromium
 
+from pretouch.hardware.keys import Keys, UnitKey
+from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.params import profile
 from pretouch.recording.compare import compare
 from pretouch.recording.reader import open_recording
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import paper_skin
+from pretouch.serving.simulate import SimulateOptions
+from pretouch.serving.simulate import run as simulate
 from pretouch.types import FloatArray, Mode
 from pretouch.viewer.live import serve_live
+from pretouch.viewer.real_units import RealUnits
 from pretouch.viewer.replay import serve_replay
 from pretouch.viewer.scene import GIZMO_M
 from pretouch.viewer.settings import LiveSettings
@@ -131,3 +140,29 @@ def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
         visitor.wait_for("rates", "5.01 of ")
         visitor.press("Play")
         visitor.wait_for("rates", f"{recorded.stamps()[-1] - recorded.stamps()[0]:.2f} of ")
+
+
+def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path: Path) -> None:
+    model, other = RobotModel(panda()), RobotModel(panda())  # each thread its own
+    skin = paper_skin(model)
+    keys = Keys([UnitKey(unit, k + 1, bytes([k]) * 32) for k, unit in enumerate(skin.ids)])
+    over = Event()
+    with NetworkSkin(skin.ids, keys) as units:
+        desk = SimulateOptions(other, paper_skin(other), keys, *units.address, hand=False)
+        thread = Thread(target=simulate, args=(desk, over.is_set, lambda line: None))
+        thread.start()
+        try:
+            simulation = LiveSimulation(model=model, skin=skin, real=RealUnits(units))
+            with live(simulation) as served, chromium() as visitor:
+                visitor.open(served)
+                visitor.wait_for("mode", Mode.TRACK.name)
+                visitor.tab("World")
+                visitor.page.wait_for_function("() => document.querySelector('.units').textContent.includes(' Hz · ')")
+                visitor.keep("desk", tmp_path)
+                over.set()
+                visitor.wait_for("reason", "No usable reading from hand_left")
+                visitor.page.wait_for_function("() => document.querySelector('.units').textContent.includes('nothing')")
+                visitor.keep("desk-silent", tmp_path)
+        finally:
+            over.set()
+            thread.join()

@@ -25,6 +25,7 @@ from pretouch.cli.commands import (
     Reproduce,
     WarmUp,
 )  # fmt: skip
+from pretouch.cli.skin_commands import Skin
 from pretouch.errors import ParameterError, PretouchError
 
 # the rest of the package takes a second to import: only the functions that run something do
@@ -84,6 +85,8 @@ def main(args: list[str] | None = None) -> int:
                     _detect(command)
                 case Report():
                     _report(command)
+                case Skin():
+                    return _skin(command)
                 case WarmUp():
                     _warm_up()
     except PretouchError as error:
@@ -184,7 +187,7 @@ def _live(command: Live) -> None:
     from pretouch.cli.live import live
 
     c = command
-    live(c.profile, c.path, c.seed, c.record, c.host, c.port)
+    live(c.profile, c.path, c.seed, c.record, c.host, c.port, c.keys, c.skin, c.units_host, c.units_port)
 
 
 def _report(command: Report) -> None:
@@ -192,6 +195,12 @@ def _report(command: Report) -> None:
 
     limits = Path(command.limits) if command.limits else None
     print(f"Report: {write_page([Path(file) for file in command.files], Path(command.out), limits)}")
+
+
+def _skin(command: Skin) -> int:
+    from pretouch.cli.skin import skin
+
+    return skin(command.what)
 
 
 def _warm_up() -> None:

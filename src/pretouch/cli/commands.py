@@ -5,6 +5,9 @@ from typing import Annotated, Literal
 
 import tyro
 
+from pretouch.cli.skin_commands import Skin
+from pretouch.hardware.address import HOST, PORT
+
 
 @dataclass(frozen=True)
 class Demo:
@@ -120,6 +123,14 @@ class Live:
     """Address to serve the page at. Anyone who can reach it can move the simulated arm."""
     port: int = 8080
     """Port to serve the page at."""
+    keys: str = ""
+    """File of the keys of real sensor units, which the simulated arm then carries in place of simulated ones."""
+    skin: str = ""
+    """Skin file; by default the seven units that come with the package."""
+    units_host: str = HOST
+    """Address at which real units are heard. They need 0.0.0.0, which is every address of this machine."""
+    units_port: int = PORT
+    """UDP port at which real units are heard."""
 
 
 @dataclass(frozen=True)
@@ -203,5 +214,6 @@ Command = (
     | Annotated[Recover, tyro.conf.subcommand("recover")]
     | Annotated[Detect, tyro.conf.subcommand("detect")]
     | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[Skin, tyro.conf.subcommand("skin")]
     | Annotated[WarmUp, tyro.conf.subcommand("warm-up")]
 )

@@ -23,7 +23,7 @@ LIBRARY = f"pretouch {pretouch.__version__}"
 PACKAGE = "pretouch_msgs"
 OWN = (
     "RobotState", "RangeReadings", "Inputs", "Obstacles", "Thresholds", "Contact", "QpSolution", "Step", "Run", "State",
-    "Truth",
+    "Truth", "UnitSample",
 )  # fmt: skip
 """Our types; each has a file in `msg/`."""
 TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in ("Run", "Inputs", "Step", "State", "Truth")}

@@ -14,6 +14,7 @@ from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messag
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.recorded_path import Tangents
 from pretouch.recording.setting import Run, decode_run
+from pretouch.recording.skin_recording import UNIT_SAMPLE
 from pretouch.recording.state_codec import decode_state
 from pretouch.recording.truth import Truth
 from pretouch.types import ControlStep, FloatArray, Inputs
@@ -157,13 +158,18 @@ def _check(place: Path, contents: Contents, raw: Raw) -> None:
     """Refuse a file without a step of ours, or with messages that are not these."""
     for topic, number, _ in contents.channels.values():
         kind, schema = contents.schemas.get(number, ("", b""))
-        if TOPICS.get(topic) == kind and not _is_ours(schema, kind):
+        if TOPICS.get(topic) == kind and not is_ours(schema, kind):
             raise RecordingError(
                 f"{place} was recorded by another version of pretouch, whose messages on {topic} are others: open it"
                 " with that version."
             )
     if raw["/pretouch/step"] and raw["/pretouch/run"]:
         return
+    if any(kind == UNIT_SAMPLE for _, kind in contents.topics().values()):
+        raise RecordingError(
+            f"{place} holds what sensor units sent, and no control step: read it with"
+            " pretouch.recording.skin_reader.read_skin, or open it in Foxglove."
+        )
     if contents.library.startswith(LIBRARY.split()[0]) or any(t in TOPICS for t, _, _ in contents.channels.values()):
         raise RecordingError(f"{place} holds no control step: the run ended before the first was written.")
     raise RecordingError(
@@ -171,7 +177,7 @@ def _check(place: Path, contents: Contents, raw: Raw) -> None:
     )
 
 
-def _is_ours(schema: bytes, kind: str) -> bool:
+def is_ours(schema: bytes, kind: str) -> bool:
     """Whether a schema record ends with the definition of a type of ours, comments apart."""
     ours, at = definition(kind), len(schema)
     text = schema[max(0, at - 4 * len(ours)) :].decode(errors="replace")

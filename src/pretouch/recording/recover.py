@@ -9,6 +9,7 @@ from pretouch.recording.container import Contents, begins_as_mcap, scan
 from pretouch.recording.ending import ending, entry, header, in_chunk
 from pretouch.recording.messages import LIBRARY
 from pretouch.recording.reader import open_recording
+from pretouch.recording.skin_reader import holds_units, read_skin
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,7 @@ class Recovered:
     place: Path
     """The file that opens everywhere: a new one, or the given one if it was complete."""
     steps: int
+    """Control steps it holds, or samples of sensor units."""
     said: str
     """What was done, for a person to read."""
 
@@ -29,10 +31,9 @@ def recover(place: Path, out: Path | None = None) -> Recovered:
     already is a RecordingError, as is a file that holds no recording.
     """
     place = Path(place)
-    recorded = open_recording(place)
-    steps = len(recorded)
-    if recorded.complete:
-        return Recovered(place, steps, f"{place} is complete, with {steps} control steps: there is nothing to recover.")
+    complete, steps, what, last = _held(place)
+    if complete:
+        return Recovered(place, steps, f"{place} is complete, with {steps} {what}: there is nothing to recover.")
     out = Path(out) if out is not None else place.with_name(f"{place.name.removesuffix('.mcap')}.recovered.mcap")
     try:
         with place.open("rb") as source, out.open("xb") as target:
@@ -45,8 +46,16 @@ def recover(place: Path, out: Path | None = None) -> Recovered:
         raise RecordingError(f"There is something at {out} already: give another name, or move it away.") from error
     except OSError as error:
         raise RecordingError(f"The recovered recording {out} cannot be written: {error.strerror}.") from error
-    last = recorded.stamps()[-1]
-    return Recovered(out, steps, f"{out} holds what was whole of {place}: {steps} control steps, up to {last:.2f} s.")
+    return Recovered(out, steps, f"{out} holds what was whole of {place}: {steps} {what}, up to {last:.2f} s.")
+
+
+def _held(place: Path) -> tuple[bool, int, str, float]:
+    """Whether a recording is complete, how many of what it holds, and the instant of the last [s]."""
+    if holds_units(place):
+        units = read_skin(place)
+        return units.complete, units.samples, "samples of sensor units", units.last
+    recorded = open_recording(place)
+    return recorded.complete, len(recorded), "control steps", float(recorded.stamps()[-1])
 
 
 def _copy(source: BinaryIO, target: BinaryIO) -> None:

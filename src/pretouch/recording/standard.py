@@ -1,6 +1,7 @@
 """The standard ROS 2 topics of a recording: a copy of what was measured, for tools that do not know our messages."""
 
 import math
+import struct
 from collections.abc import Iterator
 from functools import cache
 from typing import Any
@@ -28,6 +29,11 @@ _INFRARED = 1
 _ACCURACY_M = 0.025
 """Ranging error of the VL53L1X, at most [m] (data sheet DS12385)."""
 _SHOWN = (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED)
+_HEAD = 4
+"""Bytes of the encapsulation header before a CDR message; the stamp follows."""
+_STAMP, _VECTOR = struct.Struct("<iI"), struct.Struct("<3d")
+_ANGULAR_VELOCITY, _ACCELERATION = -8 * (3 + 9 + 3 + 9), -8 * (3 + 9)
+"""Where an Imu message holds these, from its end: each is followed by its covariance."""
 _UNKNOWN = np.array([-1.0, *np.zeros(8)])
 """Covariance that says a quantity is not there (sensor_msgs/Imu)."""
 
@@ -86,19 +92,39 @@ class Standard:
         fresh = np.flatnonzero((stamps != self._newest) & np.isfinite(stamps))
         self._newest = stamps
         for k in fresh.tolist():
-            at = header(nanoseconds(float(stamps[k]), time), self._ids[k])
-            shown = _single(float(distances[k])) if statuses[k] in _SHOWN else math.inf
-            message = make(RANGE, at, _INFRARED, CONE_ANGLE, MIN_DISTANCE, MAX_DISTANCE, shown, _ACCURACY_M**2)
-            name = f"/skin/{topic_name(self._ids[k])}/range"
-            yield Item(name, RANGE, sequence, time, encoded(RANGE, message))
+            yield range_item(self._ids[k], sequence, time, float(stamps[k]), float(distances[k]), int(statuses[k]))
 
-    def imu(self, unit_id: str, time: int, acceleration: FloatArray, angular_velocity: FloatArray) -> Item:
-        """Return what a unit's IMU measured at an instant [ns]."""
-        message = make(
-            IMU, header(time, unit_id), make(QUATERNION, 0.0, 0.0, 0.0, 1.0), _UNKNOWN, vector(angular_velocity),
-            np.zeros(9), vector(acceleration), np.zeros(9),
-        )  # fmt: skip
-        return Item(f"/skin/{topic_name(unit_id)}/imu", IMU, 0, time, encoded(IMU, message))
+
+def range_item(unit_id: str, sequence: int, time: int, stamp: float, distance: float, status: int) -> Item:
+    """Return a unit's reading measured at a stamp [s], logged at an instant [ns]: distance [m] and `RangeStatus`."""
+    at = header(nanoseconds(stamp, time), unit_id)
+    shown = _single(distance) if status in _SHOWN else math.inf
+    message = make(RANGE, at, _INFRARED, CONE_ANGLE, MIN_DISTANCE, MAX_DISTANCE, shown, _ACCURACY_M**2)
+    return Item(f"/skin/{topic_name(unit_id)}/range", RANGE, sequence, time, encoded(RANGE, message))
+
+
+def imu_item(unit_id: str, time: int, acceleration: FloatArray, angular_velocity: FloatArray) -> Item:
+    """Return what a unit's IMU measured at an instant [ns]."""
+    name, blank = _blank_imu(unit_id)
+    data = bytearray(blank)
+    _STAMP.pack_into(data, _HEAD, time // 10**9, time % 10**9)
+    _VECTOR.pack_into(data, len(data) + _ANGULAR_VELOCITY, *angular_velocity.tolist())
+    _VECTOR.pack_into(data, len(data) + _ACCELERATION, *acceleration.tolist())
+    return Item(name, IMU, 0, time, bytes(data))
+
+
+@cache
+def _blank_imu(unit_id: str) -> tuple[str, bytes]:
+    """Topic of a unit's IMU, and a message of it with zeros.
+
+    Thousands come each second, and differ in three places only.
+    """
+    nothing = vector(np.zeros(3))
+    message = make(
+        IMU, header(0, unit_id), make(QUATERNION, 0.0, 0.0, 0.0, 1.0), _UNKNOWN, nothing, np.zeros(9), nothing,
+        np.zeros(9),
+    )  # fmt: skip
+    return f"/skin/{topic_name(unit_id)}/imu", encoded(IMU, message)
 
 
 def vector(given: FloatArray) -> Any:

@@ -22,7 +22,7 @@ from pretouch.recording.messages import TOPICS, Item, prepare
 from pretouch.recording.plain import JSON
 from pretouch.recording.scene import DRAWN, Scene
 from pretouch.recording.setting import RUN, encode_run, is_described
-from pretouch.recording.standard import STANDARD, Standard, nanoseconds
+from pretouch.recording.standard import STANDARD, Standard, imu_item, nanoseconds
 from pretouch.recording.state_codec import STATE, encode_state
 from pretouch.recording.truth import Truth
 from pretouch.robot.model import RobotModel
@@ -135,7 +135,7 @@ class Recording:
         """Keep what a unit's IMU measured: acceleration (3,) [m/s^2], angular velocity (3,) [rad/s], sensor frame."""
         if self._closed is None and not self.trouble:
             time = nanoseconds(stamp, self._log_time)
-            self._disk.put([self._standard.imu(unit_id, time, acceleration, angular_velocity)])
+            self._disk.put([imu_item(unit_id, time, acceleration, angular_velocity)])
 
     @property
     def trouble(self) -> str:

@@ -16,6 +16,7 @@ from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs, written
 from pretouch.viewer.recordings import toggle_recording
 from pretouch.viewer.settings import ObjectName, PathName
 from pretouch.viewer.simulation import LiveSimulation
+from pretouch.viewer.unit_panel import UnitPanel
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -66,6 +67,8 @@ class Controls:
             self._base = "paper"
         self.on_view: Callable[[str, bool], None] = lambda name, visible: None
         """Told which part of the scene to show or hide."""
+        self.unit_panel: UnitPanel | None = None
+        """How the units are, if they are real."""
         tabs = gui.add_tab_group()
         with tabs.add_tab("Run"):
             self._run_tab()
@@ -121,7 +124,10 @@ class Controls:
         stiffness = gui.add_slider("Stiffness [kN/m]", 3.0, 150.0, 1.0, 75.0, hint=hint)
         self._number(stiffness, self._set_stiffness, "stiffness", lambda: simulation.settings.stiffness / 1000.0)
         with gui.add_folder("Sensor units"):
-            self._fault_controls()
+            if simulation.real:
+                self.unit_panel = UnitPanel(gui, simulation.real.source, simulation.skin.ids)
+            else:
+                self._fault_controls()
 
     def _fault_controls(self) -> None:
         gui, simulation = self._gui, self._simulation

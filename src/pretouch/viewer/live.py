@@ -123,6 +123,8 @@ class LivePage:
             )  # fmt: skip
             self._status.draw(frame.step, f"t = {frame.step.stamp:.2f} s · {rates}{recorded}", pace.sentence(), now)
             self.controls.offer_resume(self._simulation.latched)
+            if self.controls.unit_panel:
+                self.controls.unit_panel.draw(now)
 
     def _follow_target(self, target: FloatArray | None) -> None:
         """Have gizmo and sliders show where the hand is to be, wherever that came from."""

@@ -1,11 +1,13 @@
 """The simulated room of a live session: arm, sensor units, object and a person's hand."""
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.errors import ParameterError
+from pretouch.ports import Skin as UnitPort
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.board import Side, board_beside
@@ -17,6 +19,7 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import FloatArray
 from pretouch.viewer.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
+from pretouch.viewer.real_units import RealUnits
 from pretouch.viewer.settings import Faults, LiveSettings
 
 _SETTLE_S = 0.2
@@ -34,8 +37,13 @@ def live_path(settings: LiveSettings) -> Path:
 class Room:
     """All that is simulated, at rest where the path begins."""
 
-    def __init__(self, settings: LiveSettings, path: Path, model: RobotModel, skin: Skin) -> None:
-        """Build it; a control period that is no whole number of physics steps is a ParameterError."""
+    def __init__(
+        self, settings: LiveSettings, path: Path, model: RobotModel, skin: Skin, real: RealUnits | None = None
+    ) -> None:
+        """Build it; a control period that is no whole number of physics steps is a ParameterError.
+
+        With `real` units the arm carries those in place of simulated ones.
+        """
         q, hand = brought_to(model, path.point(0.0)), HandSpec(stiffness=settings.stiffness)
         boxes: tuple[Box, ...] = ()
         if settings.object != "none":
@@ -47,24 +55,34 @@ class Room:
         self.mouse.move(start)
         self.scene = replace(scene, hand=replace(hand, start=tuple(start.tolist())))
         self.plant = Plant(model, self.scene, PlantParams(), q, settings.seed)
-        self.units = RangeFinders(self.plant, skin, RangeFinderParams(), settings.seed)
+        self._simulated = None if real else RangeFinders(self.plant, skin, RangeFinderParams(), settings.seed)
+        self.units: UnitPort = self._simulated or cast(RealUnits, real)
         self.hand = Hand(self.plant, self.mouse, speed_max=HAND_SPEED_M_S)
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._wanted = settings.stiffness
-        self._skin, self._sound = skin, self.units.params
+        self._skin = skin
         self._moving = np.flatnonzero(model.moved_by.any(axis=1))
         self.fail(settings.faults)
         self.plant.advance(_SETTLE_S)
+        if real:
+            real.begin(lambda: self.plant.time)
 
     def fail(self, faults: Faults) -> None:
-        """Have the units err so, from the next measurement on; an id that no unit has is a ParameterError."""
+        """Have the units err so, from the next measurement on; an id that no unit has is a ParameterError.
+
+        So is any fault of real units.
+        """
+        if self._simulated is None:
+            if faults != Faults():
+                raise ParameterError("The units are real ones: unplug or cover one to see what the arm does.")
+            return
         unknown = sorted(faults.silenced - set(self._skin.ids))
         if unknown:
             known = ", ".join(self._skin.ids)
             raise ParameterError(f"There is no unit {', '.join(unknown)} to be silenced: choose from {known}.")
-        sound = self._sound
-        self.units.silenced = {i for i, name in enumerate(self._skin.ids) if name in faults.silenced}
-        self.units.change(replace(
+        sound = RangeFinderParams()
+        self._simulated.silenced = {i for i, name in enumerate(self._skin.ids) if name in faults.silenced}
+        self._simulated.change(replace(
             sound, noise_floor_m=sound.noise_floor_m * faults.noise_factor,
             noise_rate=sound.noise_rate * faults.noise_factor, latency_s=sound.latency_s + faults.latency_s,
         ))  # fmt: skip

@@ -25,6 +25,7 @@ from pretouch.viewer.settings import Faults, LiveSettings, PathName
 
 if TYPE_CHECKING:
     from pretouch.recording.writer import Closed, Recording
+    from pretouch.viewer.real_units import RealUnits
 
 
 class LiveSimulation:
@@ -40,11 +41,17 @@ class LiveSimulation:
     """The newest instant."""
 
     def __init__(
-        self, settings: LiveSettings | None = None, model: RobotModel | None = None, skin: Skin | None = None
-    ) -> None:
-        """Begin with the first control cycle done. Without others, the arm is a Panda with the paper's skin."""
+        self, settings: LiveSettings | None = None, model: RobotModel | None = None, skin: Skin | None = None,
+        real: "RealUnits | None" = None,
+    ) -> None:  # fmt: skip
+        """Begin with the first control cycle done. Without others, the arm is a Panda with the paper's skin.
+
+        With `real` units, they are what the skin's units read.
+        """
         self.model = model or RobotModel(panda())
         self.skin = skin or paper_skin(self.model)
+        self.real = real
+        """The real units on the arm; None: it carries simulated ones."""
         self.recording: Recording | None = None
         """The recording under way."""
         self.notice = ""
@@ -53,7 +60,7 @@ class LiveSimulation:
 
     def _begin(self, settings: LiveSettings) -> None:
         path = live_path(settings)
-        room = Room(settings, path, self.model, self.skin)
+        room = Room(settings, path, self.model, self.skin, self.real)
         closed = self.stop_recording()
         if closed:
             self.notice = closed.sentence
@@ -185,8 +192,12 @@ class LiveSimulation:
     def _keep(self, cycle: Cycle, hand: FloatArray) -> None:
         """Empty the plant's log, into the recording if there is one."""
         log, touches = self._room.plant.take_log()
+        imu = self.real.take_imu() if self.real else []
         if self.recording is None:
             return
+        for batch in imu:
+            for measured in zip(batch.stamp.tolist(), batch.acceleration, batch.angular_velocity, strict=True):
+                self.recording.imu(self.skin.ids[batch.unit], *measured)
         self.recording.record(cycle, truth_of(log, touches, hand))
         if self.recording.trouble:
             self.notice = self.recording.trouble
@@ -199,6 +210,7 @@ class LiveSimulation:
             "command": "pretouch live",
             "seed": settings.seed,
             "path": settings.path,
+            "units": "real" if self.real else "simulated",
             "object": settings.object,
             "stiffness_n_m": self.stiffness,
             "scene": described(self._room.scene),

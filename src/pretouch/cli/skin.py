@@ -1,0 +1,27 @@
+"""What `pretouch skin` does: each command by its own file."""
+
+from pathlib import Path
+
+from pretouch.cli.skin_commands import Keys, Monitor, Provision, Simulate, SkinCommand
+
+
+def skin(command: SkinCommand) -> int:
+    """Run one of the commands for sensor units, and return the exit code."""
+    match command:
+        case Monitor():
+            from pretouch.cli.skin_monitor import monitor
+
+            return monitor(command)
+        case Simulate():
+            from pretouch.cli.skin_simulate import simulate_units
+
+            simulate_units(command)
+        case Provision():
+            from pretouch.cli.skin_provision import provision_unit
+
+            provision_unit(command)
+        case Keys():
+            from pretouch.cli.skin_keys import list_keys
+
+            list_keys(Path(command.keys), command.new)
+    return 0

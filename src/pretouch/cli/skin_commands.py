@@ -1,0 +1,133 @@
+"""What can be said after `pretouch skin`: one dataclass a command, its docstrings are the help."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import tyro
+
+from pretouch.hardware.address import HOST, PORT
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """Watch sensor units: rates, losses, latency, batteries, and what is wrong, with what to do about it."""
+
+    keys: str
+    """File of the units' keys."""
+    skin: str = ""
+    """Skin file whose units to watch; by default all in the file of keys."""
+    units: str = ""
+    """Names of the units to watch, separated by commas."""
+    arm: Literal["panda", "fr3"] = "panda"
+    """The arm of the skin file."""
+    posture: str = ""
+    """Joint positions [rad], separated by commas, of the arm that stands still: with --skin, units that do not see what
+    they must by the model are named. Nothing but the arm may be near."""
+    host: str = HOST
+    """Address to listen at. Real units need 0.0.0.0, which is every address of this machine."""
+    port: int = PORT
+    """UDP port to listen at."""
+    record: str = ""
+    """Recording to write: all samples as they came, ranges, IMU and diagnostics."""
+    duration: float = 0.0
+    """Time to watch [s]; 0: until Ctrl-C. The exit code is then 1 if a unit is faulty at the end."""
+    once: bool = False
+    """Watch for 5 s and print one table."""
+    json: str = ""
+    """File for the numbers at the end."""
+
+
+@dataclass(frozen=True)
+class Provision:
+    """Tell a unit over USB who it is: its number, its own random key, your Wi-Fi, and where to send.
+
+    The password is asked for, and shown nowhere.
+    """
+
+    id: str
+    """Name of the unit, as in the skin file."""
+    keys: str
+    """File of the units' keys; it is made if it is not there, for your eyes only."""
+    ssid: str
+    """Name of the Wi-Fi network (2.4 GHz)."""
+    host: str
+    """IPv4 address of this machine in that network."""
+    number: int = 0
+    """Number of the unit in datagrams, 1 to 65535; by default as in the file of keys, or the first that is free."""
+    device: str = "/dev/ttyUSB0"
+    """Serial device of the unit."""
+    port: int = PORT
+    """UDP port of the receiver."""
+    battery_full_mv: int = 0
+    """Voltage of the battery that fills the unit's converter [mV] (docs/hardware/wiring.md); 0: none is wired to it."""
+    password_file: str = ""
+    """File whose first line is the Wi-Fi password, instead of being asked for it."""
+    replace: bool = False
+    """Go on if the unit has another number or key already."""
+
+
+@dataclass(frozen=True)
+class Keys:
+    """List the units of a file of keys, or add some: random keys, to try `simulate` and `monitor` with."""
+
+    keys: str
+    """File of the units' keys; it is made if it is not there, for your eyes only."""
+    new: str = ""
+    """Names of units to add, separated by commas."""
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """Simulate a skin that sends what real units send: an arm on its path, a hand that comes and goes."""
+
+    keys: str
+    """File of the units' keys; one that is not there is made. `pretouch skin monitor` takes the same."""
+    skin: str = ""
+    """Skin file; by default the seven units that come with the package."""
+    arm: Literal["panda", "fr3"] = "panda"
+    """The arm."""
+    host: str = HOST
+    """Name or address of the receiver."""
+    port: int = PORT
+    """UDP port of the receiver."""
+    loss: float = 0.0
+    """Share of datagrams lost on their way, in either direction."""
+    loss_run: float = 0.0
+    """Mean number lost in a row; 0: each is lost or not by itself."""
+    delay: float = 0.008
+    """Least time on the way to the receiver [s]."""
+    jitter: float = 0.004
+    """Mean of what is added to it at random [s]."""
+    overtaken: float = 0.0
+    """Share of datagrams held up so that later ones overtake them."""
+    doubled: float = 0.0
+    """Share of datagrams that arrive twice."""
+    reboot_every: float = 0.0
+    """Time between two reboots of each unit [s]; 0: none."""
+    silenced: str = ""
+    """Names of units that send nothing, separated by commas."""
+    stuck: str = ""
+    """Names of units whose range finder repeats its first reading, separated by commas."""
+    hand: bool = True
+    """Whether a person's hand comes and goes."""
+    profile: str = "paper"
+    """Profile of the arm's controller, or PROFILE:GROUP.FIELD=VALUE."""
+    seed: int = 0
+    """Decides all that is random."""
+    duration: float = 0.0
+    """Time to simulate [s]; 0: until Ctrl-C."""
+
+
+SkinCommand = (
+    Annotated[Monitor, tyro.conf.subcommand("monitor")]
+    | Annotated[Simulate, tyro.conf.subcommand("simulate")]
+    | Annotated[Provision, tyro.conf.subcommand("provision")]
+    | Annotated[Keys, tyro.conf.subcommand("keys")]
+)
+
+
+@dataclass(frozen=True)
+class Skin:
+    """Sensor units: watch them, set them up, or simulate them."""
+
+    what: SkinCommand

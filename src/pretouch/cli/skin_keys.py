@@ -1,0 +1,46 @@
+"""What `pretouch skin keys` does: the units of a file of keys, listed or added to."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pretouch.errors import HardwareError
+from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
+from pretouch.hardware.provision import fingerprint
+
+_LAST = 0xFFFF
+
+
+def list_keys(place: Path, new: str = "") -> None:
+    """Print name, number and fingerprint of each unit in a file, after adding those of new names."""
+    names = words(new)
+    keys = keys_or_none(place) if names else load_keys(place)
+    if names:
+        keys = with_new(keys, names)
+        save_keys(keys, place)
+    for unit in keys.values():
+        print(f"{unit.id}: number {unit.number}, key {fingerprint(unit.key)}...")
+
+
+def words(text: str) -> tuple[str, ...]:
+    """Return the words between commas."""
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def keys_or_none(place: Path) -> Keys:
+    """Read a file of keys; one that is not there holds none."""
+    return load_keys(place) if place.exists() else Keys()
+
+
+def with_new(keys: Keys, names: Sequence[str]) -> Keys:
+    """Return keys with new ones for some names, under the first free numbers. One there already is a HardwareError."""
+    there = [name for name in names if name in keys]
+    if there:
+        raise HardwareError(f"There is a key for {', '.join(there)} already: give other names.")
+    for name in names:
+        keys = Keys([*keys.values(), UnitKey(name, free_number(keys), new_key())])
+    return keys
+
+
+def free_number(keys: Keys) -> int:
+    """Return the first number that no unit has."""
+    return next(n for n in range(1, _LAST + 2) if n not in keys.by_number)

@@ -1,0 +1,175 @@
+"""What `pretouch skin monitor` does: units watched in the terminal, and recorded."""
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack, nullcontext
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+
+from pretouch.cli.skin_commands import Monitor
+from pretouch.cli.skin_keys import words
+from pretouch.cli.skin_record import record
+from pretouch.cli.skin_table import line, thrown_away, view
+from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.errors import HardwareError
+from pretouch.hardware.address import EVERYWHERE, HOST
+from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.keys import load_keys
+from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
+from pretouch.hardware.monitor import Posture, Turn, watch
+from pretouch.hardware.receiver import SkinReceiver
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.recording.skin_recording import SkinRecording
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import load_skin
+from pretouch.types import FloatArray
+
+_ONCE_S = 5.0
+_SECOND_S = 1.0
+_INTERRUPTED = 130
+
+
+def monitor(command: Monitor) -> int:
+    """Watch units; return 1 if one is faulty after a given time or recording failed, 130 after Ctrl-C, or else 0."""
+    duration = _duration(command)
+    json_file = Path(command.json) if command.json else None
+    if json_file:
+        check_writable("file", json_file)
+    keys = load_keys(Path(command.keys))
+    ids, posture = _watched(command, tuple(keys))
+    with ExitStack() as stack:
+        receiver = stack.enter_context(SkinReceiver(ids, keys, command.host, command.port))
+        recording = stack.enter_context(SkinRecording(Path(command.record))) if command.record else None
+        turns = watch(receiver, HealthParams(), duration, posture)
+        last, code = _shown(turns, receiver, recording, command.once)
+        sentence = recording.close() if recording else ""
+    notes = [note for note in (_unheard(receiver), sentence) if note]
+    console = Console(highlight=False, soft_wrap=True)
+    if last is not None:
+        console.print(view(last, receiver.rejected, notes))
+        if json_file:
+            text = json.dumps(_numbers(last, receiver, notes), indent=1, allow_nan=False)
+            with unwritable_said("file", json_file):
+                json_file.write_text(text + "\n", encoding="utf-8")
+        if math.isfinite(duration):
+            code = code or int(any(f.level == "fault" for f in last.findings))
+    return code or int(bool(recording and recording.trouble))
+
+
+def _duration(command: Monitor) -> float:
+    if not (math.isfinite(command.duration) and command.duration >= 0):
+        raise HardwareError(f"The duration is {command.duration:g} s: give 0 or more.")
+    return command.duration or (_ONCE_S if command.once else math.inf)
+
+
+def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[tuple[str, ...], Posture | None]:
+    """Names of the units to watch, and the posture they are to agree with, if one is given."""
+    if command.skin and command.units:
+        raise HardwareError("Both --skin and --units are given: leave one of them out.")
+    if command.posture and not command.skin:
+        raise HardwareError("A --posture needs --skin: it says where the units are.")
+    if not command.skin:
+        ids = words(command.units) or all_ids
+        if not ids:
+            raise HardwareError(f"{command.keys} holds no unit: `pretouch skin provision` or `skin keys` adds one.")
+        return ids, None
+    model = RobotModel({"panda": panda, "fr3": fr3}[command.arm]())
+    skin = load_skin(Path(command.skin), model)
+    if not command.posture:
+        return skin.ids, None
+    return skin.ids, Posture(
+        _posture(command.posture, model.n), ModelCheck(model, skin, no_fixtures(), ModelCheckParams())
+    )
+
+
+def _posture(text: str, joints: int) -> FloatArray:
+    try:
+        q = np.array([float(word) for word in words(text)])
+    except ValueError:
+        q = np.zeros(0)
+    if q.shape != (joints,) or not np.isfinite(q).all():
+        raise HardwareError(f"The posture is {text!r}: give {joints} joint positions [rad], separated by commas.")
+    return q
+
+
+def _shown(
+    turns: Iterator[Turn], receiver: SkinReceiver, recording: SkinRecording | None, quiet: bool
+) -> tuple[Turn | None, int]:
+    """Show and record the turns until the last; return it and the exit code so far."""
+    console, last, second = Console(highlight=False, soft_wrap=True), None, 0.0
+    live = None if quiet or not console.is_terminal else Live(console=console, auto_refresh=False, transient=True)
+    lines = None if quiet or live else _Lines(console)
+    try:
+        with live or nullcontext():
+            for turn in turns:
+                last, full = turn, turn.elapsed >= second
+                second += _SECOND_S * full
+                if recording:
+                    record(recording, turn, receiver, full)
+                if live:
+                    live.update(view(turn, receiver.rejected, _notes(receiver, recording)), refresh=True)
+                elif lines and full:
+                    lines.show(turn)
+    except KeyboardInterrupt:
+        return last, _INTERRUPTED
+    return last, 0
+
+
+class _Lines:
+    """Says a turn in a line, and each finding when it comes and when it goes."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._known: dict[tuple[str, str], str] = {}
+
+    def show(self, turn: Turn) -> None:
+        """Say it."""
+        self._console.print(line(turn), markup=False)
+        known = {(f.unit, f.what): f"{f.level}: {f.sentence}" for f in turn.findings}
+        for sentence in (known[key] for key in known if key not in self._known):
+            self._console.print(f"  {sentence}", markup=False)
+        for unit, what in (key for key in self._known if key not in known):
+            self._console.print(f"  over: {unit}, {what}", markup=False)
+        self._known = known
+
+
+def _notes(receiver: SkinReceiver, recording: SkinRecording | None) -> list[str]:
+    notes = [_unheard(receiver)]
+    if recording:
+        notes.append(recording.trouble or f"Recording {recording.place}: {recording.samples} samples.")
+    return [note for note in notes if note]
+
+
+def _unheard(receiver: SkinReceiver) -> str:
+    """Say, while nothing has been heard at all, where is listened and what may be amiss, or ''."""
+    if any(unit.state != "never heard" for unit in receiver.units):
+        return ""
+    host, port = receiver.address
+    local = (
+        f"; only what runs on this machine is heard there: real units need --host {EVERYWHERE}" if host == HOST else ""
+    )
+    return f"Nothing was heard at {host}:{port}{local}."
+
+
+def _numbers(turn: Turn, receiver: SkinReceiver, notes: list[str]) -> dict[str, Any]:
+    return {
+        "elapsed_s": turn.elapsed,
+        "units": [_plain(asdict(unit)) for unit in turn.units],
+        "findings": [asdict(finding) for finding in turn.findings],
+        "rejected": dict(receiver.rejected),
+        "notes": [*notes, *filter(None, [thrown_away(receiver.rejected)])],
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers as JSON has them: none that is not finite."""
+    if isinstance(value, dict):
+        return {name: _plain(part) for name, part in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,67 @@
+"""What `pretouch skin provision` does: a unit at a USB port told who it is."""
+
+import getpass
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+from pretouch.cli.skin_commands import Provision
+from pretouch.cli.skin_keys import free_number, keys_or_none
+from pretouch.errors import HardwareError
+from pretouch.hardware.keys import Keys, UnitKey, new_key, save_keys
+from pretouch.hardware.provision import Network, differs, fingerprint, greet, provision
+from pretouch.hardware.serial_line import SerialLine
+
+
+def provision_unit(command: Provision) -> None:
+    """Make a key if the unit has none, tell the unit, and check what it then says it is."""
+    place = Path(command.keys)
+    keys = keys_or_none(place)
+    unit = _unit(keys, command.id, command.number, place)
+    with SerialLine(Path(command.device)):  # what is wrong is said before the password is asked for
+        network = Network(command.ssid, "", command.host, command.port, command.battery_full_mv)
+    network = replace(network, password=_password(command))
+    with SerialLine(Path(command.device)) as line:
+        line.reset()  # a unit that was set up before listens for some seconds after that only
+        peer = greet(line)
+        print(f"At {command.device}: {peer.board}, firmware {peer.firmware}.", flush=True)
+        change = differs(peer, unit)
+        if change and not command.replace:
+            raise HardwareError(f"The unit at {command.device} was set up before: {change}; --replace changes it.")
+        if unit.id not in keys:
+            save_keys(Keys([*keys.values(), unit]), place)  # first: a unit with a key that nobody knows is mute
+        provision(line, unit, network)
+    print(
+        f"{unit.id} is number {unit.number} with the key {fingerprint(unit.key)}..., and sends to"
+        f" {network.host}:{network.port}. Its key is in {place}."
+    )
+
+
+def _unit(keys: Keys, name: str, number: int, place: Path) -> UnitKey:
+    """Return the unit's entry of the file, or a new one."""
+    if name not in keys:
+        taken = keys.by_number.get(number)
+        if taken is not None:
+            raise HardwareError(f"The number {number} is that of {taken.id} in {place}: give another, or leave it out.")
+        return UnitKey(name, number or free_number(keys), new_key())
+    if number not in (0, keys[name].number):
+        raise HardwareError(
+            f"{name} has the number {keys[name].number} in {place}, not {number}: give that one, or leave it out."
+        )
+    return keys[name]
+
+
+def _password(command: Provision) -> str:
+    if not command.password_file:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", getpass.GetPassWarning)
+                return getpass.getpass(f"Password of {command.ssid} (empty for an open network): ")
+        except (EOFError, getpass.GetPassWarning):
+            raise HardwareError("There is no terminal to type the password at: name a --password-file.") from None
+    try:
+        lines = Path(command.password_file).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise HardwareError(f"The password file {command.password_file} cannot be read: {why}.") from error
+    return lines[0] if lines else ""

@@ -1,0 +1,92 @@
+"""How `pretouch skin monitor` shows units: a table, the findings below it, and what was thrown away at the socket."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from pretouch.hardware.findings import Finding
+from pretouch.hardware.health import UnitHealth, status_name
+from pretouch.hardware.monitor import Turn
+from pretouch.types import RangeStatus
+
+_COLUMNS = (
+    "unit", "state", "rate\n[Hz]", "loss\n[%]", "latency\n[ms]", "dist.\n[m]", "status", "sigma\n[mm]", "batt.\n[V]",
+    "temp.\n[C]", "IMU\n[Hz]", "clock\n[ms]",
+)  # fmt: skip
+_TARGET = (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeStatus.MIN_CLIPPED)
+"""Statuses of readings that have a distance."""
+_STYLES = {"fault": "bold red", "warning": "yellow"}
+_MEANINGS = {
+    "size": "no size of ours",
+    "format": "no magic, version or kind of ours",
+    "unit": "a number that none of these units has",
+    "tag": "a wrong tag: another key, or a forgery",
+    "replayed": "a sequence number seen already",
+    "no session": "a sample outside a session",
+    "too many hellos": "more hellos than are answered",
+    "old hello": "a hello of the session that is live",
+}
+
+
+def view(turn: Turn, rejected: Mapping[str, int], notes: Sequence[str]) -> RenderableType:
+    """Return all that is to be seen of a turn."""
+    lines = [Text(f"{f.level}: {f.sentence}", style=_STYLES[f.level]) for f in turn.findings]
+    said = thrown_away(rejected)
+    below = [Text(text, style="dim") for text in (*notes, *([said] if said else []))]
+    return Group(table(turn.units, turn.findings), *(lines or [Text("Nothing is wrong.", style="green")]), *below)
+
+
+def table(units: Sequence[UnitHealth], found: Sequence[Finding]) -> Table:
+    """Return one row per unit, coloured by the worst that was found of it."""
+    shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    for i, name in enumerate(_COLUMNS):
+        shown.add_column(escape(name), justify="left" if i in (0, 1, 6) else "right", no_wrap=True)
+    worst = {f.unit: f.level for f in sorted(found, key=lambda f: f.level, reverse=True)}
+    for unit in units:
+        shown.add_row(*map(escape, _cells(unit)), style=_STYLES.get(worst.get(unit.unit, ""), ""))
+    return shown
+
+
+def _cells(unit: UnitHealth) -> tuple[str, ...]:
+    standing = unit.standing
+    bound = standing.bound if math.isfinite(standing.bound) else math.nan
+    return (
+        unit.unit, standing.state, number(unit.rate_hz, 1), number(100 * unit.loss, 1),
+        number(1000 * unit.latency_s, 1), number(unit.distance_m if unit.status in _TARGET else math.nan, 3),
+        _status(unit), number(1000 * unit.sigma_m, 1), number(unit.battery_v, 2),
+        number(unit.temperature_c, 1), number(unit.imu_rate_hz, 0), number(1000 * bound, 2),
+    )  # fmt: skip
+
+
+def _status(unit: UnitHealth) -> str:
+    if unit.standing.stuck:
+        return RangeStatus.STUCK.name
+    return status_name(unit.status) if unit.statuses else "-"
+
+
+def number(value: float, digits: int) -> str:
+    """Return a number as text, '-' for one that is not known."""
+    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
+
+
+def line(turn: Turn) -> str:
+    """Return a turn as one line."""
+    live = [unit for unit in turn.units if unit.standing.state == "live"]
+    rates = [unit.rate_hz for unit in live if math.isfinite(unit.rate_hz)]
+    losses = [unit.loss for unit in live if math.isfinite(unit.loss)]
+    slowest, most = min(rates, default=math.nan), max(losses, default=math.nan)
+    faults = sum(f.level == "fault" for f in turn.findings)
+    return (
+        f"{turn.elapsed:.0f} s: {len(live)} of {len(turn.units)} units live, slowest {number(slowest, 1)} Hz,"
+        f" largest loss {number(100 * most, 1)} %, {faults} faults, {len(turn.findings) - faults} warnings."
+    )
+
+
+def thrown_away(rejected: Mapping[str, int]) -> str:
+    """Say what was thrown away at the socket and why, or ''."""
+    parts = [f"{count} with {_MEANINGS.get(why, why)}" for why, count in rejected.items() if count]
+    return f"Thrown away: {', '.join(parts)}." if parts else ""

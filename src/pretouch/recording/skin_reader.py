@@ -1,0 +1,160 @@
+"""A recording of sensor units, opened: what each unit measured, as arrays."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pretouch.errors import RecordingError
+from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
+from pretouch.recording.messages import TOPICS, decoded
+from pretouch.recording.reader import is_ours
+from pretouch.recording.skin_recording import UNIT_SAMPLE
+from pretouch.recording.standard import IMU
+from pretouch.types import FloatArray, IntArray
+from pretouch.values import value
+
+_RANGE_NEW = 1
+"""Flag of a sample with a range that no sample before had (docs/hardware/wire.md)."""
+
+
+@value
+class RangeTrace:
+    """Readings of one unit, in the order in which they came. R of them."""
+
+    stamp: FloatArray
+    """(R,) earliest instant of the measurement [s], NaN while the unit's clock was not known."""
+    bound: FloatArray
+    """(R,) most the unit's clock can have been off by [s]."""
+    arrival: FloatArray
+    """(R,) when the datagram came [s]."""
+    distance: FloatArray
+    """(R,) [m]."""
+    status: IntArray
+    """(R,) `RangeStatus` codes."""
+    sigma: FloatArray
+    """(R,) standard deviation by the sensor's own estimate [m]."""
+
+
+@value
+class ImuTrace:
+    """What the IMU of one unit measured, by time. M samples, sensor frame."""
+
+    stamp: FloatArray
+    """(M,) [s]."""
+    acceleration: FloatArray
+    """(M, 3) [m/s^2]."""
+    angular_velocity: FloatArray
+    """(M, 3) [rad/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnitTrace:
+    """All that one unit measured."""
+
+    range: RangeTrace
+    imu: ImuTrace
+    samples: list[Any]
+    """Its datagrams, field by field as in `UnitSample.msg`."""
+
+
+@dataclass(frozen=True, eq=False)
+class SkinTrace:
+    """A recording of sensor units."""
+
+    units: dict[str, UnitTrace]
+    """By name, in the order in which they were first heard."""
+    complete: bool
+    """Whether the recording was ended in order, and nothing in it is damaged."""
+
+    @property
+    def samples(self) -> int:
+        """Number of datagrams."""
+        return sum(len(unit.samples) for unit in self.units.values())
+
+    @property
+    def last(self) -> float:
+        """When the last datagram came [s]."""
+        return max(unit.samples[-1].arrival for unit in self.units.values())
+
+
+def read_skin(place: Path) -> SkinTrace:
+    """Read what `SkinRecording` wrote, finished or cut off. RecordingError for a file that holds nothing of it."""
+    place = Path(place)
+    contents = Contents()
+    samples: dict[str, list[Any]] = {}
+    imu: dict[str, list[tuple[float, ...]]] = {}
+    try:
+        for kind, message in _messages(place, contents):
+            if kind == UNIT_SAMPLE:
+                samples.setdefault(message.id, []).append(message)
+            else:
+                imu.setdefault(message.header.frame_id, []).append(_imu_row(message))
+    except OSError as error:
+        reason = "there is none" if isinstance(error, FileNotFoundError) else error.strerror
+        raise RecordingError(f"The recording {place} cannot be read: {reason}.") from error
+    if not samples:
+        raise RecordingError(
+            f"{place} holds no samples of sensor units: give a recording made by `pretouch skin monitor --record`."
+        )
+    units = {unit: UnitTrace(_ranges(rows), _imu(imu.get(unit, [])), rows) for unit, rows in samples.items()}
+    return SkinTrace(units, contents.complete and not contents.damaged)
+
+
+def holds_units(place: Path) -> bool:
+    """Whether a file is a recording of sensor units: what its first chunks hold tells."""
+    contents = Contents()
+    with suppress(OSError), Path(place).open("rb") as file:  # whoever opens it next says what is wrong
+        for _ in scan(file, contents) if begins_as_mcap(file) else ():
+            kinds = {kind for _, kind in contents.topics().values()}
+            if UNIT_SAMPLE in kinds or not kinds.isdisjoint(TOPICS.values()):
+                return UNIT_SAMPLE in kinds
+    return False
+
+
+def _messages(place: Path, contents: Contents) -> Iterator[tuple[str, Any]]:
+    """Yield type and message of all samples and IMU measurements in the whole chunks of a file."""
+    with place.open("rb") as file:
+        if not begins_as_mcap(file):
+            raise RecordingError(f"{place} is no MCAP file: give a recording made by `pretouch skin monitor --record`.")
+        for chunk in scan(file, contents):
+            kinds = {i: kind for i, (_, kind) in contents.topics().items() if kind in (UNIT_SAMPLE, IMU)}
+            _check(place, contents)
+            for message in messages(chunk):
+                kind = kinds.get(message.channel)
+                if kind is not None:
+                    yield kind, decoded(kind, message.data)
+
+
+def _check(place: Path, contents: Contents) -> None:
+    """Refuse samples of another definition than ours."""
+    if any(kind == UNIT_SAMPLE and not is_ours(schema, kind) for kind, schema in contents.schemas.values()):
+        raise RecordingError(
+            f"{place} was recorded by another version of pretouch, whose samples of units are others: open it with"
+            " that version."
+        )
+
+
+def _ranges(samples: list[Any]) -> RangeTrace:
+    fresh = [s for s in samples if s.flags & _RANGE_NEW]
+    return RangeTrace(
+        stamp=np.array([s.stamp for s in fresh], dtype=np.float64),
+        bound=np.array([s.bound for s in fresh], dtype=np.float64),
+        arrival=np.array([s.arrival for s in fresh], dtype=np.float64),
+        distance=np.array([s.range_mm for s in fresh], dtype=np.float64) / 1000,
+        status=np.array([s.range_status for s in fresh], dtype=np.int64),
+        sigma=np.array([s.range_sigma for s in fresh], dtype=np.float64) / 4000,
+    )
+
+
+def _imu_row(message: Any) -> tuple[float, ...]:
+    at, a, w = message.header.stamp, message.linear_acceleration, message.angular_velocity
+    return at.sec + at.nanosec / 1e9, a.x, a.y, a.z, w.x, w.y, w.z
+
+
+def _imu(rows: list[tuple[float, ...]]) -> ImuTrace:
+    table = np.array(sorted(rows), dtype=np.float64).reshape(-1, 7)
+    return ImuTrace(table[:, 0], table[:, 1:4], table[:, 4:])

@@ -1,0 +1,71 @@
+"""Real sensor units on a simulated arm: their readings, in the time of the simulation."""
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from pretouch.hardware.receiver_process import Traffic
+from pretouch.hardware.traffic import ImuBatch, Received
+from pretouch.types import RangeReadings
+
+
+class UnitSource(Protocol):
+    """Where readings of real units come from, stamped by the machine's monotonic clock."""
+
+    def read(self) -> RangeReadings:
+        """Return the newest reading of each unit."""
+        ...
+
+    def take_imu(self) -> list[ImuBatch]:
+        """Return what the units' IMUs measured since the last call."""
+        ...
+
+    def take_samples(self) -> list[Received]:
+        """Return what came of the units since the last call."""
+        ...
+
+    def traffic(self) -> Traffic:
+        """Return what was counted of each unit."""
+        ...
+
+
+class RealUnits:
+    """The port `Skin` of a simulated arm that carries real units.
+
+    A reading is as old in the simulation as it is in the room: how fast the simulation's clock goes, and whether it
+    stands, makes none fresher.
+    """
+
+    def __init__(self, source: UnitSource, clock: Callable[[], float] = time.monotonic) -> None:
+        """Take the source, and the clock its stamps come from."""
+        self.source, self._clock = source, clock
+        self._simulated: Callable[[], float] = lambda: 0.0
+        first = source.read()
+        self._seen = np.full(len(first.stamp), -np.inf)
+        self._stamp = self._seen.copy()
+
+    def begin(self, simulated: Callable[[], float]) -> None:
+        """Go by another simulation's time [s]; what was measured before stays as old as it is."""
+        self._simulated = simulated
+        self._seen[:] = self._stamp[:] = -np.inf
+
+    def read(self) -> RangeReadings:
+        """Return the newest reading of each unit, stamped in the simulation's time."""
+        readings = self.source.read()
+        fresh = readings.stamp > self._seen
+        self._seen[fresh] = readings.stamp[fresh]
+        self._stamp[fresh] = np.maximum(self._stamp[fresh], readings.stamp[fresh] + self._ahead())
+        return RangeReadings(self._stamp.copy(), readings.distance, readings.status)
+
+    def take_imu(self) -> list[ImuBatch]:
+        """Return what the units' IMUs measured since the last call, stamped in the simulation's time."""
+        ahead, batches = self._ahead(), self.source.take_imu()
+        for batch in batches:
+            batch.stamp = batch.stamp + ahead
+        return batches
+
+    def _ahead(self) -> float:
+        """By how much the simulation's clock is ahead of the machine's [s]."""
+        return self._simulated() - self._clock()

@@ -1,0 +1,264 @@
+"""`pretouch skin`: units watched, recorded, simulated, and given keys."""
+
+import json
+import os
+import resource
+import signal
+import socket
+import stat
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pretouch import cli
+from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
+from pretouch.recording.skin_reader import read_skin
+from pretouch.types import RangeStatus
+from tests.hardware.desk import Desk
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def keys(tmp_path):
+    made = Keys([UnitKey("wrist", 1, new_key()), UnitKey("hand-1", 2, new_key())])
+    save_keys(made, tmp_path / "keys.toml")
+    return made
+
+
+@pytest.fixture
+def port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def monitor(tmp_path, port, *more):
+    return cli.main(["skin", "monitor", "--keys", str(tmp_path / "keys.toml"), "--port", str(port), *more])
+
+
+def test_units_that_are_well_are_shown_recorded_and_written_as_numbers(keys, port, tmp_path, capsys):
+    place, numbers = tmp_path / "units.mcap", tmp_path / "health.json"
+    with Desk(keys, port):
+        code = monitor(tmp_path, port, "--duration", "3", "--record", str(place), "--json", str(numbers))
+    said = capsys.readouterr().out
+    assert code == 0, said
+    assert "2 of 2 units live" in said
+    assert "hand-1" in said
+    assert "units.mcap holds" in said
+    told = json.loads(numbers.read_text())
+    assert [unit["unit"] for unit in told["units"]] == ["wrist", "hand-1"]
+    assert not any(finding["level"] == "fault" for finding in told["findings"])
+    for unit in told["units"]:
+        assert unit["standing"]["state"] == "live"
+        assert unit["distance_m"] == pytest.approx(0.5, abs=0.02)
+        assert unit["imu_rate_hz"] == pytest.approx(416, rel=0.02)
+    trace = read_skin(place)
+    assert trace.complete
+    for unit in trace.units.values():
+        assert len(unit.samples) > 75
+        assert (unit.range.status == RangeStatus.OK).all()
+        known = np.isfinite(unit.range.stamp)
+        assert known.mean() > 0.9
+        assert (unit.range.arrival[known] >= unit.range.stamp[known]).all()
+        assert len(unit.imu.stamp) > 800
+        assert np.allclose(np.median(unit.imu.acceleration, axis=0), [0, 0, 9.80665], atol=0.1)
+
+
+def test_a_unit_that_goes_silent_is_a_fault_and_the_exit_code_says_so(keys, port, tmp_path, capsys):
+    with Desk(keys, port) as desk:
+        timer = threading.Timer(1.0, lambda: setattr(desk.fleet.units[1], "silent", True))
+        timer.start()
+        code = monitor(tmp_path, port, "--duration", "2.5")
+        timer.join()
+    said = capsys.readouterr().out
+    assert code == 1
+    assert "fault: hand-1 has sent nothing for 1." in said
+    assert "fault: wrist" not in said
+
+
+def test_a_stuck_unit_is_named(keys, port, tmp_path, capsys):
+    with Desk(keys, port) as desk:
+        desk.fleet.units[0].stuck = True
+        code = monitor(tmp_path, port, "--duration", "3", "--units", "wrist")
+    assert code == 1
+    said = capsys.readouterr().out
+    assert "wrist repeats 0." in said
+    assert "STUCK" in said
+    assert "hand-1" not in said
+
+
+def test_where_nothing_is_heard_the_way_out_is_said(keys, port, tmp_path, capsys):
+    assert monitor(tmp_path, port, "--duration", "0.3") == 1
+    said = capsys.readouterr().out
+    assert f"Nothing was heard at 127.0.0.1:{port}; only what runs on this machine is heard there" in said
+    assert "--host 0.0.0.0" in said
+    assert "wrist has not been heard" in said
+
+
+def test_units_with_other_keys_are_told_from_silent_ones(keys, port, tmp_path, capsys):
+    others = Keys([UnitKey("wrist", 1, new_key()), UnitKey("hand-1", 2, new_key())])
+    with Desk(others, port):
+        assert monitor(tmp_path, port, "--duration", "1") == 1
+    assert "with a wrong tag: another key, or a forgery" in capsys.readouterr().out
+
+
+def test_a_posture_tells_whether_units_agree_with_the_model(panda_model, paper_skin, port, tmp_path, capsys):
+    from pretouch.sensing.skin import PAPER_SKIN
+
+    made = Keys(UnitKey(name, number, new_key()) for number, name in enumerate(paper_skin.ids, 1))
+    save_keys(made, tmp_path / "keys.toml")
+    posture = ",".join(map(str, panda_model.description.q_ready))
+    with Desk(made, port) as desk:  # all see a wall; of the arm, the one at the back must see more
+        desk.distance = 0.9
+        code = monitor(tmp_path, port, "--duration", "7", "--skin", str(PAPER_SKIN), "--posture", posture)
+    assert code == 1
+    said = capsys.readouterr().out
+    assert "fault: hand_back reports 0.90 m where the model has the arm" in said
+    assert said.split("Nothing was heard")[0].count("where the model has the arm") == 2  # when it came, and at the end
+
+
+def test_a_terminal_shows_a_table_that_changes(keys, port, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    with Desk(keys, port):
+        assert monitor(tmp_path, port, "--duration", "1.2") == 0
+    said = capsys.readouterr().out
+    assert said.count("latency") >= 4
+    assert "\x1b[2K" in said
+    assert "units live" not in said
+
+
+def test_a_disk_that_is_full_is_said_and_the_exit_code_tells_of_it(keys, port, tmp_path, capsys):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, before[1]))
+        with Desk(keys, port):
+            code = monitor(tmp_path, port, "--duration", "3", "--record", str(tmp_path / "units.mcap"))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert code == 1
+    assert "make room, then record again" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--duration", "-1"), "The duration is -1 s"),
+        (("--duration", "nan"), "The duration is nan s"),
+        (("--units", "elbow"), "There is no key for elbow"),
+        (("--units", "wrist", "--skin", "x.toml"), "Both --skin and --units are given"),
+        (("--posture", "0,0"), "A --posture needs --skin"),
+        (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
+        (("--keys", "/nowhere.toml"), "The keys in /nowhere.toml cannot be read"),
+        (("--host", "no.such.host.invalid"), "no.such.host.invalid"),
+        (("--port", "70000"), "70000"),
+        (("--record", "/nowhere/x.mcap"), "The folder /nowhere for the recording is not there"),
+        (("--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
+    ],
+)
+def test_bad_input_ends_with_one_sentence_and_code_2(keys, port, tmp_path, capsys, more, words):
+    assert monitor(tmp_path, port, "--once", *more) == 2
+    said = capsys.readouterr()
+    assert words in said.err
+    assert said.err.count("\n") == 1
+    assert said.out == ""
+
+
+def test_a_port_that_is_taken_is_said(keys, port, tmp_path, capsys):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", port))
+        assert monitor(tmp_path, port, "--once") == 2
+    assert f"Port {port} of 127.0.0.1 is taken" in capsys.readouterr().err
+
+
+def started(*args):
+    return subprocess.Popen(
+        [sys.executable, "-m", "pretouch.cli", *args], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        cwd=ROOT, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
+def test_a_monitor_that_is_ended_leaves_its_recording(keys, port, tmp_path, number, code):
+    place = tmp_path / "units.mcap"
+    with Desk(keys, port) as desk:
+        process = started(
+            "skin", "monitor", "--keys", str(tmp_path / "keys.toml"), "--port", str(port), "--record", str(place)
+        )
+        assert process.stdout
+        for line in process.stdout:
+            if line.startswith("2 s"):
+                break
+        time.sleep(0.5)
+        process.send_signal(number)
+        sent = desk.fleet.units[0]._sequence
+        out, err = process.communicate(timeout=20)
+    assert process.returncode == code, err
+    assert "Traceback" not in err
+    trace = read_skin(place)
+    assert trace.complete == (number != signal.SIGKILL)
+    assert sent - trace.units["wrist"].samples[-1].sequence <= 55
+    assert ("units.mcap holds" in out) == (number == signal.SIGINT)
+
+
+def test_keys_are_made_and_listed_without_being_shown(tmp_path, capsys):
+    place = tmp_path / "keys.toml"
+    assert cli.main(["skin", "keys", "--keys", str(place), "--new", "a, b"]) == 0
+    assert stat.S_IMODE(place.stat().st_mode) == 0o600
+    assert cli.main(["skin", "keys", "--keys", str(place), "--new", "c"]) == 0
+    made = load_keys(place)
+    assert [(unit.id, unit.number) for unit in made.values()] == [("a", 1), ("b", 2), ("c", 3)]
+    said = capsys.readouterr().out
+    assert "c: number 3, key " in said
+    assert not any(unit.key.hex() in said for unit in made.values())
+    assert cli.main(["skin", "keys", "--keys", str(place), "--new", "b"]) == 2
+    assert "There is a key for b already" in capsys.readouterr().err
+    assert cli.main(["skin", "keys", "--keys", str(tmp_path / "none.toml")]) == 2
+    assert "cannot be read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--loss", "1.5"), "WayParams.loss is 1.5"),
+        (("--port", "0"), "The port is 0"),
+        (("--profile", "brave"), "The profile 'brave' is unknown"),
+        (("--stuck", "elbow"), "There is no unit elbow"),
+        (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
+        (("--duration", "-2"), "-2"),
+    ],
+)
+def test_a_simulation_that_makes_no_sense_is_refused(tmp_path, capsys, more, words):
+    assert cli.main(["skin", "simulate", "--keys", str(tmp_path / "keys.toml"), *more]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+
+
+def test_simulated_units_are_heard_by_the_monitor_with_the_keys_that_were_made(tmp_path, port, capsys):
+    place = tmp_path / "keys.toml"
+    simulation = started(
+        "skin", "simulate", "--keys", str(place), "--port", str(port), "--silenced", "hand_left", "--loss", "0.2"
+    )
+    try:
+        assert simulation.stdout
+        assert "Made keys for 7 units" in simulation.stdout.readline()
+        simulation.stdout.readline()
+        assert monitor(tmp_path, port, "--duration", "6") == 1
+    finally:
+        simulation.send_signal(signal.SIGINT)
+        _, err = simulation.communicate(timeout=20)
+    assert simulation.returncode == 130
+    assert "Traceback" not in err
+    said = capsys.readouterr().out
+    assert "6 of 7 units live" in said
+    assert "fault: hand_left has not been heard" in said
+    assert "of its samples on their way (limit 10%)" in said
