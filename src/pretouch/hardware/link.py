@@ -39,8 +39,9 @@ class LinkParams(Checked):
     """How a receiver treats its units."""
 
     beacon_period_s: Positive = 0.25
-    """Time between the beacons to a unit [s]. Without one for 2 s it leaves the session (docs/hardware/wire.md): where 30 %
-    are lost, with eight in that time once in an hour and a half, with four every minute and a half."""
+    """Time between the beacons to a unit [s]. Without one for 2 s it leaves the session (docs/hardware/wire.md). Where
+    30 % are lost, that happens once in an hour and a half with eight in that time, and every minute and a half with
+    four."""
     pending_most: PositiveCount = 4
     """Most sessions offered to one unit at once."""
     pending_expiry_s: Positive = 5.0
