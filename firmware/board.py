@@ -1,4 +1,4 @@
-"""The boards a unit can be built on, an ESP8266 (D1 mini and alike) or an ESP32-C3: the only file that knows them."""
+"""The boards a unit can be built on, an ESP32-C3 or the paper's ESP8266 (D1 mini): the only file that knows them."""
 
 import os
 import socket
@@ -15,6 +15,8 @@ _HALF_BIT_US = const(2)
 _WATCHDOG_MS = const(3000)
 _NOTE = const(200)
 _SOFTWARE_WATCHDOG = const(3)
+_ADC_FULL_MV = const(2500)
+"""What counts as the range of the ADC of an ESP32-C3 [mV]; it is linear up to 2450."""
 _CAUSES = ("PWRON_RESET", "HARD_RESET", "WDT_RESET", "DEEPSLEEP_RESET", "SOFT_RESET")
 
 
@@ -47,8 +49,7 @@ class Board:
         """Return what tells the battery's voltage [mV]; `full_mv` fills the ADC's range, 0 means that none is wired."""
         if not full_mv:
             return lambda: 0
-        adc = self._adc()
-        return lambda: adc.read_u16() * full_mv >> 16
+        return self._battery(full_mv)
 
     def reset_cause(self):
         """Why the unit began anew, as on the wire."""
@@ -82,6 +83,26 @@ class Board:
             return ""
 
 
+class Esp32C3(Board):
+    """SDA is GPIO 6, SCL is GPIO 7, the battery is GPIO 3."""
+
+    SDA, SCL, BATTERY = 6, 7, 3
+
+    def _i2c(self, scl, sda):
+        return machine.I2C(0, scl=scl, sda=sda, freq=_BUS_HZ)
+
+    def _stay_awake(self, wlan):
+        wlan.config(pm=wlan.PM_NONE, reconnects=0)  # the one who joins anew is `Station`
+
+    def _battery(self, full_mv):
+        adc = machine.ADC(machine.Pin(self.BATTERY), atten=machine.ADC.ATTN_11DB)
+        return lambda: adc.read_uv() // 1000 * full_mv // _ADC_FULL_MV
+
+    def open_watchdog(self):
+        """Return what resets the unit unless it is fed within 3 s."""
+        return machine.WDT(timeout=_WATCHDOG_MS)
+
+
 class Esp8266(Board):
     """SDA is D2, SCL is D1, the battery is A0."""
 
@@ -95,8 +116,9 @@ class Esp8266(Board):
 
         esp.sleep_type(esp.SLEEP_NONE)
 
-    def _adc(self):
-        return machine.ADC(0)
+    def _battery(self, full_mv):
+        adc = machine.ADC(0)
+        return lambda: adc.read_u16() * full_mv >> 16
 
     def open_watchdog(self):
         """Return what resets the unit unless it is fed; after how long, some seconds, the chip decides."""
@@ -105,25 +127,6 @@ class Esp8266(Board):
     def reset_cause(self):
         """Why the unit began anew; the software watchdog has no name in `machine`."""
         return 3 if machine.reset_cause() == _SOFTWARE_WATCHDOG else super().reset_cause()
-
-
-class Esp32C3(Board):
-    """SDA is GPIO 6, SCL is GPIO 7, the battery is GPIO 3."""
-
-    SDA, SCL, BATTERY = 6, 7, 3
-
-    def _i2c(self, scl, sda):
-        return machine.I2C(0, scl=scl, sda=sda, freq=_BUS_HZ)
-
-    def _stay_awake(self, wlan):
-        wlan.config(pm=wlan.PM_NONE)
-
-    def _adc(self):
-        return machine.ADC(machine.Pin(self.BATTERY), atten=machine.ADC.ATTN_11DB)
-
-    def open_watchdog(self):
-        """Return what resets the unit unless it is fed within 3 s."""
-        return machine.WDT(timeout=_WATCHDOG_MS)
 
 
 def open_socket():

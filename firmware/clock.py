@@ -1,4 +1,4 @@
-"""Time of a unit: wrapping ticks [us] for what is near, microseconds since the reset for the wire."""
+"""Time of a unit: wrapping ticks [us] for what is near, microseconds since it began to serve for the wire."""
 
 
 class Clock:

@@ -26,7 +26,8 @@ def _whole(line, name, least, most):
 
 def _text(line, name, least, most):
     value = line.get(name)
-    if not isinstance(value, str) or not least <= len(value.encode()) <= most or "\0" in value:
+    good = isinstance(value, str) and not any(c == "\0" or 0xD800 <= ord(c) < 0xE000 for c in value)
+    if not good or not least <= len(value.encode()) <= most:
         raise ConfigError(f"{name} must be text of {least} to {most} bytes")
     return value
 
@@ -41,7 +42,9 @@ def _key(line):
 def _host(line):
     value = line.get("host")
     parts = value.split(".") if isinstance(value, str) else ()
-    if len(parts) != 4 or not all(0 < len(p) < 4 and all(c in "0123456789" for c in p) and int(p) < 256 for p in parts):
+    numbers = [int(p) if 0 < len(p) < 4 and all(c in "0123456789" for c in p) else 256 for p in parts]
+    well = len(parts) == 4 and max(numbers) < 256 and value == ".".join(map(str, numbers))
+    if not well or not 0 < numbers[0] < 224 or numbers[0] == 127:
         raise ConfigError("host must be an IPv4 address such as 192.168.1.10")
     return value
 
@@ -96,7 +99,13 @@ def load(path=PATH):
         raise ConfigError("the configuration is torn") from None
     if rest != "\n\n" or total != _sum(text):
         raise ConfigError("the configuration is torn")
-    return Config(json.loads(text))
+    try:
+        line = json.loads(text)
+    except ValueError:
+        line = None
+    if not isinstance(line, dict):
+        raise ConfigError("the configuration is no JSON object")
+    return Config(line)
 
 
 def _sum(text):

@@ -1,7 +1,8 @@
 """The IMU LSM6DS3, or LSM6DS3TR-C (ST): gyroscope and accelerometer through its FIFO, some in each cycle.
 
 Facts from ST: data sheet DocID026899, application note AN4650 (chapter on the FIFO); DS11857 for the TR-C. Errors are
-OSError: 19 no such device, 5 it does not keep what was written or lost its set-up, 110 it does not answer in time.
+OSError: 19 no such device, 5 it does not keep what was written, tells nonsense or lost its set-up, 110 it does not
+answer in time.
 """
 
 import time
@@ -28,6 +29,7 @@ _NOT_DECIMATED = b"\x09\x00"
 _WHOLE_WORDS = b"\x44"  # CTRL3_C: block data update, address counts up
 _SOFT_RESET = b"\x05"
 _EMPTY = const(0x10)
+_FULL = const(0x60)  # full, or run over
 _WORDS = const(6)
 _MARGIN = const(48)
 """A FIFO with so few words of room [words] may run over while it is read, and counts as having done so."""
@@ -102,7 +104,7 @@ class LSM6DS3:
         now = self._ticks_us()
         if words == 0:
             return self._nothing(now)
-        pattern = self._status[2] | (self._status[3] & 3) << 8
+        pattern = self._status[2]
         if pattern:
             self._gap = True
             words -= self._align(pattern, words)
@@ -130,7 +132,11 @@ class LSM6DS3:
         status = self._status
         self._i2c.readfrom_mem_into(self._address, _FIFO_STATUS1, status)
         words = status[0] | (status[1] & 0x0F) << 8
-        return words if words or status[1] & _EMPTY else self._room + _MARGIN
+        empty, full = status[1] & _EMPTY, status[1] & _FULL
+        # a data line that is held or disturbed raises nothing, so what it tells is looked at
+        if (words and empty) or not (words or empty or full) or status[2] >= _WORDS or status[3] & 3:
+            raise OSError(_IO, "LSM6DS3 tells what no FIFO can hold")
+        return words if words or empty else self._room + _MARGIN
 
     def _nothing(self, now):
         self.lost = 0

@@ -13,6 +13,7 @@ _LONGEST_PAUSE_US = const(5_000_000)
 _SILENT_US = const(300_000)
 _FORGET_US = const(10_000_000)
 _MOST_ERRORS = const(0xFFFF)
+_WARMER_CDEG = const(800)
 
 
 class Bus:
@@ -46,7 +47,7 @@ class Watched:
         if self._clock.diff(now, self._next) < 0:
             return False
         if not self._up:
-            self._start()
+            self._start(self._begin)
             return False
         return True
 
@@ -56,9 +57,9 @@ class Watched:
         if self._clock.diff(now, self._fresh) > _SILENT_US:
             self._stop()
 
-    def _start(self):
+    def _start(self, begin):
         try:
-            self._begin()
+            begin()
         except OSError:
             self._note_error()
             self._stop()
@@ -109,11 +110,12 @@ class RangeFinder(Watched):
         self._device = device
         self._stream = None
         self._known = False
+        self._calibrated_cdeg = None
         self.new = False
         self._empty = self._middle = self._fresh
 
     def _begun(self):
-        self._stream = None
+        self._stream = self._calibrated_cdeg = None
         self._empty = self._fresh
 
     def step(self, now):
@@ -135,6 +137,15 @@ class RangeFinder(Watched):
             self._nothing(now)
         else:
             self._take(now)
+
+    def look_at_temperature(self, cdeg):
+        """Calibrate the sensor anew if it is 8 degrees C from where that was done last, as ST asks; one told first."""
+        if not self._up or cdeg == wire.NO_TEMPERATURE:
+            return
+        if self._calibrated_cdeg is None:
+            self._calibrated_cdeg = cdeg
+        elif abs(cdeg - self._calibrated_cdeg) >= _WARMER_CDEG:
+            self._start(self._device.recalibrate)
 
     def _take(self, now):
         """Note the measurement. It ended after the last moment at which none can have been there.
@@ -169,7 +180,7 @@ class RangeFinder(Watched):
 
 
 class Imu(Watched):
-    """The LSM6DS3 of a unit: what its FIFO holds, numbered from the reset on, and how old the newest is."""
+    """The LSM6DS3 of a unit: what its FIFO holds, numbered from the first on, and how old the newest is."""
 
     ERROR, RESTARTED = wire.IMU_BUS_ERROR, wire.IMU_RESTARTED
 
@@ -179,7 +190,8 @@ class Imu(Watched):
         self._count = self._index = 0
         self._read_at = self._fresh
         self._read_us = None
-        self._temperature = wire.NO_TEMPERATURE
+        self.temperature_cdeg = wire.NO_TEMPERATURE
+        """As it was looked at last."""
 
     def _begun(self):
         """Count what it missed since it was read last as lost."""
@@ -214,11 +226,11 @@ class Imu(Watched):
 
     def look_at_temperature(self):
         """Read the sensor's temperature anew."""
-        self._temperature = wire.NO_TEMPERATURE
+        self.temperature_cdeg = wire.NO_TEMPERATURE
         if not self._up:
             return
         try:
-            self._temperature = self._device.temperature_cdeg()
+            self.temperature_cdeg = self._device.temperature_cdeg()
         except OSError:
             self._fail()
 
@@ -227,7 +239,7 @@ class Imu(Watched):
         device = self._device
         sample.imu_count, sample.imu_index = self._count, self._index
         sample.imu_scale, sample.imu_rate_hz = device.scale_code, device.rate_hz
-        sample.temperature_cdeg = self._temperature
+        sample.temperature_cdeg = self.temperature_cdeg
         sample.imu_age_us = wire.LONGEST_US
         if self._count:
             half_periods = 2 * device.waiting + 1

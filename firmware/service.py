@@ -26,9 +26,8 @@ def run():
     """Serve until something fails, note what, and begin anew. Ctrl-C leads to the prompt."""
     board = this_board()
     try:
-        clock = Clock(time)
-        config = provision(board, clock, Console())
-        serve(board, clock, config)
+        config = provision(board, Clock(time), Console())
+        serve(board, Clock(time), config)  # one of its own: it may have listened for longer than a clock bears
     except Exception as error:
         try:
             board.note(trace(error))

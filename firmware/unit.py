@@ -46,6 +46,7 @@ class Unit:
         if self._cycles % _SLOW == 0:
             sample.battery_mv = self._battery_mv()
             self._imu.look_at_temperature()
+            self._range_finder.look_at_temperature(self._imu.temperature_cdeg)
         self._cycles += 1
         self._imu.step(sample.imu, now)
         now = self._clock.ticks()

@@ -26,8 +26,6 @@ _RANGE_TIMEOUT_A = const(0x005E)
 _VCSEL_PERIOD_A = const(0x0060)
 _RANGE_TIMEOUT_B = const(0x0061)
 _VCSEL_PERIOD_B = const(0x0063)
-_SIGMA_LIMIT = const(0x0064)
-_SIGNAL_LIMIT = const(0x0066)
 _VALID_PHASE_HIGH = const(0x0069)
 _PERIOD = const(0x006C)
 _WINDOW_AND_PHASE = const(0x0078)
@@ -40,7 +38,7 @@ _MODEL = const(0x010F)
 
 _STOP, _TIMED = b"\x00", b"\x40"
 _GUARD_MS = const(4)
-"""By how much the period must exceed the budget [ms] (UM2356, 2.2): else the device misses every other start."""
+"""By how much the period must exceed the budget [ms]: ST wants them apart (UM2356, 2.2), so that no start is missed."""
 _VHV_WAIT_MS = const(300)
 _BOOT_WAIT_MS = const(50)
 
@@ -126,7 +124,7 @@ class VL53L1X:
         self._read(_RESULT, block)
         self._write(_INTERRUPT_CLEAR, b"\x01")
         code = block[0] & 0x1F
-        if code == 0:
+        if code == 0 or block[0] == 0xFF:  # the latter is a data line that nobody drives
             raise OSError(_IO, "VL53L1X has measured nothing: it lost its set-up")
         self.status = _STATUS[code]
         self.stream = block[2]
@@ -142,20 +140,11 @@ class VL53L1X:
         self._write(_INTERRUPT_CLEAR, b"\x01")
 
     def recalibrate(self):
-        """Calibrate anew for the present temperature, for changes of 8 degrees C and more; ranging goes on after it."""
+        """Calibrate anew for the present temperature, after which ranging goes on; takes some 0.06 s."""
         self.stop()
         self._write(_VHV_LOOP_BOUND, b"\x81")
         self._write(_VHV_START, b"\x92")
         self._calibrate()
-        self._write(_MODE_START, _TIMED)
-
-    def set_limits(self, sigma_mm, signal_kcps):
-        """Set from which sigma on a reading has status 1, and below which rate of the signal status 2."""
-        if not (0 < sigma_mm < 16384 and 0 < signal_kcps < 524288):
-            raise ValueError("limits are 1 to 16383 mm and 1 to 524287 kcps")
-        self.stop()
-        self._keep(_SIGMA_LIMIT, (sigma_mm << 2).to_bytes(2, "big"))
-        self._keep(_SIGNAL_LIMIT, (signal_kcps * 128 // 1000).to_bytes(2, "big"))
         self._write(_MODE_START, _TIMED)
 
     def _read(self, register, into):

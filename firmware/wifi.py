@@ -5,7 +5,7 @@ from micropython import const
 _LOOK_US = const(200_000)
 _ATTEMPT_US = const(15_000_000)
 _FIRST_PAUSE_US = const(1_000_000)
-_LONGEST_PAUSE_US = const(30_000_000)
+_LONGEST_PAUSE_US = const(5_000_000)
 _REFUSED_IN_A_ROW = const(100)
 
 

@@ -45,6 +45,23 @@ def test_the_hosts_side_reaches_the_unit(micropython: Run) -> None:
     assert (told.unit, told.firmware, told.board) == (7, "0.1", "test")
 
 
+def test_a_name_with_characters_beyond_16_bits_is_kept_as_it_is(micropython: Run) -> None:
+    class Keeping(UnitLine):
+        """Keeps what the host says."""
+
+        said = b""
+
+        def write(self, data: bytes, timeout: float) -> None:
+            self.said += data
+            super().write(data, timeout)
+
+    line, name, password = Keeping(), "caf\u00e9 \U0001f600", "\U0001f600" * 2
+    provision(line, UnitKey("left", 7, bytes(range(32))), Network(name, password, "10.0.0.1", 4950))
+    read_back = "import config\nfor text in (config.load().ssid, config.load().password): print(text.encode().hex())"
+    kept = micropython({}, f"LINE = {line.said.strip()!r}\n{ANSWER}\n{read_back}")[1:]
+    assert kept == [name.encode().hex(), password.encode().hex()]
+
+
 def test_the_units_refusal_reaches_the_host(micropython: Run) -> None:
     class Spoiling(UnitLine):
         """Another unit number than any arrives; what is told comes in pieces."""

@@ -146,6 +146,11 @@ def test_the_same_unit_is_told_again_without_ado_and_another_one_only_if_asked(u
     ("more", "words"),
     [
         (("--host", "127.0.0.1"), "A unit cannot send to 127.0.0.1"),
+        (("--host", "0.0.0.0"), "A unit cannot send to 0.0.0.0"),  # noqa: S104
+        (("--host", "255.255.255.255"), "A unit cannot send to 255.255.255.255"),
+        (("--host", "224.0.0.1"), "A unit cannot send to 224.0.0.1"),
+        (("--host", "010.0.0.1"), "The host '010.0.0.1' is no IPv4 address"),
+        (("--ssid", "caf\udce9"), "The network's name is no Unicode text: give it in UTF-8."),
         (("--host", "my-pc"), "The host 'my-pc' is no IPv4 address"),
         (("--port", "0"), "The port is 0"),
         (("--ssid", "x" * 33), "give 1 to 32 bytes"),
@@ -256,6 +261,16 @@ def test_a_line_that_goes_away_is_said():
     with pytest.raises(HardwareError, match="went away"):
         line.read(1.0)
     line.close()
+
+
+def test_a_unit_that_goes_away_when_it_is_reset_is_said_with_the_way_out():
+    master, slave = os.openpty()
+    with SerialLine(os.ttyname(slave)) as line:
+        os.close(slave)
+        os.close(master)
+        line.reset()
+        with pytest.raises(HardwareError, match=r"went away.*within 3 s after its reset"):
+            greet(line, 1.0)
 
 
 def test_the_password_is_asked_for_without_echo(unit, tmp_path, monkeypatch):

@@ -25,6 +25,8 @@ _LONGEST = 1 << 16
 _PIECE, _PAUSE_S = 32, 0.01
 """Bytes sent at once, and the pause after them [s]: a unit takes in few before it reads them."""
 _FULL_MOST_MV = 20_000
+_NO_HOSTS, _FIRST_MULTICAST = (0, 127), 224
+"""First numbers of IPv4 addresses that are no host a unit could send to; multicast and broadcast are the upper ones."""
 _SSID_MOST, _PASSWORD_LEAST, _PASSWORD_MOST = 32, 8, 63
 
 
@@ -53,9 +55,9 @@ class Network:
     """Voltage of the unit's battery that fills its converter [mV] (docs/hardware/wiring.md); 0: none is wired to it."""
 
     def __post_init__(self) -> None:
-        if not 1 <= len(self.ssid.encode()) <= _SSID_MOST or "\0" in self.ssid:
+        if not 1 <= _size(self.ssid, "network's name") <= _SSID_MOST or "\0" in self.ssid:
             raise HardwareError(f"The network's name {self.ssid!r} is none: give 1 to {_SSID_MOST} bytes.")
-        size = len(self.password.encode())
+        size = _size(self.password, "password")
         if (size and not _PASSWORD_LEAST <= size <= _PASSWORD_MOST) or "\0" in self.password:
             raise HardwareError(
                 f"The password has {size} bytes: WPA has {_PASSWORD_LEAST} to {_PASSWORD_MOST}, an open network none."
@@ -64,7 +66,7 @@ class Network:
             address = ipaddress.IPv4Address(self.host)
         except ValueError:
             raise HardwareError(f"The host {self.host!r} is no IPv4 address: give one as 192.168.1.10.") from None
-        if address.is_loopback or address.is_unspecified or address.is_multicast:
+        if address.packed[0] in _NO_HOSTS or address.packed[0] >= _FIRST_MULTICAST:
             raise HardwareError(
                 f"A unit cannot send to {self.host}: give the address this machine has in the unit's network."
             )
@@ -72,7 +74,7 @@ class Network:
             raise HardwareError(f"The port is {self.port}: give one from 1 to 65535.")
         if not 0 <= self.battery_full_mv <= _FULL_MOST_MV:
             raise HardwareError(
-                f"The battery fills the converter at {self.battery_full_mv} mV: give 0 to {_FULL_MOST_MV}, as 4500."
+                f"The battery fills the converter at {self.battery_full_mv} mV: give 0 to {_FULL_MOST_MV}, as 5000."
             )
 
     def __repr__(self) -> str:
@@ -125,7 +127,7 @@ def provision(line: Line, key: UnitKey, network: Network, timeout: float = ANSWE
         "password": network.password, "host": network.host, "port": network.port,
         "battery_full_mv": network.battery_full_mv,
     }  # fmt: skip
-    data = json.dumps(told).encode() + b"\n"
+    data = json.dumps(told, ensure_ascii=False).encode() + b"\n"  # units join no halves of \u escapes
     for start in range(0, len(data), _PIECE):
         line.write(data[start : start + _PIECE], timeout)
         time.sleep(_PAUSE_S)
@@ -203,6 +205,14 @@ def _peer(answer: dict[str, Any]) -> Peer:
 
 def _text(value: object) -> str:
     return _shown(str(value).encode()) if value is not None else "unknown"
+
+
+def _size(text: str, name: str) -> int:
+    """Return the bytes of a text; one that is no Unicode text is a HardwareError."""
+    try:
+        return len(text.encode())
+    except UnicodeEncodeError:
+        raise HardwareError(f"The {name} is no Unicode text: give it in UTF-8.") from None
 
 
 def _shown(data: bytes) -> str:

@@ -95,7 +95,10 @@ class SerialLine:
 
     def _gone(self, error: OSError | None) -> HardwareError:
         why = f" ({error.strerror})" if error else ""
-        return HardwareError(f"{self._device} went away{why}: plug the unit in again, with a sound cable.")
+        return HardwareError(
+            f"{self._device} went away{why}: if the unit has USB of its own, start the command within 3 s after its"
+            " reset; else plug it in again, with a sound cable."
+        )
 
     def __enter__(self) -> Self:
         return self

@@ -85,6 +85,9 @@ class ADC:
     def read_u16(self):
         return 0x8000
 
+    def read_uv(self):
+        return 1_250_400
+
 
 class WDT:
     def __init__(self, timeout=None):

@@ -8,7 +8,7 @@ class State:
         self.active = {AP_IF: True, STA_IF: False}
         self.there = True
         self.asked = None
-        self.pm = None
+        self.pm = self.reconnects = None
         self.joined = False
 
 
@@ -24,8 +24,8 @@ class WLAN:
     def active(self, on):
         state.active[self.interface] = on
 
-    def config(self, pm):
-        state.pm = pm
+    def config(self, pm, reconnects):
+        state.pm, state.reconnects = pm, reconnects
 
     def isconnected(self):
         state.joined = state.there and state.asked is not None

@@ -1,7 +1,10 @@
 """What a unit keeps over a reset."""
 
+import json
 import os
 import sys
+from binascii import hexlify
+from hashlib import sha256
 
 from config import PATH, Config, ConfigError, load
 
@@ -55,7 +58,28 @@ def each_wrong_value_is_refused_by_its_name():
         assert _refused(password=value).startswith("password must be")
     for value in ("", "host", "1.2.3", "1.2.3.4.5", "1.2.3.256", "1.2.3.-4", "1.2..4", "1.2.3.4444", 5, None):
         assert _refused(host=value) == "host must be an IPv4 address such as 192.168.1.10"
+    for value in ("010.0.0.1", "1.2.3.04", "0.0.0.0", "0.1.2.3", "127.0.0.1", "224.0.0.1", "255.255.255.255"):  # noqa: S104
+        assert _refused(host=value) == "host must be an IPv4 address such as 192.168.1.10"
     assert _refused(battery_full_mv=-1) == "battery_full_mv must be a whole number from 0 to 20000"
+
+
+def half_a_character_is_refused():
+    half = json.loads('"net\\ud83d"')
+    assert _refused(ssid=half) == "ssid must be text of 1 to 32 bytes"
+    assert _refused(password=half + "work") == "password must be text of 0 to 63 bytes"
+
+
+def a_character_beyond_16_bits_is_kept_as_it_is():
+    name = b"net \xf0\x9f\x98\x80"
+    Config(dict(LINE, ssid=json.loads(b'"' + name + b'"'))).save()
+    assert load().ssid.encode() == name
+
+
+def a_file_whose_sum_is_right_and_that_is_no_configuration_is_refused():
+    for text in ("[]", "x", "7", "null", '"text"', ""):
+        with open(PATH, "w") as file:
+            file.write(text + "\n" + hexlify(sha256(text.encode()).digest()).decode() + "\n")
+        assert _fault() == "the configuration is no JSON object", text
 
 
 def no_refusal_tells_a_secret():

@@ -214,6 +214,40 @@ def a_bus_held_down_is_an_error():
     assert _error(sensor.temperature_cdeg) == 110
 
 
+def a_data_line_that_is_held_or_full_of_noise_is_an_error_and_no_sample():
+    for byte, most in ((lambda: 0x00, 0), (lambda: 0xFF, 0), (_noise(), 2)):
+        clock, bus, _, sensor = _made()
+        errors = []
+        for _ in range(200):
+            sensor.begin()
+            clock.advance(20_000)
+            bus.held = byte
+            try:
+                _drained(sensor)
+            except OSError as error:
+                errors.append(error.args[0])
+            bus.held = None
+        assert set(errors) == {5}
+        assert len(errors) >= 200 - most, "of noise, 1 in 300 looks as if it could be"
+        bus.held = byte
+        assert _error(sensor.begin) in (5, 19, 110)
+        bus.held = None
+        sensor.begin()
+        clock.advance(20_000)
+        assert len(_drained(sensor)) == 8
+
+
+def _noise():
+    """Bytes of a generator with a fixed seed."""
+    state = [1]
+
+    def byte():
+        state[0] = (state[0] * 69069 + 1) & 0x3FFFFFFF
+        return state[0] >> 16 & 0xFF
+
+    return byte
+
+
 def a_failed_transfer_loses_nothing():
     clock, bus, _, sensor = _made()
     sensor.begin()

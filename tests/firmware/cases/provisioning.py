@@ -124,7 +124,7 @@ def a_line_too_long_is_refused_and_the_next_is_read():
 
 
 def the_longest_line_there_can_be_is_taken():
-    longest = dict(LINE, unit=65535, port=65535, host="255.255.255.255", battery_full_mv=20000)
+    longest = dict(LINE, unit=65535, port=65535, host="223.255.255.255", battery_full_mv=20000)
     longest["ssid"], longest["password"] = "\u00e9" * 16, '"' * 63
     _, answers, config = _listen(Config(LINE), (0, json.dumps(longest).encode() + b"\n"))
     assert answers[0]["unit"] == 65535

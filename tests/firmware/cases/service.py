@@ -1,5 +1,6 @@
 """The life of a unit on a fake chip."""
 
+import json
 import os
 import socket
 import sys
@@ -150,11 +151,19 @@ def a_call_that_never_returns_lets_the_watchdog_bite():
 
 
 class _Console:
-    """A serial line on which nobody is."""
+    """A serial line on which nobody is, until `said` at a time [us]."""
+
+    said = None
 
     def read(self, wait_ms):
         service.time.sleep_ms(wait_ms)
-        return b""
+        if _Console.said is None or service.time.clock.now_us < _Console.said[0]:
+            return b""
+        (_, line), _Console.said = _Console.said, None
+        return line
+
+    def write(self, text):
+        pass
 
 
 def _run(board):
@@ -208,13 +217,30 @@ def without_a_configuration_nothing_is_sent():
         assert chip.receiver.hellos == []
 
 
+def time_begins_when_it_serves_however_long_it_waited_for_its_configuration():
+    for minutes in (1, 10, 20):
+        chip = _Chip()
+        Config(CONFIG).save()
+        os.remove("config.json")
+        waited = minutes * 60 * SECOND
+        _Console.said = (waited, json.dumps(dict(CONFIG, pretouch=1)).encode() + b"\n")
+        chip.at(waited + 8 * SECOND, _enough)
+        try:
+            _run(_Draw())
+        except _Enough:
+            times = [s["time_us"] for s in chip.receiver.samples]
+            assert 0 <= chip.receiver.hellos[0][2] <= times[0] <= times[-1] <= 8 * SECOND, (minutes, times[-1])
+            assert len(times) > 150
+
+
 def the_radio_never_sleeps_and_its_own_network_is_off():
     for board in (Esp8266(), Esp32C3()):
         network.state.__init__()
         esp.State.sleep = esp.SLEEP_MODEM
         board.open_wlan()
         assert network.state.active == {network.AP_IF: False, network.STA_IF: True}
-        assert (esp.State.sleep, network.state.pm) in ((esp.SLEEP_NONE, None), (esp.SLEEP_MODEM, network.WLAN.PM_NONE))
+        told = (esp.State.sleep, network.state.pm, network.state.reconnects)
+        assert told in ((esp.SLEEP_NONE, None, None), (esp.SLEEP_MODEM, network.WLAN.PM_NONE, 0))
 
 
 def a_sensor_cut_off_in_a_byte_is_clocked_free():

@@ -199,6 +199,38 @@ def a_stuck_bus_silences_both_and_samples_go_on():
     assert _all_flags(unit.run(SECOND)) == NEW
 
 
+def a_held_data_line_gives_neither_ranges_nor_samples_of_the_imu():
+    for level in (0x00, 0xFF):
+        unit = _well()
+        unit.bus.held = lambda level=level: level
+        unit.run(SECOND)
+        samples = unit.run(2 * SECOND)
+        assert all(s["flags"] == RANGE_ERROR | IMU_ERROR | LATE for s in samples), (level, samples[-1])
+        assert all(s["count"] == 0 and s["temperature"] == -32768 for s in samples[50:])
+        unit.bus.held = None
+        unit.run(6 * SECOND, pass_us=15_000)
+        assert _all_flags(unit.run(SECOND)) == NEW
+
+
+def a_warmer_range_finder_is_calibrated_anew_and_tells_so():
+    unit = _well()
+    starts = unit.vl53l1x.starts
+    for raw in (0, 100, 127, -126):
+        unit.lsm6ds3.temperature = raw
+        assert _all_flags(unit.run(2 * SECOND)) == NEW, raw
+    assert unit.vl53l1x.starts == starts
+    for raw in (128, 0, 250, 300):
+        unit.lsm6ds3.temperature = raw
+        samples = unit.run(2 * SECOND)
+        restarts = [s for s in samples if s["flags"] & RANGE_RESTARTED]
+        assert len(restarts) == (raw != 300), raw
+        assert not _all_flags(samples) & (RANGE_ERROR | IMU_ERROR | IMU_LOST | IMU_RESTARTED)
+        assert max(_gaps([s for s in samples if s["flags"] & NEW])) < 100_000
+    unit.lsm6ds3.power_off()
+    unit.lsm6ds3.temperature = 0
+    assert not _all_flags(unit.run(2 * SECOND)) & RANGE_RESTARTED
+
+
 def attempts_on_what_is_dead_become_rare():
     unit = _well()
     unit.vl53l1x.power_off()

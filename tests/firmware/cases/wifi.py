@@ -64,14 +64,14 @@ def asks_again_at_once_when_the_network_is_lost_and_is_back_when_it_is():
     assert station.connected
 
 
-def pauses_between_attempts_grow_to_30_s():
+def pauses_between_attempts_grow_to_5_s():
     fake, clock, wlan, station = _station()
     wlan.there = False
     _pass(fake, clock, station, 400)
     times = [each[0] for each in wlan.asked]
     gaps = [(step + 250_000) // 1_000_000 for step in steps(times)]
-    assert gaps[:6] == [16, 17, 19, 23, 31, 45], gaps
-    assert set(gaps[6:]) <= {45}, gaps
+    assert gaps[:3] == [16, 17, 19], gaps
+    assert set(gaps[3:]) == {20}, gaps
     assert wlan.disconnects == len(gaps) or wlan.disconnects == len(gaps) + 1
 
 

@@ -13,7 +13,7 @@ is no OSError, so that no driver can swallow it.
 NO_ANSWER = 19
 """ENODEV: what MicroPython raises where nobody acknowledges."""
 TIMED_OUT = 110
-"""ETIMEDOUT: what it raises where the bus is held down."""
+"""ETIMEDOUT: what it raises where the clock line is held down."""
 
 
 class Refused(Exception):
@@ -56,6 +56,10 @@ class Bus:
         self.us_per_byte = us_per_byte
         self.transfers = self.bytes = self.failed = 0
         self.stuck = False
+        """The clock line is held down: no transfer ends."""
+        self.held = None
+        """The data line is not the device's own: this tells each byte that is read, what is written vanishes, and no
+        transfer fails. So it is where that line is held down, as its level counts as the acknowledgement."""
         self._devices = []
         self._fail_next, self._fail_until, self._errno = 0, -1, NO_ANSWER
         self._break_next = 0
@@ -85,13 +89,15 @@ class Bus:
 
     def readfrom_mem_into(self, address, register, buffer, *, addrsize=8):
         device = self._transfer(address, register, len(buffer), addrsize)
-        data = device.read(register, len(buffer))
+        data = device.read(register, len(buffer)) if device else [self.held() for _ in buffer]
         self._break_off()
         for i in range(len(buffer)):
             buffer[i] = data[i]
 
     def writeto_mem(self, address, register, data, *, addrsize=8):
-        self._transfer(address, register, len(data), addrsize).write(register, bytes(data))
+        device = self._transfer(address, register, len(data), addrsize)
+        if device:
+            device.write(register, bytes(data))
         self._break_off()
 
     def _break_off(self):
@@ -104,6 +110,9 @@ class Bus:
         if self.stuck:
             raise self._failure(TIMED_OUT)
         self.clock.advance(self.us_per_byte)
+        if self.held:
+            self.clock.advance(self.us_per_byte * (count + 2))
+            return None
         if self._fail_next or self.clock.now_us < self._fail_until:
             self._fail_next = max(self._fail_next - 1, 0)
             raise self._failure(self._errno)

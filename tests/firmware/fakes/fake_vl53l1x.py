@@ -1,8 +1,9 @@
 """The VL53L1X at the level of its registers, with time: what it is set to decides when it has measured.
 
 A measurement takes as long as the timeouts and VCSEL periods in the registers say, by the frequency of its fast clock,
-plus a fixed part. In timed ranging they start on a grid of the period, which the slow oscillator counts; a start that
-comes before the last measurement is through is missed, so the period doubles (UM2510, 3.3 and 3.6.2).
+plus a fixed part. In timed ranging they start on a grid of the period, which the slow oscillator counts. What a start
+does that comes before the last measurement is through is not sure: here it is missed, so the period doubles, which is
+the worst that it can be; others of ST's papers let the next measurement begin at once.
 """
 
 from binascii import crc32
@@ -16,7 +17,7 @@ FIXED_US = 11_900
 FULL_VHV_US = 40_000
 """Longer takes the first measurement, or one after a full VHV was asked for."""
 GUARD_US = 4_000
-"""From the end of a measurement until it can start the next (UM2356, 2.2)."""
+"""From the end of a measurement until it can start the next: a guess on the safe side."""
 FAST_CLOCK = 0xBCCC
 """Frequency of the fast clock [MHz / 4096]."""
 OSCILLATOR = 37
