@@ -11,11 +11,13 @@ from pretouch.cli.detect import detect
 from pretouch.errors import ParameterError, PretouchError, RecordingError
 from pretouch.foreign.source import Choice
 from pretouch.loop import Cycle
+from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
 from tests.foreign.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
+from tests.hardware.traffic import heard
 
 
 @pytest.fixture
@@ -32,6 +34,15 @@ def test_what_was_read_assumed_and_found_is_printed(capsys, file):
     rows = [line.split() for line in said.splitlines() if line.startswith("paper ")]
     assert [row[-1] for row in rows[:3]] == ["y", "x", "z"]
     assert "paper: if nobody touched the arm, 3 false contacts in 0.2 min" in said
+
+
+def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
+    place = tmp_path / "units.mcap"
+    with SkinRecording(place) as recording:
+        recording.sample("wrist", heard(0.02)[0], new=True)
+    with pytest.raises(RecordingError, match="holds what sensor units sent, and no force: read it with") as caught:
+        detect(place, Choice())
+    assert len(str(caught.value)) < 300
 
 
 def test_profiles_stand_side_by_side(capsys, file):

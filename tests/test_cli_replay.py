@@ -53,7 +53,20 @@ def page(monkeypatch):
 def test_a_line_says_what_ran_for_how_long_and_what_happened(capsys, whole):
     assert replay(whole, page=False) == 0
     said = capsys.readouterr().out
-    assert said == "pretouch test: profile paper on panda with 7 units, 5.0 s, 500 steps: 1 contact, 1 hold.\n"
+    what = "pretouch test: profile paper on panda with 7 units, 5.0 s, 500 steps"
+    assert said == f"{what}: 1 contact, 1 hold after the start, held for 24% of the time.\n"
+
+
+def test_of_a_run_that_was_held_from_the_start_on_it_is_said_that_it_was(capsys, panda_model, paper_skin, tmp_path):
+    arm = Arm(panda_model, paper_skin)
+    with Recording(tmp_path / "held.mcap", arm.controller) as recording:
+        for sample in pushed(1.0, ()):
+            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings(silent={0: 9.0})), arm.state
+            step, arm.state = arm.controller.step(before, inputs)
+            recording.record(Cycle(inputs, before, step, arm.state))
+            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
+    assert replay(tmp_path / "held.mcap", page=False) == 0
+    assert "0 contacts, 0 holds after the start, held for 100% of the time." in capsys.readouterr().out
 
 
 def test_of_a_killed_run_it_is_said_what_is_missing(capsys, cut):
@@ -106,7 +119,7 @@ def test_the_same_profile_is_later_by_nothing(capsys, whole):
 
 def test_the_page_is_given_recording_place_and_comparison(whole, page):
     assert replay(whole, profile="blind", host="127.0.0.1", port=8123) == 0
-    ((recorded, options, comparison),) = page
+    ((recorded, options, comparison, *_),) = page
     assert recorded.place == whole
     assert (options.host, options.port) == ("127.0.0.1", 8123)
     assert comparison.other.name == "blind"

@@ -1,6 +1,6 @@
 """What is said to be wrong with a unit: each by traffic that has it, and only it."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,10 @@ def found(samples, counted=None, **standing):
     return findings([unit], LIMITS)
 
 
+def without_clock():
+    return [replace(one, stamp=np.nan, offset=np.nan, bound=np.inf) for one in heard()]
+
+
 def wide(number):
     return round(500 + np.random.default_rng(number).normal(scale=40.0))
 
@@ -40,10 +44,17 @@ CASES = {
     "very slow": (
         lambda: found(heard(flags=lambda n: WELL * (n % 10 == 0))), "fault", "rate", "readings a second (limit 10)"
     ),
-    "lossy": (lambda: found(heard(), Counts(440, 60)), "warning", "loss", "loses 12% of its samples"),
+    "lossy": (lambda: found(heard(), Counts(400, 100)), "warning", "loss", "loses 20% of its samples"),
+    "hardly lossy": (
+        lambda: found(heard(), Counts(424, 76)), "warning", "loss",
+        "loses 15.2% of its samples on their way (limit 15%)",
+    ),
     "very lossy": (lambda: found(heard(), Counts(340, 160)), "fault", "loss", "loses 32% of its samples"),
     "late": (lambda: found(heard(latency=0.07)), "warning", "latency", "in the median 70 ms (limit 50 ms)"),
     "clock": (lambda: found(heard(), bound=0.02), "warning", "clock", "known to 20.0 ms only (limit 10 ms)"),
+    "clock never known": (
+        lambda: found(without_clock(), bound=np.inf), "fault", "clock", "clock has not been known for 10 s (limit 2 s)"
+    ),
     "jumps": (lambda: found(heard(), Counts(500, 0, 0, 2)), "warning", "clock jump", "jumped 2 times"),
     "sigma": (lambda: found(heard(range_sigma=80)), "warning", "sigma", "own error at 20 mm (limit 15 mm)"),
     "noise": (lambda: found(heard(range_mm=wide)), "warning", "noise", "from reading to reading (limit 20 mm)"),
@@ -52,9 +63,13 @@ CASES = {
         "fails in 25% of its readings (125 HARDWARE; limit 10%)",
     ),
     "failed": (lambda: found(heard(range_status=10)), "fault", "status", "fails in 100% of its readings"),
+    "unknown statuses": (
+        lambda: found(heard(range_status=lambda n: (77, 254, 0, 0)[n % 4])), "warning", "status",
+        "fails in 50% of its readings (125 77, 125 STUCK; limit 10%)",
+    ),
     "range late": (
         lambda: found(heard(flags=lambda n: WELL | (64 if n % 100 == 0 else 0))), "warning", "range late",
-        "nothing measured in time 5 times",
+        "nothing measured in time 5 times in 10 s (limit 3)",
     ),
     "battery low": (lambda: found(heard(battery_mv=3450)), "warning", "battery", "at 3.45 V (limit 3.5 V)"),
     "battery flat": (lambda: found(heard(battery_mv=3250)), "fault", "battery", "at 3.25 V (limit 3.3 V)"),
@@ -98,6 +113,43 @@ def test_old_firmware_is_named():
 
 def test_rates_are_not_judged_before_a_unit_has_settled():
     assert found(heard(1.0, imu_count=0, latency=0.3)) == ()
+
+
+def test_a_range_finder_late_now_and_then_or_at_the_start_is_not_named():
+    late = int(Flag.RANGE_NEW | Flag.RANGE_LATE)
+    assert found(heard(flags=lambda n: late if n % 250 == 0 else WELL)) == ()
+    assert found(heard(1.0, flags=late)) == ()
+
+
+def test_a_clock_is_not_judged_right_after_it_began_anew():
+    last = [replace(one, stamp=np.nan, offset=np.nan, bound=np.inf) for one in heard(1.0)]
+    assert found([*heard(9.0, until=NOW - 1.0), *last], bound=np.inf) == ()
+
+
+def test_rate_and_clock_are_not_judged_while_the_window_holds_a_silence_or_a_reboot():
+    cut_off = [*heard(2.0, until=NOW - 8.0), *heard(2.0)]
+    assert found(cut_off) == ()
+    slow = heard(flags=lambda n: WELL * (n % 2))
+    assert [f.what for f in found(slow, Counts(500, 0, 1), bound=0.02)] == ["reboot"]
+    assert [f.what for f in found(slow, bound=0.02)] == ["rate", "clock"]
+
+
+@pytest.mark.parametrize(
+    ("standing", "changes", "words"),
+    [
+        ({}, {"battery_mv": 3499}, "at 3.499 V (limit 3.5 V)"),
+        ({}, {"range_sigma": 61}, "at 15.2 mm (limit 15 mm)"),
+        ({"bound": 0.01004}, {}, "known to 10.04 ms only (limit 10 ms)"),
+    ],
+)
+def test_a_value_is_told_with_as_many_digits_as_set_it_off_from_its_limit(standing, changes, words):
+    (finding,) = found(heard(**changes), **standing)
+    assert words in finding.sentence
+
+
+def test_a_healthy_unit_on_a_lossy_network_is_not_warned_of_again_and_again():
+    samples, lost = heard(), np.random.default_rng(1).binomial(500, 0.1, size=200)
+    assert not [n for n in lost if found(samples, Counts(500 - n, n))]
 
 
 def test_faults_come_before_warnings():

@@ -1,6 +1,7 @@
 """Numbers of a unit's health, from traffic that is made up."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,6 +68,16 @@ def test_imu_samples_that_the_fifo_lost_are_told_from_those_of_lost_datagrams():
     assert unit.imu_rate_hz == pytest.approx(500.0)
     assert unit.imu_loss == pytest.approx(0.2, rel=0.02)
     assert health(heard(imu_count=0)).imu_rate_hz == 0.0
+
+
+def test_the_longest_break_and_the_time_without_a_clock_are_told():
+    unit = health([*heard(2.0, until=NOW - 8.0), *heard(2.0)])
+    assert unit.gap_s == pytest.approx(6.02)
+    assert unit.clock_unknown_s == 0.0
+    known = heard(4.0, until=NOW - 3.0)
+    unknown = [replace(one, bound=math.inf) for one in heard(3.0)]
+    assert health([*known, *unknown], bound=math.inf).clock_unknown_s == pytest.approx(3.0)
+    assert health(unknown, bound=math.inf).clock_unknown_s == pytest.approx(2.98)
 
 
 def test_what_a_unit_cannot_tell_is_not_known():

@@ -152,7 +152,7 @@ def test_a_file_that_is_cut_off_is_read_and_recovered(place, tmp_path):
     assert trace.samples == 200
     recovered = recover(cut)
     assert recovered.steps == 200
-    assert "200 samples of sensor units" in recovered.said
+    assert "200 samples of sensor units, over 1.98 s." in recovered.said
     assert read_skin(recovered.place).complete
     with AnyReader([recovered.place]) as reader:
         assert sum(c.msgcount for c in reader.connections) == 200 + 146 + 1600 + 1

@@ -179,7 +179,7 @@ def test_a_units_imu_is_kept_in_its_topic(controller, tmp_path):
     run = Run(controller)
     with Recording(tmp_path / "a.mcap", controller) as recording:
         recording.record(run.turn())
-        recording.imu("hand_left", 0.005, np.array([0.0, np.nan, 9.81]), np.array([1.0, 2.0, 3.0]))
+        recording.imu("hand_left", np.array([0.005]), np.array([[0.0, np.nan, 9.81]]), np.array([[1.0, 2.0, 3.0]]))
     with AnyReader([tmp_path / "a.mcap"]) as reader:
         ((connection, _, data),) = (m for m in reader.messages() if m[0].topic == "/skin/hand_left/imu")
         found = reader.deserialize(data, connection.msgtype)
@@ -254,7 +254,7 @@ def test_closing_twice_says_the_same_and_later_cycles_are_left_out(controller, t
     recording.record(run.turn())
     closed = recording.close()
     recording.record(run.turn())
-    recording.imu("hand_left", 0.0, np.zeros(3), np.zeros(3))
+    recording.imu("hand_left", np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))
     assert recording.close() is closed
     assert (closed.steps, closed.duration_s) == (2, 0.01)
     assert closed.size_bytes == (tmp_path / "a.mcap").stat().st_size

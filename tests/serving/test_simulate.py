@@ -1,19 +1,21 @@
 import threading
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.receiver import SkinReceiver
+from pretouch.serving import simulate
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import network
 from pretouch.serving.simulate import SimulateOptions, Visitor, run
 from pretouch.serving.unit import UnitParams
 from pretouch.serving.wire_skin import made_keys
 from pretouch.sim.imu import ImuParams
-from pretouch.types import RangeStatus
+from pretouch.types import Mode, RangeStatus
 
 
 @pytest.fixture
@@ -90,11 +92,28 @@ def test_it_ends_by_itself_in_order_and_says_how_it_went_each_second(options):
     assert all("0 of 7 units in session" in line for line in said)
 
 
+def test_a_receiver_that_does_not_answer_is_named_once():
+    units, said = [SimpleNamespace(in_session=False, silent=False)], []
+    fleet = SimpleNamespace(ids=["a"], units=units, sent=0, lost=0, receiver=("desk", 47470))
+    clock = SimpleNamespace(now=0.0, left_out=0.0)
+    cycle = SimpleNamespace(step=SimpleNamespace(ee_velocity=np.zeros(3), mode=Mode.TRACK))
+    teller = simulate._Teller(fleet, clock, said.append)
+    for second in range(1, 20):
+        clock.now, units[0].in_session = float(second), 8 <= second < 12
+        teller.record(cycle)
+    named = [i for i, line in enumerate(said) if line.startswith("Nobody answers at desk:47470: ")]
+    assert [i - k for k, i in enumerate(named)] == [3, 14]  # after the lines of so many seconds
+
+
 def test_a_unit_there_is_not_cannot_be_silenced(options):
     with pytest.raises(HardwareError, match=r"There is no unit elbow: choose from hand_left"):
         options(("127.0.0.1", 9), silenced=frozenset({"elbow"}))
     with pytest.raises(ParameterError, match=r"SimulateOptions.duration_s"):
         options(("127.0.0.1", 9), duration_s=-1.0)
+    with pytest.raises(ParameterError, match=r"SimulateOptions.seed is -1"):
+        options(("127.0.0.1", 9), seed=-1)
+    with pytest.raises(HardwareError, match=r"No receiver is given"):
+        run(options(("", 9)), lambda: True, lambda _: None)
     with pytest.raises(HardwareError, match=r"port is 0"):
         run(options(("127.0.0.1", 0)), lambda: True, lambda _: None)
 

@@ -1,10 +1,15 @@
 """Real units on the simulated arm: readings are as old in the simulation as they are in the room."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from tests.viewer.browser import free_port
 
 from pretouch.errors import ParameterError
 from pretouch.hardware.receiver_process import Traffic
@@ -13,7 +18,9 @@ from pretouch.hardware.wire import Flag, Sample
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.types import Mode, RangeReadings, RangeStatus
+from pretouch.viewer.live import LivePage
 from pretouch.viewer.real_units import RealUnits
+from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
 from pretouch.viewer.unit_panel import PERIOD_S, UnitPanel
 
@@ -38,6 +45,7 @@ class Room:
         self.readings = RangeReadings(
             np.full(UNITS, -np.inf), np.zeros(UNITS), np.full(UNITS, int(RangeStatus.NONE), dtype=np.int64)
         )
+        self.alive = True
         self.imu: list[ImuBatch] = []
         self.samples: list[Received] = []
         self.units = tuple(UnitTraffic(f"unit_{k}", k + 1) for k in range(UNITS))
@@ -105,6 +113,20 @@ def test_imu_samples_are_stamped_in_the_simulations_time(room: Room, real: RealU
     room.imu = [ImuBatch(2, np.array([room.now - 0.02, room.now - 0.01]), np.ones((2, 3)), np.zeros((2, 3)), 0)]
     (batch,) = real.take_imu()
     np.testing.assert_allclose(batch.stamp, [4.98, 4.99], atol=1e-9)
+
+
+def test_imu_samples_that_would_overlap_in_a_slower_simulation_are_left_out(room: Room, real: RealUnits) -> None:
+    time, stamps = [5.0], []
+    real.begin(lambda: time[0])
+    for _ in range(100):
+        room.now, time[0] = room.now + 0.02, time[0] + 0.01
+        at = room.now - np.arange(8)[::-1] / 416
+        room.imu = [ImuBatch(0, at, np.ones((8, 3)), np.zeros((8, 3)), 0)]
+        stamps += [batch.stamp for batch in real.take_imu()]
+    kept = np.concatenate(stamps)
+    assert np.diff(kept).min() > 0
+    assert 300 < len(kept) < 600  # of 800, in half the time
+    assert kept[-1] == pytest.approx(time[0], abs=0.06)
 
 
 def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_are_not(
@@ -180,3 +202,50 @@ def test_the_panel_shows_each_unit_and_what_is_wrong_with_it(room: Room) -> None
     assert "unit_1 has not been heard" in html
     panel.draw(float(arrivals[-1]) + 0.9 * PERIOD_S)
     assert gui.html.content == html
+
+
+@contextmanager
+def page_of(simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None) -> Iterator[LivePage]:
+    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
+    with served(ServeOptions(port=free_port()), "test") as server:
+        yield LivePage(server, simulation, say)
+
+
+def test_a_pause_while_recording_ends_no_recording_and_leaves_its_imu_samples_out(
+    room: Room, real: RealUnits, tmp_path: Path
+) -> None:
+    simulation = LiveSimulation(real=real)
+    begun = simulation.time
+    simulation.start_recording(tmp_path / "desk.mcap")
+    with page_of(simulation) as page:
+        for turn in range(100):
+            page.controls.running.paused = 30 <= turn < 60
+            passed = 1.0 if page.controls.running.paused else 1 / 30
+            room.now += passed
+            room.hear()
+            count = round(2900 * passed)
+            stamps = room.now - np.arange(count)[::-1] / 2900
+            room.imu = [ImuBatch(0, stamps, np.zeros((count, 3)), np.zeros((count, 3)), 0)]
+            page.turn(room.now)
+    closed = simulation.stop_recording()
+    assert closed is not None
+    assert "ended early" not in closed.sentence
+    with (tmp_path / "desk.mcap").open("rb") as file:
+        times = [m.log_time for _, c, m in make_reader(file).iter_messages() if c.topic == "/skin/hand_left/imu"]
+    assert min(times) > 0
+    spacing = np.diff(times)
+    assert np.median(spacing) == pytest.approx(1e9 / 2900, rel=0.01)
+    assert len(times) == pytest.approx(2900 * (simulation.time - begun), abs=200)
+
+
+def test_a_receiver_that_has_ended_is_said_once(room: Room, real: RealUnits) -> None:
+    said: list[str] = []
+    simulation = LiveSimulation(real=real)
+    with page_of(simulation, said.append) as page:
+        page.turn(0.0)
+        assert not said
+        room.alive = False
+        for turn in range(10):
+            page.turn(turn / 30)
+        assert page.notice == "The receiver of the sensor units has ended: start the page again."
+    assert said == [page.notice]

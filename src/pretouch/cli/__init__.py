@@ -1,11 +1,7 @@
 """The command `pretouch`."""
 
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
-from types import FrameType
 
 import tyro
 from rich.console import Console
@@ -25,7 +21,9 @@ from pretouch.cli.commands import (
     Reproduce,
     WarmUp,
 )  # fmt: skip
+from pretouch.cli.ending import Terminated, ends_raise, exit_code
 from pretouch.cli.skin_commands import Skin
+from pretouch.cli.words import words
 from pretouch.errors import ParameterError, PretouchError
 
 # the rest of the package takes a second to import: only the functions that run something do
@@ -33,33 +31,11 @@ from pretouch.errors import ParameterError, PretouchError
 _USAGE, _INTERRUPTED = 2, 130
 
 
-class _Terminated(BaseException):
-    """SIGTERM, or SIGHUP of a terminal that closed, so that what is under way can end in order."""
-
-    def __init__(self, number: int) -> None:
-        self.code = 128 + number
-
-
-@contextmanager
-def _ends_raise() -> Iterator[None]:
-    def handle(number: int, _frame: FrameType | None) -> None:
-        raise _Terminated(number)
-
-    # nohup has SIGHUP ignored, and wants it so
-    ours = [n for n in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, handle) for number in ours}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def main(args: list[str] | None = None) -> int:
     """Run the command; return its exit code: 2 for bad input, 130, 143 or 129 after Ctrl-C, SIGTERM or SIGHUP."""
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
     try:
-        with _ends_raise():
+        with ends_raise():
             command = tyro.cli(
                 Command, prog="pretouch", description="Contact-anticipating robot arms.", args=args,
                 config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
@@ -92,11 +68,9 @@ def main(args: list[str] | None = None) -> int:
     except PretouchError as error:
         errors.print(str(error), markup=False)
         return _USAGE
-    except KeyboardInterrupt:
-        return _INTERRUPTED
-    except _Terminated as end:
-        return end.code
-    return 0
+    except (KeyboardInterrupt, Terminated):
+        return exit_code() or _INTERRUPTED
+    return exit_code()
 
 
 def _demo(command: Demo) -> None:
@@ -123,10 +97,10 @@ def _reproduce(command: Reproduce) -> None:
     request = Request(
         experiments=tuple(EXPERIMENTS) if everything else (command.experiment,),
         seeds=command.seeds,
-        profiles=_words(command.profiles),
-        restrictions=_words(command.restrictions),
+        profiles=words(command.profiles),
+        restrictions=words(command.restrictions),
         orientation=command.orientation or None,
-        stiffness=tuple(map(_number, _words(command.stiffness))),
+        stiffness=tuple(map(_number, words(command.stiffness))),
         skin=command.skin or None,
         record=command.record,
     )
@@ -167,7 +141,7 @@ def _detect(command: Detect) -> None:
     c = command
     choice = Choice(c.wrench, c.joints, c.sign, c.frame, c.zeros, c.arm, ranges=bool(c.skin))
     skin, out, json = (Path(text) if text else None for text in (c.skin, c.out, c.json))
-    detect(Path(c.file), choice, _words(c.profiles), skin, c.rate, out, json)
+    detect(Path(c.file), choice, words(c.profiles), skin, c.rate, out, json)
 
 
 def _replay(command: Replay) -> int:
@@ -186,8 +160,7 @@ def _recover(command: Recover) -> None:
 def _live(command: Live) -> None:
     from pretouch.cli.live import live
 
-    c = command
-    live(c.profile, c.path, c.seed, c.record, c.host, c.port, c.keys, c.skin, c.units_host, c.units_port)
+    live(command)
 
 
 def _report(command: Report) -> None:
@@ -212,15 +185,11 @@ def _warm_up() -> None:
     )
 
 
-def _words(text: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(",") if part.strip())
-
-
 def _counts(text: str) -> tuple[int, ...]:
-    words = _words(text)
-    if not words or not all(word.isdecimal() for word in words):
+    numbers = words(text)
+    if not numbers or not all(number.isdecimal() for number in numbers):
         raise ParameterError(f"The numbers of points are {text!r}: give whole numbers, separated by commas.")
-    return tuple(map(int, words))
+    return tuple(map(int, numbers))
 
 
 def _number(text: str) -> float:

@@ -10,6 +10,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from pretouch.cli.detect import axes_shown
+from pretouch.cli.ending import ended
 from pretouch.params import profile as find_profile
 from pretouch.recording import recover as recovering
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
@@ -59,7 +60,7 @@ def replay(
     if page:
         from pretouch.viewer.replay import serve_replay
 
-        serve_replay(recorded, ServeOptions(host, port), comparison)
+        serve_replay(recorded, ServeOptions(host, port), comparison, ended)
     return 0
 
 
@@ -69,16 +70,18 @@ def recover(place: Path, out: Path | None = None) -> None:
 
 
 def happened(recorded: Recorded, advance: Callable[[int], None] = lambda done: None) -> str:
-    """Count contacts and holds; `advance` is told how many steps were read."""
-    contacts = holds = 0
+    """Count contacts and holds, and say for how long it was held; `advance` is told how many steps were read."""
+    contacts = holds = held = 0
     before: Mode | None = None
     for i, kept in enumerate(recorded):
         contacts += kept.step.contact is not None
         # the arm begins in HOLD, until its window is full
         holds += kept.step.mode is Mode.HOLD and before in (Mode.TRACK, Mode.REACT)
+        held += kept.step.mode is Mode.HOLD
         before = kept.step.mode
         advance(i + 1)
-    return f"{_many(contacts, 'contact')}, {_many(holds, 'hold')}"
+    share = held / len(recorded)
+    return f"{_many(contacts, 'contact')}, {_many(holds, 'hold')} after the start, held for {share:.0%} of the time"
 
 
 def told(recorded: Recorded) -> str:

@@ -1,7 +1,5 @@
 """What `pretouch skin` does: each command by its own file."""
 
-from pathlib import Path
-
 from pretouch.cli.skin_commands import Keys, Monitor, Provision, Simulate, SkinCommand
 
 
@@ -21,7 +19,7 @@ def skin(command: SkinCommand) -> int:
 
             provision_unit(command)
         case Keys():
-            from pretouch.cli.skin_keys import list_keys
+            from pretouch.cli.skin_keys import keys_file, list_keys
 
-            list_keys(Path(command.keys), command.new)
+            list_keys(keys_file(command.keys), command.new)
     return 0

@@ -1,13 +1,13 @@
 """What `pretouch skin keys` does: the units of a file of keys, listed or added to."""
 
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 
+from pretouch.cli.words import words
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
 from pretouch.hardware.provision import fingerprint
-
-_LAST = 0xFFFF
 
 
 def list_keys(place: Path, new: str = "") -> None:
@@ -21,9 +21,11 @@ def list_keys(place: Path, new: str = "") -> None:
         print(f"{unit.id}: number {unit.number}, key {fingerprint(unit.key)}...")
 
 
-def words(text: str) -> tuple[str, ...]:
-    """Return the words between commas."""
-    return tuple(part.strip() for part in text.split(",") if part.strip())
+def keys_file(text: str) -> Path:
+    """Return the file of keys that is named; none is a HardwareError."""
+    if not text:
+        raise HardwareError("No file of keys is given: name one with --keys.")
+    return Path(text)
 
 
 def keys_or_none(place: Path) -> Keys:
@@ -43,4 +45,4 @@ def with_new(keys: Keys, names: Sequence[str]) -> Keys:
 
 def free_number(keys: Keys) -> int:
     """Return the first number that no unit has."""
-    return next(n for n in range(1, _LAST + 2) if n not in keys.by_number)
+    return next(n for n in count(1) if n not in keys.by_number)

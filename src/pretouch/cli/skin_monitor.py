@@ -2,9 +2,12 @@
 
 import json
 import math
+import socket
 from collections.abc import Iterator
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import asdict
+from functools import cache
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +15,13 @@ import numpy as np
 from rich.console import Console
 from rich.live import Live
 
+from pretouch.cli.arms import arm_model
+from pretouch.cli.ending import Terminated
 from pretouch.cli.skin_commands import Monitor
-from pretouch.cli.skin_keys import words
+from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_record import record
 from pretouch.cli.skin_table import line, thrown_away, view
+from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import HardwareError
 from pretouch.hardware.address import EVERYWHERE, HOST
@@ -26,7 +32,6 @@ from pretouch.hardware.monitor import Posture, Turn, watch
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
-from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
 from pretouch.types import FloatArray
@@ -42,13 +47,21 @@ def monitor(command: Monitor) -> int:
     json_file = Path(command.json) if command.json else None
     if json_file:
         check_writable("file", json_file)
-    keys = load_keys(Path(command.keys))
+    if not command.host:
+        raise HardwareError(f"No address to listen at is given: give {HOST}, or {EVERYWHERE} for all of this machine.")
+    keys = load_keys(keys_file(command.keys))
     ids, posture = _watched(command, tuple(keys))
     with ExitStack() as stack:
         receiver = stack.enter_context(SkinReceiver(ids, keys, command.host, command.port))
         recording = stack.enter_context(SkinRecording(Path(command.record))) if command.record else None
         turns = watch(receiver, HealthParams(), duration, posture)
-        last, code = _shown(turns, receiver, recording, command.once)
+        try:
+            last, code = _shown(turns, receiver, recording, command.once)
+        except Terminated:
+            if recording:
+                with suppress(OSError):  # the terminal may be gone
+                    print(recording.close(), flush=True)
+            raise
         sentence = recording.close() if recording else ""
     notes = [note for note in (_unheard(receiver), sentence) if note]
     console = Console(highlight=False, soft_wrap=True)
@@ -60,6 +73,8 @@ def monitor(command: Monitor) -> int:
                 json_file.write_text(text + "\n", encoding="utf-8")
         if math.isfinite(duration):
             code = code or int(any(f.level == "fault" for f in last.findings))
+    elif sentence:
+        console.print(sentence, markup=False)
     return code or int(bool(recording and recording.trouble))
 
 
@@ -80,22 +95,29 @@ def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[tuple[str, ...
         if not ids:
             raise HardwareError(f"{command.keys} holds no unit: `pretouch skin provision` or `skin keys` adds one.")
         return ids, None
-    model = RobotModel({"panda": panda, "fr3": fr3}[command.arm]())
+    model = arm_model(command.arm)
     skin = load_skin(Path(command.skin), model)
     if not command.posture:
         return skin.ids, None
     return skin.ids, Posture(
-        _posture(command.posture, model.n), ModelCheck(model, skin, no_fixtures(), ModelCheckParams())
+        _posture(command.posture, model), ModelCheck(model, skin, no_fixtures(), ModelCheckParams())
     )
 
 
-def _posture(text: str, joints: int) -> FloatArray:
+def _posture(text: str, model: RobotModel) -> FloatArray:
     try:
         q = np.array([float(word) for word in words(text)])
     except ValueError:
         q = np.zeros(0)
-    if q.shape != (joints,) or not np.isfinite(q).all():
-        raise HardwareError(f"The posture is {text!r}: give {joints} joint positions [rad], separated by commas.")
+    if q.shape != (model.n,) or not np.isfinite(q).all():
+        raise HardwareError(f"The posture is {text!r}: give {model.n} joint positions [rad], separated by commas.")
+    beyond = np.flatnonzero((q < model.q_min) | (q > model.q_max))
+    if len(beyond):
+        i = beyond[0]
+        raise HardwareError(
+            f"The posture has joint {i + 1} at {q[i]:g} rad, out of its range of {model.q_min[i]:.2f} to"
+            f" {model.q_max[i]:.2f} rad: give joint positions of this arm."
+        )
     return q
 
 
@@ -152,10 +174,18 @@ def _unheard(receiver: SkinReceiver) -> str:
     if any(unit.state != "never heard" for unit in receiver.units):
         return ""
     host, port = receiver.address
-    local = (
-        f"; only what runs on this machine is heard there: real units need --host {EVERYWHERE}" if host == HOST else ""
-    )
-    return f"Nothing was heard at {host}:{port}{local}."
+    local = f"; only what runs on this machine is heard there: real units need --host {EVERYWHERE}"
+    return f"Nothing was heard at {host}:{port}{local if only_here(host) else ''}."
+
+
+@cache
+def only_here(host: str) -> bool:
+    """Whether only what runs on this machine can send to an address of it."""
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_DGRAM)[0][4][0]
+    except (OSError, UnicodeError):
+        return False
+    return ip_address(str(found).partition("%")[0]).is_loopback
 
 
 def _numbers(turn: Turn, receiver: SkinReceiver, notes: list[str]) -> dict[str, Any]:

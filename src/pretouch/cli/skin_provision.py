@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pretouch.cli.skin_commands import Provision
-from pretouch.cli.skin_keys import free_number, keys_or_none
+from pretouch.cli.skin_keys import free_number, keys_file, keys_or_none
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey, new_key, save_keys
 from pretouch.hardware.provision import Network, differs, fingerprint, greet, provision
@@ -15,7 +15,7 @@ from pretouch.hardware.serial_line import SerialLine
 
 def provision_unit(command: Provision) -> None:
     """Make a key if the unit has none, tell the unit, and check what it then says it is."""
-    place = Path(command.keys)
+    place = keys_file(command.keys)
     keys = keys_or_none(place)
     unit = _unit(keys, command.id, command.number, place)
     with SerialLine(Path(command.device)):  # what is wrong is said before the password is asked for

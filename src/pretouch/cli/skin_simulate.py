@@ -3,27 +3,22 @@
 from functools import partial
 from pathlib import Path
 
+from pretouch.cli.arms import arm_model
 from pretouch.cli.skin_commands import Simulate
-from pretouch.cli.skin_keys import keys_or_none, with_new, words
-from pretouch.errors import HardwareError
+from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
+from pretouch.cli.words import words
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.params import profile as find_profile
-from pretouch.robot.description import fr3, panda
-from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import NetworkParams, WayParams
 from pretouch.serving.simulate import SimulateOptions, run
 from pretouch.sim.imu import ImuParams
 
-_LAST_PORT = 0xFFFF
-
 
 def simulate_units(command: Simulate) -> None:
     """Simulate until interrupted, or for the given time."""
     c = command
-    if not 1 <= c.port <= _LAST_PORT:
-        raise HardwareError(f"The port is {c.port}: give one from 1 to {_LAST_PORT}.")
     up = WayParams(
         loss=c.loss, loss_run=c.loss_run, delay_s=c.delay, jitter_s=c.jitter, overtaken=c.overtaken, doubled=c.doubled
     )
@@ -32,10 +27,10 @@ def simulate_units(command: Simulate) -> None:
     )
     fleet = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=c.reboot_every)
     profile = find_profile(c.profile)
-    model = RobotModel({"panda": panda, "fr3": fr3}[c.arm]())
+    model = arm_model(c.arm)
     skin = load_skin(Path(c.skin), model) if c.skin else paper_skin(model)
     options = SimulateOptions(
-        model, skin, _keys(Path(c.keys), skin), c.host, c.port, fleet, profile=profile, hand=c.hand,
+        model, skin, _keys(keys_file(c.keys), skin), c.host, c.port, fleet, profile=profile, hand=c.hand,
         silenced=frozenset(words(c.silenced)), stuck=frozenset(words(c.stuck)), seed=c.seed, duration_s=c.duration,
     )  # fmt: skip
     run(options, lambda: False, partial(print, flush=True))

@@ -14,7 +14,7 @@ from pretouch.hardware.monitor import Turn
 from pretouch.types import RangeStatus
 
 _COLUMNS = (
-    "unit", "state", "rate\n[Hz]", "loss\n[%]", "latency\n[ms]", "dist.\n[m]", "status", "sigma\n[mm]", "batt.\n[V]",
+    "unit", "state", "rate\n[Hz]", "loss\n[%]", "latency\n[ms]", "dist.\n[m]", "sigma\n[mm]", "batt.\n[V]",
     "temp.\n[C]", "IMU\n[Hz]", "clock\n[ms]",
 )  # fmt: skip
 _TARGET = (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeStatus.MIN_CLIPPED)
@@ -44,7 +44,8 @@ def table(units: Sequence[UnitHealth], found: Sequence[Finding]) -> Table:
     """Return one row per unit, coloured by the worst that was found of it."""
     shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     for i, name in enumerate(_COLUMNS):
-        shown.add_column(escape(name), justify="left" if i in (0, 1, 6) else "right", no_wrap=True)
+        # a long name is broken: 80 columns hold all else
+        shown.add_column(escape(name), justify="left" if i < 2 else "right", no_wrap=i > 0, overflow="fold")
     worst = {f.unit: f.level for f in sorted(found, key=lambda f: f.level, reverse=True)}
     for unit in units:
         shown.add_row(*map(escape, _cells(unit)), style=_STYLES.get(worst.get(unit.unit, ""), ""))
@@ -55,17 +56,20 @@ def _cells(unit: UnitHealth) -> tuple[str, ...]:
     standing = unit.standing
     bound = standing.bound if math.isfinite(standing.bound) else math.nan
     return (
-        unit.unit, standing.state, number(unit.rate_hz, 1), number(100 * unit.loss, 1),
+        unit.unit, _state(unit), number(unit.rate_hz, 1), number(100 * unit.loss, 1),
         number(1000 * unit.latency_s, 1), number(unit.distance_m if unit.status in _TARGET else math.nan, 3),
-        _status(unit), number(1000 * unit.sigma_m, 1), number(unit.battery_v, 2),
-        number(unit.temperature_c, 1), number(unit.imu_rate_hz, 0), number(1000 * bound, 2),
+        number(1000 * unit.sigma_m, 1), number(unit.battery_v, 2), number(unit.temperature_c, 1),
+        number(unit.imu_rate_hz, 0), number(1000 * bound, 2),
     )  # fmt: skip
 
 
-def _status(unit: UnitHealth) -> str:
+def _state(unit: UnitHealth) -> str:
+    """Return what a live unit's newest reading is, or the state of another."""
+    if unit.standing.state != "live" or not unit.statuses:
+        return unit.standing.state
     if unit.standing.stuck:
         return RangeStatus.STUCK.name
-    return status_name(unit.status) if unit.statuses else "-"
+    return status_name(unit.status)
 
 
 def number(value: float, digits: int) -> str:

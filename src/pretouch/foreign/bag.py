@@ -13,9 +13,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RecordingError
 from pretouch.foreign.source import Arm, Choice, RangeTopic, Series, Source
+from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.types import RangeStatus
 
 WRENCH, JOINTS, RANGE = "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Range"
+_HELD = {WRENCH: "force", JOINTS: "joint positions"}
 _JOINT = re.compile(r"(?!.*finger).*joint_?([1-7])")
 """Names of the joints of the arms that are known: panda_joint1, fr3_joint1, joint_1."""
 Row = tuple[float, ...]
@@ -106,6 +108,8 @@ def _wanted(place: Path, reader: AnyReader, choice: Choice) -> dict[str, list[An
 def _one_topic(place: Path, there: list[Any], kind: str, option: str, named: str) -> list[Any]:
     topics = sorted({c.topic for c in there if c.msgtype == kind})
     short = kind.replace("/msg/", "/")
+    if not topics and any(c.msgtype == UNIT_SAMPLE for c in there):
+        raise RecordingError(f"{place} holds what sensor units sent, and no {_HELD[kind]}: {READ_WITH}.")
     if not topics:
         held = ", ".join(sorted({f"{c.topic} ({c.msgtype.replace('/msg/', '/')})" for c in there})) or "nothing"
         raise RecordingError(f"{place} has no topic of {short}: it holds {held}.")

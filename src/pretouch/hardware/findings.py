@@ -10,10 +10,12 @@ from pretouch.hardware.health_params import HealthParams
 from pretouch.hardware.wire import Reset
 from pretouch.types import RangeStatus
 
-_FAILED = tuple(s.name for s in (
-    RangeStatus.HARDWARE, RangeStatus.CROSSTALK, RangeStatus.SYNC, RangeStatus.INVALID, RangeStatus.NONE
-))  # fmt: skip
-"""Statuses of a sensor that failed; the others say that something is there, or that nothing near is."""
+_MEASURED = {s.name for s in (
+    RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeStatus.MIN_CLIPPED, RangeStatus.MIN_RANGE,
+    RangeStatus.SIGMA, RangeStatus.SIGNAL, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED,
+)}  # fmt: skip
+"""Statuses that say that something is there, or that nothing near is; all others are of a sensor that failed."""
+_MOST_DIGITS = 4
 _ENDS: dict[int, str] = {
     Reset.POWER_ON: "its power came on: see to its battery and plug",
     Reset.HARD: "its reset line was pulled: see to its wiring",
@@ -75,77 +77,67 @@ def _silence(unit: UnitHealth, params: HealthParams) -> str:
 
 
 def _range_finder(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
-    name = unit.unit
     if unit.standing.stuck:
         yield Finding(
-            name, "fault", "stuck",
-            f"{name} repeats {unit.distance_m:.3f} m to the last digit: its range finder hangs; restart the unit, and"
-            " replace the sensor if it comes again.",
+            unit.unit, "fault", "stuck",
+            f"{unit.unit} repeats {unit.distance_m:.3f} m to the last digit: its range finder hangs; restart the unit,"
+            " and replace the sensor if it comes again.",
         )  # fmt: skip
-    readings = sum(unit.statuses.values())
-    failed = sum(count for status, count in unit.statuses.items() if status in _FAILED)
-    if readings and failed / readings > params.failed:
-        level, limit = _graded(failed / readings, params.failed, params.failed_fault, above=True)
-        kinds = ", ".join(f"{unit.statuses[s]} {s}" for s in _FAILED if s in unit.statuses)
-        yield Finding(
-            name, level, "status",
-            f"{name} fails in {failed / readings:.0%} of its readings ({kinds}; limit {limit:.0%}): see to its wiring"
-            " and supply, and replace the sensor if it stays.",
+    failed = {status: count for status, count in unit.statuses.items() if status not in _MEASURED}
+    if failed:
+        kinds = ", ".join(f"{count} {status}" for status, count in sorted(failed.items()))
+        yield from _beyond(
+            unit, "status", 100 * sum(failed.values()) / sum(unit.statuses.values()),
+            (100 * params.failed, 100 * params.failed_fault),
+            f" fails in {{value}}% of its readings ({kinds}; limit {{limit}}%): see to its wiring and supply, and"
+            " replace the sensor if it stays.",
         )  # fmt: skip
-    if unit.sigma_m > params.sigma_m:
-        yield Finding(
-            name, "warning", "sigma",
-            f"{name} estimates its own error at {1000 * unit.sigma_m:.0f} mm (limit {1000 * params.sigma_m:g} mm):"
-            " clean its window, and shade it from the sun.",
-        )  # fmt: skip
-    if unit.noise_m > params.noise_m:
-        yield Finding(
-            name, "warning", "noise",
-            f"{name} scatters by {1000 * unit.noise_m:.0f} mm from reading to reading (limit"
-            f" {1000 * params.noise_m:g} mm): clean its window, and see that nothing shiny or moving is before it.",
-        )  # fmt: skip
-    if unit.range_late:
-        yield Finding(
-            name, "warning", "range late",
-            f"{name} had nothing measured in time {unit.range_late} times in {params.window_s:g} s: see to its"
-            " interrupt line and bus.",
-        )  # fmt: skip
+    yield from _beyond(
+        unit, "sigma", 1000 * unit.sigma_m, (1000 * params.sigma_m,),
+        " estimates its own error at {value} mm (limit {limit} mm): clean its window, and shade it from the sun.",
+    )  # fmt: skip
+    yield from _beyond(
+        unit, "noise", 1000 * unit.noise_m, (1000 * params.noise_m,),
+        " scatters by {value} mm from reading to reading (limit {limit} mm): clean its window, and see that nothing"
+        " shiny or moving is before it.",
+    )  # fmt: skip
 
 
 def _rates(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
-    name = unit.unit
-    if unit.rate_hz < params.rate_hz:
-        level, limit = _graded(unit.rate_hz, params.rate_hz, params.rate_fault_hz, above=False)
-        yield Finding(
-            name, level, "rate",
-            f"{name} gives {unit.rate_hz:.1f} readings a second (limit {limit:g}): see to its wiring and supply, and"
-            " to its radio if samples are lost.",
+    if _unbroken(unit, params):
+        yield from _beyond(
+            unit, "rate", unit.rate_hz, (params.rate_hz, params.rate_fault_hz),
+            " gives {value} readings a second (limit {limit}): see to its wiring and supply, and to its radio if"
+            " samples are lost.",
+            digits=1, below=True,
         )  # fmt: skip
-    if unit.loss > params.loss:
-        level, limit = _graded(unit.loss, params.loss, params.loss_fault, above=True)
+    if unit.range_late >= params.range_late:
         yield Finding(
-            name, level, "loss",
-            f"{name} loses {unit.loss:.0%} of its samples on their way (limit {limit:.0%}): bring the access point"
-            " nearer, or take a free channel.",
+            unit.unit, "warning", "range late",
+            f"{unit.unit} had nothing measured in time {unit.range_late} times in {params.window_s:g} s (limit"
+            f" {params.range_late}): see to its interrupt line and bus.",
         )  # fmt: skip
-    if unit.imu_rate_hz < params.imu_rate_hz:
-        yield Finding(
-            name, "warning", "imu rate",
-            f"{name} gives {unit.imu_rate_hz:.0f} IMU samples a second (limit {params.imu_rate_hz:g}): see to the IMU's"
-            " wiring, and to its rate in the firmware.",
-        )  # fmt: skip
-    if unit.imu_loss > params.imu_loss:
-        yield Finding(
-            name, "warning", "imu loss",
-            f"{name} loses {unit.imu_loss:.0%} of its IMU samples before they are sent (limit {params.imu_loss:.0%}):"
-            " its loop is too slow for the IMU's rate; lower that in the firmware.",
-        )  # fmt: skip
+    yield from _beyond(
+        unit, "loss", 100 * unit.loss, (100 * params.loss, 100 * params.loss_fault),
+        " loses {value}% of its samples on their way (limit {limit}%): bring the access point nearer, or take a free"
+        " channel.",
+    )  # fmt: skip
+    yield from _beyond(
+        unit, "imu rate", unit.imu_rate_hz, (params.imu_rate_hz,),
+        " gives {value} IMU samples a second (limit {limit}): see to the IMU's wiring, and to its rate in the"
+        " firmware.",
+        below=True,
+    )  # fmt: skip
+    yield from _beyond(
+        unit, "imu loss", 100 * unit.imu_loss, (100 * params.imu_loss,),
+        " loses {value}% of its IMU samples before they are sent (limit {limit}%): its loop is too slow for the IMU's"
+        " rate; lower that in the firmware.",
+    )  # fmt: skip
 
 
 def _clock(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
-    name = unit.unit
     over = [
-        f"{kind} {1000 * value:.0f} ms (limit {1000 * limit:g} ms)"
+        f"{kind} {_told(1000 * value, 1000 * limit)} ms (limit {1000 * limit:g} ms)"
         for kind, value, limit in (
             ("in the median", unit.latency_s, params.latency_s),
             ("in one of twenty readings", unit.latency_late_s, params.latency_late_s),
@@ -154,42 +146,53 @@ def _clock(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     ]
     if over:
         yield Finding(
-            name, "warning", "latency",
-            f"{name} is heard {' and '.join(over)} after its measurement: bring the access point nearer, and see that"
-            " its power save is off.",
+            unit.unit, "warning", "latency",
+            f"{unit.unit} is heard {' and '.join(over)} after its measurement: bring the access point nearer, and see"
+            " that its power save is off.",
         )  # fmt: skip
-    if params.bound_s < unit.standing.bound < math.inf:
+    if math.isfinite(unit.standing.bound) and _unbroken(unit, params):
+        yield from _beyond(
+            unit, "clock", 1000 * unit.standing.bound, (1000 * params.bound_s,),
+            "'s clock is known to {value} ms only (limit {limit} ms): the way to it is slow or one-sided; bring the"
+            " access point nearer.",
+            digits=1,
+        )  # fmt: skip
+    if unit.clock_unknown_s >= params.settle_s:
         yield Finding(
-            name, "warning", "clock",
-            f"{name}'s clock is known to {1000 * unit.standing.bound:.1f} ms only (limit"
-            f" {1000 * params.bound_s:g} ms): the way to it is slow or one-sided; bring the access point nearer.",
+            unit.unit, "fault", "clock",
+            f"{unit.unit}'s clock has not been known for {unit.clock_unknown_s:.0f} s (limit {params.settle_s:g} s), so"
+            " that none of its readings counts: it echoes no beacon in time; bring the access point nearer, and see to"
+            " its firmware.",
         )  # fmt: skip
     if unit.clock_jumps:
         yield Finding(
-            name, "warning", "clock jump",
-            f"{name}'s clock jumped {unit.clock_jumps} times in {params.window_s:g} s: its crystal or firmware is not"
-            " sound; replace the board if it comes again.",
+            unit.unit, "warning", "clock jump",
+            f"{unit.unit}'s clock jumped {unit.clock_jumps} times in {params.window_s:g} s: its crystal or firmware is"
+            " not sound; replace the board if it comes again.",
         )  # fmt: skip
+
+
+def _unbroken(unit: UnitHealth, params: HealthParams) -> bool:
+    """Whether the window holds neither a silence nor a reboot."""
+    return unit.gap_s <= params.silent_s and not unit.reboots
 
 
 def _unit_itself(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
+    yield from _beyond(
+        unit, "battery", unit.battery_v, (params.battery_v, params.battery_fault_v),
+        "'s battery is at {value} V (limit {limit} V): charge it.",
+        digits=2, below=True,
+    )  # fmt: skip
+    yield from _beyond(
+        unit, "temperature", unit.temperature_c, (params.temperature_c, params.temperature_fault_c),
+        " is at {value} degrees C (limit {limit}): take it from what heats it.",
+    )  # fmt: skip
+    yield from _beyond(
+        unit, "temperature", unit.temperature_c, (params.temperature_low_c,),
+        " is at {value} degrees C (limit {limit}): warm it.",
+        below=True,
+    )  # fmt: skip
     name = unit.unit
-    if unit.battery_v < params.battery_v:
-        level, limit = _graded(unit.battery_v, params.battery_v, params.battery_fault_v, above=False)
-        yield Finding(
-            name, level, "battery", f"{name}'s battery is at {unit.battery_v:.2f} V (limit {limit:g} V): charge it."
-        )
-    if unit.temperature_c > params.temperature_c:
-        level, limit = _graded(unit.temperature_c, params.temperature_c, params.temperature_fault_c, above=True)
-        yield Finding(
-            name, level, "temperature",
-            f"{name} is at {unit.temperature_c:.0f} degrees C (limit {limit:g}): take it from what heats it.",
-        )  # fmt: skip
-    if unit.temperature_c < params.temperature_low_c:
-        yield Finding(
-            name, "warning", "temperature",
-            f"{name} is at {unit.temperature_c:.0f} degrees C (limit {params.temperature_low_c:g}): warm it.",
-        )  # fmt: skip
     if unit.bus_errors >= params.bus_errors or unit.restarts:
         yield Finding(
             name, "warning", "bus",
@@ -211,12 +214,27 @@ def _unit_itself(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
         )  # fmt: skip
 
 
+def _beyond(
+    unit: UnitHealth, what: str, value: float, limits: tuple[float, ...], sentence: str, *,
+    digits: int = 0, below: bool = False,
+) -> Iterator[Finding]:  # fmt: skip
+    """Yield a warning if a value is over, or `below`, the first limit; a fault if it is beyond the second as well.
+
+    The sentence goes on from the unit's name, with {value} and {limit} in it.
+    """
+    passed = [limit for limit in limits if (value < limit if below else value > limit)]
+    if passed:
+        told = sentence.format(value=_told(value, passed[-1], digits), limit=f"{passed[-1]:g}")
+        yield Finding(unit.unit, "fault" if len(passed) > 1 else "warning", what, unit.unit + told)
+
+
+def _told(value: float, limit: float, digits: int = 0) -> str:
+    """Return a value with so many digits, or as many more as set it off from its limit."""
+    while digits < _MOST_DIGITS and f"{value:.{digits}f}" == f"{limit:.{digits}f}":
+        digits += 1
+    return f"{value:.{digits}f}"
+
+
 def version(firmware: int) -> str:
     """Return a firmware version as text."""
     return f"{firmware >> 8}.{firmware & 0xFF}"
-
-
-def _graded(value: float, warning: float, fault: float, above: bool) -> tuple[Level, float]:
-    """Return how bad a value beyond the limit of a warning is, and which limit it passed."""
-    beyond = value > fault if above else value < fault
-    return ("fault", fault) if beyond else ("warning", warning)

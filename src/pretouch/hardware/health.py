@@ -74,6 +74,8 @@ class UnitHealth:
     """Time within the window since its first sample [s]."""
     silent_s: float
     """Time since its last sample [s], infinite before the first."""
+    gap_s: float
+    """Longest time between two of its samples within the window [s]."""
     rate_hz: float
     """Fresh readings a second [Hz]."""
     loss: float
@@ -104,6 +106,8 @@ class UnitHealth:
     """Failed transfers on its bus within the window."""
     restarts: int
     """How often it initialised a sensor anew within the window."""
+    clock_unknown_s: float
+    """For how long its clock has not been known, within the window [s]; 0 while it is."""
     range_late: int
     """Samples that said the range finder was late."""
     imu_rate_hz: float
@@ -168,6 +172,7 @@ def unit_health(
         standing=standing,
         heard_s=heard_s,
         silent_s=now - standing.last_arrival,
+        gap_s=max((b - a for a, b in pairwise(sorted(h.arrival for h in heard))), default=0.0),
         rate_hz=len(fresh) / heard_s if heard_s > 0 else math.nan,
         loss=counted.lost / sent if sent else math.nan,
         latency_s=float(np.median(ages)) if len(ages) else math.nan,
@@ -184,6 +189,7 @@ def unit_health(
         # its count ends at 65535, its flags do not
         bus_errors=max(last.bus_errors - boot[0].bus_errors, sum(bool(f & _BUS_ERROR) for f in flags)) if last else 0,
         restarts=sum(bool(f & _RESTARTED) for f in flags),
+        clock_unknown_s=_clock_unknown(heard, now, standing),
         range_late=sum(bool(f & _LATE) for f in flags),
         imu_rate_hz=imu_rate_hz,
         imu_loss=imu_loss,
@@ -195,6 +201,13 @@ def unit_health(
 def status_name(code: int) -> str:
     """Return the name of a `RangeStatus`, or the number of one there is not."""
     return RangeStatus(code).name if code in RangeStatus._value2member_map_ else str(code)
+
+
+def _clock_unknown(heard: Sequence[Received], now: float, standing: Standing) -> float:
+    """Return for how long [s] a unit's clock has not been known."""
+    if math.isfinite(standing.bound) or not heard:
+        return 0.0
+    return now - max((h.arrival for h in heard if math.isfinite(h.bound)), default=heard[0].arrival)
 
 
 def _since_reboot(samples: Sequence[Sample]) -> list[Sample]:

@@ -30,7 +30,7 @@ class ModelCheckParams(Checked):
     margin_m: Positive = 0.1
     """By how much a reading may be farther than predicted [m]: ranging error, placement, and capsules for surfaces."""
     tests: PositiveCount = 100
-    """Readings from which a verdict is given: two seconds' worth."""
+    """Readings from which a verdict is given: four seconds' worth of the monitor's 25 a second."""
     share: Fraction = 0.8
     """Share of the last ones that must contradict the model."""
     near_m: Positive = 0.1

@@ -14,7 +14,7 @@ from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messag
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.recorded_path import Tangents
 from pretouch.recording.setting import Run, decode_run
-from pretouch.recording.skin_recording import UNIT_SAMPLE
+from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.recording.state_codec import decode_state
 from pretouch.recording.truth import Truth
 from pretouch.types import ControlStep, FloatArray, Inputs
@@ -166,10 +166,7 @@ def _check(place: Path, contents: Contents, raw: Raw) -> None:
     if raw["/pretouch/step"] and raw["/pretouch/run"]:
         return
     if any(kind == UNIT_SAMPLE for _, kind in contents.topics().values()):
-        raise RecordingError(
-            f"{place} holds what sensor units sent, and no control step: read it with"
-            " pretouch.recording.skin_reader.read_skin, or open it in Foxglove."
-        )
+        raise RecordingError(f"{place} holds what sensor units sent, and no control step: {READ_WITH}.")
     if contents.library.startswith(LIBRARY.split()[0]) or any(t in TOPICS for t, _, _ in contents.channels.values()):
         raise RecordingError(f"{place} holds no control step: the run ended before the first was written.")
     raise RecordingError(

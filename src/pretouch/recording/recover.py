@@ -31,7 +31,7 @@ def recover(place: Path, out: Path | None = None) -> Recovered:
     already is a RecordingError, as is a file that holds no recording.
     """
     place = Path(place)
-    complete, steps, what, last = _held(place)
+    complete, steps, what, duration = _held(place)
     if complete:
         return Recovered(place, steps, f"{place} is complete, with {steps} {what}: there is nothing to recover.")
     out = Path(out) if out is not None else place.with_name(f"{place.name.removesuffix('.mcap')}.recovered.mcap")
@@ -46,16 +46,17 @@ def recover(place: Path, out: Path | None = None) -> Recovered:
         raise RecordingError(f"There is something at {out} already: give another name, or move it away.") from error
     except OSError as error:
         raise RecordingError(f"The recovered recording {out} cannot be written: {error.strerror}.") from error
-    return Recovered(out, steps, f"{out} holds what was whole of {place}: {steps} {what}, up to {last:.2f} s.")
+    return Recovered(out, steps, f"{out} holds what was whole of {place}: {steps} {what}, over {duration:.2f} s.")
 
 
 def _held(place: Path) -> tuple[bool, int, str, float]:
-    """Whether a recording is complete, how many of what it holds, and the instant of the last [s]."""
+    """Whether a recording is complete, how many of what it holds, and over what time [s]."""
     if holds_units(place):
         units = read_skin(place)
-        return units.complete, units.samples, "samples of sensor units", units.last
+        return units.complete, units.samples, "samples of sensor units", units.duration
     recorded = open_recording(place)
-    return recorded.complete, len(recorded), "control steps", float(recorded.stamps()[-1])
+    stamps = recorded.stamps()
+    return recorded.complete, len(recorded), "control steps", float(stamps[-1] - stamps[0])
 
 
 def _copy(source: BinaryIO, target: BinaryIO) -> None:

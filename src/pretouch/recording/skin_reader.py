@@ -76,9 +76,10 @@ class SkinTrace:
         return sum(len(unit.samples) for unit in self.units.values())
 
     @property
-    def last(self) -> float:
-        """When the last datagram came [s]."""
-        return max(unit.samples[-1].arrival for unit in self.units.values())
+    def duration(self) -> float:
+        """Time from the first datagram to the last [s]."""
+        first = min(unit.samples[0].arrival for unit in self.units.values())
+        return float(max(unit.samples[-1].arrival for unit in self.units.values()) - first)
 
 
 def read_skin(place: Path) -> SkinTrace:

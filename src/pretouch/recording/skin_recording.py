@@ -13,11 +13,13 @@ import numpy as np
 
 from pretouch.recording.disk import Disk
 from pretouch.recording.messages import PACKAGE, Item, encoded, make, plain_text, prepare, typestore
-from pretouch.recording.standard import IMU, RANGE, header, imu_item, nanoseconds, range_item, topic_name
+from pretouch.recording.standard import IMU, RANGE, header, imu_items, nanoseconds, range_item, topic_name
 from pretouch.types import FloatArray
 
 UNIT_SAMPLE = f"{PACKAGE}/msg/UnitSample"
 """Type of the messages that hold a datagram as it came."""
+READ_WITH = "read it with pretouch.recording.skin_reader.read_skin, or open it in Foxglove"
+"""What can be done with such a recording, as the end of a sentence."""
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _STATUS, _KEY_VALUE = "diagnostic_msgs/msg/DiagnosticStatus", "diagnostic_msgs/msg/KeyValue"
 _OURS = 5
@@ -89,7 +91,7 @@ class SkinRecording:
     def imu(self, unit: str, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray) -> None:
         """Keep what a unit's IMU measured at instants (M,) [s]: (M, 3) [m/s^2], (M, 3) [rad/s], sensor frame."""
         if not self._sentence and not self.trouble:
-            self._disk.put([], partial(_imu_items, unit, self._time, stamp, acceleration, angular_velocity))
+            self._disk.put([], partial(imu_items, unit, self._time, stamp, acceleration, angular_velocity))
 
     def health(self, stamp: float, rows: Sequence[Diagnosis]) -> None:
         """Keep how the units are at an instant [s]."""
@@ -130,13 +132,6 @@ class SkinRecording:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _imu_items(
-    unit: str, time: int, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray
-) -> Iterator[Item]:
-    for t, a, w in zip(stamp.tolist(), acceleration, angular_velocity, strict=True):
-        yield imu_item(unit, nanoseconds(t, time), a, w)
 
 
 def _health_items(time: int, rows: Sequence[Diagnosis]) -> Iterator[Item]:

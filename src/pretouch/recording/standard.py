@@ -113,6 +113,14 @@ def imu_item(unit_id: str, time: int, acceleration: FloatArray, angular_velocity
     return Item(name, IMU, 0, time, bytes(data))
 
 
+def imu_items(
+    unit_id: str, instead: int, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray
+) -> Iterator[Item]:
+    """Yield what a unit's IMU measured at instants (M,) [s]; one that is no time stands at `instead` [ns]."""
+    for t, a, w in zip(stamp.tolist(), acceleration, angular_velocity, strict=True):
+        yield imu_item(unit_id, nanoseconds(t, instead), a, w)
+
+
 @cache
 def _blank_imu(unit_id: str) -> tuple[str, bytes]:
     """Topic of a unit's IMU, and a message of it with zeros.

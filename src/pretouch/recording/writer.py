@@ -22,7 +22,7 @@ from pretouch.recording.messages import TOPICS, Item, prepare
 from pretouch.recording.plain import JSON
 from pretouch.recording.scene import DRAWN, Scene
 from pretouch.recording.setting import RUN, encode_run, is_described
-from pretouch.recording.standard import STANDARD, Standard, imu_item, nanoseconds
+from pretouch.recording.standard import STANDARD, Standard, imu_items, nanoseconds
 from pretouch.recording.state_codec import STATE, encode_state
 from pretouch.recording.truth import Truth
 from pretouch.robot.model import RobotModel
@@ -131,11 +131,10 @@ class Recording:
     def _tangent(self, phase: float) -> FloatArray | None:
         return None if self._path is None else np.array(self._path.tangent(phase), dtype=np.float64)
 
-    def imu(self, unit_id: str, stamp: float, acceleration: FloatArray, angular_velocity: FloatArray) -> None:
-        """Keep what a unit's IMU measured: acceleration (3,) [m/s^2], angular velocity (3,) [rad/s], sensor frame."""
+    def imu(self, unit_id: str, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray) -> None:
+        """Keep what a unit's IMU measured at instants (M,) [s]: (M, 3) [m/s^2], (M, 3) [rad/s], sensor frame."""
         if self._closed is None and not self.trouble:
-            time = nanoseconds(stamp, self._log_time)
-            self._disk.put([imu_item(unit_id, time, acceleration, angular_velocity)])
+            self._disk.put([], partial(imu_items, unit_id, self._log_time, stamp, acceleration, angular_velocity))
 
     @property
     def trouble(self) -> str:

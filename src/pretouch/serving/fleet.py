@@ -46,7 +46,9 @@ class Fleet:
         missing = [name for name in ids if name not in keys]
         if missing:
             raise HardwareError(f"There is no key for unit {', '.join(missing)}: make keys for all units of the skin.")
-        family, self._address = _resolved(address)
+        family, self._found = _resolved(address)
+        self.receiver = address
+        """Name or address, and port, of the receiver."""
         self.ids = tuple(ids)
         seeds = np.random.SeedSequence([seed, 6]).spawn(len(ids))
         rngs = [[np.random.default_rng(s) for s in one.spawn(3)] for one in seeds]
@@ -93,7 +95,7 @@ class Fleet:
 
     def _send(self, one: socket.socket, datagram: bytes) -> None:
         try:
-            one.sendto(datagram, self._address)
+            one.sendto(datagram, self._found)
             self.sent += 1
         except OSError:
             self.lost += 1
@@ -111,6 +113,8 @@ def _reboots(every: float, rng: np.random.Generator) -> "count[float] | tuple[()
 def _resolved(address: tuple[str, int]) -> tuple[int, tuple[object, ...]]:
     """Family and address of a receiver by its name and port."""
     host, port = address
+    if not host:
+        raise HardwareError("No receiver is given: give its name or address.")
     if not 1 <= port <= _LAST_PORT:
         raise HardwareError(f"The receiver's port is {port}: give one from 1 to {_LAST_PORT}.")
     try:

@@ -14,7 +14,7 @@ import numpy as np
 from pretouch.checks import Checked, NonNegative
 from pretouch.control.path import Circle, Path
 from pretouch.controller import Controller
-from pretouch.errors import HardwareError
+from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import Keys
 from pretouch.loop import Cycle
 from pretouch.loop import run as turn_on
@@ -38,6 +38,8 @@ _LATE_S = 0.1
 _SETTLE_S = 0.2
 """Time the arm stands before the controller starts [s]: the observer's transient is over."""
 _SAY_S = 1.0
+_ANSWER_S = 3.0
+"""Time without any unit in session after which it is said that nobody answers [s]: a session takes 0.1 s to begin."""
 
 Measured = TypeVar("Measured", RangeSample, ImuSample)
 
@@ -82,6 +84,8 @@ class SimulateOptions(Checked):
         unknown = sorted((self.silenced | self.stuck) - set(self.skin.ids))
         if unknown:
             raise HardwareError(f"There is no unit {', '.join(unknown)}: choose from {', '.join(self.skin.ids)}.")
+        if self.seed < 0:
+            raise ParameterError(f"SimulateOptions.seed is {self.seed}: it must be at least 0.")
 
 
 class Visitor:
@@ -148,11 +152,26 @@ class _Teller:
     def __init__(self, fleet: Fleet, clock: _RealTime, say: Callable[[str], None]) -> None:
         self._fleet, self._clock, self._say = fleet, clock, say
         self._next, self._sent = _SAY_S, 0
+        self._answered, self._named = 0.0, False
 
     def record(self, cycle: Cycle) -> None:
         if self._clock.now >= self._next:
             self._next += _SAY_S
             self._say(self._line(cycle))
+            self._name_receiver()
+
+    def _name_receiver(self) -> None:
+        """Say once that a receiver does not answer."""
+        now, sending = self._clock.now, [unit for unit in self._fleet.units if not unit.silent]
+        if not sending or any(unit.in_session for unit in sending):
+            self._answered, self._named = now, False
+        elif not self._named and now - self._answered >= _ANSWER_S:
+            self._named = True
+            host, port = self._fleet.receiver
+            self._say(
+                f"Nobody answers at {host}:{port}: start `pretouch skin monitor` there with the same keys, or check"
+                " address and firewall."
+            )
 
     def _line(self, cycle: Cycle) -> str:
         fleet, step = self._fleet, cycle.step
@@ -176,8 +195,8 @@ class _Teller:
 def run(options: SimulateOptions, done: Callable[[], bool], say: Callable[[str], None]) -> None:
     """Simulate until `done` says so or the time is over; the arm is brought to rest and the sockets are closed.
 
-    `say` is handed a line each second. A receiver that cannot be found is a HardwareError; one that does not listen is
-    not noticed, as with real units.
+    `say` is handed a line each second, and a sentence when nobody answers. A receiver that cannot be found is a
+    HardwareError.
     """
     model, skin, profile = options.model, options.skin, options.profile
     scene = SceneSpec(hand=HandSpec(start=Visitor.away)) if options.hand else SceneSpec()

@@ -36,6 +36,8 @@ class LivePage:
         self.pace = Pace()
         self._commands = Commands()
         self._pointed: FloatArray | None = None
+        self._deaf = False
+        """Whether nothing more can come of real units."""
         dress(server)
         self._status = Status(server.gui)
         server.gui.add_html(legend())
@@ -76,6 +78,11 @@ class LivePage:
         self.pace.tick(now, max(0.0, self._simulation.time - before), 0.0 if running.paused else running.speed)
         if recording and recording.trouble:
             self._say(recording.trouble)
+        real = self._simulation.real
+        if real and not self._deaf and not real.source.alive:
+            self._deaf = True
+            self._simulation.notice = "The receiver of the sensor units has ended: start the page again."
+            self._say(self._simulation.notice)
         if self._simulation.notice:
             self._status.notice, self._simulation.notice = self._simulation.notice, ""
             self.controls.refresh()
@@ -85,6 +92,8 @@ class LivePage:
     def _pass_time(self) -> list[ControlStep]:
         """Let the time of one update pass, or as many single steps as were asked for."""
         running, simulation = self.controls.running, self._simulation
+        if running.paused or running.speed < 1.0:
+            simulation.leave_out_imu()
         single, running.single = running.single, 0
         if single:
             return [simulation.single_step() for _ in range(single)]

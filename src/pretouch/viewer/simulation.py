@@ -111,6 +111,11 @@ class LiveSimulation:
         self._keep(cycle, hand)
         return cycle.step
 
+    def leave_out_imu(self) -> None:
+        """Record nothing of what real units' IMUs measured up to now: the simulation does not go with their time."""
+        if self.real:
+            self.real.take_imu()
+
     # what a person does
 
     def move_hand(self, target: FloatArray) -> None:
@@ -196,8 +201,7 @@ class LiveSimulation:
         if self.recording is None:
             return
         for batch in imu:
-            for measured in zip(batch.stamp.tolist(), batch.acceleration, batch.angular_velocity, strict=True):
-                self.recording.imu(self.skin.ids[batch.unit], *measured)
+            self.recording.imu(self.skin.ids[batch.unit], batch.stamp, batch.acceleration, batch.angular_velocity)
         self.recording.record(cycle, truth_of(log, touches, hand))
         if self.recording.trouble:
             self.notice = self.recording.trouble
