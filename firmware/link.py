@@ -13,6 +13,8 @@ _SILENCE_US = const(2_000_000)
 _CHALLENGE_SIZE = const(8)
 _MOST_PER_STEP = const(4)
 _LARGEST = const(64)
+_LAST_SEQUENCE = const(0xFFFFFFFF)
+"""Of a session; after 2.7 years of one."""
 
 
 class Link:
@@ -48,7 +50,7 @@ class Link:
                 break
             if size == BEACON_SIZE and self._challenge is not None:
                 self._take(bytes(memoryview(self._buffer)[:size]), self._clock.ticks())
-        if self.live and self._clock.diff(now, self._heard) > _SILENCE_US:
+        if self.live and (self._sequence >= _LAST_SEQUENCE or self._clock.diff(now, self._heard) > _SILENCE_US):
             self._session = self._nonce = self._challenge = None
             self._next_hello = now
         if not self.live and self._clock.diff(now, self._next_hello) >= 0:

@@ -52,6 +52,11 @@ def test_a_file_others_can_get_at_is_refused(tmp_path, mode):
         ("[hand]\nnumber = 1\nkey = 5", "no text"),
         (f"[hand]\nnumber = 0\nkey = '{'0' * 64}'", "number of unit hand is 0"),
         (f"[hand]\nnumber = true\nkey = '{'0' * 64}'", "number of unit hand is True"),
+        (f"[hand]\nnumber = {'9' * 5000}\nkey = '{'0' * 64}'", "no TOML"),
+        (f"[hand]\nnumber = 0x{'f' * 5000}\nkey = '{'0' * 64}'", "number of unit hand is one of 20000 bits"),
+        (f"[hand]\nnumber = '3'\nkey = '{'0' * 64}'", "number of unit hand is of type str"),
+        (f"a = {'[' * 20000}{']' * 20000}", "no TOML"),
+        (f'["a\\u001b[2J"]\nnumber = 1\nkey = "{"0" * 64}"', "can be printed"),
         (f"[a]\nnumber = 1\nkey = '{'0' * 64}'\n[b]\nnumber = 1\nkey = '{'1' * 64}'", "both have the number 1"),
         (f"[a]\nnumber = 1\nkey = '{'0' * 64}'\n[b]\nnumber = 2\nkey = '{'0' * 64}'", "the same key"),
     ],
@@ -76,12 +81,53 @@ def test_a_file_that_is_not_there_or_cannot_be_written_is_an_error_of_ours(tmp_p
     assert os.listdir(tmp_path) == ["folder"]
 
 
+def test_a_path_that_no_file_can_have_is_an_error_of_ours(tmp_path):
+    with pytest.raises(HardwareError, match="can be no file"):
+        load_keys(tmp_path / "a\0b")
+    with pytest.raises(HardwareError, match="can be no file"):
+        save_keys(Keys(), tmp_path / "a\0b")
+
+
+def test_a_key_that_stands_in_the_place_of_the_number_is_not_shown(tmp_path):
+    path = tmp_path / "keys.toml"
+    path.write_text(f"[hand]\nnumber = '{'ab' * 32}'\nkey = '03'")
+    path.chmod(0o600)
+    with pytest.raises(HardwareError) as caught:
+        load_keys(path)
+    assert "abab" not in str(caught.value)
+    with pytest.raises(HardwareError) as caught:
+        unit(number=b"k" * 32)
+    assert "kkk" not in str(caught.value)
+
+
+def test_a_file_of_another_owner_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "keys.toml"
+    save_keys(Keys([unit()]), path)
+    monkeypatch.setattr(os, "geteuid", lambda: path.stat().st_uid + 1)
+    with pytest.raises(HardwareError, match=f"belongs to user {path.stat().st_uid}"):
+        load_keys(path)
+
+
+def test_saving_through_a_link_replaces_what_it_leads_to(tmp_path):
+    real, link = tmp_path / "real" / "keys.toml", tmp_path / "link.toml"
+    real.parent.mkdir()
+    save_keys(Keys([unit()]), real)
+    link.symlink_to(real)
+    save_keys(Keys([unit("foot")]), link)
+    assert link.is_symlink()
+    assert list(load_keys(real)) == ["foot"]
+    assert os.listdir(real.parent) == ["keys.toml"]
+
+
 def test_two_units_of_one_name_are_refused():
     with pytest.raises(HardwareError, match="Two units are named hand"):
         Keys([unit(), unit(number=2, key=b"x" * 32)])
 
 
-@pytest.mark.parametrize("wrong", [{"id": ""}, {"number": 65536}, {"number": 1.0}, {"key": "k" * 32}, {"key": b""}])
+@pytest.mark.parametrize(
+    "wrong",
+    [{"id": ""}, {"id": "a\ud800"}, {"id": "a\n"}, {"number": 65536}, {"number": 1.0}, {"key": "k" * 32}, {"key": b""}],
+)
 def test_a_unit_that_cannot_be_is_refused(wrong):
     with pytest.raises(HardwareError):
         unit(**wrong)

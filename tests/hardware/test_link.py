@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.hardware.link import WIDTH, Window
+from pretouch.hardware.link import WIDTH, Allowance, Answered, Window
 
 
 @given(st.lists(st.one_of(st.integers(0, 300), st.integers(2**32 - 200, 2**32 - 1)), max_size=300))
@@ -29,3 +29,27 @@ def test_lost_and_missing_are_what_never_came(sequences):
     gone = set(range(1, window.newest + 1)) - seen
     assert lost == sum(sequence <= window.newest - WIDTH for sequence in gone)
     assert lost + window.missing() == len(gone)
+
+
+@given(st.lists(st.floats(0.0, 0.5), max_size=200))
+def test_an_allowance_is_so_many_a_second_and_as_many_at_once(gaps):
+    allowance, left, now = Allowance(20.0), 20.0, 100.0
+    for gap in gaps:
+        now += gap
+        left = min(20.0, left + 20.0 * gap)
+        assert abs(allowance.left(now) - left) < 1e-6
+        spent = allowance.spend(now)
+        assert spent == (left >= 1.0) or abs(left - 1.0) < 1e-6
+        left -= spent
+
+
+def test_of_challenges_the_latest_are_remembered():
+    answered = Answered()
+    for k in range(1000):
+        answered.add(b"%d" % k, float(k))
+        answered.add(b"often", float(k))
+    assert len(answered) == 256
+    assert answered.told(b"999") == (1, 999.0)
+    assert answered.told(b"1")[0] == 0
+    assert answered.worn(b"often")
+    assert not answered.worn(b"999")

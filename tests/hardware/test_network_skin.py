@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,24 @@ from pretouch.types import RangeStatus
 from tests.hardware.fake_unit import IDS, KEYS, FakeUnit
 
 SHARED = Path("/dev/shm")  # noqa: S108  where named shared memory would lie
+ALONE = """
+import multiprocessing, sys
+sys.path.insert(0, {tests!r})
+from pretouch.errors import HardwareError
+from pretouch.hardware.network_skin import NetworkSkin
+from tests.hardware.fake_unit import IDS, KEYS
+
+def start():
+    try:
+        NetworkSkin(IDS, KEYS)
+    except HardwareError as error:
+        print(error, flush=True)
+
+if __name__ == "__main__":
+    process = multiprocessing.get_context("spawn").Process(target=start, daemon=True)
+    process.start()
+    process.join()
+"""
 PROGRAM = """
 import os, sys, time
 sys.path.insert(0, {tests!r})
@@ -144,6 +163,57 @@ def test_a_priority_there_is_not_is_told_at_the_start():
         NetworkSkin(IDS, KEYS, priority=1000)
 
 
+@pytest.mark.parametrize("port", ["x", 70000, 1.5, True])
+def test_what_is_no_port_is_told_before_anything_starts(port, monkeypatch):
+    monkeypatch.setattr("pretouch.hardware.network_skin.get_context", None)
+    with pytest.raises(HardwareError, match="no port"):
+        NetworkSkin(IDS, KEYS, port=port)
+
+
+def test_a_daemonic_process_is_told_that_it_may_start_none(tmp_path):
+    script = tmp_path / "program.py"
+    script.write_text(ALONE.format(tests=str(Path(__file__).parents[2])))
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=True)
+    assert "daemonic process" in done.stdout
+    assert done.stderr == ""
+
+
+def test_in_a_process_forked_off_closing_does_nothing(skin, monkeypatch):
+    owner = os.getpid()
+    with monkeypatch.context() as forked:
+        forked.setattr(os, "getpid", lambda: owner + 1)
+        skin.close()
+        with pytest.raises(HardwareError, match=f"belongs to process {owner}"):
+            _ = skin.alive
+        assert skin.read().stamp.tolist() == [-np.inf] * 2
+    assert skin.alive
+    assert runs(skin.pid)
+
+
+def test_ctrl_c_while_it_starts_leaves_no_process(monkeypatch):
+    begun = []
+
+    def interrupted(_):
+        begun.extend(active_children())
+        raise KeyboardInterrupt
+
+    before = set(active_children())
+    monkeypatch.setattr("pretouch.hardware.network_skin._greeted", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        NetworkSkin(IDS, KEYS)
+    assert set(begun) - before
+    assert set(active_children()) <= before
+
+
+def test_the_receivers_process_does_not_heed_ctrl_c(skin, player):
+    until(lambda: player.all_live(skin))
+    for _ in range(3):
+        os.kill(skin.pid, signal.SIGINT)
+        accepted = skin.traffic().units[0].accepted
+        until(lambda accepted=accepted: player.all_live(skin) and skin.traffic().units[0].accepted > accepted)
+    assert skin.alive
+
+
 @pytest.fixture
 def program(tmp_path):
     script = tmp_path / "program.py"
@@ -156,7 +226,9 @@ def program(tmp_path):
     child = int(parent.stdout.readline())
     yield parent, child
     parent.kill()
-    parent.communicate()
+    with suppress(ProcessLookupError):
+        os.kill(child, signal.SIGKILL)
+    parent.communicate(timeout=30)
     assert not [path for path in set(SHARED.iterdir()) - before if "pretouch" in path.name]
 
 

@@ -45,6 +45,7 @@ def test_before_any_unit_speaks_all_is_unknown(bench):
 def test_a_unit_joins_and_its_readings_come_through(bench):
     bench.send(bench.units[0].hello(bench.now))
     assert bench.receiver.units[0].state == "greeting"
+    assert bench.receiver.units[0].address is None, "a hello may be a recorded one, from anywhere"
     bench.deliver()
     bench.now += 0.02
     assert bench.send(bench.units[0].sample(bench.now, range_mm=612, range_status=4)) == 1
@@ -84,6 +85,43 @@ def test_a_late_reading_never_replaces_a_newer_one(bench):
     assert bench.receiver.readings().distance[0] == 0.2
 
 
+def test_a_late_reading_of_which_a_better_bound_is_known_does_not_replace_a_newer_one(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    bench.now += 0.08  # the first beacon is long on its way, so that stamps are early
+    bench.deliver()
+    bench.send(unit.sample(bench.now))
+    bench.now += 0.05
+    late = unit.sample(bench.now, range_mm=4000)
+    bench.now += 0.02
+    bench.send(unit.sample(bench.now, range_mm=300))
+    while not bench.deliver():
+        bench.now += 0.01
+        bench.receiver.receive()
+    assert bench.send(unit.sample(bench.now, flags=0)) == 1
+    assert bench.receiver.units[0].bound < 0.04
+    assert bench.send(late) == 1
+    assert bench.receiver.readings().distance[0] == 0.3
+
+
+def test_readings_go_on_when_a_good_bound_drops_out_of_the_window(bench):
+    bench.join()
+    bench.run(5.0)
+    unit, traffic, waiting, stamps = bench.units[0], bench.receiver.units[0], [], []
+    for k in range(1500):
+        bench.now += 0.01
+        if k % 2 == 0:
+            bench.send(unit.sample(bench.now))
+            stamps.append(traffic.last_reading_stamp)
+            assert stamps[-1] <= bench.now - 0.01
+        bench.receiver.receive()
+        waiting += [(bench.now + 0.15, datagram) for datagram in bench.answers()]
+        while waiting and waiting[0][0] <= bench.now:
+            unit.hear(waiting.pop(0)[1], bench.now)
+    assert traffic.bound > 0.07
+    assert np.diff(stamps) == pytest.approx(0.02, abs=1e-4)
+
+
 def test_silence_lets_readings_grow_old_and_is_named(bench):
     bench.join()
     stamp = bench.receiver.readings().stamp.copy()
@@ -91,6 +129,22 @@ def test_silence_lets_readings_grow_old_and_is_named(bench):
     bench.receiver.receive()
     assert [unit.state for unit in bench.receiver.units] == ["silent"] * 2
     np.testing.assert_array_equal(bench.receiver.readings().stamp, stamp)
+
+
+def test_a_unit_greets_until_a_second_after_its_last_hello(bench):
+    traffic = bench.receiver.units[0]
+    for _ in range(5):
+        bench.now += 0.9
+        bench.send(bench.units[0].hello(bench.now))
+        assert traffic.state == "greeting"
+    bench.now += 0.9
+    bench.receiver.receive()
+    assert traffic.state == "greeting"
+    bench.now += 0.2
+    bench.receiver.receive()
+    assert traffic.state == "silent"
+    bench.send(bench.units[0].hello(bench.now))
+    assert traffic.state == "greeting"
 
 
 def test_a_bus_error_renews_no_reading(bench):
@@ -235,6 +289,153 @@ def test_a_clock_that_jumps_is_noticed_and_known_again_after_a_beacon(bench):
         assert bench.receiver.units[0].clock_jumps > before
         assert bench.now - bench.receiver.readings().stamp[0] < 0.06
         assert bench.receiver.units[0].offset == pytest.approx(bench.units[0].offset, abs=0.03)
+
+
+def test_after_a_jump_a_beacon_is_sent_at_once_and_only_its_echo_tells_the_time(bench):
+    bench.join()
+    bench.run(2.0)
+    unit, unheard = bench.units[0], []
+    while not unheard:
+        bench.run(0.02)
+        bench.now += 0.02
+        bench.send(unit.sample(bench.now))
+        unheard = [b for d in bench.answers() if (b := decode_beacon(d, unit.mac, unit.challenge))]
+    unit.offset -= 4.0  # its clock went forward, and the hold it tells holds the jump
+    bench.now += 0.02
+    bench.send(unit.sample(bench.now))
+    assert bench.receiver.units[0].clock_jumps == 1
+    bench.answers()
+    bench.now += 0.021
+    bench.receiver.receive()
+    beacons = [decode_beacon(d, unit.mac, unit.challenge) for d in bench.answers()]
+    [beacon] = [b for b in beacons if b]
+    # an echo of one heard before the jump: its hold would say nonsense
+    assert beacon.number > unheard[0].number
+    assert bench.send(unit.sample(bench.now, beacon=unheard[0].number, beacon_hold_us=0)) == 1
+    assert math.isnan(bench.receiver.units[0].offset)
+    unit.beacon, unit.heard_us = beacon, unit.us(bench.now)
+    bench.send(unit.sample(bench.now))
+    assert bench.receiver.units[0].offset == pytest.approx(unit.offset, abs=0.03)
+
+
+def test_an_echo_of_a_beacon_that_is_long_past_tells_nothing(bench):
+    bench.join()
+    bench.run(20.0)
+    session = bench.receiver._stations[0]._session
+    assert sorted(session.sent) == list(range(session.number - 63, session.number + 1))
+    assert bench.send(bench.units[0].sample(bench.now, beacon=1, beacon_hold_us=0)) == 1
+    assert bench.receiver.units[0].clock_jumps == 0
+
+
+def test_each_beacon_is_taken_as_echoed_once(bench):
+    bench.join()
+    clock = bench.receiver._stations[0]._clock
+    [before] = clock._lows
+    # were it taken again, each of these would be another bound
+    for k in range(3):
+        bench.now += 0.02
+        assert bench.send(bench.units[0].sample(bench.now, beacon=1, beacon_hold_us=40_000 + 20_000 * k)) == 1
+        assert list(clock._lows) == [before]
+    assert clock.jumps == 0
+
+
+def test_the_first_beacon_of_a_session_is_due_a_period_after_its_answer(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    sent = bench.now
+    bench.now += 0.1
+    bench.send(unit.sample(bench.now))
+    while not bench.answers():
+        bench.now += 0.001
+        bench.receiver.receive()
+    assert bench.now - sent == pytest.approx(0.25, abs=0.03)
+
+
+def test_beacons_are_sent_during_a_flood_that_fills_a_call():
+    with Bench(params=LinkParams(drain_most=2000)) as bench:
+        bench.join()
+        forged = replace(PLAIN, sequence=10**6).encode(Mac(bytes(32)))
+        for _ in range(1500):
+            bench.socket.sendto(forged, bench.receiver.address)
+
+        def ticking() -> float:
+            bench.now += 0.001
+            return bench.now
+
+        bench.receiver._clock = ticking
+        bench.receiver.receive()
+        assert bench.receiver.taken == 1500
+        assert len([d for d in bench.answers() if decode_beacon(d, bench.units[0].mac, bench.units[0].challenge)]) >= 4
+
+
+def test_the_holder_of_a_key_costs_bounded_memory_and_time(bench):
+    bench.join()
+    unit, station = bench.units[0], bench.receiver._stations[0]
+    began, base, taken = bench.now, unit.us(bench.now), 0
+    for k in range(10_000):
+        bench.now += 0.001
+        taken += bench.send(unit.sample(bench.now, time_us=base, beacon=1 + k % 2, beacon_hold_us=400_000 - k))
+    assert taken <= 200 * (bench.now - began) + 201
+    assert bench.receiver.rejected["too fast"] == 10_000 - taken
+    assert len(station._clock._highs) <= 1024
+    assert len(station._clock._lows) <= 1024
+
+
+def test_twice_the_rate_of_a_unit_is_taken(bench):
+    bench.join()
+    for _ in range(500):
+        bench.now += 0.01
+        assert bench.send(bench.units[0].sample(bench.now)) == 1
+
+
+def test_after_the_hosts_clock_stood_still_nothing_is_known_until_a_beacon_is_echoed(bench):
+    bench.join()
+    bench.run(1.0)
+    traffic, unit = bench.receiver.units[0], bench.units[0]
+    bench.receiver.forget_times()
+    assert bench.receiver.readings().stamp.tolist() == [-np.inf] * 2
+    assert bench.receiver.readings().status.tolist() == [RangeStatus.NONE] * 2
+    assert math.isnan(traffic.offset)
+    unit.offset -= 60.0  # the unit's clock went on
+    assert bench.send(unit.sample(bench.now)) == 1
+    assert bench.receiver.readings().stamp[0] == -np.inf
+    bench.now += 0.02
+    bench.receiver.receive()
+    bench.deliver()
+    bench.now += 0.02
+    bench.send(unit.sample(bench.now))
+    assert bench.now - 0.06 < bench.receiver.readings().stamp[0] <= bench.now - 0.01
+    assert traffic.clock_jumps == 0
+
+
+def test_what_was_offered_before_the_hosts_clock_stood_still_tells_no_time_after_it(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    bench.now += 0.02
+    late = unit.sample(bench.now)
+    unit.offset -= 60.0  # the unit's clock goes on for a minute
+    bench.receiver.forget_times()
+    assert bench.send(late) == 0
+    assert bench.send(unit.sample(bench.now)) == 0
+    assert bench.receiver.readings().stamp[0] == -np.inf
+    unit.leave()
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    assert bench.send(unit.sample(bench.now)) == 1
+    assert bench.receiver.readings().stamp[0] <= bench.now - 0.01
+
+
+def test_with_somebody_to_deliver_to_nothing_is_kept():
+    given = []
+    with Bench(deliver=lambda received, datagram: given.append((received, bytes(datagram)))) as bench:
+        bench.join()
+        sample = bench.units[0].sample(bench.now)
+        bench.send(sample)
+        assert [received.unit for received, _ in given] == [0, 1, 0]
+        assert given[-1][1] == sample
+        assert bench.receiver.take_samples() == bench.receiver.take_imu() == []
 
 
 def test_each_flipped_bit_of_a_hello_makes_it_worthless(unfiltered):

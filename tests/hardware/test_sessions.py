@@ -85,6 +85,53 @@ def test_an_old_beacon_is_nothing_to_a_unit(bench):
     assert not any(unit.hear(old, bench.now) for old in first)
 
 
+def test_a_sample_held_back_under_an_older_offer_never_takes_over(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    hello, held_back = unit.hello(bench.now), [unit.sample(bench.now) for _ in range(3)]
+    bench.now += 2.1
+    unit.leave()
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    assert bench.send(unit.sample(bench.now)) == 1
+    for k in range(100):
+        if k % 20 == 0:
+            bench.send(hello)
+        bench.now += 0.1
+        assert bench.send(unit.sample(bench.now)) == 1
+        bench.deliver()
+    assert bench.send(*held_back) == 0
+    assert bench.receiver.units[0].sessions == 1
+    assert bench.send(unit.sample(bench.now)) == 1
+
+
+def test_a_newer_offer_outlives_an_older_one_that_is_taken_late(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    late = unit.sample(bench.now)
+    unit.leave()
+    bench.send(unit.hello(bench.now))
+    bench.deliver()
+    assert [bench.send(late), bench.send(unit.sample(bench.now))] == [1, 1]
+    assert bench.receiver.units[0].sessions == 2
+
+
+def test_asking_renews_an_offer_but_not_for_ever(bench):
+    unit = bench.units[0]
+    bench.send(unit.hello(bench.now))
+    [first] = bench.answers()
+    nonces = []
+    for _ in range(12):
+        bench.now += 3.0
+        bench.receiver.receive()
+        bench.send(unit.hello(bench.now))
+        nonces += [decode_beacon(d, unit.mac, unit.challenge).nonce for d in bench.answers()]
+    assert nonces[:9] == [decode_beacon(first, unit.mac, unit.challenge).nonce] * 9
+    assert len(set(nonces)) == 2
+
+
 def test_a_beacon_for_one_unit_is_nothing_to_another(bench):
     bench.send(bench.units[0].hello(bench.now))
     [beacon] = bench.answers()
@@ -107,8 +154,8 @@ def test_a_recorded_hello_never_ends_a_live_session(bench):
     assert bench.receiver.units[0].firmware == 0x0102
 
 
-@pytest.mark.parametrize("count", [1, 4, 20])
-def test_recorded_hellos_sent_again_and_again_do_not_keep_a_unit_out(bench, count):
+@pytest.mark.parametrize(("count", "longest"), [(1, 3.0), (4, 3.0), (20, 3.0), (30, 10.0), (60, 20.0)])
+def test_recorded_hellos_sent_again_and_again_do_not_keep_a_unit_out(bench, count, longest):
     unit, old = bench.units[0], recorded_hellos(count)
     began = bench.now
     while not accepted(bench):
@@ -119,7 +166,45 @@ def test_recorded_hellos_sent_again_and_again_do_not_keep_a_unit_out(bench, coun
         elif round(bench.now / 0.02) % 5 == 0:
             bench.send(unit.hello(bench.now))
         bench.deliver()
-        assert bench.now - began < 3.0
+        assert bench.now - began < longest
+
+
+def test_hellos_of_sessions_that_were_live_are_known_as_recorded_ones(bench):
+    unit, old = bench.units[0], []
+    for _ in range(60):
+        bench.send(unit.hello(bench.now))
+        old.append(unit.hello(bench.now))
+        bench.deliver()
+        assert bench.send(unit.sample(bench.now)) == 1
+        bench.now += 2.0
+        unit.leave()
+    for _ in range(50):
+        bench.now += 0.02
+        bench.send(*old)
+    bench.answers()
+    bench.send(*old, unit.hello(bench.now), *old)
+    assert bench.deliver()
+    assert bench.send(unit.sample(bench.now)) == 1
+
+
+def test_a_challenge_answered_in_vain_takes_no_other_offers_place(bench):
+    old, *others = recorded_hellos(4)
+    for _ in range(5):
+        bench.send(old)
+        bench.now += 0.1
+    bench.now += 6.0
+    bench.receiver.receive()
+    bench.answers()
+    bench.send(bench.units[0].hello(bench.now), *others)
+    bench.deliver()
+    bench.send(old)
+    assert bench.receiver.rejected["too many hellos"] == 1
+    assert bench.answers() == []
+    assert bench.send(bench.units[0].sample(bench.now)) == 1
+    bench.now += 6.0
+    bench.receiver.receive()
+    bench.send(old)
+    assert len([d for d in bench.answers() if decode_beacon(d, bench.units[0].mac, b"old 0000")]) == 1
 
 
 def test_answers_to_hellos_are_limited(bench):

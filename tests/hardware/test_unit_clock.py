@@ -14,12 +14,12 @@ delays = st.one_of(st.floats(0.0, 0.005), st.floats(0.0, 0.1), st.floats(0.0, 3.
 
 
 class Wire:
-    """Beacons every 0.5 s and samples every 20 ms, given to a clock in their order of arrival."""
+    """Beacons every 0.25 s and samples every 20 ms, given to a clock in their order of arrival."""
 
     def __init__(self, offset, rate, down, up):
         """Unit time = (host time - offset) * rate; delays of beacons (B,) and samples (S,) [s], NaN where lost."""
         self._offset, self._rate = offset, rate
-        self.sent = 0.5 * np.arange(len(down))
+        self.sent = 0.25 * np.arange(len(down))
         self._down = self.sent + down
         made = 0.3 + 0.02 * np.arange(len(up))
         self.order = [(t, a) for a, t in sorted((a, t) for t, a in zip(made, made + up, strict=True) if a == a)]
@@ -65,7 +65,7 @@ def test_the_true_offset_is_within_the_bounds(offset, drift, down, up):
 @given(st.floats(0.1, 1e5), st.booleans(), st.integers(0, 2**32 - 1))
 def test_after_a_jump_it_recovers(jump, forward, seed):
     rng = np.random.default_rng(seed)
-    down, up = rng.exponential(0.002, 20), rng.exponential(0.002, 300)
+    down, up = rng.exponential(0.002, 40), rng.exponential(0.002, 300)
     wire, clock = Wire(0.0, 1.0, down, up), UnitClock(DRIFT, 10.0)
     # the jump comes after 3 s, between a beacon heard and its echo as well as elsewhere
     shift = jump if forward else -jump
@@ -100,6 +100,55 @@ def test_a_round_trip_gives_its_half_as_bound():
     assert clock.earliest(4.9) == pytest.approx(99.91 - 1.0e-6 - TICK - DRIFT * 0.12, abs=1e-6)
 
 
+@given(
+    st.floats(-1000.0, 1000.0), st.floats(-0.99 * DRIFT, 0.99 * DRIFT),
+    st.lists(st.tuples(delays, st.booleans()), min_size=1, max_size=60),
+    st.lists(st.tuples(delays, st.booleans(), st.floats(0.0, 0.05)), min_size=1, max_size=200),
+    st.sampled_from([0.5, 10.0]),
+)  # fmt: skip
+def test_no_stamp_is_later_than_the_truth_and_newer_readings_have_later_stamps(offset, drift, down, up, window):
+    ages = [age for _, _, age in up]
+    down, up = (with_losses(*list(zip(*pairs, strict=True))[:2]) for pairs in (down, up))
+    wire, clock = Wire(offset, 1.0 + drift, down, up), UnitClock(DRIFT, window)
+    for made, arrival in wire.order:
+        sent, hold = wire.echo(made)
+        assert clock.heard(wire.unit(made), arrival, sent, hold)
+        true = made - ages[round((made - 0.3) / 0.02)]
+        instant, newest, before = wire.unit(true), clock.last_reading, clock._last_stamp
+        at_least = clock.earliest(instant)
+        stamp = clock.stamp(instant)
+        assert at_least <= stamp <= true + 1e-9
+        if instant > newest:
+            assert stamp > before or stamp == -math.inf
+        else:
+            assert (clock.last_reading, clock._last_stamp) == (newest, before)
+
+
+def test_jumps_too_small_to_be_seen_make_no_stamp_later_than_it_can_be():
+    clock = UnitClock(DRIFT, 10.0)
+    for k in range(6000):
+        host = 0.02 * k
+        made = host + 0.015 * (k // 600)
+        assert clock.heard(made, host + 0.02, host - 0.02, 0.0)
+        assert clock.stamp(made) <= min(made + clock.high, host + 0.02)
+    assert clock.jumps == 0
+
+
+def test_what_a_beacon_told_allows_for_the_resolution_of_the_units_clock():
+    clock = UnitClock(DRIFT, 10.0)
+    clock.heard(5.0, 100.0, 100.0, 0.0)
+    assert clock.low == pytest.approx(95.0 - TICK, abs=1e-9)
+    assert clock.known
+
+
+def test_its_memory_is_bounded_however_the_units_clock_goes():
+    clock = UnitClock(DRIFT, 10.0)
+    for k in range(5000):
+        clock.heard(5.0, 100.0 + 1e-6 * k, 90.0 - 1e-6 * k, 1e-6 * k)
+    assert len(clock._lows) <= 1024
+    assert len(clock._highs) <= 1024
+
+
 def test_its_memory_is_bounded():
     clock = UnitClock(DRIFT, 10.0)
     for k in range(5000):
@@ -122,7 +171,7 @@ def wifi(rng, count, busy):
 )  # fmt: skip
 def test_on_networks_as_they_are_the_offset_is_good_to_milliseconds(busy, saving, most):
     rng = np.random.default_rng(0)
-    down = wifi(rng, 240, busy) + rng.uniform(0, saving, 240)
+    down = wifi(rng, 480, busy) + rng.uniform(0, saving, 480)
     wire, clock = Wire(12.345, 1 + 20e-6, down, wifi(rng, 5900, busy)), UnitClock(DRIFT, 10.0)
     errors = []
     for made, arrival in wire.order:

@@ -195,6 +195,16 @@ def test_only_a_fresh_beacon_of_its_own_opens_and_keeps_a_session(desk):
     assert not on.unit.in_session
 
 
+def test_after_the_last_sequence_number_it_leaves_its_session(desk):
+    on = desk()
+    session = on.open()
+    on.pass_time(0.1)
+    on.unit._sequence = 2**32 - 3
+    said = on.pass_time(0.5)
+    assert [sample.sequence for sample in samples(said, session)] == [2**32 - 2, 2**32 - 1]
+    assert on.hellos(said)[0][1].challenge != on.hellos(on.said)[0][1].challenge
+
+
 def test_a_reboot_begins_its_clock_at_nothing_and_takes_its_time(desk):
     on = desk(reboots=[1.0], boot_s=0.5)
     on.open()

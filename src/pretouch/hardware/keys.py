@@ -16,6 +16,7 @@ from pretouch.errors import HardwareError
 from pretouch.hardware.wire import KEY_SIZE
 
 _LAST_NUMBER = 0xFFFF
+_SHOWN_BITS = 64
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,12 @@ class UnitKey:
     """32 random bytes that only the unit and its receiver know."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.id, str) or not self.id:
-            raise HardwareError(f"The name of a unit is {self.id!r}: give it one, as it stands in the skin.")
+        if not isinstance(self.id, str) or not self.id or not self.id.isprintable():
+            raise HardwareError(
+                f"The name of a unit is {self.id!r}: give it one that can be printed, as it stands in the skin."
+            )
         if type(self.number) is not int or not 1 <= self.number <= _LAST_NUMBER:
-            raise HardwareError(f"The number of unit {self.id} is {self.number!r}: choose 1 to {_LAST_NUMBER}.")
+            raise HardwareError(f"The number of unit {self.id} is {_told(self.number)}: choose 1 to {_LAST_NUMBER}.")
         if not isinstance(self.key, bytes) or len(self.key) != KEY_SIZE:
             size = f"{len(self.key)} bytes" if isinstance(self.key, bytes) else f"of type {type(self.key).__name__}"
             raise HardwareError(f"The key of unit {self.id} is {size}, not {KEY_SIZE} bytes: make one with new_key().")
@@ -41,6 +44,13 @@ class UnitKey:
     def __repr__(self) -> str:
         """Without the key: it must not get into logs."""
         return f"UnitKey(id={self.id!r}, number={self.number})"
+
+
+def _told(number: object) -> str:
+    """What stands in the place of a number: itself only if it is none of a key, which must not get into logs."""
+    if not isinstance(number, int):
+        return f"of type {type(number).__name__}"
+    return str(number) if number.bit_length() <= _SHOWN_BITS else f"one of {number.bit_length()} bits"
 
 
 class Keys(Mapping[str, UnitKey]):
@@ -82,19 +92,18 @@ def new_key() -> bytes:
 
 
 def load_keys(path: Path) -> Keys:
-    """Read a file of keys; one that others may read, or that holds no keys, is a HardwareError."""
+    """Read a file of keys; one that another owns or may read, or that holds no keys, is a HardwareError."""
     try:
         with open(path, "rb") as file:
-            mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
-            if mode & 0o077:
-                raise HardwareError(
-                    f"{path} has the mode {mode:04o}, so that others can get at its keys:"
-                    f" chmod 600 {path}, and make new keys if they may have been read."
-                )
-            tables = tomllib.load(file)
+            _demand_private(os.fstat(file.fileno()), path)
+            text = file.read()
     except OSError as error:
         raise HardwareError(f"The keys in {path} cannot be read: {error.strerror}.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
+        raise HardwareError(f"There can be no file {str(path)!r}: {error}.") from None
+    try:
+        tables = tomllib.loads(text.decode())
+    except (ValueError, RecursionError) as error:
         raise HardwareError(f"{path} is no TOML file of keys: {error}.") from None
     try:
         return Keys(_unit(id, table) for id, table in tables.items())
@@ -102,7 +111,23 @@ def load_keys(path: Path) -> Keys:
         raise HardwareError(f"{path}: {error}") from None
 
 
+def _demand_private(status: os.stat_result, path: Path) -> None:
+    if hasattr(os, "geteuid") and status.st_uid != os.geteuid():
+        raise HardwareError(
+            f"{path} belongs to user {status.st_uid}, who can get at its keys:"
+            f" make it yours (chown {os.geteuid()} {path})."
+        )
+    mode = stat.S_IMODE(status.st_mode)
+    if mode & 0o077:
+        raise HardwareError(
+            f"{path} has the mode {mode:04o}, so that others can get at its keys:"
+            f" chmod 600 {path}, and make new keys if they may have been read."
+        )
+
+
 def _unit(id: str, table: object) -> UnitKey:
+    if not id.isprintable():
+        raise HardwareError(f"The name of a unit is {id!r}: give it one that can be printed.")
     if not isinstance(table, dict) or set(table) != {"number", "key"}:
         raise HardwareError(f"Unit {id} must have a number and a key, and nothing else.")
     if not isinstance(table["key"], str):
@@ -115,19 +140,25 @@ def _unit(id: str, table: object) -> UnitKey:
 
 
 def save_keys(keys: Keys, path: Path) -> None:
-    """Write a file of keys that only its owner can read; it is replaced whole or, with a HardwareError, not at all."""
+    """Write a file of keys that only its owner can read; it is replaced whole or, with a HardwareError, not at all.
+
+    Where the path is a symbolic link, the file it leads to is replaced.
+    """
     tables = {unit.id: {"number": unit.number, "key": unit.key.hex()} for unit in keys.values()}
     unfinished = None
     try:
-        handle, unfinished = tempfile.mkstemp(prefix=f".{Path(path).name}.", dir=Path(path).parent)  # mode 0600
+        place = Path(os.path.realpath(path))
+        handle, unfinished = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)  # mode 0600
         with open(handle, "wb") as file:
             tomli_w.dump(tables, file)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(unfinished, path)
+        os.replace(unfinished, place)
         unfinished = None
     except OSError as error:
         raise HardwareError(f"The keys cannot be written to {path}: {error.strerror}.") from None
+    except ValueError as error:
+        raise HardwareError(f"There can be no file {str(path)!r}: {error}.") from None
     finally:
         if unfinished is not None:
             os.unlink(unfinished)

@@ -32,6 +32,11 @@ _CHALLENGE = slice(PREFIX.size + 4, PREFIX.size + 4 + CHALLENGE_SIZE)
 """Of a hello."""
 _REMEMBERED = 64
 """Beacons of a session whose instants are kept."""
+_CHALLENGES = 256
+"""Of one unit, that are remembered as answered."""
+_IN_VAIN = 5
+"""Answers to a challenge after which it comes last, unless its unit takes one."""
+_ROUNDING_S = 1e-9
 
 
 @dataclass(frozen=True)
@@ -46,11 +51,16 @@ class LinkParams(Checked):
     """Most sessions offered to one unit at once."""
     pending_expiry_s: Positive = 5.0
     """How long an offer stands after the last hello that asked for it [s]."""
+    pending_longest_s: Positive = 30.0
+    """How long an offer stands at most [s], however often it is asked for: recorded hellos must not keep it."""
     answers_per_s: Annotated[float, Check(low=1.0)] = 20.0
     """Most hellos of one unit that are answered in a second; a unit says ten."""
     tries_per_s: Annotated[float, Check(low=1.0)] = 200.0
     """Most samples of one unit that are tried against its offers in a second, so that offers nobody takes do not make
     a flood of forged samples five times as dear; a unit sends fifty."""
+    samples_per_s: Annotated[float, Check(low=1.0)] = 200.0
+    """Most genuine samples of one unit that are taken in a second, so that the holder of one key costs no more than
+    four units; a unit sends fifty, and no more than a hundred."""
     drift_ppm: Positive = 50.0
     """Largest difference in rate between a unit's clock and the host's [1e-6] (crystals of 20 ppm, their temperature,
     and the steering of the host's clock)."""
@@ -105,21 +115,58 @@ class Allowance:
     """So many a second, and as many at once."""
 
     def __init__(self, rate: float) -> None:
-        self.rate = self.left = rate
-        self._counted = -math.inf
+        self.rate = rate
+        self._spent_to = -math.inf
+        """Up to when all that comes in is spent [s]; the last second's is what can be left."""
 
-    def refill(self, now: float) -> float:
+    def left(self, now: float) -> float:
         """Return how many are left at an instant [s]."""
-        self.left = min(self.rate, self.left + self.rate * max(now - self._counted, 0.0))
-        self._counted = now
-        return self.left
+        return self.rate * min(now - self._spent_to, 1.0)
+
+    def spend(self, now: float) -> bool:
+        """Spend one if there is one; return whether there was."""
+        spent_to = max(self._spent_to, now - 1.0) + 1.0 / self.rate
+        if spent_to > now + _ROUNDING_S:
+            return False
+        self._spent_to = spent_to
+        return True
+
+
+class Answered:
+    """How often challenges were answered without being taken: those of recorded hellos, answered in vain, come last."""
+
+    def __init__(self) -> None:
+        self._told: dict[bytes, tuple[int, float]] = {}
+
+    def told(self, challenge: bytes) -> tuple[int, float]:
+        """Return how often a challenge was answered, and when last [s]."""
+        return self._told.get(challenge, (0, -math.inf))
+
+    def worn(self, challenge: bytes) -> bool:
+        """Whether a challenge was answered so often in vain that its unit hardly waits for another answer."""
+        return self.told(challenge)[0] >= _IN_VAIN
+
+    def add(self, challenge: bytes, now: float, times: int = 1) -> None:
+        """Count an answer; the challenge answered longest ago makes room."""
+        count = self.told(challenge)[0] + times
+        self._told.pop(challenge, None)
+        self._told[challenge] = count, now
+        if len(self._told) > _CHALLENGES:
+            del self._told[next(iter(self._told))]
+
+    def __len__(self) -> int:
+        return len(self._told)
 
 
 class Session:
     """One challenge of a unit and one nonce of the receiver."""
 
-    def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float) -> None:
-        self.hello, self.nonce, self.asked = hello, nonce, now
+    def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float, place: int) -> None:
+        self.hello, self.nonce = hello, nonce
+        self.place = place
+        """Its place in the order in which the unit's sessions were offered."""
+        self.offered = self.asked = now
+        """When it was offered, and asked for last [s]."""
         self.mac = session_mac(key, hello.challenge, nonce)
         self.window = Window()
         self.number = 0
@@ -143,10 +190,12 @@ class Link:
         self._key, self._params, self._draw = Mac(key), params, draw
         self.live: Session | None = None
         self._pending: dict[bytes, Session] = {}
+        self._offers = 0
         self._answers, self._tries = Allowance(params.answers_per_s), Allowance(params.tries_per_s)
-        self._answered: dict[bytes, float] = {}
+        self._samples = Allowance(params.samples_per_s)
+        self._answered = Answered()
         self.beacon_due = math.inf
-        """When the live session's next beacon is to be sent [s]."""
+        """When the live session's next beacon is to be sent [s]; never while there is none."""
 
     @property
     def pending(self) -> int:
@@ -163,15 +212,25 @@ class Link:
         hello = decode_hello(datagram, self._key)
         if hello is None:
             return "tag"
-        self._spend(challenge, now)
-        session = self._pending.pop(hello.challenge, None)
+        session = self._pending.get(challenge) or self._offer(hello, now)
         if session is None:
-            session = Session(self._key, hello, self._draw(NONCE_SIZE), now)
+            return "too many hellos"
         session.asked = now
-        while len(self._pending) >= self._params.pending_most:
-            del self._pending[next(iter(self._pending))]
-        self._pending[hello.challenge] = session
+        self._answers.spend(now)
+        self._answered.add(challenge, now)
         return session.beacon(self._key, now)
+
+    def _offer(self, hello: Hello, now: float) -> Session | None:
+        """Offer a session, in the place of the oldest if there are enough; None if others go before."""
+        pending = self._pending
+        if len(pending) >= self._params.pending_most:
+            worn = next((challenge for challenge in pending if self._answered.worn(challenge)), None)
+            if worn is None and self._answered.worn(hello.challenge):
+                return None
+            del pending[next(iter(pending)) if worn is None else worn]
+        self._offers += 1
+        pending[hello.challenge] = Session(self._key, hello, self._draw(NONCE_SIZE), now, self._offers)
+        return pending[hello.challenge]
 
     def sample(self, datagram: memoryview, sequence: int, now: float) -> tuple[Session, Sample, int] | str:
         """Return the session of what looks like a sample, what it says, and how many it shows to be lost.
@@ -184,48 +243,60 @@ class Link:
         if self.live is not None and self.live.window.admits(sequence):
             sample = decode_sample(datagram, self.live.mac)
             if sample is not None:
+                if not self._samples.spend(now):
+                    return "too fast"
                 return self.live, sample, self.live.window.take(sequence)
             reason = "tag"
-        if self._pending:
-            if self._tries.refill(now) < 1.0:
-                return "too many samples"
-            self._tries.left -= 1.0
-        for challenge, session in self._pending.items():
+        if self._pending and not self._tries.spend(now):
+            return "too many samples"
+        for session in self._pending.values():
             sample = decode_sample(datagram, session.mac) if session.window.admits(sequence) else None
             if sample is not None:
-                del self._pending[challenge]
-                given_up = self.live.window.missing() if self.live else 0
-                self.live = session
-                self.beacon_due = max(session.sent.values()) + self._params.beacon_period_s
-                return session, sample, session.window.take(sequence) + given_up
+                return session, sample, session.window.take(sequence) + self._go_live(session, now)
             reason = "tag"
         return reason
 
-    def beacon(self, now: float) -> bytes | None:
-        """Return the live session's next beacon, to be sent at once, if there is a live one."""
+    def _go_live(self, session: Session, now: float) -> int:
+        """Let a session be the live one; return how many of the last one's samples never came.
+
+        The unit that took it no longer heeds what was offered before: a sample held back until now must not bring it
+        back.
+        """
+        given_up = self.live.window.missing() if self.live else 0
+        self.live = session
+        self._pending = {c: s for c, s in self._pending.items() if s.place > session.place}
+        self._answered.add(session.hello.challenge, now, _IN_VAIN)
+        self.beacon_due = session.sent[session.number] + self._params.beacon_period_s
+        return given_up
+
+    def beacon(self, now: float) -> bytes:
+        """Return the live session's next beacon, to be sent at once; without a live session there is none."""
         if self.live is None:
-            return None
+            raise RuntimeError("a unit without a session was to get a beacon")
         self.beacon_due = now + self._params.beacon_period_s
         return self.live.beacon(self._key, now)
 
+    def forget_offers(self) -> None:
+        """Take back what is offered."""
+        self._pending.clear()
+
     def expire(self, now: float) -> None:
         """Forget offers that were not taken."""
-        for challenge in [c for c, s in self._pending.items() if now - s.asked > self._params.pending_expiry_s]:
-            del self._pending[challenge]
+        if not self._pending:
+            return
+        expiry, longest = self._params.pending_expiry_s, self._params.pending_longest_s
+        for challenge, session in list(self._pending.items()):
+            if now - session.asked > expiry or now - session.offered > longest:
+                del self._pending[challenge]
 
     def _affordable(self, challenge: bytes, now: float) -> bool:
-        """Whether a challenge may have an answer: while answers are scarce, one a second.
+        """Whether a challenge may have an answer.
 
-        So recorded hellos, sent again and again, do not use up the answers that a unit needs.
+        While answers are scarce it gets one a second, and none after five that its unit did not take: so recorded
+        hellos, sent again and again, do not use up the answers that a unit needs.
         """
-        left = self._answers.refill(now)
-        if left < 0.5 * self._answers.rate:
-            return left >= 1.0 and now - self._answered.get(challenge, -math.inf) >= 1.0
-        return True
-
-    def _spend(self, challenge: bytes, now: float) -> None:
-        self._answers.left -= 1.0
-        self._answered.pop(challenge, None)
-        self._answered[challenge] = now
-        if len(self._answered) > 2 * self._answers.rate:
-            del self._answered[next(iter(self._answered))]
+        left = self._answers.left(now)
+        if left >= 0.5 * self._answers.rate:
+            return True
+        count, last = self._answered.told(challenge)
+        return left >= 1.0 - _ROUNDING_S and count < _IN_VAIN and now - last >= 1.0

@@ -8,7 +8,7 @@ memory between them has no name that could be left over.
 import os
 import signal
 from collections.abc import Callable, Sequence
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from multiprocessing.connection import Connection
 from typing import Self
 
@@ -20,6 +20,7 @@ from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver import keys_of
 from pretouch.hardware.receiver_process import Outlets, Traffic, serve
 from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch
+from pretouch.hardware.udp import demand_port
 from pretouch.types import RangeReadings, RangeStatus
 
 _START_S = 60.0
@@ -51,6 +52,10 @@ class NetworkSkin:
                 leaves the class as it is.
         """
         units = keys_of(ids, keys)
+        demand_port(host, port)
+        if current_process().daemon:
+            raise HardwareError("A daemonic process may start no receiver: make this one with daemon=False.")
+        self._owner = os.getpid()
         self._params = params or LinkParams()
         self._outlets = Outlets(tuple(ids), self._params.samples_most)
         none = np.full(len(units), int(RangeStatus.NONE))
@@ -61,7 +66,7 @@ class NetworkSkin:
         self._untaken = 0
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
-        arguments = (os.getpid(), units, (host, port), self._params, priority, self._outlets, theirs)
+        arguments = (self._owner, units, (host, port), self._params, priority, self._outlets, theirs)
         self._process = context.Process(target=serve, args=arguments, daemon=True)
         _start_without_interrupts(self._process.start)
         theirs.close()
@@ -74,7 +79,9 @@ class NetworkSkin:
 
     @property
     def alive(self) -> bool:
-        """Whether the receiver's process runs."""
+        """Whether the receiver's process runs; only the process that started it can tell."""
+        if os.getpid() != self._owner:
+            raise HardwareError(f"The receiver belongs to process {self._owner}: ask there whether it lives.")
         return self._process.is_alive()
 
     @property
@@ -89,7 +96,9 @@ class NetworkSkin:
         self.close()
 
     def close(self) -> None:
-        """End the receiver; what it received stays."""
+        """End the receiver; what it received stays. In a process forked from the one that started it, do nothing."""
+        if os.getpid() != self._owner:
+            return
         self._process.kill()
         self._process.join()
 

@@ -15,7 +15,7 @@ import numpy as np
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
-from pretouch.hardware.station import Address, Station
+from pretouch.hardware.station import NO_READING, Address, Station
 from pretouch.hardware.traffic import REASONS, ImuBatch, Received, UnitTraffic, imu_batch
 from pretouch.hardware.udp import attach_filter, bind
 from pretouch.hardware.wire import (
@@ -29,7 +29,7 @@ from pretouch.hardware.wire import (
     VERSION,
     Kind,
 )
-from pretouch.types import RangeReadings, RangeStatus
+from pretouch.types import RangeReadings
 
 _HEAD = struct.Struct("<4sHHI")
 """Magic, version and kind as one; number of the unit; and, of a sample, flags and sequence."""
@@ -44,6 +44,9 @@ _CHORES_S = 0.02
 """Time between two looks for beacons that are due [s]."""
 _CHECK_EVERY = 256
 """Datagrams after which a flood makes room for the beacons."""
+
+
+Deliver = Callable[[Received, memoryview], None]
 
 
 def keys_of(ids: Sequence[str], keys: Keys) -> tuple[UnitKey, ...]:
@@ -72,6 +75,7 @@ class SkinReceiver:
         clock: Callable[[], float] = time.monotonic,
         draw: Callable[[int], bytes] = secrets.token_bytes,
         params: LinkParams | None = None,
+        deliver: Deliver | None = None,
     ) -> None:
         """Listen.
 
@@ -83,10 +87,12 @@ class SkinReceiver:
             clock: gives the time [s] of all stamps.
             draw: gives so many random bytes.
             params: how units are treated.
+            deliver: is called with each accepted sample and its datagram, which changes afterwards; then none are kept
+                to be taken.
         """
         self._params = params or LinkParams()
         units = keys_of(ids, keys)
-        self.table = np.array([[-np.inf], [0.0], [float(RangeStatus.NONE)]]).repeat(len(units), axis=1)
+        self.table = np.array([NO_READING]).T.repeat(len(units), axis=1)
         """Stamps [s], distances [m] and statuses of the newest readings, (3, K); not to be written to."""
         self._stations = [Station(i, unit, self._params, draw, self.table[:, i]) for i, unit in enumerate(units)]
         self._by_number = {unit.number: station for unit, station in zip(units, self._stations, strict=True)}
@@ -101,6 +107,7 @@ class SkinReceiver:
         """Datagrams that the last call of `receive` took in, genuine or not."""
         self._samples: deque[Received] = deque(maxlen=self._params.samples_most)
         self._imu: deque[Received] = deque(maxlen=self._params.samples_most)
+        self._deliver = deliver
         self._clock, self._next_chores = clock, -np.inf
         self._buffer = bytearray(2048)
         self._view = memoryview(self._buffer)
@@ -154,6 +161,13 @@ class SkinReceiver:
                 return self._drain()[0]
             self._chores()
         return 0
+
+    def forget_times(self) -> None:
+        """Know no reading and no unit's clock until the next beacons are echoed: the host's clock stood still."""
+        now = self._clock()
+        for station in self._stations:
+            station.forget_time(now)
+        self._next_chores = now
 
     def readings(self) -> RangeReadings:
         """Return the newest reading of each unit, stamped with the earliest instant it can be of."""
@@ -213,7 +227,7 @@ class SkinReceiver:
         if station is None:
             return "unit"
         if head == _HELLO:
-            answer = station.hello(datagram, address, now)
+            answer = station.hello(datagram, now)
             if isinstance(answer, str):
                 return answer
             self._send(answer, address)
@@ -221,6 +235,9 @@ class SkinReceiver:
         received = station.sample(datagram, sequence, address, now)
         if isinstance(received, str):
             return received
+        if self._deliver is not None:
+            self._deliver(received, datagram)
+            return None
         self.untaken += len(self._samples) == self._samples.maxlen
         self._samples.append(received)
         if received.sample.imu_count:
@@ -234,9 +251,8 @@ class SkinReceiver:
             return
         self._next_chores = now + _CHORES_S
         for station in self._stations:
-            beacon = station.beacon(self._clock())
-            if beacon is not None and station.address is not None:
-                self._send(beacon, station.address)
+            if station.beacon_due(now) and station.address is not None:
+                self._send(station.beacon(self._clock()), station.address)
 
     def _send(self, beacon: bytes, address: Address) -> None:
         """Send, or count what cannot be sent: another beacon follows."""

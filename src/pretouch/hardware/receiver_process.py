@@ -5,10 +5,11 @@ import os
 import pickle
 import signal
 import struct
+import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from operator import attrgetter
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
@@ -17,7 +18,7 @@ from pretouch.hardware.mailbox import Mailbox
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.ring import Ring
 from pretouch.hardware.traffic import Received, UnitTraffic
-from pretouch.hardware.wire import SAMPLE, SAMPLE_MOST, Sample
+from pretouch.hardware.wire import PREFIX, SAMPLE, SAMPLE_MOST, TAG_SIZE, Sample
 
 _PAUSE_S = 0.008
 """Pause after each look at the socket [s]: what arrives meanwhile is taken in at once. Waking up for each sample would
@@ -29,10 +30,14 @@ _TELL_S = 0.5
 _WAIT_S = 0.05
 """Longest wait for a datagram [s]."""
 
-_RECORD = struct.Struct("<HHdddd")
-"""Index and number of the unit; arrival, stamp, offset, bound; then the sample as in `SAMPLE`, and its IMU data."""
-_RECORD_MOST = _RECORD.size + SAMPLE_MOST
-_FIELDS = attrgetter(*[name for name in Sample.__slots__ if name not in ("unit", "imu")])
+_SUSPENDED_S = 0.02
+"""Growth of the time spent suspended that counts [s]."""
+
+_RECORD = struct.Struct("<Hdddd")
+"""Index of the unit; arrival, stamp, offset, bound; then the datagram without its tag."""
+_SAMPLE_AT = _RECORD.size + PREFIX.size
+_IMU_AT = _SAMPLE_AT + SAMPLE.size
+_RECORD_MOST = _RECORD.size + SAMPLE_MOST - TAG_SIZE
 
 
 @dataclass(frozen=True)
@@ -58,10 +63,10 @@ class Outlets:
         """Give stamps, distances and statuses, (3, K) float64."""
         self._readings.write(table)
 
-    def put_samples(self, samples: list[Received]) -> None:
-        """Give samples."""
-        for sample in samples:
-            self._samples.write(_pack(sample))
+    def put_samples(self, records: list[bytes]) -> None:
+        """Give samples, as `packed` made them."""
+        for record in records:
+            self._samples.write(record)
 
     def put_traffic(self, traffic: Traffic) -> None:
         """Give what was counted."""
@@ -87,16 +92,43 @@ class Outlets:
         return pickle.loads(value) if number else None  # noqa: S301  our own process wrote it
 
 
-def _pack(received: Received) -> bytes:
-    sample = received.sample
-    head = _RECORD.pack(received.unit, sample.unit, received.arrival, received.stamp, received.offset, received.bound)
-    return head + SAMPLE.pack(*_FIELDS(sample)) + sample.imu
+def packed(received: Received, datagram: memoryview) -> bytes:
+    """Return a sample for the program that started the receiver: what the unit said is taken apart there."""
+    return (
+        _RECORD.pack(received.unit, received.arrival, received.stamp, received.offset, received.bound)
+        + datagram[:-TAG_SIZE]
+    )
 
 
 def _unpack(record: bytes) -> Received:
-    index, number, arrival, stamp, offset, bound = _RECORD.unpack_from(record)
-    fields = *SAMPLE.unpack_from(record, _RECORD.size), record[_RECORD.size + SAMPLE.size :]
+    index, arrival, stamp, offset, bound = _RECORD.unpack_from(record)
+    number = PREFIX.unpack_from(record, _RECORD.size)[3]
+    fields = *SAMPLE.unpack_from(record, _SAMPLE_AT), record[_IMU_AT:]
     return Received(index, arrival, stamp, offset, bound, Sample(number, *fields))
+
+
+def suspended() -> float:
+    """Return for how long the machine was suspended since it started, or a little less [s]; 0 where it cannot tell."""
+    if sys.platform != "linux":
+        return 0.0
+    whole = time.clock_gettime(time.CLOCK_BOOTTIME)
+    return whole - time.clock_gettime(time.CLOCK_MONOTONIC)
+
+
+class SuspendWatch:
+    """Notices that the machine was suspended: `time.monotonic` stood still, and what was measured before looks new."""
+
+    def __init__(self, suspended: Callable[[], float] = suspended) -> None:
+        """Count from now on what `suspended` tells, which may be too little at times but never too much [s]."""
+        self._suspended = suspended
+        self._most = max(suspended() for _ in range(3))
+
+    def noticed(self) -> bool:
+        """Return whether it was since the last call."""
+        known, told = self._most, self._suspended()
+        if told > known:
+            self._most = told
+        return told - known > _SUSPENDED_S
 
 
 def _go_first(priority: int | None) -> None:
@@ -109,6 +141,36 @@ def _go_first(priority: int | None) -> None:
             f"The receiver's process cannot have the real-time priority {priority} ({error}):"
             " raise the limit `rtprio` (docs/realtime.md), or leave the priority out."
         ) from None
+
+
+class Service:
+    """A receiver whose readings and samples go to outlets."""
+
+    def __init__(
+        self, units: tuple[UnitKey, ...], address: tuple[str, int], params: LinkParams, outlets: Outlets,
+        suspended: Callable[[], float] = suspended,
+    ) -> None:  # fmt: skip
+        """Listen; see `SkinReceiver` and `SuspendWatch`."""
+        self._records: list[bytes] = []
+        self.receiver = SkinReceiver(
+            [unit.id for unit in units], Keys(units), *address, params=params, deliver=self._keep
+        )
+        self._outlets, self._watch = outlets, SuspendWatch(suspended)
+
+    def turn(self) -> None:
+        """Wait for datagrams if none are there, and give away what they brought."""
+        accepted = self.receiver.receive(_WAIT_S)
+        if self._watch.noticed():
+            self.receiver.forget_times()
+            self._records.clear()
+        elif not accepted:
+            return
+        self._outlets.put_readings(self.receiver.table.tobytes())
+        self._outlets.put_samples(self._records)
+        self._records.clear()
+
+    def _keep(self, received: Received, datagram: memoryview) -> None:
+        self._records.append(packed(received, datagram))
 
 
 def serve(
@@ -125,20 +187,19 @@ def serve(
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     try:
         _go_first(priority)
-        receiver = SkinReceiver([unit.id for unit in units], Keys(units), *address, params=params)
+        service = Service(units, address, params, outlets)
     except HardwareError as error:
         started.send(str(error))
         return
     gc.collect()
     gc.freeze()
+    receiver = service.receiver
     with receiver:
         started.send((receiver.address, receiver.buffer_bytes, receiver.filtered))
         started.close()
         tell_at = -1.0
         while True:
-            if receiver.receive(_WAIT_S):
-                outlets.put_readings(receiver.table.tobytes())
-                outlets.put_samples(receiver.take_samples())
+            service.turn()
             now = time.monotonic()
             if now >= tell_at:
                 tell_at = now + _TELL_S

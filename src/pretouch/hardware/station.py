@@ -8,10 +8,14 @@ from pretouch.hardware.link import Link, LinkParams, Session
 from pretouch.hardware.stuck import StuckDetector
 from pretouch.hardware.traffic import Latency, Received, UnitTraffic
 from pretouch.hardware.unit_clock import UnitClock
-from pretouch.hardware.wire import LONGEST_US, Flag, Sample
+from pretouch.hardware.wire import Flag, Sample
 from pretouch.types import FloatArray, RangeStatus
 
 _RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
+NO_READING = (-math.inf, 0.0, float(RangeStatus.NONE))
+"""Stamp [s], distance [m] and status of a unit that has measured nothing."""
+_GREETING_S = 1.0
+"""Time without a hello after which a unit no longer asks for a session [s]; it would ask ten times in it."""
 
 Address = tuple[str, int]
 
@@ -33,21 +37,21 @@ class Station:
         self._stuck = StuckDetector(params.stuck_after_s)
         self._latency = Latency()
         self._session: Session | None = None
+        self._last_hello = -math.inf
         self._echoed = 0
         """Beacon whose echo was used last: the same one again tells nothing new."""
         self._trusted_from = 0
         """First beacon whose echo tells the time: those before were heard before the unit's clock jumped."""
 
-    def hello(self, datagram: memoryview, address: Address, now: float) -> bytes | str:
+    def hello(self, datagram: memoryview, now: float) -> bytes | str:
         """Return the answer to what looks like a hello, or why there is none."""
         answer = self._link.hello(datagram, now)
         if isinstance(answer, bytes):
             traffic = self.traffic
             traffic.hellos += 1
+            self._last_hello = now
             if traffic.state in ("never heard", "silent"):
                 traffic.state = "greeting"
-            if traffic.address is None:
-                traffic.address = address[:2]
         return answer
 
     def sample(self, datagram: memoryview, sequence: int, address: Address, now: float) -> Received | str:
@@ -71,34 +75,55 @@ class Station:
         stamp = self._take_reading(sample, now) if sample.flags & _RANGE_NEW else math.nan
         return Received(self._index, now, stamp, traffic.offset, traffic.bound, sample)
 
-    def beacon(self, now: float) -> bytes | None:
-        """Return the beacon that is due, to be sent to `address`; do what else time asks for."""
+    def beacon_due(self, now: float) -> bool:
+        """Return whether a beacon is to be sent to `address`; do what else time asks for."""
         traffic = self.traffic
-        if traffic.state == "live" and now - traffic.last_arrival > self._params.silent_after_s:
+        if (traffic.state == "live" and now - traffic.last_arrival > self._params.silent_after_s) or (
+            traffic.state == "greeting" and now - self._last_hello > _GREETING_S
+        ):
             traffic.state = "silent"
         self._link.expire(now)
-        return self._link.beacon(now) if now >= self._link.beacon_due else None
+        return now >= self._link.beacon_due
+
+    def beacon(self, now: float) -> bytes:
+        """Return the beacon that is due, to be sent at once."""
+        return self._link.beacon(now)
 
     def _begin(self, session: Session) -> None:
         """Another session is live."""
         traffic, before = self.traffic, self.traffic.sample
         traffic.sessions += 1
-        traffic.reboots += before is not None and session.hello.uptime_us < before.time_us
+        if before is not None and session.hello.uptime_us < before.time_us:
+            traffic.reboots += 1
+            self._stuck.forget_stream()
         traffic.firmware, traffic.reset = session.hello.firmware, session.hello.reset
         self._session, self._trusted_from, self._echoed = session, 0, 0
         self._clock.forget()
-        self._stuck.forget()
+
+    def forget_time(self, now: float) -> None:
+        """Know nothing of the unit's clock, and have no reading, until it echoes a beacon sent from an instant on."""
+        self._clock.forget()
+        self._link.forget_offers()
+        self._distrust_beacons(now)
+        traffic = self.traffic
+        traffic.offset, traffic.bound, traffic.last_reading_stamp = math.nan, math.inf, -math.inf
+        self._reading[:] = NO_READING
+
+    def _distrust_beacons(self, now: float) -> None:
+        """Take the time from no beacon that was sent already, and send another soon."""
+        if self._session is not None:
+            self._trusted_from = self._session.number + 1
+            self._link.beacon_due = now
 
     def _tell_time(self, session: Session, sample: Sample, now: float) -> None:
         """Renew offset, bound and latency."""
         clock, traffic = self._clock, self.traffic
         made, hold = 1e-6 * sample.time_us, sample.beacon_hold_us
         sent = None
-        if sample.beacon != self._echoed and sample.beacon >= self._trusted_from and hold < LONGEST_US:
+        if sample.beacon != self._echoed and sample.beacon >= self._trusted_from:
             sent, self._echoed = session.sent.get(sample.beacon), sample.beacon
         if not clock.heard(made, now, sent, 1e-6 * hold):
-            self._trusted_from = session.number + 1
-            self._link.beacon_due = now
+            self._distrust_beacons(now)
         traffic.clock_jumps = clock.jumps
         traffic.offset, traffic.bound = clock.offset, clock.bound
         if clock.known:
@@ -107,12 +132,15 @@ class Station:
 
     def _take_reading(self, sample: Sample, now: float) -> float:
         """Keep a reading if it is the newest; return its stamp, NaN if it cannot be told."""
-        traffic = self.traffic
-        traffic.stuck = self._stuck.heard(sample, now)
-        if not self._clock.known:
+        traffic, clock = self.traffic, self._clock
+        instant = 1e-6 * (sample.time_us - sample.range_age_us)
+        newest = instant > clock.last_reading
+        if newest:
+            traffic.stuck = self._stuck.heard(sample, now)
+        stamp = clock.stamp(instant)
+        if not clock.known:
             return math.nan
-        stamp = self._clock.earliest(1e-6 * (sample.time_us - sample.range_age_us))
-        if stamp > traffic.last_reading_stamp:
+        if newest and stamp > traffic.last_reading_stamp:
             traffic.last_reading_stamp = stamp
             self._reading[:] = stamp, 1e-3 * sample.range_mm, _STUCK if traffic.stuck else sample.range_status
         return stamp

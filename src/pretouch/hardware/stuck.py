@@ -16,18 +16,16 @@ class StuckDetector:
         """Call a unit stuck whose readings are alike for so long [s]."""
         self._after = after
         self.stuck = False
-        self.forget()
-
-    def forget(self) -> None:
-        """Begin anew, as after a reboot."""
-        self.stuck = False
-        self._stream = -1
         self._values: tuple[int, ...] = ()
-        self._streams, self._alikes = 0, 0
-        self._stream_since = self._values_since = math.inf
+        self._alikes, self._values_since = 0, math.inf
+        self.forget_stream()
+
+    def forget_stream(self) -> None:
+        """Let the count of measurements begin anew, as after a reboot; values that were alike still are."""
+        self._stream, self._streams, self._stream_since = -1, 0, math.inf
 
     def heard(self, sample: Sample, now: float) -> bool:
-        """Take in a sample that arrived at this instant [s]; return whether the unit is stuck."""
+        """Take in a sample newer than those before, that arrived at this instant [s]; return whether it is stuck."""
         if not sample.flags & _NEW:
             return self.stuck
         if sample.range_stream != self._stream:

@@ -10,7 +10,7 @@ from pretouch.hardware.wire import Reset, Sample, imu_values
 from pretouch.types import FloatArray
 
 UnitState = Literal["never heard", "greeting", "live", "silent"]
-"""Nothing genuine yet; hellos only; samples; samples no more."""
+"""Nothing genuine yet; hellos only; samples; neither any more."""
 
 REASONS = (
     "size",
@@ -20,12 +20,14 @@ REASONS = (
     "replayed",
     "no session",
     "too many samples",
+    "too fast",
     "too many hellos",
     "old hello",
 )
 """Why datagrams are thrown away: no size, or no magic, version and kind, of ours; a unit this skin lacks; a wrong tag;
 a sequence number seen already or long past; a sample of a unit without session, or more of them than are tried against
-the sessions on offer; more hellos than are answered; a hello of the very session that is live."""
+the sessions on offer; genuine samples at a rate no unit has; more hellos than are answered; a hello of the very session
+that is live."""
 
 
 @dataclass(slots=True)
@@ -52,7 +54,7 @@ class UnitTraffic:
     reset: int = Reset.UNKNOWN
     """Why it last began anew, by what it told then: a `Reset`."""
     address: tuple[str, int] | None = None
-    """Host and port of its last sample, or of its last hello before there is one."""
+    """Host and port of its last sample."""
     last_arrival: float = -math.inf
     """When its last sample arrived [s]."""
     last_reading_stamp: float = -math.inf
@@ -97,7 +99,8 @@ class ImuBatch:
     unit: int
     """Index in the skin."""
     stamp: FloatArray
-    """(M,) instants [s], the earliest they can have been; spaced by the nominal period."""
+    """(M,) instants [s]: the newest is the earliest it can have been; the others lie before it by the nominal period,
+    which a sensor keeps to some per cent."""
     acceleration: FloatArray
     """(M, 3) specific force [m/s^2]."""
     angular_velocity: FloatArray

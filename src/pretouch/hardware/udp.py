@@ -13,10 +13,15 @@ _SO_RCVBUFFORCE, _SO_ATTACH_FILTER = 33, 26
 """Of Linux."""
 
 
+def demand_port(host: str, port: int) -> None:
+    """Raise a HardwareError for what is no port."""
+    if type(port) is not int or not 0 <= port <= 0xFFFF:
+        raise HardwareError(f"There is no port {port!r} at {host}: choose one from 1 to 65535, or 0 for any.")
+
+
 def bind(host: str, port: int, buffer_bytes: int) -> socket.socket:
     """Open a socket that never blocks, at this address; one that cannot be had is a HardwareError."""
-    if not 0 <= port <= 0xFFFF:
-        raise HardwareError(f"There is no port {port} at {host}: choose one from 1 to 65535, or 0 for any.")
+    demand_port(host, port)
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host or None, port, type=socket.SOCK_DGRAM, flags=socket.AI_PASSIVE

@@ -12,6 +12,8 @@ from collections import deque
 
 TICK = 1e-6
 """Resolution of the unit's clock [s]: it shows an instant up to this much too early."""
+_MOST = 1024
+"""Bounds of each kind that are kept at most: a unit that sends a hundred a second fills its window with a thousand."""
 
 
 class UnitClock:
@@ -28,8 +30,8 @@ class UnitClock:
         """How often the bounds contradicted each other: the unit's clock jumped, or drifts more than it should."""
         self._drift, self._window = drift, window
         # (instant, bound as of instant 0): all loosen at one rate, so that their order never changes
-        self._lows: deque[tuple[float, float]] = deque()
-        self._highs: deque[tuple[float, float]] = deque()
+        self._lows: deque[tuple[float, float]] = deque(maxlen=_MOST)
+        self._highs: deque[tuple[float, float]] = deque(maxlen=_MOST)
         self._newest = -math.inf
         self.low = -math.inf
         """Least offset there can be, as of the newest sample [s]."""
@@ -37,6 +39,9 @@ class UnitClock:
         """Largest offset there can be, as of the newest sample [s]."""
         self.known = False
         """Whether both bounds are there."""
+        self.last_reading = -math.inf
+        """Instant of the newest reading that was stamped [s], unit's clock."""
+        self._last_stamp = -math.inf
 
     @property
     def offset(self) -> float:
@@ -81,6 +86,7 @@ class UnitClock:
         self._lows.clear()
         self._highs.clear()
         self._newest, self.low, self.high, self.known = -math.inf, -math.inf, math.inf, False
+        self.last_reading = self._last_stamp = -math.inf
 
     def earliest(self, instant: float) -> float:
         """Return the earliest host time that an instant of the unit, not after its newest sample, can be [s].
@@ -88,6 +94,22 @@ class UnitClock:
         -inf while that is not known.
         """
         return instant - TICK + self.low - self._drift * (self._newest - instant)
+
+    def stamp(self, instant: float) -> float:
+        """Return the earliest host time that a reading of an instant of the unit can be of [s]; -inf while not known.
+
+        Readings are stamped in their order: what was known of the newest one holds for those after it too, so that
+        bounds which grow worse hold none of them back.
+        """
+        stamp = self.earliest(instant)
+        if instant <= self.last_reading:
+            return stamp
+        if self._last_stamp > -math.inf:
+            by_the_last = self._last_stamp + (1.0 - self._drift) * (instant - self.last_reading)
+            # not later than it can be: the clock may have jumped by less than could be seen
+            stamp = min(max(stamp, by_the_last), instant + self.high)
+        self.last_reading, self._last_stamp = instant, stamp
+        return stamp
 
 
 def _insert(bounds: deque[tuple[float, float]], instant: float, bound: float) -> None:

@@ -28,7 +28,7 @@ KEY_SIZE = 32
 PREFIX = struct.Struct("<2sBBH")
 """Magic, version, kind, number of the unit."""
 HELLO = struct.Struct("<HBB8sQ")
-"""After the prefix: firmware version, cause of the last reset, 0, challenge, time since the reset [us]."""
+"""After the prefix: firmware version, cause of the last reset, 0, challenge, time since the unit began to serve [us]."""
 BEACON = struct.Struct("<HI8s")
 """After the prefix: 0, number of the beacon, nonce of the session."""
 SAMPLE = struct.Struct("<HIQIIHhHBBHIHHHHBBHII")
@@ -184,7 +184,7 @@ class Sample:
     sequence: int
     """Grows by 1 with each sample of a session, from 1."""
     time_us: int
-    """The unit's clock when the datagram was made: time since its reset [us]."""
+    """The unit's clock when the datagram was made: time since it began to serve [us]."""
     beacon: int
     """Number of the last beacon it heard."""
     beacon_hold_us: int
@@ -194,7 +194,7 @@ class Sample:
     temperature_cdeg: int
     """Temperature of its IMU [0.01 degrees C]; `NO_TEMPERATURE` if it cannot tell."""
     bus_errors: int
-    """Failed transfers on its bus since the reset; stays at 65535."""
+    """Failed transfers on its bus since the unit began to serve; stays at 65535."""
     range_stream: int
     """The range finder's own count of measurements, from 0 to 255 and then from 128 on again."""
     range_status: int
@@ -218,7 +218,7 @@ class Sample:
     imu_rate_hz: int
     """Nominal rate of the IMU [Hz]."""
     imu_index: int
-    """Number of the first IMU sample in this datagram since the reset; lost ones are counted, as far as known."""
+    """Number of the first IMU sample in this datagram since the unit began to serve; lost ones are counted, as far as known."""
     imu_age_us: int
     """From the newest IMU sample to `time_us` [us]."""
     imu: bytes = b""

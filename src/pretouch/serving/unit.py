@@ -25,12 +25,14 @@ from pretouch.sim.imu import ACCELERATION_LSB_MG, ANGULAR_RATE_LSB_MDPS, ImuPara
 from pretouch.sim.range_finder import RangeSample
 from pretouch.types import RangeStatus
 
-FIRMWARE = 0x0100
-"""Version that a simulated unit reports: 1.0."""
+FIRMWARE = 0x0001
+"""Version that a simulated unit reports: 0.1, that of `firmware/`."""
 FIFO_MOST = 682
 """IMU samples that the LSM6DS3's FIFO of 8 kB holds (data sheet)."""
 _RANGE_PERIOD_S = 0.02
 _ROUNDING_S = 1e-9
+_LAST = 0xFFFFFFFF
+"""Last sequence number of a session."""
 _BATTERY_MV, _TEMPERATURE_CDEG = 3900, 3100
 
 
@@ -161,7 +163,7 @@ class SimulatedUnit:
             self._next_reboot = next(self._reboots, np.inf)
         if now < self._up:
             return []
-        if self._session is not None and now - self._heard > self._params.silence_s:
+        if self._session is not None and (now - self._heard > self._params.silence_s or self._sequence == _LAST):
             self._leave()
             self._next_hello = now
         sample = self._cycle(now)

@@ -79,6 +79,16 @@ def a_session_ends_2_s_after_the_last_beacon_and_the_next_has_another_challenge(
     assert [s["sequence"] for s in receiver.samples] == [1]
 
 
+def a_session_ends_with_its_last_sequence_number():
+    _, clock, receiver, link = _live()
+    link._sequence = 0xFFFFFFFE
+    link.send(Sample(7), clock.ticks())
+    link.step(clock.ticks())
+    assert not link.live
+    assert len(receiver.hellos) == 2
+    assert receiver.hellos[0][3] != receiver.hellos[1][3]
+
+
 def beacons_keep_a_session_open():
     fake, clock, receiver, link = _live()
     for _ in range(20):
