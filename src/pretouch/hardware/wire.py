@@ -28,7 +28,7 @@ KEY_SIZE = 32
 PREFIX = struct.Struct("<2sBBH")
 """Magic, version, kind, number of the unit."""
 HELLO = struct.Struct("<HBB8sQ")
-"""After the prefix: firmware version, cause of the last reset, 0, challenge, time since the unit began to serve [us]."""
+"""After the prefix: firmware version, cause of the last reset, 0, challenge, time since it began to serve [us]."""
 BEACON = struct.Struct("<HI8s")
 """After the prefix: 0, number of the beacon, nonce of the session."""
 SAMPLE = struct.Struct("<HIQIIHhHBBHIHHHHBBHII")
@@ -218,7 +218,8 @@ class Sample:
     imu_rate_hz: int
     """Nominal rate of the IMU [Hz]."""
     imu_index: int
-    """Number of the first IMU sample in this datagram since the unit began to serve; lost ones are counted, as far as known."""
+    """Number of the first IMU sample in this datagram since the unit began to serve; lost ones are counted, as far as
+    known."""
     imu_age_us: int
     """From the newest IMU sample to `time_us` [us]."""
     imu: bytes = b""
