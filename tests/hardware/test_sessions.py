@@ -8,12 +8,6 @@ from pretouch.hardware.wire import Hello, Mac, Reset, decode_beacon
 from tests.hardware.fake_unit import KEYS, PLAIN, Bench, FakeUnit
 
 
-@pytest.fixture
-def bench():
-    with Bench() as made:
-        yield made
-
-
 def accepted(bench):
     return bench.receiver.units[0].accepted
 

@@ -1,0 +1,204 @@
+"""The receiver against what is not genuine, and against a genuine unit gone mad."""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.hardware.link import LinkParams
+from pretouch.hardware.wire import SAMPLE_LEAST, Hello, Mac, decode_beacon
+from tests.hardware.fake_unit import KEYS, PLAIN, Bench, FakeUnit
+
+
+def counters(bench):
+    return [(unit.accepted, unit.sessions, unit.last_arrival) for unit in bench.receiver.units]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"imu_count": 255},
+        {"imu_count": 1},
+        {"time_us": 2**64 - 1},
+        {"time_us": 0, "range_age_us": 2**32 - 1, "beacon_hold_us": 2**32 - 1, "imu_age_us": 2**32 - 1},
+        {"beacon": 2**32 - 1},
+        {"range_status": 254, "range_mm": 65535},
+    ],
+)
+def test_a_unit_gone_mad_harms_only_itself(bench, changes):
+    bench.join()
+    for _ in range(5):
+        bench.now += 0.02
+        bench.send(bench.units[0].sample(bench.now, **changes), bench.units[1].sample(bench.now))
+        bench.deliver()
+        bench.receiver.take_imu()
+        readings = bench.receiver.readings()
+        assert readings.stamp[0] <= bench.now
+        assert bench.now - readings.stamp[1] < 0.1
+
+
+def test_the_holder_of_a_key_costs_bounded_memory_and_time(bench):
+    bench.join()
+    unit, station = bench.units[0], bench.receiver._stations[0]
+    began, base, taken = bench.now, unit.us(bench.now), 0
+    for k in range(10_000):
+        bench.now += 0.001
+        taken += bench.send(unit.sample(bench.now, time_us=base, beacon=1 + k % 2, beacon_hold_us=400_000 - k))
+    assert taken <= 200 * (bench.now - began) + 201
+    assert bench.receiver.rejected["too fast"] == 10_000 - taken
+    assert len(station._clock._highs) <= 1024
+    assert len(station._clock._lows) <= 1024
+
+
+def test_twice_the_rate_of_a_unit_is_taken(bench):
+    bench.join()
+    for _ in range(500):
+        bench.now += 0.01
+        assert bench.send(bench.units[0].sample(bench.now)) == 1
+
+
+def test_each_flipped_bit_of_a_hello_makes_it_worthless(unfiltered):
+    hello = unfiltered.units[0].hello(unfiltered.now)
+    for bit in range(8 * len(hello)):
+        bad = bytearray(hello)
+        bad[bit // 8] ^= 1 << bit % 8
+        unfiltered.send(bytes(bad))
+    assert unfiltered.answers() == []
+    assert unfiltered.receiver.units[0].state == "never heard"
+    unfiltered.send(hello)
+    assert len(unfiltered.answers()) == 1
+
+
+def test_each_flipped_bit_of_a_sample_makes_it_worthless(unfiltered):
+    unfiltered.join()
+    before = counters(unfiltered)
+    sample = unfiltered.units[0].sample(unfiltered.now)
+    for bit in range(8 * len(sample)):
+        bad = bytearray(sample)
+        bad[bit // 8] ^= 1 << bit % 8
+        assert unfiltered.send(bytes(bad)) == 0
+    assert counters(unfiltered) == before
+    assert sum(unfiltered.receiver.rejected.values()) == 8 * len(sample)
+    assert unfiltered.send(sample) == 1
+
+
+def test_each_flipped_bit_of_a_beacon_makes_it_worthless(bench):
+    bench.send(bench.units[0].hello(bench.now))
+    [beacon] = bench.answers()
+    for bit in range(8 * len(beacon)):
+        bad = bytearray(beacon)
+        bad[bit // 8] ^= 1 << bit % 8
+        assert decode_beacon(bytes(bad), bench.units[0].mac, bench.units[0].challenge) is None
+    assert bench.units[0].hear(beacon, bench.now)
+
+
+@pytest.mark.parametrize("filtered", [False, True])
+def test_every_other_length_is_refused(filtered, monkeypatch):
+    if not filtered:
+        monkeypatch.setattr("pretouch.hardware.receiver.attach_filter", lambda _: False)
+    with Bench() as bench:
+        bench.join()
+        sample, hello = bench.units[0].sample(bench.now), bench.units[0].hello(bench.now)
+        for whole in (sample, hello):
+            for size in range(len(whole)):
+                assert bench.send(whole[:size]) == 0
+            for more in (1, 12, 300, 1990, 5000):
+                assert bench.send(whole + bytes(more)) == 0
+        assert bench.answers() == []
+        assert bench.send(sample) == 1
+
+
+def test_samples_without_any_imu_and_of_the_most_are_taken(bench):
+    bench.join()
+    for count in (0, 32):
+        assert bench.send(bench.units[0].sample(bench.now, imu_count=count, imu=bytes(12 * count))) == 1
+    assert len(bench.units[0].sample(bench.now, imu_count=0, imu=b"")) == SAMPLE_LEAST
+
+
+def test_other_versions_kinds_and_units_are_refused_by_reason(unfiltered):
+    unfiltered.join()
+    sample = bytearray(unfiltered.units[0].sample(unfiltered.now))
+    for place, number in ((0, 0), (2, 2), (3, 2), (3, 7)):
+        bad = bytearray(sample)
+        bad[place] = number
+        unfiltered.send(bytes(bad))
+    assert unfiltered.receiver.rejected["format"] == 4
+    stranger = FakeUnit(KEYS["unit 5"])
+    unfiltered.send(stranger.hello(unfiltered.now))
+    assert unfiltered.receiver.rejected["unit"] == 1
+    assert unfiltered.answers() == []
+
+
+def test_the_key_of_one_unit_is_worth_nothing_for_another(bench):
+    bench.join()
+    unit, other = bench.units
+    before = counters(bench)
+    bench.send(Hello(3, 0x0102, 1, b"fraudful", 1).encode(other.mac))
+    bench.send(replace(PLAIN, unit=3, sequence=99).encode(other.session))
+    bench.send(replace(PLAIN, unit=4, sequence=99).encode(unit.session))
+    assert counters(bench) == before
+    assert bench.receiver.rejected["tag"] == 3
+    assert bench.answers() == []
+
+
+def test_units_may_swap_addresses(bench):
+    bench.join()
+    bench.run(1.0)
+    with bench.new_socket() as elsewhere:
+        bench.now += 0.02
+        assert bench.send(bench.units[0].sample(bench.now), by=elsewhere) == 1
+        assert bench.receiver.units[0].address == elsewhere.getsockname()
+        bench.now += 0.6
+        bench.send(bench.units[0].sample(bench.now), by=elsewhere)
+        [beacon] = bench.answers(elsewhere)
+        assert bench.units[0].hear(beacon, bench.now)
+
+
+def test_a_flood_between_two_calls_keeps_a_call_short_and_loses_nothing_genuine(bench):
+    bench.join()
+    forged = replace(PLAIN, sequence=10**6).encode(Mac(bytes(32)))
+    replayed = bench.units[0].sample(bench.now)
+    assert bench.send(replayed) == 1
+    accepted, calls = 0, 0
+    for _ in range(20):
+        bench.now += 0.02
+        for datagram in (forged, replayed) * 1000:
+            bench.socket.sendto(datagram, bench.receiver.address)
+        accepted += bench.send(bench.units[0].sample(bench.now))
+        while bench.receiver.behind:
+            accepted += bench.receiver.receive()
+            calls += 1
+    assert accepted == 20
+    assert calls >= 20
+    assert bench.receiver.rejected["tag"] == bench.receiver.rejected["replayed"] == 20_000
+    assert bench.receiver.buffer_bytes > 0
+
+
+def test_a_flood_takes_no_memory(unfiltered):
+    unfiltered.join()
+    rng, unit = np.random.default_rng(0), unfiltered.units[0]
+    wrong = Mac(bytes(32))
+    hellos = [Hello(int(n), 0, 0, rng.bytes(8), 1).encode(wrong) for n in rng.integers(0, 65536, 300)]
+    recorded = [Hello(3, 0, 0, rng.bytes(8), 1).encode(unit.mac) for _ in range(300)]
+    samples = [replace(PLAIN, unit=int(n), sequence=9).encode(wrong) for n in rng.integers(0, 65536, 300)]
+    random = [rng.bytes(int(n)) for n in rng.integers(0, 600, 300)]
+    sockets = [unfiltered.new_socket() for _ in range(5)]
+
+    def flood() -> None:
+        for k in range(5):
+            unfiltered.send(*hellos, *recorded, *samples, *random, by=sockets[k])
+            unfiltered.now += 0.1
+
+    flood()
+    tracemalloc.start()
+    flood()
+    before = tracemalloc.get_traced_memory()[0]
+    for _ in range(20):
+        flood()
+    grown = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    for made in sockets:
+        made.close()
+    assert grown < 20_000
+    assert unfiltered.receiver._stations[0]._link.pending <= LinkParams().pending_most
