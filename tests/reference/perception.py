@@ -12,6 +12,10 @@ from pretouch.types import Obstacles, RangeReadings, RangeStatus
 from tests.reference.geometry import Posture, closest, first_hit
 
 RAYS = cone_rays(2)
+FAILURES = {
+    RangeStatus.HARDWARE: " (it reports a hardware failure)",
+    RangeStatus.STUCK: " (it repeats the same reading)",
+}
 A_TARGET = {RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED}
 TOO_NEAR = {RangeStatus.MIN_RANGE, RangeStatus.MIN_CLIPPED}
 NOTHING_NEAR = {RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED}
@@ -102,13 +106,14 @@ class Eyes:
         self.direction[k] = direction
         return point, np.linalg.norm(point - ee), on_body, body.link[c], direction, distance
 
-    def silence(self, now: float) -> tuple[float, str]:
+    def silence(self, now: float, status: np.ndarray) -> tuple[float, str]:
         """Factor on the speed for the unit that has been silent longest, and the names of those silent too long."""
         if not self.params.enabled or not self.heard:
             return 1.0, ""
         ages = [now - heard for heard in self.heard]
         from_, to = self.params.slow_after_s, self.params.silent_after_s
-        names = [name for name, age in zip(self.skin.ids, ages, strict=True) if age >= to]
+        units = zip(self.skin.ids, ages, status, strict=True)
+        names = [name + FAILURES.get(int(said), "") for name, age, said in units if age >= to]
         return min(1.0, max(0.0, (to - max(ages)) / (to - from_))), ", ".join(names)
 
 

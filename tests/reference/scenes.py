@@ -18,6 +18,9 @@ READY = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)
 QUICK = replace(PROFILES["paper"], threshold=ThresholdParams(window_samples=20))
 """The paper's profile with a window that is full sooner."""
 
+ODD = [s.value for s in RangeStatus if s is not RangeStatus.STUCK]
+"""Statuses of the sensor itself; what a receiver makes of its readings is in the scene of all statuses."""
+
 Span = tuple[int, int]
 """From a cycle on up to another."""
 
@@ -124,7 +127,7 @@ class World:
         new = (rng.random(count) < 0.6) & ~np.isin(np.arange(count), list(mute))
         low, high = scene.near
         distance = low + (high - low) * (0.5 + 0.5 * np.sin(self.phase + self.rate * self.time))
-        status = np.where(rng.random(count) < scene.odd, rng.choice([s.value for s in RangeStatus], count), 0)
+        status = np.where(rng.random(count) < scene.odd, rng.choice(ODD, count), 0)
         if scene.statuses:
             status = np.resize(scene.statuses, count)
         stamp = self.time - rng.uniform(0, 0.015, count)
@@ -227,7 +230,8 @@ SCENES = (
     Scene("dropout", SHORT, silent={(40, 62): (0,), (70, 145): (2, 3)}, cycles=160, near=(0.1, 0.6),
           pushes={(95, 99): (60.0, 0.0, 0.0)}, meets=(*YIELDS, "from hand_front, hand_back:")),
     Scene("statuses", AT_ONCE, 32, near=(0.3, 0.9), cycles=45, statuses=tuple(s.value for s in RangeStatus),
-          meets=("from unit_5, unit_8, unit_9, unit_12, unit_13, unit_19, unit_22,",)),
+          meets=("from unit_5 (it reports a hardware failure), unit_8, unit_9, unit_12,"
+                 " unit_13 (it repeats the same reading), unit_14, unit_20 (it reports",)),
     Scene("room", AT_ONCE, 32, near=(0.3, 1.6), cycles=35, fixtures=table),
     Scene("broken-units", QUICK, odd=0.7, change=dict.fromkeys((30, 31, 45, 60), broken_units), near=(0.1, 0.6)),
     Scene("no-wrench", QUICK, no_wrench=((35, 70),), near=(0.1, 0.6), meets=("no force estimate",),

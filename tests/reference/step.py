@@ -60,7 +60,7 @@ class ReferenceController:
         force = None if robot.wrench is None else robot.wrench[:3]
         limits, touched, armed = self.touch.feel(force, x, obstacles)
 
-        heard, silent = self.eyes.silence(now)
+        heard, silent = self.eyes.silence(now, inputs.readings.status)
         contact = self._decide(seen, silent, touched, armed, inputs.resume)
         scale = self.fading.factor(float(obstacles.ee_distance.min(initial=np.inf)), heard)
         reacting = self.behaviour.mode is Mode.REACT

@@ -13,6 +13,7 @@ from hashlib import sha256
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from threading import Thread
+from types import FrameType
 from typing import Any, Literal, cast, get_args
 
 from pretouch import __version__
@@ -225,12 +226,20 @@ def run_campaign(request: Request, out: Path, progress: Callable[[float], None])
 
 @contextmanager
 def _interrupt_held_back() -> Iterator[None]:
-    """Hold Ctrl-C back while processes start; they inherit that, so that it finds none of them half imported."""
+    """Hold Ctrl-C back while processes start; they inherit that, so that it finds none of them half imported.
+
+    Here it may come by another thread of a library, which this one's mask does not keep from calling the handler.
+    """
+    came: list[tuple[int, FrameType | None]] = []
+    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append((number, frame)))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+        if came and callable(handler):
+            handler(*came[0])
 
 
 @contextmanager
