@@ -39,7 +39,8 @@ test: setup
 	$(BIN)/pytest -n 2 -m "not slow"
 
 test-slow: setup
-	$(BIN)/pytest -n 2 -m slow
+	$(BIN)/pytest -n 2 -m "slow and not alone"
+	$(BIN)/pytest -n 0 -m alone
 
 lint: setup
 	$(BIN)/ruff check .

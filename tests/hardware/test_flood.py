@@ -12,6 +12,7 @@ _TRIES = 4
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.parametrize("kind", ["random", "forged", "replayed", "mixed"])
 def test_under_a_flood_less_than_a_hundredth_is_lost_and_nothing_is_20_ms_late(kind, monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parents[2] / "benchmarks")
