@@ -11,6 +11,10 @@ def test_the_driver_of_the_imu(unit_python: Run) -> None:
     run_all(unit_python, "lsm6ds3")
 
 
+def test_the_driver_of_an_imu_that_fails(unit_python: Run) -> None:
+    run_all(unit_python, "lsm6ds3_faults")
+
+
 def test_the_wire_reads_its_samples_and_its_scales(unit_python: Run) -> None:
     """The sensor at rest, z up, turning at 100 degrees a second about x; counts by the data sheet's sensitivities."""
     script = """

@@ -1,6 +1,6 @@
 """The driver of the range finder on a fake one. Runs in both interpreters."""
 
-from fake_bus import Bus, Clock, Refused
+from fake_bus import Bus, Clock, Refused, error_of
 from fake_vl53l1x import FakeVl53l1x
 from vl53l1x import LONG, SHORT, VL53L1X
 
@@ -24,14 +24,6 @@ def _readings(clock, sensor, seconds, poll_us=2_000):
             found.append((clock.now_us, sensor.stream))
         clock.advance(poll_us)
     return found
-
-
-def _error(action, *arguments, kind=OSError):
-    try:
-        action(*arguments)
-    except kind as error:
-        return error.args[0]
-    raise AssertionError("no error")
 
 
 def it_ranges_at_fifty_hertz_started_once():
@@ -58,7 +50,7 @@ def no_start_is_missed_whatever_its_clocks_are_off_by():
 
 def a_budget_of_20_ms_in_a_period_of_20_ms_is_refused():
     _, _, _, sensor = _made()
-    assert "a period of 20 ms" in _error(sensor.begin, SHORT, 20, 20, kind=ValueError)
+    assert "a period of 20 ms" in error_of(sensor.begin, SHORT, 20, 20, kind=ValueError)
     sensor.begin(SHORT, 20, 24)
     assert sensor.period_us == 24_000
 
@@ -68,7 +60,7 @@ def every_budget_is_kept_in_both_modes():
         for budget in (15, 20, 33, 50, 100, 200, 500):
             clock, _, device, sensor = _made()
             if mode == LONG and budget == 15:
-                assert "15 ms in short mode" in _error(sensor.begin, mode, budget, 40, kind=ValueError)
+                assert "15 ms in short mode" in error_of(sensor.begin, mode, budget, 40, kind=ValueError)
                 continue
             sensor.begin(mode, budget, budget + 10)
             assert 0.75 * budget < device.duration_us() / 1000 <= budget, (mode, budget, device.duration_us())
@@ -80,7 +72,7 @@ def every_budget_is_kept_in_both_modes():
 def an_unknown_budget_is_an_error():
     for budget in (0, 10, 21, 1000):
         _, _, _, sensor = _made()
-        assert "budgets are" in _error(sensor.begin, SHORT, budget, 2000, kind=ValueError)
+        assert "budgets are" in error_of(sensor.begin, SHORT, budget, 2000, kind=ValueError)
 
 
 def a_reading_has_the_values_of_the_registers():
@@ -147,21 +139,21 @@ def the_middle_of_a_measurement_is_half_a_budget_before_it_is_ready():
 
 def another_chip_is_an_error():
     _, _, _, sensor = _made(model=0xEEAA)
-    assert _error(sensor.begin) == 19
+    assert error_of(sensor.begin) == 19
 
 
 def no_device_is_an_error():
     _, _, device, sensor = _made()
     device.power_off()
-    assert _error(sensor.begin) == 19
+    assert error_of(sensor.begin) == 19
 
 
 def a_bus_held_down_is_an_error():
     _, bus, _, sensor = _made()
     sensor.begin()
     bus.stuck = True
-    assert _error(sensor.ready) == 110
-    assert _error(sensor.read) == 110
+    assert error_of(sensor.ready) == 110
+    assert error_of(sensor.read) == 110
     bus.stuck = False
     sensor.ready()
 
@@ -171,9 +163,9 @@ def a_failed_transfer_is_told_and_does_no_harm():
     sensor.begin()
     clock.advance(20_000)
     bus.fail_next(1)
-    assert _error(sensor.ready) == 19
+    assert error_of(sensor.ready) == 19
     bus.fail_next(1)
-    assert _error(sensor.read) == 19
+    assert error_of(sensor.read) == 19
     assert sensor.status == 255
     sensor.read()
     assert sensor.status == 0
@@ -183,9 +175,9 @@ def a_bus_that_fails_for_a_time_comes_back():
     clock, bus, _, sensor = _made()
     sensor.begin()
     bus.fail_for(30_000)
-    assert _error(sensor.ready) == 19
+    assert error_of(sensor.ready) == 19
     clock.advance(20_000)
-    assert _error(sensor.read) == 19
+    assert error_of(sensor.read) == 19
     clock.advance(20_000)
     sensor.read()
     assert sensor.status == 0
@@ -198,7 +190,7 @@ def a_transfer_that_breaks_off_does_no_harm():
     clock.advance(20_000)
     before = sensor.stream
     bus.break_next(1)
-    assert _error(sensor.read) == 110
+    assert error_of(sensor.read) == 110
     assert sensor.stream == before
     found = _readings(clock, sensor, 0.5)
     assert [stream for _, stream in found] == list(range(found[0][1], found[0][1] + len(found)))
@@ -237,19 +229,19 @@ def a_register_that_does_not_keep_its_value_is_an_error():
     _, _, device, sensor = _made()
     write = device._write_one
     device._write_one = lambda at, value: write(at, 1 if at == 0x6F else value)
-    assert _error(sensor.begin) == 5
+    assert error_of(sensor.begin) == 5
 
 
 def a_device_that_never_measures_is_an_error():
     _, _, device, sensor = _made()
     device._measure = lambda: None
-    assert _error(sensor.begin) == 110
+    assert error_of(sensor.begin) == 110
 
 
 def a_device_that_never_boots_is_an_error():
     clock, _, device, sensor = _made()
     device.read = lambda register, count: bytearray(count)
-    assert _error(sensor.begin) == 110
+    assert error_of(sensor.begin) == 110
     assert clock.now_us < 100_000
 
 
@@ -258,11 +250,11 @@ def lost_power_never_reads_as_a_range():
     sensor.begin()
     _readings(clock, sensor, 0.1)
     device.power_off()
-    assert _error(sensor.ready) == 19
+    assert error_of(sensor.ready) == 19
     clock.advance(50_000)
     device.power_on()
     clock.advance(50_000)
-    assert _error(sensor.read) == 5
+    assert error_of(sensor.read) == 5
     sensor.begin()
     assert len(_readings(clock, sensor, 0.5)) > 23
 
@@ -284,11 +276,11 @@ def a_data_line_that_is_held_never_reads_as_a_range():
     clock.advance(20_000)
     bus.held = lambda: 0xFF
     assert sensor.ready()
-    assert _error(sensor.read) == 5
-    assert _error(sensor.begin) == 19
+    assert error_of(sensor.read) == 5
+    assert error_of(sensor.begin) == 19
     bus.held = lambda: 0x00
     assert not sensor.ready()
-    assert _error(sensor.begin) == 110
+    assert error_of(sensor.begin) == 110
     assert sensor.status == 255
 
 
@@ -316,8 +308,8 @@ def the_fake_refuses_what_the_device_would_not_take():
         lambda: bus.writeto_mem(0x29, 0x89, b"\x00", addrsize=16),
         lambda: bus.writeto_mem(0x29, 0x87, b"\x40", addrsize=16),
     ):
-        assert _error(action, kind=Refused)
+        assert error_of(action, kind=Refused)
     sensor.begin()
-    assert _error(device.write, 0x5E, b"\x00", kind=Refused)
+    assert error_of(device.write, 0x5E, b"\x00", kind=Refused)
     sensor.stop()
     device.write(0x5E, b"\x00")

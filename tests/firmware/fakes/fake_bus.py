@@ -130,3 +130,12 @@ class Bus:
     def _failure(self, errno):
         self.failed += 1
         return OSError(errno)
+
+
+def error_of(action, *arguments, kind=OSError):
+    """Return what an error of an action says first; no error is one."""
+    try:
+        action(*arguments)
+    except kind as error:
+        return error.args[0]
+    raise AssertionError("no error")
