@@ -40,6 +40,8 @@ RATE, FLOOD = 50.0, 100_000.0
 """Samples a second of each unit; datagrams a second of a flood."""
 LONGEST_BURST_S = 0.005
 """A sender that had to wait makes up for no more than this [s]."""
+LONGEST_START_S = 30.0
+"""In this time all units must be heard, and processes end [s]."""
 IMU = secrets.token_bytes(9 * 12)
 Address = tuple[str, int]
 Stop = "multiprocessing.synchronize.Event"
@@ -88,11 +90,14 @@ def send_samples(keys: Keys, address: Address, stop: Stop) -> None:
         poll.register(handle, select.POLLIN)
     step, due = 1.0 / (RATE * len(units)), time.monotonic()
     for unit in cycle(units):
-        while (left := due - time.monotonic()) > 0:
-            for handle, _ in poll.poll(1e3 * left):
+        while True:
+            left = due - time.monotonic()
+            for handle, _ in poll.poll(max(1e3 * left, 0.0)):
                 by_handle[handle].listen()
+            if left <= 0:
+                break
         unit.speak()
-        due += step
+        due += step + max(-left - LONGEST_BURST_S, 0.0)
         if stop.is_set():
             return
 
@@ -112,15 +117,15 @@ def garbage(kind: str, keys: Keys) -> list[bytes]:
     return kinds[kind] if kind in kinds else [d for three in zip(random, forged, cycle(replayed)) for d in three]
 
 
-def flood(kind: str, keys: Keys, address: Address, stop: Stop, sent: "multiprocessing.Value") -> None:
-    """Send garbage at the rate of a flood, as evenly as a loop can; what it could not send in time it leaves out."""
+def flood(kind: str, rate: float, keys: Keys, address: Address, stop: Stop, sent: "multiprocessing.Value") -> None:
+    """Send garbage at that rate [1/s], as evenly as a loop can; what it could not send in time it leaves out."""
     datagrams, count = cycle(garbage(kind, keys)), 0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         out.connect(address)
         last = time.monotonic()
         while not stop.is_set():
             now = time.monotonic()
-            burst = int(min(now - last, LONGEST_BURST_S) * FLOOD)
+            burst = int(min(now - last, LONGEST_BURST_S) * rate)
             for _ in range(burst):
                 out.send(next(datagrams))
             count += burst
@@ -148,29 +153,47 @@ def on_cpu(pid: int) -> float:
     return int(Path(f"/proc/{pid}/schedstat").read_text().split()[0]) * 1e-9
 
 
-def measure(duration: float, keys: Keys, kind: str | None, priority: int | None) -> Outcome:
-    """Let all units send for so long [s], and flood the receiver with garbage of that kind."""
+def measure(duration: float, keys: Keys, kind: str | None, priority: int | None, rate: float = FLOOD) -> Outcome | None:
+    """Let all units send for so long [s], and flood the receiver with garbage of that kind, at that rate [1/s].
+
+    None if not all units were heard within `LONGEST_START_S`.
+    """
     context = multiprocessing.get_context("spawn")
     stop, sent = context.Event(), context.Value("q", 0)
     with NetworkSkin(tuple(keys), keys, priority=priority) as skin:
         others = [context.Process(target=send_samples, args=(keys, skin.address, stop), daemon=True)]
         if kind:
-            others.append(context.Process(target=flood, args=(kind, keys, skin.address, stop, sent), daemon=True))
+            others.append(context.Process(target=flood, args=(kind, rate, keys, skin.address, stop, sent), daemon=True))
         for process in others:
             process.start()
-        while any(unit.state != "live" for unit in skin.traffic().units) or (kind and not sent.value):
-            time.sleep(0.05)
-        time.sleep(1.0)
-        skin.take_samples()
-        spent, flooded, begin, received = on_cpu(skin.pid), sent.value, time.monotonic(), []
-        while time.monotonic() < begin + duration:
-            time.sleep(0.1)
-            received += skin.take_samples()
-        took = time.monotonic() - begin
-        cpu, flooded = (on_cpu(skin.pid) - spent) / took, (sent.value - flooded) / took
-        stop.set()
-        for process in others:
-            process.join()
+        try:
+            return _watch(skin, sent, duration) if _all_heard(skin, kind is None, sent) else None
+        finally:
+            stop.set()
+            for process in others:
+                process.join(LONGEST_START_S)
+                process.kill()
+
+
+def _all_heard(skin: NetworkSkin, calm: bool, sent: "multiprocessing.Value") -> bool:
+    """Wait for all units, and for the flood if there is one."""
+    until = time.monotonic() + LONGEST_START_S
+    while any(unit.state != "live" for unit in skin.traffic().units) or not (calm or sent.value):
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def _watch(skin: NetworkSkin, sent: "multiprocessing.Value", duration: float) -> Outcome:
+    time.sleep(1.0)
+    skin.take_samples()
+    spent, flooded, begin, received = on_cpu(skin.pid), sent.value, time.monotonic(), []
+    while time.monotonic() < begin + duration:
+        time.sleep(0.1)
+        received += skin.take_samples()
+    took = time.monotonic() - begin
+    cpu, flooded = (on_cpu(skin.pid) - spent) / took, (sent.value - flooded) / took
     return Outcome(cpu, len(received), _lost(received), _lateness(received), flooded)
 
 
@@ -197,6 +220,9 @@ def main() -> None:
     print(f"{os.cpu_count()} processors, load before of {os.getloadavg()[0]:.1f}", flush=True)
     for kind in (None, "random", "forged", "replayed", "mixed"):
         seen = measure(duration, keys, kind, priority)
+        if seen is None:
+            print(f"{kind or 'no flood':9s} not all units were heard within {LONGEST_START_S:g} s", flush=True)
+            continue
         each = f", {1e6 * seen.cpu * duration / seen.accepted:.1f} us a sample" if kind is None else ""
         late = 1e3 * np.percentile(seen.lateness, (50, 99, 100))
         print(
