@@ -10,7 +10,9 @@ from numba import njit
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-_NOT_COMPILED = ("cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording")
+_NOT_COMPILED = (
+    "cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording", "calibration", "traces.py"
+)  # fmt: skip
 
 
 def digest(folder: Path) -> str:
