@@ -111,7 +111,9 @@ class Imus:
         if self._drawn + most > len(self._draws):
             self._draws, self._drawn = self._rng.standard_normal((max(_DRAWS, most), 6)), 0
         dt, qvel = plant.params.period_s, self._qvel.copy()
-        self._qvel[:] = self._last_qvel  # the step has moved it on already
+        # MuJoCo's steps are semi-implicit: its velocities belong half a step before its positions and accelerations
+        self._qvel[:] = 0.5 * (self._last_qvel + qvel)
+        mujoco.mj_comVel(plant.mj_model, plant.mj_data)
         mujoco.mj_rnePostConstraint(plant.mj_model, plant.mj_data)
         self._qvel[:] = self._last_qvel = qvel
         taken = _take(
