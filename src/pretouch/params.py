@@ -25,6 +25,9 @@ class PerceptionParams(Checked):
     self_margin_m: NonNegative = 0.06
     """A reading is taken as the arm or a fixture from this much before its predicted return [m]: twice the
     VL53L1X ranging error of 25 mm, and 10 mm of pose error."""
+    spread_sigmas: NonNegative = 2.0
+    """Standard deviations of a unit's place by which what it shows counts as nearer, and as the arm or a fixture
+    earlier [1]: ours, about 95 % along one direction. It has no effect where the skin says no uncertainty."""
     slow_after_s: Positive = 0.1
     """Age of a unit's newest telling reading at which the arm begins to slow [s]."""
     silent_after_s: Positive = 0.3

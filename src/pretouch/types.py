@@ -114,7 +114,7 @@ class Obstacles:
     point: FloatArray
     """(K, 3) obstacle positions, eq. 1 [m]."""
     ee_distance: FloatArray
-    """(K,) distance from the end-effector origin [m] (eqs. 3, 11)."""
+    """(K,) distance from the end-effector origin, less the point's spread, at least 0 [m] (eqs. 3, 11)."""
     body_point: FloatArray
     """(K, 3) closest points on the surface of the body [m]."""
     link: IntArray
@@ -122,7 +122,7 @@ class Obstacles:
     direction: FloatArray
     """(K, 3) unit vectors from body to obstacle, defined in penetration too."""
     body_distance: FloatArray
-    """(K,) signed distance from the body's surface [m] (eqs. 5-7)."""
+    """(K,) signed distance from the body's surface, less the point's spread [m] (eqs. 5-7)."""
 
 
 @value

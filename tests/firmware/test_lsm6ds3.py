@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from pretouch.hardware.wire import ACCELERATION_LSB, ANGULAR_RATE_LSB, GRAVITY, imu_values
+from pretouch.hardware.wire import imu_values
+from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from tests.firmware.harness import Run
 from tests.firmware.together import run_all
 
@@ -40,5 +41,5 @@ for g, dps, one_g, turn in SCALES:
         code, data = line.split()
         acceleration, turn = imu_values(bytes.fromhex(data), int(code))
         assert len(turn) == 8
-        np.testing.assert_allclose(acceleration, [[0, 0, GRAVITY]] * 8, atol=max(ACCELERATION_LSB))
-        np.testing.assert_allclose(turn, [[np.deg2rad(100), 0, 0]] * 8, atol=max(ANGULAR_RATE_LSB))
+        np.testing.assert_allclose(acceleration, [[0, 0, STANDARD_GRAVITY]] * 8, atol=max(ACCELERATION_LSB.values()))
+        np.testing.assert_allclose(turn, [[np.deg2rad(100), 0, 0]] * 8, atol=max(ANGULAR_RATE_LSB.values()))

@@ -26,6 +26,7 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
     PerceptionParams: {
         "enabled": (True, True, True, False), "filter_views": (True, False), "persistence_s": (0.06, 0.005, 1.0),
         "self_margin_m": (0.06, 0.0, 1.0), "slow_after_s": (0.1, 0.02), "silent_after_s": (0.3, 0.101),
+        "spread_sigmas": (2.0, 0.0, 20.0),
     },
     TaskParams: {
         "speed_m_s": (0.3, 1e-3, 5.0), "acceleration_m_s2": (1.0, 1e-3, 100.0), "position_gain_1_s": (2.0, 0.0, 50.0),
@@ -98,12 +99,17 @@ def _drawn(rng: np.random.Generator, choices: dict[str, tuple[object, ...]], usu
 def any_skin(rng: np.random.Generator, model: RobotModel) -> Skin:
     """Draw the paper's skin where it fits, or 0, 1, 7 or 32 units on the surface of the arm.
 
-    They look outwards, anywhere, or inwards: then a reading may put its point on the axis of the unit's own link.
+    They look outwards, anywhere, or inwards: then a reading may put its point on the axis of the unit's own link. In
+    half of these skins the places of the units are uncertain, slightly or as much as a skin may say.
     """
     if rng.random() < 0.3 and model.description.name == "panda":
         return paper_skin(model)
     count = int(rng.choice([0, 1, 7, 7, 32]))
-    return Skin([_unit(rng, model, f"u{i}") for i in range(count)], model)
+    worst = np.array([(0.0, 0.0), (0.0, 0.0), (0.01, 0.05), (0.5, 1.5)])[rng.integers(4)]
+    units = [_unit(rng, model, f"u{i}") for i in range(count)]
+    sigmas = worst * rng.random((count, 2))
+    unsure = [replace(u, position_sigma=p, orientation_sigma=o) for u, (p, o) in zip(units, sigmas, strict=True)]
+    return Skin(unsure, model)
 
 
 def _unit(rng: np.random.Generator, model: RobotModel, name: str) -> SensorUnit:

@@ -39,8 +39,8 @@ class Touch:
         mean, sigma = statistics(self.samples)
         noise = np.array([min(s / p.sigma_max_n, 1.0) * p.f_std_n for s in sigma])  # eq. 10
         positive, negative = np.zeros(3), np.zeros(3)
-        for point in obstacles.point:
-            f_obs = self._obstacle_force(float(np.linalg.norm(point - ee)))
+        for k, point in enumerate(obstacles.point):
+            f_obs = self._obstacle_force(float(obstacles.ee_distance[k]))
             # of several on one side the nearest counts, which gives the largest force
             positive = np.where(point > ee, np.maximum(positive, f_obs), positive)
             negative = np.where(point < ee, np.maximum(negative, f_obs), negative)

@@ -78,8 +78,14 @@ class Eyes:
             self.heard[k] = stamp
         d = shown(distance, status)
         late = now - stamp > self.params.persistence_s
-        if not np.isnan(d) and not late and d < self._predicted(k, T, posture) - self.params.self_margin_m:
+        margin = self.params.self_margin_m + min(self._spread(k, d), self.params.self_margin_m)
+        if not np.isnan(d) and not late and d < self._predicted(k, T, posture) - margin:
             self.point[k], self.seen[k] = (T @ [0.0, 0.0, d, 1.0])[:3], stamp  # eq. 1
+
+    def _spread(self, k: int, distance: float) -> float:
+        """How far from its place a point may lie that unit k shows at a distance [m], by what is not known of it."""
+        unit = self.skin.units[k]
+        return self.params.spread_sigmas * float(np.hypot(unit.position_sigma, distance * unit.orientation_sigma))
 
     def _predicted(self, k: int, T: np.ndarray, posture: Posture) -> float:
         """Distance at which unit k would see another link or a fixture, over the rays of its cone."""
@@ -104,7 +110,8 @@ class Eyes:
         fallback = T[:3, 2] if last is None else last
         c, on_body, direction, distance = closest(point, *posture.ends(body), body.radius, fallback)
         self.direction[k] = direction
-        return point, np.linalg.norm(point - ee), on_body, body.link[c], direction, distance
+        u = self._spread(k, float(np.linalg.norm(point - T[:3, 3])))
+        return point, max(0.0, np.linalg.norm(point - ee) - u), on_body, body.link[c], direction, distance - u
 
     def silence(self, now: float, status: np.ndarray) -> tuple[float, str]:
         """Factor on the speed for the unit that has been silent longest, and the names of those silent too long."""

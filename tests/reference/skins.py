@@ -9,12 +9,20 @@ from pretouch.sensing.unit import SensorUnit
 HEIGHT = 0.008
 """Height of a unit above the surface it is on [m]."""
 
+MOST_UNSURE = (0.02, 0.1)
+"""Largest standard deviations of a unit's position [m] and orientation [rad]."""
+
+UNSURE = ((0.0, 0.0), (1.0, 0.0), (0.0, 0.0), (0.0, 1.0), (0.0, 0.0), (0.0, 0.0), (1.0, 1.0), (0.0, 0.0))
+"""What is uncertain of each unit, in turns: position, orientation."""
+
 
 def spread(model: RobotModel, count: int, seed: int) -> Skin:
     """Lay `count` units on the capsules that move, by the size of their sides, each looking straight out.
 
-    A unit that another capsule of its link would cover is laid anew. The turn about the beam is random.
+    A unit that another capsule of its link would cover is laid anew. The turn about the beam is random. Of
+    three units in eight the position, the orientation or both are uncertain.
     """
+    doubt = np.random.default_rng([seed, count])
     rng = np.random.default_rng(seed)
     body = model.body
     length = np.linalg.norm(body.b - body.a, axis=1)
@@ -37,7 +45,8 @@ def spread(model: RobotModel, count: int, seed: int) -> Skin:
         side /= np.linalg.norm(side)
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = np.column_stack([side, np.cross(out, side), out]), place
-        units.append(SensorUnit(f"unit_{len(units)}", model.links[body.link[c]], T))
+        sigmas = doubt.uniform(0.0, MOST_UNSURE) * UNSURE[len(units) % len(UNSURE)]
+        units.append(SensorUnit(f"unit_{len(units)}", model.links[body.link[c]], T, *sigmas))
     return Skin(units, model)
 
 

@@ -1,3 +1,5 @@
+import os
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,12 +54,23 @@ def test_units_keep_their_order(panda_model):
     np.testing.assert_array_equal(skin.T_link_sensor[:, 0, 3], [0, 0.2, 0])
 
 
+def test_a_skin_knows_how_uncertain_the_places_of_its_units_are(panda_model):
+    units = [replace(_unit("a"), position_sigma=0.01), replace(_unit("b"), orientation_sigma=0.02)]
+    skin = Skin(units, panda_model)
+    np.testing.assert_array_equal(skin.position_sigma, [0.01, 0.0])
+    np.testing.assert_array_equal(skin.orientation_sigma, [0.0, 0.02])
+    assert [Skin(some, panda_model).exact for some in (units, units[:1], units[1:])] == [False] * 3
+    assert Skin([_unit("a")], panda_model).exact
+
+
 def test_an_empty_skin_has_empty_arrays(panda_model):
     skin = Skin([], panda_model)
     assert len(skin) == 0
     assert skin.ids == ()
     assert skin.link.shape == (0,)
     assert skin.T_link_sensor.shape == (0, 4, 4)
+    assert skin.position_sigma.shape == skin.orientation_sigma.shape == (0,)
+    assert skin.exact
 
 
 def test_duplicate_ids_are_named(panda_model):
@@ -114,12 +127,16 @@ def test_the_paper_skin_looks_outwards_from_the_surface(panda_model, paper_skin)
     turns=st.lists(st.tuples(*[st.floats(-4, 4)] * 3), min_size=1, max_size=3),
     position=st.tuples(st.floats(0.2, 0.4), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)),
     names=st.lists(st.text(min_size=1, alphabet=PRINTABLE), min_size=3, max_size=3, unique=True),
+    sigmas=st.tuples(st.floats(0.0, 0.5), st.floats(0.0, 1.5)) | st.just((0.0, 0.0)),
 )
-def test_a_saved_skin_is_read_back(panda_model, tmp_path_factory, turns, position, names):
+def test_a_saved_skin_is_read_back(panda_model, tmp_path_factory, turns, position, names, sigmas):
     units = [
-        _unit(name, "panda_link6", position, Rotation.from_rotvec(turn).as_matrix())
+        replace(
+            _unit(name, "panda_link6", position, Rotation.from_rotvec(turn).as_matrix()),
+            position_sigma=sigmas[0], orientation_sigma=sigmas[1],
+        )
         for name, turn in zip(names, turns, strict=False)
-    ]
+    ]  # fmt: skip
     skin, path = Skin(units, panda_model), tmp_path_factory.mktemp("skin") / "skin.toml"
     save_skin(skin, path)
     back = load_skin(path, panda_model)
@@ -127,6 +144,62 @@ def test_a_saved_skin_is_read_back(panda_model, tmp_path_factory, turns, positio
     np.testing.assert_array_equal(back.link, skin.link)
     np.testing.assert_array_equal(back.T_link_sensor[:, :3, 3], skin.T_link_sensor[:, :3, 3])
     np.testing.assert_allclose(back.T_link_sensor, skin.T_link_sensor, atol=1e-14)
+    np.testing.assert_array_equal(back.position_sigma, skin.position_sigma)
+    np.testing.assert_array_equal(back.orientation_sigma, skin.orientation_sigma)
+
+
+def test_uncertainties_are_written_only_where_there_are_any(panda_model, tmp_path):
+    save_skin(Skin([_unit("a"), replace(_unit("b"), orientation_sigma=0.02)], panda_model), tmp_path / "skin.toml")
+    first, second = (tmp_path / "skin.toml").read_text().split("[[unit]]")[1:]
+    assert "sigma" not in first
+    assert "position_sigma_m" not in second
+    assert "orientation_sigma_rad = 0.02" in second
+
+
+def test_an_uncertainty_in_whole_numbers_is_taken(panda_model, tmp_path):
+    skin = load_skin(_file(tmp_path, _entry(position_sigma_m="0", orientation_sigma_rad="1")), panda_model)
+    assert (skin.units[0].position_sigma, skin.units[0].orientation_sigma) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("fails", ["write", "replace"])
+def test_a_skin_that_cannot_be_written_leaves_the_file_that_was_there(panda_model, tmp_path, monkeypatch, fails):
+    path = _file(tmp_path, "dear")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync" if fails == "write" else "replace", full)
+    with pytest.raises(SkinError, match=r"cannot be written to .*skin\.toml: No space left on device"):
+        save_skin(Skin([_unit("a")], panda_model), path)
+    assert path.read_text() == "dear"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_skin_replaces_what_a_link_leads_to_and_keeps_who_may_read_it(panda_model, tmp_path):
+    path, link = _file(tmp_path, "old"), tmp_path / "link.toml"
+    path.chmod(0o640)
+    link.symlink_to(path)
+    save_skin(Skin([_unit("a")], panda_model), link)
+    assert link.is_symlink()
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert load_skin(path, panda_model).ids == ("a",)
+
+
+def test_a_skin_goes_down_a_pipe_as_it_is(panda_model, tmp_path):
+    pipe, read = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: read.append(pipe.read_text()), daemon=True)
+    reader.start()
+    save_skin(Skin([_unit("a")], panda_model), pipe)
+    reader.join(30.0)
+    assert pipe.is_fifo()
+    assert load_skin(_file(tmp_path, read[0]), panda_model).ids == ("a",)
+
+
+@pytest.mark.parametrize(("place", "why"), [("nowhere/skin.toml", "No such file"), ("", "Is a directory")])
+def test_a_place_for_a_skin_that_cannot_be_is_named(panda_model, tmp_path, place, why):
+    with pytest.raises(SkinError, match=f"The skin cannot be written to .*{tmp_path.name}.*: {why}"):
+        save_skin(Skin([_unit("a")], panda_model), tmp_path / place)
 
 
 def test_a_quaternion_begins_with_w(panda_model, tmp_path):
@@ -171,6 +244,14 @@ def test_a_rounded_quaternion_is_taken(panda_model, tmp_path):
         ({"quaternion_wxyz": "[1, 0, 0, nan]"}, "give 4 finite numbers"),
         ({"quaternion_wxyz": "[0, 0, 0, 0]"}, "unit left: quaternion_wxyz has length 0.0000: it must be 1"),
         ({"quaternion_wxyz": "[1, 1, 0, 0]"}, "has length 1.4142: it must be 1"),
+        ({"position_sigma_m": "-0.001"}, "unit left: position_sigma_m is -0.001: give a standard deviation from 0 to"),
+        ({"position_sigma_m": "2.5"}, r"position_sigma_m is 2.5: give a standard deviation from 0 to 0\.5"),
+        ({"position_sigma_m": "nan"}, "position_sigma_m is nan: give a standard deviation"),
+        ({"position_sigma_m": '"0.1"'}, "position_sigma_m is '0.1': give a standard deviation"),
+        ({"orientation_sigma_rad": "5"}, r"orientation_sigma_rad is 5: give a standard deviation from 0 to 1\.571"),
+        ({"orientation_sigma_rad": "true"}, "orientation_sigma_rad is true: give a standard deviation"),
+        ({"orientation_sigma_rad": f"0x{'f' * 5000}"}, "orientation_sigma_rad is too long to show: give a standard"),
+        ({"orientation_sigma_deg": "1"}, "has the unknown key orientation_sigma_deg: use .*, orientation_sigma_rad"),
     ],
 )
 def test_what_is_wrong_with_a_unit_is_said_with_unit_and_file(panda_model, tmp_path, changes, message):

@@ -62,6 +62,22 @@ def test_absurd_numbers_are_refused_without_being_multiplied(rotation):
         SensorUnit("hand", "panda_hand", _pose(position=rotation[0]))
 
 
+def test_a_unit_is_taken_to_be_where_it_is_said_to_be():
+    unit = SensorUnit("hand", "panda_hand", np.eye(4))
+    assert (unit.position_sigma, unit.orientation_sigma) == (0.0, 0.0)
+    unsure = SensorUnit("hand", "panda_hand", np.eye(4), 0.5, np.float32(0.25))
+    assert (unsure.position_sigma, unsure.orientation_sigma) == (0.5, 0.25)
+    assert type(unsure.orientation_sigma) is float
+
+
+@pytest.mark.parametrize("sigma", [-1e-9, np.nan, np.inf, 3.0, True, "0.1", None])
+def test_an_uncertainty_that_is_none_is_refused_with_the_units_name(sigma):
+    with pytest.raises(SkinError, match=r"Unit hand: its position_sigma is .*: give .* deviation from 0 to 0\.5 m"):
+        SensorUnit("hand", "panda_hand", np.eye(4), position_sigma=sigma)
+    with pytest.raises(SkinError, match=r"Unit hand: its orientation_sigma is .*: give .* from 0 to 1\.571 rad"):
+        SensorUnit("hand", "panda_hand", np.eye(4), orientation_sigma=sigma)
+
+
 @pytest.mark.parametrize(("rings", "count"), [(0, 1), (1, 7), (2, 19), (3, 37)])
 def test_cone_rays_are_unit_vectors_from_axis_to_edge(rings, count):
     rays = cone_rays(rings)

@@ -22,7 +22,7 @@ from pretouch.hardware.wire import (
     session_mac,
 )
 from pretouch.serving.unit import FIFO_MOST, SimulatedUnit, UnitParams
-from pretouch.sim.imu import ACCELERATION_LSB_MG, ANGULAR_RATE_LSB_MDPS, ImuParams, ImuSample
+from pretouch.sim.imu import ImuParams, ImuSample
 from pretouch.sim.range_finder import RangeSample
 from pretouch.types import RangeStatus
 
@@ -269,15 +269,20 @@ def test_before_the_first_range_there_is_none(desk):
     assert all(s.range_status == RangeStatus.NONE and not s.flags for s in samples(on.pass_time(0.2), session))
 
 
-@pytest.mark.parametrize("acceleration_range", ACCELERATION_LSB_MG)
-@pytest.mark.parametrize("rate_range", ANGULAR_RATE_LSB_MDPS)
+MG = {2: 0.061, 4: 0.122, 8: 0.244, 16: 0.488}
+MDPS = {125: 4.375, 245: 8.75, 500: 17.5, 1000: 35.0, 2000: 70.0}
+"""One count by full scale, as the data sheet of the LSM6DS3 has it."""
+
+
+@pytest.mark.parametrize("acceleration_range", MG)
+@pytest.mark.parametrize("rate_range", MDPS)
 def test_counts_of_the_simulated_imu_mean_on_the_wire_what_they_meant(desk, acceleration_range, rate_range):
     on = desk(imu=ImuParams(acceleration_range_g=acceleration_range, angular_rate_range_dps=rate_range))
     session = on.open()
     on.unit.take_imu(ImuSample(0, on.now, np.array([100, -200, 300, 32767, -32768, 1])))
     sample = samples(on.pass_time(0.05), session)[0]
     acceleration, rate = imu_values(sample.imu, sample.imu_scale)
-    mg, mdps = ACCELERATION_LSB_MG[acceleration_range], ANGULAR_RATE_LSB_MDPS[rate_range]
+    mg, mdps = MG[acceleration_range], MDPS[rate_range]
     assert acceleration[0] == pytest.approx(np.array([32767, -32768, 1]) * mg * 9.80665e-3)
     assert rate[0] == pytest.approx(np.deg2rad(np.array([100, -200, 300]) * mdps * 1e-3))
     assert sample.imu_rate_hz == 416

@@ -17,6 +17,7 @@ from hmac import compare_digest
 
 import numpy as np
 
+from pretouch.sensing.imu_scale import counts_of
 from pretouch.types import FloatArray
 
 MAGIC = b"PT"
@@ -248,21 +249,11 @@ def decode_sample(datagram: bytes | memoryview, session: Mac) -> Sample | None:
     return sample if len(sample.imu) == sample.imu_count * IMU_SAMPLE.size else None
 
 
-GRAVITY = 9.80665
-"""Standard gravity [m/s^2]."""
-ACCELERATION_LSB = tuple(mg * 1e-3 * GRAVITY for mg in (0.061, 0.122, 0.244, 0.488))
-"""One count of the LSM6DS3's accelerometer at 2, 4, 8, 16 g [m/s^2] (data sheet, LA_So)."""
-ANGULAR_RATE_LSB = tuple(np.deg2rad(1e-3 * mdps) for mdps in (4.375, 8.75, 17.5, 35.0, 70.0))
-"""One count of its gyroscope at 125, 245, 500, 1000, 2000 degrees a second [rad/s] (data sheet, G_So)."""
-
-
 def imu_values(imu: bytes, scale: int) -> tuple[FloatArray, FloatArray]:
     """Return accelerations (M, 3) [m/s^2] and angular velocities (M, 3) [rad/s], sensor frame, of a sample's IMU data.
 
     Full scales there are not are a ValueError.
     """
-    acceleration_code, rate_code = scale & 3, scale >> 4 & 7
-    if rate_code >= len(ANGULAR_RATE_LSB):
-        raise ValueError(f"the gyroscope's full scale has the code {rate_code}: there are 0 to 4")
+    acceleration, angular_rate = counts_of(scale)
     counts = np.frombuffer(imu, dtype="<i2").reshape(-1, 6).astype(np.float64)
-    return counts[:, 3:] * ACCELERATION_LSB[acceleration_code], counts[:, :3] * ANGULAR_RATE_LSB[rate_code]
+    return counts[:, 3:] * acceleration, counts[:, :3] * angular_rate

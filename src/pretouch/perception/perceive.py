@@ -19,6 +19,7 @@ from pretouch.perception.obstacles import (
     tells_anything,
 )
 from pretouch.perception.scene_filter import RAYS, Fixtures, leave_out, leave_out_planes
+from pretouch.perception.spread import bring_nearer, widen
 from pretouch.perception.vectors import placed_ends, rotate
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
@@ -49,7 +50,11 @@ def perceive(
     now: float,
     params: PerceptionParams,
 ) -> tuple[Perception, TrackState]:
-    """Locate what the units see (eq. 1), leave out the arm and fixtures, and find the closest body points."""
+    """Locate what the units see (eq. 1), leave out the arm and fixtures, and find the closest body points.
+
+    Where the skin says how uncertain the places of its units are, distances are less by the points' spread, and the
+    arm and fixtures are expected earlier by it.
+    """
     if not params.enabled or len(skin) == 0:
         return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0), state
     arm, body, others, count = model.capsules, model.body, fixtures.capsules, len(skin)
@@ -63,6 +68,7 @@ def perceive(
         arm.link, arm.a, arm.b, arm.radius, body.link, body.a, body.b, body.radius,
         others.link, others.a, others.b, others.radius, fixtures.planes, RAYS,
         params.persistence_s, params.self_margin_m, params.filter_views,
+        0.0 if skin.exact else params.spread_sigmas, skin.position_sigma, skin.orientation_sigma,
         distance, indices, vectors, scalars,
     )  # fmt: skip
     obstacles = Obstacles(
@@ -82,6 +88,7 @@ def _perceive(
     body_link: IntArray, body_a: FloatArray, body_b: FloatArray, body_radius: FloatArray,
     other_link: IntArray, other_a: FloatArray, other_b: FloatArray, other_radius: FloatArray, planes: FloatArray,
     rays: FloatArray, persistence: float, margin: float, filter_views: bool,
+    sigmas: float, position_sigma: FloatArray, orientation_sigma: FloatArray,
     distance: FloatArray, indices: IntArray, vectors: FloatArray, scalars: FloatArray,
 ) -> tuple[int, float, float]:  # fmt: skip
     """Change the tracks (first line of arguments), write obstacles (last line).
@@ -104,6 +111,8 @@ def _perceive(
             arm_from, arm_to = placed_ends(arm_link, arm_a, arm_b, link_position, link_rotation)
             other_from, other_to = placed_ends(other_link, other_a, other_b, link_position, link_rotation)
             ends = distance + margin
+            if sigmas > 0:
+                widen(ends, sigmas, position_sigma, orientation_sigma, distance, margin)
             leave_out(shows, fresh, ends, position, rotation, unit_link, arm_link, arm_from, arm_to, arm_radius, rays)
             leave_out(
                 shows, fresh, ends, position, rotation, unit_link, other_link, other_from, other_to, other_radius, rays
@@ -131,6 +140,11 @@ def _perceive(
     body_from, body_to = placed_ends(body_link, body_a, body_b, link_position, link_rotation)
     closest(body_link, body_from, body_to, body_radius, near, body_point, link, direction, body_distance)
     distances(near, link_position[ee], ee_distance)
+    if sigmas > 0:
+        bring_nearer(
+            body_distance, ee_distance, near, unit, sigmas, position_sigma, orientation_sigma, unit_link, T_link_sensor,
+            link_position, link_rotation,
+        )  # fmt: skip
     nearest, oldest = np.inf, np.inf
     for m in range(found):
         nearest = min(nearest, ee_distance[m])

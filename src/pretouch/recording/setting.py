@@ -88,7 +88,8 @@ def encode_run(sequence: int, controller: Controller, about: Mapping[str, JSON])
     kind, numbers = _path_numbers(controller.path)
     return encoded(RUN, make(
         RUN, sequence, FORMAT, time.time(), as_json(versions()), as_json(dict(about)),
-        as_json(asdict(controller.profile)), as_json(_description(model.description)), _mjcf(model.description),
+        as_json(asdict(controller.profile)), as_json(_description(model.description) | _sigmas(skin)),
+        _mjcf(model.description),
         list(skin.ids),
         [unit.link for unit in skin.units], skin.T_link_sensor.reshape(-1).copy(),
         controller.fixtures.planes.reshape(-1).copy(), _flat(capsules.a), _flat(capsules.b), _flat(capsules.radius),
@@ -155,9 +156,18 @@ def _model(m: Any) -> RobotModel:
     return model
 
 
+_SIGMAS = "unit_sigma"
+
+
+def _sigmas(skin: Skin) -> dict[str, JSON]:
+    return {} if skin.exact else {_SIGMAS: [[unit.position_sigma, unit.orientation_sigma] for unit in skin.units]}
+
+
 def _skin(m: Any, model: RobotModel) -> Skin:
     poses = m.unit_pose.reshape(-1, 4, 4)
-    return Skin([SensorUnit(*unit) for unit in zip(m.unit_id, m.unit_link, poses, strict=True)], model)
+    sigmas = from_json(m.robot).get(_SIGMAS, [[0.0, 0.0]] * len(poses))
+    units = zip(m.unit_id, m.unit_link, poses, sigmas, strict=True)
+    return Skin([SensorUnit(name, link, pose, at, turn) for name, link, pose, (at, turn) in units], model)
 
 
 def _fixtures(m: Any) -> Fixtures:

@@ -1,5 +1,7 @@
 """A set of sensor units on one arm, and the TOML file that describes it."""
 
+import os
+import shutil
 import tomllib
 from collections.abc import Sequence
 from importlib.resources import files
@@ -12,7 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.errors import SkinError
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.unit import LARGEST_NUMBER, SensorUnit
+from pretouch.sensing.unit import (
+    LARGEST_NUMBER,
+    LARGEST_ORIENTATION_SIGMA,
+    LARGEST_POSITION_SIGMA,
+    SensorUnit,
+)
 from pretouch.types import FloatArray, IntArray
 
 _FAR = 0.5
@@ -44,6 +51,12 @@ class Skin:
         """(K,) index of the link each unit sits on."""
         self.T_link_sensor: FloatArray = np.array([u.T_link_sensor for u in self.units]).reshape(-1, 4, 4)
         """(K, 4, 4)."""
+        self.position_sigma: FloatArray = np.array([u.position_sigma for u in self.units], dtype=np.float64)
+        """(K,) standard deviation of each unit's position [m]."""
+        self.orientation_sigma: FloatArray = np.array([u.orientation_sigma for u in self.units], dtype=np.float64)
+        """(K,) standard deviation of each unit's orientation [rad]."""
+        self.exact = not (self.position_sigma.any() or self.orientation_sigma.any())
+        """Whether the place of every unit is taken as exact."""
 
     def __len__(self) -> int:
         return len(self.units)
@@ -93,17 +106,34 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
 
 
 def save_skin(skin: Skin, path: Path) -> None:
-    """Write a skin file that `load_skin` reads back to the same poses."""
-    entries = [
-        {
-            "id": unit.id,
-            "link": unit.link,
-            "position_m": [float(v) for v in unit.T_link_sensor[:3, 3]],
-            "quaternion_wxyz": _quaternion(unit.T_link_sensor[:3, :3]),
-        }
-        for unit in skin.units
-    ]
-    path.write_text(tomli_w.dumps({"unit": entries}), encoding="utf-8")
+    """Write a skin file that `load_skin` reads back to the same poses and uncertainties.
+
+    A file that is there is replaced whole or, with a SkinError, not at all. Where the path is a symbolic link, the file
+    it leads to is replaced.
+    """
+    try:
+        _replace(Path(os.path.realpath(path)), tomli_w.dumps({"unit": [_entry(unit) for unit in skin.units]}))
+    except OSError as error:
+        raise SkinError(f"The skin cannot be written to {path}: {error.strerror}.") from error
+
+
+def _replace(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all; into a device or pipe as it is."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        path.write_text(text, encoding="utf-8")
+        return
+    unfinished = path.with_name(f".skin.{os.getpid()}.tmp")
+    try:
+        with unfinished.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        if path.is_file():
+            shutil.copymode(path, unfinished)
+        os.replace(unfinished, path)
+    except BaseException:
+        unfinished.unlink(missing_ok=True)
+        raise
 
 
 def paper_skin(model: RobotModel) -> Skin:
@@ -120,16 +150,31 @@ def paper_skin(model: RobotModel) -> Skin:
     return load_skin(path, model)
 
 
+_KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad")
+
+
+def _entry(unit: SensorUnit) -> dict[str, Any]:
+    """Return the table of a unit in a skin file."""
+    entry = {
+        "id": unit.id,
+        "link": unit.link,
+        "position_m": [float(v) for v in unit.T_link_sensor[:3, 3]],
+        "quaternion_wxyz": _quaternion(unit.T_link_sensor[:3, :3]),
+    }
+    sigmas = {"position_sigma_m": unit.position_sigma, "orientation_sigma_rad": unit.orientation_sigma}
+    return entry | {key: sigma for key, sigma in sigmas.items() if sigma}
+
+
 def _unit_from(entry: Any) -> SensorUnit:
     if not isinstance(entry, dict):
         raise SkinError(f"A unit is {_shown(entry)}: write it as a [[unit]] table.")
     name = entry.get("id")
     if not isinstance(name, str) or not name.isprintable():
         raise SkinError(f"A unit has the id {_shown(name)}: give each [[unit]] an id in quotes, printable throughout.")
-    unknown = sorted(set(entry) - {"id", "link", "position_m", "quaternion_wxyz"})
+    unknown = sorted(set(entry) - set(_KEYS))
     if unknown:
         key = unknown[0] if unknown[0].isprintable() else repr(unknown[0])
-        raise SkinError(f"Unit {name} has the unknown key {key}: use id, link, position_m, quaternion_wxyz.")
+        raise SkinError(f"Unit {name} has the unknown key {key}: use {', '.join(_KEYS)}.")
     if not isinstance(entry.get("link"), str):
         raise SkinError(f"Unit {name} has the link {_shown(entry.get('link'))}: give the name of a link in quotes.")
     T = np.eye(4)
@@ -140,7 +185,9 @@ def _unit_from(entry: Any) -> SensorUnit:
             f"Unit {name}: quaternion_wxyz has length {np.linalg.norm(quaternion):.4f}: it must be 1 to be a rotation."
         )
     T[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
-    return SensorUnit(name, entry["link"], T)
+    position_sigma = _sigma(entry, "position_sigma_m", LARGEST_POSITION_SIGMA)
+    orientation_sigma = _sigma(entry, "orientation_sigma_rad", LARGEST_ORIENTATION_SIGMA)
+    return SensorUnit(name, entry["link"], T, position_sigma, orientation_sigma)
 
 
 def _numbers(entry: dict[str, Any], key: str, count: int, largest: float) -> FloatArray:
@@ -152,6 +199,15 @@ def _numbers(entry: dict[str, Any], key: str, count: int, largest: float) -> Flo
             f" give {count} finite numbers, none beyond {largest:g} or -{largest:g}."
         )
     return np.array(value, dtype=np.float64)
+
+
+def _sigma(entry: dict[str, Any], key: str, largest: float) -> float:
+    value = entry.get(key, 0.0)
+    if type(value) not in (int, float) or not 0 <= value <= largest:
+        raise SkinError(
+            f"Unit {entry['id']}: {key} is {_shown(value)}: give a standard deviation from 0 to {largest:.4g}."
+        )
+    return float(value)
 
 
 def _shown(value: Any) -> str:

@@ -19,6 +19,12 @@ MAX_DISTANCE = 4.0
 LARGEST_NUMBER = 1000.0
 """Largest number a pose may hold: any larger one is a mistake, and its square may not be finite."""
 
+LARGEST_POSITION_SIGMA = 0.5
+"""Largest standard deviation of a unit's position [m]: beyond it nothing is known of where on the arm it is."""
+
+LARGEST_ORIENTATION_SIGMA = np.pi / 2
+"""Largest standard deviation of a unit's orientation [rad]: beyond it nothing is known of where it looks."""
+
 
 @dataclass(frozen=True, eq=False)
 class SensorUnit:
@@ -31,6 +37,10 @@ class SensorUnit:
     link: str
     T_link_sensor: FloatArray
     """(4, 4) maps sensor coordinates to link coordinates [m]."""
+    position_sigma: float = 0.0
+    """Standard deviation of its position in the worst direction [m]; 0 takes it as exact."""
+    orientation_sigma: float = 0.0
+    """Standard deviation of its orientation about the worst axis [rad]; 0 takes it as exact."""
 
     def __post_init__(self) -> None:
         if not self.id:
@@ -51,6 +61,17 @@ class SensorUnit:
         frozen = T.copy()
         frozen.flags.writeable = False
         object.__setattr__(self, "T_link_sensor", frozen)
+        self._check_sigma("position_sigma", LARGEST_POSITION_SIGMA, "m")
+        self._check_sigma("orientation_sigma", LARGEST_ORIENTATION_SIGMA, "rad")
+
+    def _check_sigma(self, name: str, largest: float, si: str) -> None:
+        sigma = getattr(self, name)
+        number = isinstance(sigma, int | float | np.integer | np.floating) and not isinstance(sigma, bool)
+        if not number or not 0 <= sigma <= largest:
+            raise SkinError(
+                f"Unit {self.id}: its {name} is {sigma!r}: give a standard deviation from 0 to {largest:.4g} {si}."
+            )
+        object.__setattr__(self, name, float(sigma))
 
 
 def cone_rays(rings: int) -> FloatArray:

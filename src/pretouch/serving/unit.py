@@ -21,7 +21,8 @@ from pretouch.hardware.wire import (
     decode_beacon,
     session_mac,
 )
-from pretouch.sim.imu import ACCELERATION_LSB_MG, ANGULAR_RATE_LSB_MDPS, ImuParams, ImuSample
+from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB
+from pretouch.sim.imu import ImuParams, ImuSample
 from pretouch.sim.range_finder import RangeSample
 from pretouch.types import RangeStatus
 
@@ -230,5 +231,5 @@ def _field(value: float, units: float) -> int:
 
 def _scale(imu: ImuParams) -> int:
     """Full scales of an IMU as a sample has them."""
-    acceleration = list(ACCELERATION_LSB_MG).index(imu.acceleration_range_g)
-    return acceleration | list(ANGULAR_RATE_LSB_MDPS).index(imu.angular_rate_range_dps) << 4
+    acceleration = list(ACCELERATION_LSB).index(imu.acceleration_range_g)
+    return acceleration | list(ANGULAR_RATE_LSB).index(imu.angular_rate_range_dps) << 4

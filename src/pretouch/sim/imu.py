@@ -10,17 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled
+from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray, IntArray
 
-_GRAVITY = 9.80665
-ACCELERATION_LSB_MG = {2: 0.061, 4: 0.122, 8: 0.244, 16: 0.488}
-"""One count of the accelerometer [mg] by its full scale [g] (data sheet, LA_So)."""
-ANGULAR_RATE_LSB_MDPS = {125: 4.375, 245: 8.75, 500: 17.5, 1000: 35.0, 2000: 70.0}
-"""One count of the gyroscope [mdps] by its full scale [dps] (data sheet, G_So)."""
-
-_SI = np.repeat((np.deg2rad(1.0), _GRAVITY), 3)
+_SI = np.repeat((np.deg2rad(1.0), STANDARD_GRAVITY), 3)
 """(6,) degrees/s and g in SI units, gyroscope first."""
 _DRAWS = 2048
 """Samples whose noise is drawn at once."""
@@ -90,7 +85,7 @@ class Imus:
         self._rng, self._draws, self._drawn = rng, np.zeros((0, 6)), 0
         density = np.repeat((1e-3 * params.angular_rate_noise_mdps, 1e-6 * params.acceleration_noise_ug), 3) * _SI
         self._noise = density * np.sqrt(self.rate[:, None] / 2.0)
-        self._lsb = _lsb(params)
+        self._lsb = imu_counts(params)
         bandwidth = np.repeat((params.angular_rate_bandwidth_hz, params.acceleration_bandwidth_hz), 3)
         self._follow = 1.0 - np.exp(-2 * np.pi * bandwidth * dt)
         most = count * (int(dt * self.rate.max(initial=0.0)) + 2)
@@ -126,10 +121,10 @@ class Imus:
             self._send(ImuSample(int(self._unit[i]), float(self._time[i]), self._counts[i].copy()))
 
 
-def _lsb(params: ImuParams) -> FloatArray:
+def imu_counts(params: ImuParams) -> FloatArray:
     """One count (6,) of gyroscope [rad/s] and accelerometer [m/s^2]."""
-    rate = 1e-3 * ANGULAR_RATE_LSB_MDPS[params.angular_rate_range_dps]
-    return np.repeat((rate, 1e-3 * ACCELERATION_LSB_MG[params.acceleration_range_g]), 3) * _SI
+    rate = ANGULAR_RATE_LSB[params.angular_rate_range_dps]
+    return np.repeat((rate, ACCELERATION_LSB[params.acceleration_range_g]), 3)
 
 
 def _errors(params: ImuParams, count: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:

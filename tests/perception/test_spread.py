@@ -1,0 +1,130 @@
+"""Where a unit sits is uncertain: what it shows counts as nearer, and the arm in view is expected earlier."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.fuzz.invariants import same
+
+from pretouch.params import PerceptionParams
+from pretouch.perception.obstacles import track_init
+from pretouch.perception.perceive import perceive
+from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.perception.spread import spread
+from pretouch.robot.description import panda
+from pretouch.sensing.skin import Skin
+from pretouch.types import RangeReadings, RangeStatus
+
+FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
+PARAMS = PerceptionParams()
+READY = panda().q_ready
+
+
+def unsure(skin: Skin, model, position: float = 0.0, orientation: float = 0.0) -> Skin:
+    """The same skin, all its units placed that badly."""
+    return Skin([replace(u, position_sigma=position, orientation_sigma=orientation) for u in skin.units], model)
+
+
+def seen(model, skin: Skin, distances, params=PARAMS, q=READY, state=None, now=1.0, stamp=1.0):
+    """What perception makes of one reading of each unit."""
+    count = len(skin)
+    distance = np.broadcast_to(np.asarray(distances, dtype=np.float64), count).copy()
+    readings = RangeReadings(np.full(count, stamp), distance, np.full(count, int(RangeStatus.OK)))
+    state = track_init(count) if state is None else state
+    return perceive(state, model, skin, FLOOR, model.kinematics(q), readings, now, params)
+
+
+def test_the_spread_grows_with_the_distance_and_both_uncertainties():
+    # legs of 3 and 4 mm, twice
+    assert spread(2.0, 0.003, 0.01, 0.4) == pytest.approx(0.01, abs=1e-15)
+    assert spread(1.0, 0.003, 0.0, 4.0) == pytest.approx(0.003, abs=1e-15)
+    assert spread(2.0, 0.0, 0.0, 4.0) == 0.0
+
+
+@pytest.mark.parametrize("filter_views", [True, False])
+@given(distances=st.lists(st.floats(0.04, 1.0), min_size=7, max_size=7))
+def test_what_is_seen_counts_as_nearer_by_its_spread(panda_model, paper_skin, filter_views, distances):
+    skin, params = unsure(paper_skin, panda_model, 0.01, 0.05), replace(PARAMS, filter_views=filter_views)
+    near, _ = seen(panda_model, skin, distances, params)
+    exact, _ = seen(panda_model, paper_skin, distances, params)
+    both = np.isin(exact.obstacles.unit, near.obstacles.unit)
+    assert set(near.obstacles.unit) <= set(exact.obstacles.unit)
+    assert filter_views or both.all()
+    u = 2.0 * np.hypot(0.01, 0.05 * np.array(distances)[near.obstacles.unit])
+    for name in ("point", "body_point", "direction", "link"):
+        np.testing.assert_array_equal(getattr(near.obstacles, name), getattr(exact.obstacles, name)[both])
+    np.testing.assert_allclose(near.obstacles.body_distance, exact.obstacles.body_distance[both] - u, atol=1e-12)
+    ee_distance = np.maximum(exact.obstacles.ee_distance[both] - u, 0.0)
+    np.testing.assert_allclose(near.obstacles.ee_distance, ee_distance, atol=1e-12)
+    assert near.nearest == near.obstacles.ee_distance.min(initial=np.inf)
+
+
+@given(distances=st.lists(st.floats(0.0, 5.0) | st.just(np.nan), min_size=7, max_size=7))
+def test_no_bit_changes_where_nothing_is_uncertain(panda_model, paper_skin, distances):
+    usual = seen(panda_model, paper_skin, distances)
+    mixed = Skin([replace(paper_skin.units[0], position_sigma=0.02), *paper_skin.units[1:]], panda_model)
+    for other in (
+        seen(panda_model, paper_skin, distances, replace(PARAMS, spread_sigmas=9.0)),
+        seen(panda_model, unsure(paper_skin, panda_model, 0.5, 1.5), distances, replace(PARAMS, spread_sigmas=0.0)),
+    ):
+        assert same(usual, other)
+    rest, all_of = (s.obstacles.unit > 0 for s in (seen(panda_model, mixed, distances)[0], usual[0]))
+    for name in ("unit", "point", "direction", "body_distance", "ee_distance"):
+        of_mixed = getattr(seen(panda_model, mixed, distances)[0].obstacles, name)
+        np.testing.assert_array_equal(of_mixed[rest], getattr(usual[0].obstacles, name)[all_of])
+
+
+def test_a_distance_from_the_body_may_be_negative_that_from_the_hand_may_not(panda_model, paper_skin):
+    found, _ = seen(panda_model, unsure(paper_skin, panda_model, 0.5), 0.1, replace(PARAMS, filter_views=False))
+    assert (found.obstacles.body_distance < 0).all()
+    np.testing.assert_array_equal(found.obstacles.ee_distance, 0.0)
+    assert found.nearest == 0.0
+    np.testing.assert_allclose(np.linalg.norm(found.obstacles.direction, axis=1), 1.0, atol=1e-12)
+
+
+def test_a_kept_point_is_as_uncertain_as_it_is_now_far_from_its_unit(panda_model, paper_skin):
+    skin = unsure(paper_skin, panda_model, orientation=0.1)
+    first, state = seen(panda_model, skin, 0.3, replace(PARAMS, filter_views=False))
+    _, exact = seen(panda_model, paper_skin, 0.3, replace(PARAMS, filter_views=False))
+    q = READY + 0.3 * np.eye(7)[0]
+    late = {"params": replace(PARAMS, filter_views=False), "q": q, "now": 1.03}
+    kept, _ = seen(panda_model, skin, 0.3, state=state, **late)
+    plain, _ = seen(panda_model, paper_skin, 0.3, state=exact, **late)
+    kin = panda_model.kinematics(q)
+    place = [kin.position[m] + kin.rotation[m] @ T[:3, 3] for m, T in zip(skin.link, skin.T_link_sensor, strict=True)]
+    away = np.linalg.norm(kept.obstacles.point - place, axis=1)
+    assert np.ptp(away) > 0.1
+    np.testing.assert_array_equal(kept.obstacles.point, first.obstacles.point)
+    np.testing.assert_allclose(
+        kept.obstacles.body_distance, plain.obstacles.body_distance - 2.0 * 0.1 * away, atol=1e-12
+    )
+
+
+# The arm in view
+
+
+def first_shown(model, skin: Skin, params=PARAMS) -> float:
+    """From which distance on, coming from far, the hand's unit that sees the forearm shows something [m]."""
+    unit, distances = skin.ids.index("hand_back"), np.arange(0.36, 0.04, -0.0005)
+    return float(next(d for d in distances if unit in seen(model, skin, d, params)[0].obstacles.unit))
+
+
+def test_an_uncertain_unit_does_not_take_its_own_arm_for_an_obstacle(panda_model, paper_skin):
+    exact = first_shown(panda_model, paper_skin)
+    unsure_by_15_mm = first_shown(panda_model, unsure(paper_skin, panda_model, position=0.015))
+    assert exact == pytest.approx(0.354 - 0.06, abs=2e-3)
+    assert unsure_by_15_mm == pytest.approx(exact - 2 * 0.015, abs=1.1e-3)
+    # d + 0.06 + 2 * 0.05 d = 0.354
+    turned = first_shown(panda_model, unsure(paper_skin, panda_model, orientation=0.05))
+    assert turned == pytest.approx((0.354 - 0.06) / 1.1, abs=2e-3)
+
+
+@pytest.mark.parametrize("sigmas", [(0.5, 0.0), (0.0, np.pi / 2), (0.5, np.pi / 2)])
+def test_however_uncertain_the_margin_at_most_doubles(panda_model, paper_skin, sigmas):
+    worst = first_shown(panda_model, unsure(paper_skin, panda_model, *sigmas))
+    assert worst == pytest.approx(0.354 - 2 * 0.06, abs=2e-3)
+    bare = replace(PARAMS, self_margin_m=0.0)
+    worst_of_none = first_shown(panda_model, unsure(paper_skin, panda_model, *sigmas), bare)
+    assert worst_of_none == first_shown(panda_model, paper_skin, bare)
