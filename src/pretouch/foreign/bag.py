@@ -25,7 +25,7 @@ _CLOCKS_APART_S = 5.0
 """How far header stamps may drift from the times of recording [s] before they are not believed."""
 
 
-class _Topic:
+class Topic:
     """What was read of one topic."""
 
     def __init__(self, name: str, width: int, row: Callable[[Any], Row | None]) -> None:
@@ -35,6 +35,7 @@ class _Topic:
         self._values = array("d")
 
     def add(self, time: int, message: Any) -> None:
+        """Take in a message that was recorded at a time [ns]."""
         row = self._row(message)
         if row is not None:
             self.frame = self.frame or message.header.frame_id
@@ -43,22 +44,23 @@ class _Topic:
             self._values.extend(row)
 
     def series(self, headers: bool) -> Series:
+        """Return what was read, at the headers' stamps or else at the times of recording."""
         stamps = np.array(self.header if headers else self.logged, dtype=np.int64)
         return Series(stamps, np.array(self._values, dtype=np.float64).reshape(-1, self._width))
 
 
 def read_bag(place: Path, choice: Choice) -> Source:
     """Read a bag or MCAP file. RecordingError for what cannot be read, and for topics that are not clear."""
-    with _read_errors_said(place):
+    with read_errors_said(place):
         reader = AnyReader([place], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         reader.open()
     try:
         wanted, arm = _wanted(place, reader, choice), _Arm()
-        force = _Topic(wanted[WRENCH][0].topic, 6, _wrench)
-        joints = _Topic(wanted[JOINTS][0].topic, 7, arm.positions) if wanted[JOINTS] else None
-        ranges = [_Topic(name, 2, _range) for name in sorted({c.topic for c in wanted[RANGE]})]
+        force = Topic(wanted[WRENCH][0].topic, 6, _wrench)
+        joints = Topic(wanted[JOINTS][0].topic, 7, arm.positions) if wanted[JOINTS] else None
+        ranges = [Topic(name, 2, _range) for name in sorted({c.topic for c in wanted[RANGE]})]
         topics = [force, *([joints] if joints else []), *ranges]
-        _fill(place, reader, [c for connections in wanted.values() for c in connections], topics)
+        fill(place, reader, [c for connections in wanted.values() for c in connections], topics)
     finally:
         reader.close()
     if joints and not joints.logged:
@@ -66,7 +68,7 @@ def read_bag(place: Path, choice: Choice) -> Source:
             f"{joints.name} of {place} names the joints {arm.seen()}: this needs those of a Panda or FR3, joint1 to"
             " joint7."
         )
-    headers, notes = _believed(topics)
+    headers, notes = believed(topics)
     return Source(
         f"the topic {force.name}",
         force.series(headers),
@@ -79,7 +81,7 @@ def read_bag(place: Path, choice: Choice) -> Source:
 
 
 @contextmanager
-def _read_errors_said(place: Path) -> Iterator[None]:
+def read_errors_said(place: Path) -> Iterator[None]:
     """Say in a sentence what rosbags finds wrong: it meets broken files with exceptions of any kind."""
     try:
         yield
@@ -97,15 +99,16 @@ def _read_errors_said(place: Path) -> Iterator[None]:
 def _wanted(place: Path, reader: AnyReader, choice: Choice) -> dict[str, list[Any]]:
     """Connections to read, by type: one topic of forces, one of joints if needed, all ranges if wanted."""
     there = [c for c in reader.connections if c.msgcount]
-    wanted = {WRENCH: _one_topic(place, there, WRENCH, "--wrench", choice.wrench)}
-    wanted[JOINTS] = _one_topic(place, there, JOINTS, "--joints", choice.joints) if choice.posture else []
+    wanted = {WRENCH: one_topic(place, there, WRENCH, "--wrench", choice.wrench)}
+    wanted[JOINTS] = one_topic(place, there, JOINTS, "--joints", choice.joints) if choice.posture else []
     wanted[RANGE] = [c for c in there if c.msgtype == RANGE] if choice.ranges else []
     if choice.ranges and not wanted[RANGE]:
         raise RecordingError(f"{place} has no topic of sensor_msgs/Range: leave out --skin.")
     return wanted
 
 
-def _one_topic(place: Path, there: list[Any], kind: str, option: str, named: str) -> list[Any]:
+def one_topic(place: Path, there: list[Any], kind: str, option: str, named: str) -> list[Any]:
+    """Connections of the one topic of a type, or of the one that is named. RecordingError if that is not clear."""
     topics = sorted({c.topic for c in there if c.msgtype == kind})
     short = kind.replace("/msg/", "/")
     if not topics and any(c.msgtype == UNIT_SAMPLE for c in there):
@@ -121,14 +124,15 @@ def _one_topic(place: Path, there: list[Any], kind: str, option: str, named: str
     return [c for c in there if c.msgtype == kind and c.topic == chosen]
 
 
-def _fill(place: Path, reader: AnyReader, connections: list[Any], topics: list[_Topic]) -> None:
+def fill(place: Path, reader: AnyReader, connections: list[Any], topics: list[Topic]) -> None:
+    """Read the messages of connections into their topics."""
     by_name = {topic.name: topic for topic in topics}
-    with _read_errors_said(place):
+    with read_errors_said(place):
         for connection, time, raw in reader.messages(connections):
             by_name[connection.topic].add(time, reader.deserialize(raw, connection.msgtype))
 
 
-def _believed(topics: list[_Topic]) -> tuple[bool, tuple[str, ...]]:
+def believed(topics: list[Topic]) -> tuple[bool, tuple[str, ...]]:
     """Whether the headers' stamps can be believed, or else the times of recording are to be used, and why."""
     logged = np.concatenate([np.array(topic.logged, dtype=np.int64) for topic in topics])
     header = np.concatenate([np.array(topic.header, dtype=np.int64) for topic in topics])

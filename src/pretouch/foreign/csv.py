@@ -13,7 +13,7 @@ from pretouch.errors import RecordingError
 from pretouch.foreign.source import Choice, Series, Source
 from pretouch.types import FloatArray, IntArray
 
-_UNITS = {
+UNITS = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
     "force": {"n": 1.0, "kn": 1e3},
     "torque": {"nm": 1.0, "knm": 1e3},
@@ -37,7 +37,7 @@ def read_csv(place: Path, choice: Choice) -> Source:
         raise RecordingError(f"{place} is a CSV file and has no topics: leave out --wrench and --joints.")
     if choice.ranges:
         raise RecordingError(f"{place} is a CSV file, which tells no ranges: leave out --skin, or give a bag.")
-    rows = _rows(place)
+    rows = read_rows(place)
     header = next(rows, None)
     if header is None:
         raise RecordingError(
@@ -45,20 +45,20 @@ def read_csv(place: Path, choice: Choice) -> Source:
         )
     names = [name.strip().lstrip("#").strip() for name in header[1]]
     columns, factors = _columns(place, names)
-    table = _table(place, rows, names, list(columns.values())) * np.array([factors[key] for key in columns])
+    table = read_table(place, rows, names, list(columns.values())) * np.array([factors[key] for key in columns])
     at = {key: i for i, key in enumerate(columns)}
-    time, notes = _time(place, table[:, at["time"]])
+    time, notes = relative_time(place, table[:, at["time"]])
     kept = np.isfinite(table[:, at["time"]])
     force = table[np.ix_(kept, [at[key] for key in columns if key.startswith(("force", "torque"))])]
     angles = [at[key] for key in columns if key.startswith("q")]
     joints = Series(time, table[np.ix_(kept, angles)]) if angles and choice.posture else None
     unused = [name for name in names if _key(name) is None]
     if unused:
-        notes.append(f"Columns that are not used: {_listed(unused)}.")
+        notes.append(f"Columns that are not used: {listed(unused)}.")
     return Source("the columns force_x, force_y, force_z", Series(time, force), "", joints, "auto", (), tuple(notes))
 
 
-def _rows(place: Path) -> Iterator[tuple[int, list[str]]]:
+def read_rows(place: Path) -> Iterator[tuple[int, list[str]]]:
     """Lines of the file that are not blank, with their numbers, split at the separator that the first one shows."""
     try:
         with place.open(encoding="utf-8-sig", newline="") as file:
@@ -98,17 +98,17 @@ def _columns(place: Path, names: list[str]) -> tuple[dict[str, int], dict[str, f
         if found is None:
             continue
         quantity, which, unit = found
-        if unit not in _UNITS[quantity]:
+        if unit not in UNITS[quantity]:
             what = f"the unit {unit!r}" if unit else "no unit"
             raise RecordingError(f"The column {name!r} of {place} has {what}: write {_SHOWN[quantity]}.")
         key = quantity + which if quantity == "q" else "_".join(filter(None, (quantity, which)))
         if key in columns:
             raise RecordingError(f"{place} has two columns for {key}, {names[columns[key]]!r} and {name!r}: keep one.")
-        columns[key], factors[key] = i, _UNITS[quantity][unit]
+        columns[key], factors[key] = i, UNITS[quantity][unit]
     for needed in ("time", "force_x", "force_y", "force_z"):
         if needed not in columns:
             shown = _SHOWN[needed[:-2] if "_" in needed else needed].replace("_x", needed[-2:])
-            raise RecordingError(f"{place} has no column {needed} (it has {_listed(names)}): add one named {shown}.")
+            raise RecordingError(f"{place} has no column {needed} (it has {listed(names)}): add one named {shown}.")
     order = [k for k in ("time", *(f"{q}_{a}" for q in ("force", "torque") for a in "xyz")) if k in columns]
     if sum(key.startswith("torque") for key in order) not in (0, 3):
         raise RecordingError(f"{place} has not all of torque_x, torque_y and torque_z: give all three, or none.")
@@ -116,11 +116,12 @@ def _columns(place: Path, names: list[str]) -> tuple[dict[str, int], dict[str, f
     return {key: columns[key] for key in order}, factors
 
 
-def _listed(names: list[str]) -> str:
+def listed(names: list[str]) -> str:
+    """Names of columns, as a part of a sentence."""
     return ", ".join(repr(name) for name in names[:8]) + (", ..." if len(names) > 8 else "")
 
 
-def _table(place: Path, rows: Iterator[tuple[int, list[str]]], names: list[str], wanted: list[int]) -> FloatArray:
+def read_table(place: Path, rows: Iterator[tuple[int, list[str]]], names: list[str], wanted: list[int]) -> FloatArray:
     """Numbers of the wanted columns (N, m), NaN where a cell is empty."""
     table = array("d")
     for line, cells in rows:
@@ -145,7 +146,7 @@ def _number(place: Path, line: int, names: list[str], cells: list[str], i: int) 
         raise RecordingError(f"{place}, line {line}: {names[i]} is {cell[:40]!r}: {hint}.") from None
 
 
-def _time(place: Path, seconds: FloatArray) -> tuple[IntArray, list[str]]:
+def relative_time(place: Path, seconds: FloatArray) -> tuple[IntArray, list[str]]:
     """Instants [ns] since the first, of the rows that have one, and what is to be said of the others."""
     known = seconds[np.isfinite(seconds)]
     if not len(known):

@@ -15,10 +15,10 @@ from pretouch.values import value
 
 POSTURE_GAP_S = 0.2
 """Time between two joint positions within which the posture is taken to move evenly [s]."""
-_OUT_OF_RANGE_RAD = 0.5
+OUT_OF_RANGE_RAD = 0.5
 """Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
-_BAGS = (".mcap", ".db3", ".bag")
-_TABLES = (".csv", ".tsv", ".txt")
+BAGS = (".mcap", ".db3", ".bag")
+TABLES = (".csv", ".tsv", ".txt")
 _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 
 
@@ -73,18 +73,18 @@ def _read(place: Path, choice: Choice) -> Source:
     if not os.path.exists(place):
         raise RecordingError(f"The recording {place} cannot be read: there is none.")
     ending = place.suffix.lower()
-    if place.is_dir() or ending in _BAGS:
+    if place.is_dir() or ending in BAGS:
         if place.is_dir() and not (place / "metadata.yaml").is_file():
             raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
         from pretouch.foreign.bag import read_bag
 
         return read_bag(place, choice)
-    if ending in _TABLES:
+    if ending in TABLES:
         from pretouch.foreign.csv import read_csv
 
         return read_csv(place, choice)
     raise RecordingError(
-        f"{place} has an ending that is none of {', '.join((*_BAGS, *_TABLES))}: give such a file or a bag's folder."
+        f"{place} has an ending that is none of {', '.join((*BAGS, *TABLES))}: give such a file or a bag's folder."
     )
 
 
@@ -98,7 +98,7 @@ def _model(place: Path, source: Source, choice: Choice) -> RobotModel:
         raise RecordingError(
             f"{place} has {given.shape[1]} joints, and {model.description.name} has {model.n}: choose another --arm."
         )
-    beyond = (given < model.q_min - _OUT_OF_RANGE_RAD) | (given > model.q_max + _OUT_OF_RANGE_RAD)
+    beyond = (given < model.q_min - OUT_OF_RANGE_RAD) | (given > model.q_max + OUT_OF_RANGE_RAD)
     if beyond.any():
         i, j = np.argwhere(beyond)[0]
         raise RecordingError(

@@ -10,10 +10,13 @@ import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
+from pretouch.recording.imu import ImuRows, no_imu
+from pretouch.recording.joints import JointRows
 from pretouch.recording.messages import TOPICS, decoded
 from pretouch.recording.reader import is_ours
 from pretouch.recording.skin_recording import UNIT_SAMPLE
-from pretouch.recording.standard import IMU
+from pretouch.recording.standard import IMU, JOINT_STATE
+from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
@@ -39,18 +42,6 @@ class RangeTrace:
     """(R,) standard deviation by the sensor's own estimate [m]."""
 
 
-@value
-class ImuTrace:
-    """What the IMU of one unit measured, by time. M samples, sensor frame."""
-
-    stamp: FloatArray
-    """(M,) [s]."""
-    acceleration: FloatArray
-    """(M, 3) [m/s^2]."""
-    angular_velocity: FloatArray
-    """(M, 3) [rad/s]."""
-
-
 @dataclass(frozen=True, eq=False)
 class UnitTrace:
     """All that one unit measured."""
@@ -67,6 +58,10 @@ class SkinTrace:
 
     units: dict[str, UnitTrace]
     """By name, in the order in which they were first heard."""
+    joints: JointTrace | None
+    """Where the arm's joints were, if that was recorded."""
+    joint_names: tuple[str, ...]
+    """Names of these joints, in the order of the columns."""
     complete: bool
     """Whether the recording was ended in order, and nothing in it is damaged."""
 
@@ -87,13 +82,16 @@ def read_skin(place: Path) -> SkinTrace:
     place = Path(place)
     contents = Contents()
     samples: dict[str, list[Any]] = {}
-    imu: dict[str, list[tuple[float, ...]]] = {}
+    imus, joints = ImuRows(), JointRows(place)
     try:
-        for kind, message in _messages(place, contents):
+        for kind, data in _messages(place, contents):
             if kind == UNIT_SAMPLE:
-                samples.setdefault(message.id, []).append(message)
+                sample = decoded(kind, data)
+                samples.setdefault(sample.id, []).append(sample)
+            elif kind == IMU:
+                imus.add(data)
             else:
-                imu.setdefault(message.header.frame_id, []).append(_imu_row(message))
+                joints.add_message(decoded(kind, data))
     except OSError as error:
         reason = "there is none" if isinstance(error, FileNotFoundError) else error.strerror
         raise RecordingError(f"The recording {place} cannot be read: {reason}.") from error
@@ -101,8 +99,9 @@ def read_skin(place: Path) -> SkinTrace:
         raise RecordingError(
             f"{place} holds no samples of sensor units: give a recording made by `pretouch skin monitor --record`."
         )
-    units = {unit: UnitTrace(_ranges(rows), _imu(imu.get(unit, [])), rows) for unit, rows in samples.items()}
-    return SkinTrace(units, contents.complete and not contents.damaged)
+    imu = imus.traces()
+    units = {unit: UnitTrace(_ranges(rows), imu.get(unit, no_imu()), rows) for unit, rows in samples.items()}
+    return SkinTrace(units, joints.trace(), joints.names, contents.complete and not contents.damaged)
 
 
 def holds_units(place: Path) -> bool:
@@ -116,18 +115,18 @@ def holds_units(place: Path) -> bool:
     return False
 
 
-def _messages(place: Path, contents: Contents) -> Iterator[tuple[str, Any]]:
-    """Yield type and message of all samples and IMU measurements in the whole chunks of a file."""
+def _messages(place: Path, contents: Contents) -> Iterator[tuple[str, bytes]]:
+    """Yield type and CDR of all messages to read in the whole chunks of a file."""
     with place.open("rb") as file:
         if not begins_as_mcap(file):
             raise RecordingError(f"{place} is no MCAP file: give a recording made by `pretouch skin monitor --record`.")
         for chunk in scan(file, contents):
-            kinds = {i: kind for i, (_, kind) in contents.topics().items() if kind in (UNIT_SAMPLE, IMU)}
+            kinds = {i: kind for i, (_, kind) in contents.topics().items() if kind in (UNIT_SAMPLE, IMU, JOINT_STATE)}
             _check(place, contents)
             for message in messages(chunk):
                 kind = kinds.get(message.channel)
                 if kind is not None:
-                    yield kind, decoded(kind, message.data)
+                    yield kind, message.data
 
 
 def _check(place: Path, contents: Contents) -> None:
@@ -149,13 +148,3 @@ def _ranges(samples: list[Any]) -> RangeTrace:
         status=np.array([s.range_status for s in fresh], dtype=np.int64),
         sigma=np.array([s.range_sigma for s in fresh], dtype=np.float64) / 4000,
     )
-
-
-def _imu_row(message: Any) -> tuple[float, ...]:
-    at, a, w = message.header.stamp, message.linear_acceleration, message.angular_velocity
-    return at.sec + at.nanosec / 1e9, a.x, a.y, a.z, w.x, w.y, w.z
-
-
-def _imu(rows: list[tuple[float, ...]]) -> ImuTrace:
-    table = np.array(sorted(rows), dtype=np.float64).reshape(-1, 7)
-    return ImuTrace(table[:, 0], table[:, 1:4], table[:, 4:])

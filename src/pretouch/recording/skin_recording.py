@@ -12,8 +12,9 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pretouch.recording.disk import Disk
+from pretouch.recording.joints import check_joints, joint_items
 from pretouch.recording.messages import PACKAGE, Item, encoded, make, plain_text, prepare, typestore
-from pretouch.recording.standard import IMU, RANGE, header, imu_items, nanoseconds, range_item, topic_name
+from pretouch.recording.standard import IMU, JOINT_STATE, RANGE, header, imu_items, nanoseconds, range_item, topic_name
 from pretouch.types import FloatArray
 
 UNIT_SAMPLE = f"{PACKAGE}/msg/UnitSample"
@@ -68,7 +69,7 @@ class SkinRecording:
         self.samples = 0
         """Datagrams that were kept."""
         self._time = 0
-        prepare((UNIT_SAMPLE, RANGE, IMU, DIAGNOSTICS))
+        prepare((UNIT_SAMPLE, RANGE, IMU, JOINT_STATE, DIAGNOSTICS))
         self._fields = [name for name, _ in typestore().get_msgdef(UNIT_SAMPLE).fields[_OURS:-1]]
         self._sentence = ""
         self._disk = Disk(self.place)
@@ -92,6 +93,16 @@ class SkinRecording:
         """Keep what a unit's IMU measured at instants (M,) [s]: (M, 3) [m/s^2], (M, 3) [rad/s], sensor frame."""
         if not self._sentence and not self.trouble:
             self._disk.put([], partial(imu_items, unit, self._time, stamp, acceleration, angular_velocity))
+
+    def joints(self, stamp: FloatArray, q: FloatArray, qd: FloatArray | None, names: Sequence[str]) -> None:
+        """Keep where an arm's n joints were at instants (M,) [s], on the clock of the samples' arrivals.
+
+        Positions q (M, n) [rad], velocities qd (M, n) [rad/s] if they are known, by the joints' names. Nobody may
+        change these arrays from here on. RecordingError for other shapes.
+        """
+        check_joints(stamp, q, qd, names)
+        if not self._sentence and not self.trouble:
+            self._disk.put([], partial(joint_items, self._time, stamp, q, qd, names))
 
     def health(self, stamp: float, rows: Sequence[Diagnosis]) -> None:
         """Keep how the units are at an instant [s]."""
