@@ -2,24 +2,21 @@
 
 import json
 import os
-import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from hashlib import sha256
-from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
-from threading import Thread
-from types import FrameType
 from typing import Any, Literal, cast, get_args
 
 from pretouch import __version__
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.registry import EXPERIMENTS
+from pretouch.experiments.workers import interrupt_held_back, workers
 from pretouch.params import Orientation, RestrictionMode, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -207,39 +204,13 @@ def run_campaign(request: Request, out: Path, progress: Callable[[float], None])
         return
     # the long ones first, so that no processor waits for one at the end
     missing.sort(key=lambda task: (task[1], -_cost(task[0])))
-    workers = min(len(missing), os.cpu_count() or 1)
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
-    try:
-        with _interrupt_held_back(), _failure_said(out):
+    with workers(min(len(missing), os.cpu_count() or 1)) as pool:
+        with interrupt_held_back(), _failure_said(out):
             futures = {pool.submit(_work, request, out, cell, seed): _cost(cell) for cell, seed in missing}
         for future in as_completed(futures):
             with _failure_said(out):
                 future.result()
             progress(futures[future])
-    except BaseException:
-        for process in active_children():
-            process.terminate()
-        pool.shutdown(wait=True, cancel_futures=True)
-        raise
-    pool.shutdown()
-
-
-@contextmanager
-def _interrupt_held_back() -> Iterator[None]:
-    """Hold Ctrl-C back while processes start; they inherit that, so that it finds none of them half imported.
-
-    Here it may come by another thread of a library, which this one's mask does not keep from calling the handler.
-    """
-    came: list[tuple[int, FrameType | None]] = []
-    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append((number, frame)))
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        signal.signal(signal.SIGINT, handler)
-        if came and callable(handler):
-            handler(*came[0])
 
 
 @contextmanager
@@ -281,20 +252,6 @@ def _row(out: Path, cell: Cell, seed: int) -> dict[str, Any] | None:
         return None
     its_own = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
     return row if all(row.get(key) == value for key, value in its_own.items()) else None
-
-
-def _start_worker() -> None:
-    """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 @cache

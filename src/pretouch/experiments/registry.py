@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pretouch.experiments import avoidance, dynamic, static, wire
+from pretouch.experiments import avoidance, dynamic, mounting, static, wire
 from pretouch.experiments.claims import anticipation, between, detectable, free_motion, noise
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.tables import TextTable
@@ -36,12 +36,14 @@ WEAKNESSES = (
     infeasible.EXPERIMENT,
 )
 HARDWARE = (wire.EXPERIMENT,)
+MOUNTING = (mounting.EXPERIMENT,)
 
 GROUPS = {
     "The paper's experiments": PAPER,
     "What the paper says of its method": CLAIMS,
     "Its weaknesses": WEAKNESSES,
     "Readings over the wire": HARDWARE,
+    "Where units sit": MOUNTING,
 }
 """All experiments by what they are for, in the order of the page."""
 EXPERIMENTS: dict[str, Experiment] = {e.name: e for group in GROUPS.values() for e in group}

@@ -40,10 +40,14 @@ class Setup:
 
     model: RobotModel
     skin: Skin
+    """Where the units truly sit: these measure."""
     profile: Profile
     scene: SceneSpec
     path: Path
     seed: int
+    believed: Skin | None = None
+    """Where the controller believes the same units to be, in the same order; none, and it knows the truth. A recording
+    holds what it believes."""
     hand: HandScript | None = None
     plant: PlantParams = field(default_factory=PlantParams)
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
@@ -156,7 +160,8 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         hand = Hand(plant, setup.hand) if setup.hand else None
         if setup.prepare:
             setup.prepare(plant, finders)
-        controller = Controller(model, setup.skin, fixtures(scene), setup.path, profile)
+        known = setup.skin if setup.believed is None else setup.believed
+        controller = Controller(model, known, fixtures(scene), setup.path, profile)
         clock = PlantClock(plant, profile.task.control_period_s)
         plant.advance(SETTLE_S)
         with _recording(setup, controller) as recording:
