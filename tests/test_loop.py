@@ -220,14 +220,14 @@ def test_the_arm_is_brought_to_rest_without_asking_where_it_is(
     last, sent = world.read(), [step.command]
     monkeypatch.setattr(world, "read", lambda: failure(last))
     monkeypatch.setattr(world, "command", lambda qd: (sent.append(qd), World.command(world, qd)))
-    loop.come_to_rest(controller, world, world, last.q_commanded, step.command)
+    loop.come_to_rest(controller.limits, world, world, last.q_commanded, step.command)
     assert_brought_to_rest(world)
     # every command slower than the one before, and none more once the arm stands
     assert np.all(np.diff(np.linalg.norm(sent, axis=1)) < 0)
     assert np.any(sent[-2])
     # again, from rest: nothing to send
     count = len(sent)
-    loop.come_to_rest(controller, world, world, last.q_commanded, np.zeros(7))
+    loop.come_to_rest(controller.limits, world, world, last.q_commanded, np.zeros(7))
     assert len(sent) == count
 
 
@@ -294,7 +294,7 @@ class Ticks:
 def test_an_arm_at_full_speed_comes_to_rest_at_any_rate(panda_model: RobotModel, paper_skin: Skin, rate: float):
     controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(PAPER, rate))
     arm, fastest = Ticks(), panda_model.description.qd_max
-    loop.come_to_rest(controller, arm, arm, panda_model.q_mid, fastest)
+    loop.come_to_rest(controller.limits, arm, arm, panda_model.q_mid, fastest)
     np.testing.assert_array_equal(arm.sent[-1], 0.0)
     change = np.abs(np.diff([fastest, *arm.sent], axis=0)).max(axis=0) * rate
     assert np.all(change <= panda_model.description.qdd_max * (1 + 1e-9))
@@ -302,7 +302,7 @@ def test_an_arm_at_full_speed_comes_to_rest_at_any_rate(panda_model: RobotModel,
 
 def test_a_speed_that_is_no_number_is_not_braked_for_ever(controller: Controller):
     arm = Ticks()
-    loop.come_to_rest(controller, arm, arm, controller.model.q_mid, np.full(7, np.nan))
+    loop.come_to_rest(controller.limits, arm, arm, controller.model.q_mid, np.full(7, np.nan))
     assert len(arm.sent) < 100
 
 

@@ -11,7 +11,8 @@ from numba import njit
 Function = TypeVar("Function", bound=Callable[..., object])
 
 _NOT_COMPILED = (
-    "cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording", "calibration", "traces.py"
+    "cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording", "calibration",
+    "traces.py",
 )  # fmt: skip
 
 

@@ -44,5 +44,9 @@ class HardwareError(PretouchError, RuntimeError):
     """Sensor units, their keys, or the network between cannot be used as asked."""
 
 
+class CalibrationError(PretouchError, ValueError):
+    """A calibration, or the motion for it, cannot be had as asked."""
+
+
 class ViewerError(PretouchError, RuntimeError):
     """The page cannot be shown."""

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pretouch.control.joint_box import box_and_brake
+from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
 from pretouch.ports import Clock, Robot, Skin
@@ -193,8 +193,8 @@ def run(
             if done(cycle.step):
                 return
     finally:
-        with _undisturbed():
-            come_to_rest(controller, robot, clock, state.watch.robot.q_commanded, sent)
+        with undisturbed():
+            come_to_rest(controller.limits, robot, clock, state.watch.robot.q_commanded, sent)
 
 
 def turn(
@@ -219,7 +219,7 @@ def _instant(tick: float, period: float, report: RobotState, readings: RangeRead
 
 
 @contextmanager
-def _undisturbed() -> Iterator[None]:
+def undisturbed() -> Iterator[None]:
     """Let Ctrl-C and SIGTERM wait until what is under way has ended: an arm on its way to rest."""
     came: list[int] = []
 
@@ -239,19 +239,18 @@ def _undisturbed() -> Iterator[None]:
             signal.raise_signal(number)
 
 
-def come_to_rest(controller: Controller, robot: Robot, clock: Clock, q: FloatArray, qd: FloatArray) -> None:
+def come_to_rest(limits: JointLimits, robot: Robot, clock: Clock, q: FloatArray, qd: FloatArray) -> None:
     """Command the arm from its last command to rest, within its limits.
 
     Where the arm is by then is reckoned from the commands: the robot's state may be what ended the loop.
 
     Args:
-        controller: for the limits and the period.
+        limits: of the joints, with the period.
         robot: to command.
         clock: one tick for each command.
         q: (n,) joint positions the motion generator was last known to be at [rad].
         qd: (n,) joint velocities sent last [rad/s].
     """
-    limits = controller.limits
     # each cycle takes one period's worth of acceleration from the joint that needs longest; one more for rounding
     longest = math.ceil(float((limits.qd_max / limits.qdd_max).max()) / limits.period) + 1
     for _ in range(longest):

@@ -1,0 +1,74 @@
+"""How late a unit's clock is, and how well a link's turning explains what its gyroscope measured.
+
+The cross-covariance of two angular velocities is R^T times the covariance of one of them if they are the same but for a
+rotation R and a constant: its nuclear norm, divided by both norms, is then 1, whatever R and the gyroscope's bias are.
+Its greatest value over all lags tells the clocks' difference.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from pretouch.types import BoolArray, FloatArray
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """The best lag for one link."""
+
+    late: float
+    """By how much the unit's clock is late [s]."""
+    likeness: float
+    """How much of both angular velocities is the same, 0 to 1."""
+
+
+def align(
+    turning: FloatArray, turned: BoolArray, sensed: FloatArray, sensing: BoolArray, step: float, most: float
+) -> Alignment:
+    """Find the lag at which a gyroscope measured what a link did.
+
+    Args:
+        turning: (N, 3) angular velocity of the link, link frame [rad/s].
+        turned: (N,) whether it is known.
+        sensed: (M, 3) what the gyroscope measured, sensor frame [rad/s]; the first at the same instant as that of the
+            link if the clocks agree.
+        sensing: (M,) whether it is known.
+        step: between instants [s].
+        most: largest lag to consider, either way [s].
+    """
+    a, b = _centred(turning, turned), _centred(sensed, sensing)
+    length = next_fast_len(len(a) + len(b), real=True)
+    fa, fb = rfft(a, length, axis=0), rfft(b, length, axis=0)
+    cross = irfft(fa.conj()[:, :, None] * fb[:, None, :], length, axis=0)
+    # energies of both where they overlap: without them, short overlaps would never win
+    energy = np.sqrt(_overlap((a**2).sum(axis=1), sensing, length) * _overlap(turned, (b**2).sum(axis=1), length))
+    lags = np.arange(length)
+    lags[lags > length - len(a)] -= length
+    norm = np.linalg.svd(cross, compute_uv=False).sum(axis=1)
+    shared = _overlap(turned, sensing, length)
+    # a tenth of the shorter one must overlap, or chance would make two short pieces alike
+    fair = (np.abs(lags) * step <= most) & (shared > 0.1 * min(turned.sum(), sensing.sum())) & (energy > 1e-9)
+    if not fair.any():
+        return Alignment(0.0, 0.0)
+    likeness = np.where(fair, norm / np.where(energy > 1e-9, energy, 1.0), 0.0)
+    best = int(np.argmax(likeness))
+    return Alignment(float(lags[best] + _peak(likeness, best)) * step, float(min(likeness[best], 1.0)))
+
+
+def _centred(signal: FloatArray, known: BoolArray) -> FloatArray:
+    mean = signal[known].mean(axis=0) if known.any() else 0.0
+    return np.where(known[:, None], signal - mean, 0.0)
+
+
+def _overlap(first: FloatArray | BoolArray, second: FloatArray | BoolArray, length: int) -> FloatArray:
+    """Sums of products at all lags (length,)."""
+    product = rfft(np.asarray(first, np.float64), length).conj() * rfft(np.asarray(second, np.float64), length)
+    return np.maximum(irfft(product, length), 0.0)
+
+
+def _peak(values: FloatArray, i: int) -> float:
+    """Where between neighbours the peak of a parabola through them lies, in steps."""
+    before, at, after = values[i - 1], values[i], values[(i + 1) % len(values)]
+    bend = before - 2 * at + after
+    return 0.0 if min(before, after) <= 0.0 or bend >= 0.0 else float(0.5 * (before - after) / bend)

@@ -1,0 +1,220 @@
+"""The pose of one IMU on its link, with its errors, by least squares on the manifold of poses.
+
+The model, for a link that moves with w and alpha, whose origin has the acceleration a, and where u is up (link frame):
+
+    gyroscope      (1 + k_g) * R^T w + b_g
+    accelerometer  (1 + k_a) * R^T (a + L p + g u) + b_a,   L = [alpha]x + [w]x [w]x
+
+with R, p = T_link_sensor, biases b and errors of scale k per axis; read at a clock that is late by an offset, the
+accelerometer by a little more than the gyroscope. Gravity's magnitude g is an unknown too: it differs by 0.5 % between
+places, and taken as known it would pass for an error of scale, and scale the levers with it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from pretouch.calibration.link_motion import LinkMotion, skew
+from pretouch.calibration.params import CalibrationParams
+from pretouch.types import FloatArray
+
+TURN, PLACE = slice(0, 3), slice(3, 6)
+"""Of the unknowns: rotation in the sensor frame [rad], position in the link frame [m]."""
+_ACC_BIAS, _GYRO_BIAS, _CLOCK, _LAG = slice(6, 9), slice(9, 12), 12, 13
+_ACC_SCALE, _GYRO_SCALE = slice(14, 17), slice(17, 20)
+_GRAVITY = 20
+_UNKNOWNS = 21
+_REWEIGHTINGS = 4
+_POSE_PRIOR = np.array([np.pi, np.pi, np.pi, 0.5, 0.5, 0.5])
+"""Standard deviation of the pose before anything is measured [rad, m]: no unit is further from its link's origin. Only
+what a motion does not tell at all depends on it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What one IMU measured at N instants, and how fast that changed."""
+
+    values: FloatArray
+    """(N, 6) angular velocity [rad/s], proper acceleration [m/s^2]."""
+    rates: FloatArray
+    """(N, 6) their derivatives by time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Pose and errors of one IMU."""
+
+    R: FloatArray
+    """(3, 3) R_link_sensor."""
+    p: FloatArray
+    """(3,) position in the link frame [m]."""
+    acceleration_bias: FloatArray
+    """(3,) [m/s^2]."""
+    angular_velocity_bias: FloatArray
+    """(3,) [rad/s]."""
+    acceleration_scale: FloatArray
+    """(3,) error of each axis' scale."""
+    angular_velocity_scale: FloatArray
+    """(3,) error of each axis' scale."""
+    late: float
+    """By how much the clock is late, beyond what was assumed [s]."""
+    lag: float
+    """By how much the accelerometer is later than the gyroscope [s]."""
+    gravity: float
+    """[m/s^2]."""
+
+    def moved(self, x: FloatArray) -> "Estimate":
+        """Return the estimate that differs from this one by x (21,): the pose by x on the manifold, the rest is x."""
+        return Estimate(
+            self.R @ Rotation.from_rotvec(x[TURN]).as_matrix(), self.p + x[PLACE], x[_ACC_BIAS], x[_GYRO_BIAS],
+            x[_ACC_SCALE], x[_GYRO_SCALE], float(x[_CLOCK]), float(x[_LAG]),
+            float(x[_GRAVITY]),
+        )  # fmt: skip
+
+    def felt(self, motion: LinkMotion) -> FloatArray:
+        """Proper acceleration (N, 3) at the IMU, link frame [m/s^2]."""
+        return motion.a + motion.lever @ self.p + self.gravity * motion.up
+
+    def expected(self, motion: LinkMotion) -> FloatArray:
+        """What the IMU should measure (N, 6), but for the clock."""
+        gyro = (motion.w @ self.R) * (1 + self.angular_velocity_scale) + self.angular_velocity_bias
+        return np.hstack([gyro, (self.felt(motion) @ self.R) * (1 + self.acceleration_scale) + self.acceleration_bias])
+
+    def differences(self, motion: LinkMotion, measured: Measured) -> FloatArray:
+        """Model less measurement (N, 6) [rad/s, m/s^2], the clock's error taken off."""
+        late = np.repeat((self.late, self.late + self.lag), 3)
+        return self.expected(motion) - measured.values - late * measured.rates
+
+
+def start(motion: LinkMotion, measured: Measured, gravity: float) -> Estimate:
+    """Find an estimate in closed form: R from angular velocities (Kabsch), then p and biases, which are linear."""
+    w, values = motion.w, measured.values
+    U, _, Vt = np.linalg.svd((w - w.mean(axis=0)).T @ (values[:, :3] - values[:, :3].mean(axis=0)))
+    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    # R values = a + g u + L p + R b, with priors so that what a motion does not tell stays small
+    left = np.concatenate([motion.lever, np.broadcast_to(np.eye(3), motion.lever.shape)], axis=2).reshape(-1, 6)
+    right = (values[:, 3:] @ R.T - motion.a - gravity * motion.up).reshape(-1)
+    found = np.linalg.solve(left.T @ left + np.diag([1e-2] * 3 + [1e-3] * 3), left.T @ right)
+    none = np.zeros(3)
+    bias = values[:, :3].mean(axis=0) - w.mean(axis=0) @ R
+    return Estimate(R, found[:3], found[3:] @ R, bias, none, none, 0.0, 0.0, gravity)
+
+
+class _Problem:
+    """Residuals of the unknowns x (21,), relative to an estimate, each divided by its standard deviation."""
+
+    def __init__(
+        self, motion: LinkMotion, measured: Measured, base: Estimate, noise: FloatArray, params: CalibrationParams
+    ) -> None:
+        self.motion, self.measured, self.base, self.noise = motion, measured, base, noise
+        self.prior = np.concatenate([
+            _POSE_PRIOR, np.full(3, params.acceleration_bias), np.full(3, params.angular_velocity_bias),
+            [np.inf, params.delay_difference_s], np.full(6, params.scale_error), [params.gravity_error],
+        ])  # fmt: skip
+        self.expected = np.append(np.zeros(_GRAVITY), params.gravity)
+
+    def residuals(self, x: FloatArray) -> FloatArray:
+        differences = self.base.moved(x).differences(self.motion, self.measured) / self.noise
+        return np.concatenate([differences.reshape(-1), (x - self.expected) / self.prior])
+
+    @property
+    def equal(self) -> FloatArray:
+        """Weights of residuals that count alike."""
+        return np.ones(6 * len(self.motion.w) + _UNKNOWNS)
+
+    def weights(self, x: FloatArray) -> FloatArray:
+        """Roots of the weights by which a large residual counts in proportion to its size only (soft L1)."""
+        weights = (1.0 + self.residuals(x) ** 2) ** -0.25
+        weights[-_UNKNOWNS:] = 1.0
+        return weights
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        motion, N = self.motion, len(self.motion.w)
+        e = self.base.moved(x)
+        J = np.zeros((N, 6, _UNKNOWNS))
+        turned = motion.w @ e.R, e.felt(motion) @ e.R
+        scales = 1 + np.concatenate([e.angular_velocity_scale, e.acceleration_scale])
+        for half, v in enumerate(turned):
+            J[:, 3 * half : 3 * half + 3, TURN] = skew(v) @ _right_jacobian(x[TURN])
+        J[:, 3:, PLACE] = e.R.T @ motion.lever
+        J[:, 3:, _GRAVITY] = motion.up @ e.R
+        J *= scales[:, None]
+        for i in range(3):
+            J[:, i, _GYRO_BIAS.start + i] = J[:, 3 + i, _ACC_BIAS.start + i] = 1.0
+            J[:, i, _GYRO_SCALE.start + i] = turned[0][:, i]
+            J[:, 3 + i, _ACC_SCALE.start + i] = turned[1][:, i]
+        J[:, :, _CLOCK] = -self.measured.rates
+        J[:, 3:, _LAG] = -self.measured.rates[:, 3:]
+        J /= self.noise[:, None]
+        return np.vstack([J.reshape(-1, _UNKNOWNS), np.diag(1 / self.prior)])
+
+
+def _right_jacobian(turn: FloatArray) -> FloatArray:
+    """Right Jacobian (3, 3) of the rotations at a rotation vector (3,) [rad]."""
+    angle = float(np.linalg.norm(turn))
+    if angle < 1e-6:
+        return np.eye(3) - 0.5 * skew(turn)
+    K = skew(turn / angle)
+    return np.eye(3) - (1 - np.cos(angle)) / angle * K + (1 - np.sin(angle) / angle) * K @ K
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The best estimate, and how sure it is."""
+
+    estimate: Estimate
+    covariance: FloatArray
+    """(21, 21) of all unknowns; `TURN` and `PLACE` say where the pose is."""
+    noise: FloatArray
+    """(6,) standard deviation of what the model does not explain [rad/s, m/s^2], by axis."""
+
+
+def fit(
+    motion: LinkMotion, measured: Measured, begin: Estimate, noise: FloatArray, params: CalibrationParams,
+    robust: bool = False,
+) -> Fit:  # fmt: skip
+    """Find the most likely estimate.
+
+    Args:
+        motion: of the link, N instants.
+        measured: by the IMU at the same instants.
+        begin: an estimate near the right one.
+        noise: (6,) standard deviation to weight angular velocities [rad/s] and accelerations [m/s^2] by.
+        params: priors, and the length of the blocks that the covariance is made of.
+        robust: let large differences count less.
+    """
+    problem = _Problem(motion, measured, begin, noise, params)
+    x = np.concatenate([
+        np.zeros(6), begin.acceleration_bias, begin.angular_velocity_bias, [begin.late, begin.lag],
+        begin.acceleration_scale, begin.angular_velocity_scale, [begin.gravity],
+    ])  # fmt: skip
+    for _ in range(_REWEIGHTINGS if robust else 1):
+        weights = problem.weights(x) if robust else problem.equal
+        # MINPACK: beside other programs the threads of LAPACK, which other methods call, cost ten times as much
+        x = least_squares(
+            lambda x, w=weights: w * problem.residuals(x), x, lambda x, w=weights: w[:, None] * problem.jacobian(x),
+            x_scale="jac", method="lm",
+        ).x  # fmt: skip
+    estimate = begin.moved(x)
+    spread = np.sqrt(np.mean(estimate.differences(motion, measured) ** 2, axis=0))
+    # the unknowns on the manifold at the answer, not at the start
+    J = _Problem(motion, measured, estimate, noise, params).jacobian(np.concatenate([np.zeros(6), x[6:]]))
+    per_block = max(1, round(params.block_s * params.rate_hz))
+    return Fit(estimate, _covariance(J, problem.residuals(x), per_block), spread)
+
+
+def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatArray:
+    """Covariance (21, 21) that holds for errors that depend on each other within blocks of so many instants.
+
+    The usual (J^T J)^-1 takes every residual as independent, and is far too small for errors that a motion repeats.
+    """
+    data = len(residuals) - _UNKNOWNS
+    N = data // 6
+    scores = np.einsum("nik,ni->nk", J[:data].reshape(N, 6, _UNKNOWNS), residuals[:data].reshape(N, 6))
+    blocks = np.add.reduceat(scores, np.arange(0, N, per_block), axis=0)
+    prior = J[data:]
+    inverse = np.linalg.inv(J.T @ J)
+    few = len(blocks) / max(1, len(blocks) - _UNKNOWNS / 6)
+    return inverse @ (few * blocks.T @ blocks + prior.T @ prior) @ inverse

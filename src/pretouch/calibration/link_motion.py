@@ -1,0 +1,97 @@
+"""How each link moved: what an IMU at its origin, with its axes, would have measured."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.signals import HALF_S, gaps, outside, rate_of_change, smooth, times
+from pretouch.robot.model import RobotModel
+from pretouch.traces import JointTrace
+from pretouch.types import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class LinkMotion:
+    """Motion of one link at N instants, all in the link's own frame."""
+
+    w: FloatArray
+    """(N, 3) angular velocity [rad/s]."""
+    a: FloatArray
+    """(N, 3) acceleration of its origin [m/s^2]."""
+    up: FloatArray
+    """(N, 3) unit vectors against gravity, which is along -z of the base frame."""
+    alpha: FloatArray
+    """(N, 3) angular acceleration [rad/s^2]."""
+
+    @cached_property
+    def lever(self) -> FloatArray:
+        """(N, 3, 3) L, so that a point p of the link has the acceleration a + L p."""
+        return skew(self.alpha) + skew(self.w) @ skew(self.w)
+
+    def at(self, which: BoolArray) -> "LinkMotion":
+        """Return the motion at some of the instants."""
+        return LinkMotion(self.w[which], self.a[which], self.up[which], self.alpha[which])
+
+
+def skew(v: FloatArray) -> FloatArray:
+    """Matrices (..., 3, 3) of the cross product with vectors (..., 3) from the left."""
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    o = np.zeros_like(x)
+    return np.stack([o, -z, y, z, o, -x, -y, x, o], axis=-1).reshape(*v.shape[:-1], 3, 3)
+
+
+class ArmMotion:
+    """Motion of all links at common instants, from measured joint positions."""
+
+    def __init__(self, model: RobotModel, joints: JointTrace, params: CalibrationParams) -> None:
+        """Take joint positions at increasing instants. An interval that is short of what the filter needs has none."""
+        self.model = model
+        fine = times(joints.stamp[0], joints.stamp[-1])
+        q = smooth(joints.stamp, joints.q, fine, params)
+        qd = rate_of_change(q)
+        chosen = slice(None, None, max(1, round(1 / (params.rate_hz * (fine[1] - fine[0])))))
+        self.time: FloatArray = fine[chosen]
+        """(N,) instants [s]."""
+        self.usable: BoolArray = outside(self.time, gaps(joints.stamp, params.longest_gap_s), HALF_S + 0.01)
+        """(N,) whether joint positions were measured all around."""
+        self.q: FloatArray = q[chosen]
+        """(N, n) joint positions [rad]."""
+        self.qd: FloatArray = qd[chosen]
+        """(N, n) joint velocities [rad/s]."""
+        self._qdd = rate_of_change(qd)[chosen]
+        postures = [model.kinematics(row) for row in self.q]
+        self._position = np.array([k.position for k in postures])
+        self._rotation = np.array([k.rotation for k in postures])
+        self._chain = self._joint_motions(np.array([k.anchor for k in postures]), np.array([k.axis for k in postures]))
+        self._links: dict[int, LinkMotion] = {}
+
+    def _joint_motions(self, anchor: FloatArray, axis: FloatArray) -> list[tuple[FloatArray, ...]]:
+        """Motion, base frame, of what moves with the first 0, 1, ... n joints: (N, 3) each.
+
+        Angular velocity, angular acceleration, acceleration of a point, and that point.
+        """
+        w, alpha, a, point = np.zeros((4, *anchor[:, 0].shape))
+        motions: list[tuple[FloatArray, ...]] = [(w, alpha, a, point)]
+        for j in range(self.model.n):
+            a, point = a + _lever_acceleration(w, alpha, anchor[:, j] - point), anchor[:, j]
+            turn = axis[:, j] * self.qd[:, j, None]
+            alpha = alpha + np.cross(w, turn) + axis[:, j] * self._qdd[:, j, None]
+            w = w + turn
+            motions.append((w, alpha, a, point))
+        return motions
+
+    def link(self, index: int) -> LinkMotion:
+        """Return the motion of a link."""
+        if index not in self._links:
+            w, alpha, a, point = self._chain[int(self.model.moved_by[index].sum())]
+            a = a + _lever_acceleration(w, alpha, self._position[:, index] - point)
+            R = self._rotation[:, index]
+            w, a, alpha = (np.einsum("nji,nj->ni", R, v) for v in (w, a, alpha))
+            self._links[index] = LinkMotion(w, a, R[:, 2], alpha)
+        return self._links[index]
+
+
+def _lever_acceleration(w: FloatArray, alpha: FloatArray, r: FloatArray) -> FloatArray:
+    return np.cross(alpha, r) + np.cross(w, np.cross(w, r))

@@ -1,0 +1,74 @@
+"""Parameters of a calibration."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
+
+
+@dataclass(frozen=True)
+class CalibrationParams(Checked):
+    """What is assumed of sensors and clocks, and what is asked of an answer. Figures without a source are ours."""
+
+    cutoff_hz: Positive = 12.0
+    """Joint positions and IMU data pass the same zero-phase low-pass [Hz]: well above a calibration motion, well below
+    the sensors' own bandwidths, so that both sides are filtered alike."""
+    rate_hz: Positive = 25.0
+    """Instants a second at which both sides are compared [Hz]: about twice the cutoff, more would be no news."""
+    longest_gap_s: Positive = 0.05
+    """Between samples further apart than this [s] nothing is interpolated."""
+    clock_error_s: Annotated[float, Check(low=0.0)] = 0.5
+    """Most a unit's clock differs from the arm's [s]; the right offset is searched for in this range."""
+    acceleration_bias: Positive = 0.4
+    """Standard deviation of the accelerometer's constant error, before anything is measured [m/s^2]: 40 mg (LSM6DS3
+    data sheet, zero-g level offset)."""
+    angular_velocity_bias: Positive = 0.17
+    """The same of the gyroscope [rad/s]: 10 degrees/s (LSM6DS3 data sheet, zero-rate level)."""
+    scale_error: Positive = 0.01
+    """The same of each axis' scale: 1 % (LSM6DS3 data sheet, over temperature)."""
+    gravity: Positive = 9.80665
+    """Standard gravity, before anything is measured [m/s^2]."""
+    gravity_error: Positive = 0.02
+    """Its standard deviation [m/s^2]: from 9.780 at the equator to 9.832 at the poles."""
+    delay_difference_s: Positive = 0.0005
+    """The same of the delay by which the accelerometer's filter lags behind the gyroscope's [s]."""
+    tolerated_acceleration: Positive = 0.2
+    """Difference from the model that is never an outlier [m/s^2]."""
+    tolerated_angular_velocity: Positive = 0.03
+    """Difference from the model that is never an outlier [rad/s]."""
+    outlier_factor: Positive = 6.0
+    """Beyond this many times the median difference, and what is tolerated, an instant is left out."""
+    block_s: Positive = 1.0
+    """Errors within this time are taken as wholly dependent on each other [s]: the answer's covariance comes from what
+    blocks of this length say."""
+    position_sigma_m: Positive = 0.01
+    """An answer with a larger standard deviation of its position, in any direction, is refused [m]."""
+    orientation_sigma_deg: Positive = 2.0
+    """An answer with a larger standard deviation of its orientation, about any axis, is refused [degrees]."""
+    board_misalignment_deg: NonNegative = 0.29
+    """Standard deviation of the angle between the IMU's axes and the range finder's [degrees], which no IMU can tell;
+    added to what a skin file says of an orientation. Up to half a degree either way: how well a board is glued on."""
+    unusable: Fraction = 0.3
+    """A unit of whose instants a larger share is left out is refused."""
+    shortest_s: Positive = 5.0
+    """Time of usable data below which nothing is tried [s]."""
+    least_swing_rad: Positive = 0.05
+    """A joint that moves by less has not moved: what it parts cannot be told apart [rad]."""
+    likeness: Fraction = 0.9
+    """How much of a gyroscope's and a link's turning must be the same for the unit to sit on that link."""
+    slip_m: Positive = 0.004
+    """Least slip that is looked for [m]: smaller ones hide in what bends and warms up."""
+    slip_deg: Positive = 0.6
+    """The same of its orientation [degrees]."""
+
+    @property
+    def position_limit(self) -> float:
+        """Largest standard deviation of an accepted position [m]."""
+        return self.position_sigma_m
+
+    @property
+    def orientation_limit(self) -> float:
+        """Largest standard deviation of an accepted orientation [rad]."""
+        return float(np.deg2rad(self.orientation_sigma_deg))

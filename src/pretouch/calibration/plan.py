@@ -1,0 +1,156 @@
+"""The motion by which units are calibrated, as a value: postures to stand in, ways between them, and swings."""
+
+import csv
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.types import FloatArray, IntArray
+from pretouch.values import value
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """Sines on all joints at once about a posture, F a joint, faded in and out so that it begins and ends at rest."""
+
+    begin: float
+    """[s]"""
+    duration: float
+    """[s]"""
+    fade: float
+    """Time it takes to fade in, and out [s]."""
+    amplitude: FloatArray
+    """(F, n) [rad]."""
+    frequency: FloatArray
+    """(F, n) [Hz]."""
+    phase: FloatArray
+    """(F, n) [rad]."""
+
+    def states(self, time: FloatArray) -> FloatArray:
+        """Deviation from the posture, its velocity and acceleration (3, T, n) at instants (T,) [s]."""
+        since = time - self.begin
+        rise, fall = _smooth_step(since / self.fade), _smooth_step((self.duration - since) / self.fade)
+        # the fades do not overlap, so that either is constant while the other changes
+        window, slope = rise[0] * fall[0], (rise[1] - fall[1]) / self.fade
+        bend = (rise[2] + fall[2]) / self.fade**2
+        rate = 2.0 * np.pi * self.frequency
+        angle = rate * since[:, None, None] + self.phase
+        x = (self.amplitude * np.sin(angle)).sum(axis=1)
+        v = (self.amplitude * rate * np.cos(angle)).sum(axis=1)
+        a = (-self.amplitude * rate**2 * np.sin(angle)).sum(axis=1)
+        w, w1, w2 = window[:, None], slope[:, None], bend[:, None]
+        return np.stack([w * x, w1 * x + w * v, w2 * x + 2.0 * w1 * v + w * a])
+
+    def scaled(self, factor: float) -> "Swing":
+        """Return the swing with its amplitudes times a factor."""
+        return replace(self, amplitude=self.amplitude * factor)
+
+    def begun_at(self, time: float) -> "Swing":
+        """Return the swing with another beginning [s]."""
+        return replace(self, begin=time)
+
+
+@value
+class PlanSamples:
+    """A plan at T instants."""
+
+    time: FloatArray
+    """(T,) since its beginning [s]."""
+    q: FloatArray
+    """(T, n) [rad]."""
+    qd: FloatArray
+    """(T, n) [rad/s]."""
+    qdd: FloatArray
+    """(T, n) [rad/s^2]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A motion that begins and ends at rest in the same posture, unless it is the way to another plan's start.
+
+    From one knot to the next the arm stands, or goes straight in joint space with the least jerk; swings are added to
+    where it stands. Positions are twice differentiable by time throughout.
+    """
+
+    knots: FloatArray
+    """(K,) increasing instants, the first is 0 [s]."""
+    postures: FloatArray
+    """(K, n) joint positions at the knots, without swings [rad]."""
+    swings: tuple[Swing, ...] = ()
+    """Each lies between two knots of one posture."""
+
+    @property
+    def start(self) -> FloatArray:
+        """Posture (n,) it begins in [rad]."""
+        return self.postures[0]
+
+    @property
+    def end(self) -> FloatArray:
+        """Posture (n,) it ends in [rad]."""
+        return self.postures[-1]
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return float(self.knots[-1])
+
+    @property
+    def still(self) -> tuple[tuple[float, float], ...]:
+        """Intervals in which the arm stands [s]."""
+        swung = [(swing.begin, swing.begin + swing.duration) for swing in self.swings]
+        spans = zip(self.knots[:-1].tolist(), self.knots[1:].tolist(), np.diff(self.postures, axis=0), strict=True)
+        return tuple(
+            (begin, end)
+            for begin, end, change in spans
+            if not change.any() and not any(first < end and begin < last for first, last in swung)
+        )
+
+    def at(self, time: float) -> tuple[FloatArray, FloatArray]:
+        """Joint positions [rad] and velocities [rad/s], (n,) each, at a time since the beginning [s].
+
+        At rest before the beginning and after the end.
+        """
+        q, qd, _ = self._states(np.array([time]))
+        return q[0], qd[0]
+
+    def sampled(self, rate: float) -> PlanSamples:
+        """Return it at equal intervals, about `rate` of them a second [Hz], beginning and end included."""
+        time = np.linspace(0.0, self.duration, max(2, int(np.ceil(self.duration * rate)) + 1))
+        return PlanSamples(time, *self._states(time))
+
+    def save(self, path: Path, rate: float = 1000.0) -> None:
+        """Write it as CSV for another program to play: time [s], q1 to qn [rad], qd1 to qdn [rad/s]."""
+        numbers = range(1, len(self.start) + 1)
+        samples = self.sampled(rate)
+        with path.open("w", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["time", *(f"q{i}" for i in numbers), *(f"qd{i}" for i in numbers)])
+            table = np.column_stack([samples.time, samples.q, samples.qd])
+            writer.writerows([f"{number:.9g}" for number in row] for row in table.tolist())
+
+    def _states(self, time: FloatArray) -> FloatArray:
+        """Joint positions, velocities and accelerations (3, T, n) at instants (T,) [s]."""
+        span = _span_of(self.knots, time)
+        length, change = np.diff(self.knots)[span], np.diff(self.postures, axis=0)[span]
+        way = _smooth_step((time - self.knots[span]) / length)
+        states = np.stack([(way[i] / length**i)[:, None] * change for i in range(3)])
+        states[0] += self.postures[span]
+        for swing in self.swings:
+            during = (time > swing.begin) & (time < swing.begin + swing.duration)
+            if during.any():
+                states[:, during] += swing.states(time[during])
+        return states
+
+
+def _span_of(knots: FloatArray, time: FloatArray) -> IntArray:
+    """Index (T,) of the knot before each instant; the first and the last span reach to the ends of time."""
+    return np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
+
+
+def _smooth_step(part: FloatArray) -> FloatArray:
+    """From 0 to 1 with the least jerk, at rest before 0 and after 1, and its first two derivatives (3, T)."""
+    s = np.clip(part, 0.0, 1.0)
+    return np.stack([
+        s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 30.0 * s**2 * (1.0 - s) ** 2, 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    ])  # fmt: skip

@@ -1,0 +1,140 @@
+"""The least squares: its derivatives, what it finds in exact data, and whether its covariance is honest."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from pretouch.calibration.fit import Estimate, Fit, Measured, _Problem, fit, start
+from pretouch.calibration.link_motion import LinkMotion
+from pretouch.calibration.params import CalibrationParams
+
+PARAMS = CalibrationParams()
+NOISE = np.repeat((0.003, 0.02), 3)
+TIME = np.arange(0, 40, 1 / PARAMS.rate_hz)
+
+
+def motion(axes=3, seed=0):
+    """A link that turns about the first so many of its axes, all derivatives exact; up turns with it."""
+    rng = np.random.default_rng(seed)
+    frequency, phase = rng.uniform(0.2, 0.9, 3), rng.uniform(0, 6, 3)
+    angle = 2 * np.pi * frequency * TIME[:, None] + phase
+    on = np.arange(3) < axes
+    w = np.where(on, np.sin(angle), 0.0)
+    alpha = np.where(on, 2 * np.pi * frequency * np.cos(angle), 0.0)
+    a = 0.8 * np.sin(angle[:, ::-1] + 1.0) if axes > 1 else np.zeros_like(w)
+    up = Rotation.from_rotvec(np.where(on, -np.cos(angle), 0.0)).as_matrix()[:, 2]
+    return LinkMotion(w, a, up if axes > 1 else np.tile([1.0, 0.0, 0.0], (len(TIME), 1)), alpha)
+
+
+def truth(seed=0, gravity=9.81):
+    rng = np.random.default_rng([seed, 1])
+    return Estimate(
+        Rotation.random(random_state=seed).as_matrix(), rng.uniform(-0.1, 0.1, 3), rng.uniform(-0.4, 0.4, 3),
+        rng.uniform(-0.1, 0.1, 3), rng.uniform(-0.01, 0.01, 3), rng.uniform(-0.01, 0.01, 3), 0.004, 0.0003, gravity,
+    )  # fmt: skip
+
+
+def measured(link, true, noise=None, seed=0):
+    """What an IMU tells whose clock is late; its rates are by differences."""
+    exact = true.expected(link)
+    rates = np.gradient(exact, TIME, axis=0)
+    late = np.repeat((true.late, true.late + true.lag), 3)
+    values = exact - late * rates
+    if noise is not None:
+        values = values + noise * np.random.default_rng([seed, 2]).standard_normal(values.shape)
+    return Measured(values, rates)
+
+
+def test_the_jacobian_is_that_of_finite_differences():
+    link, true = motion(), truth()
+    problem = _Problem(link, measured(link, truth(3)), true, NOISE, PARAMS)
+    x = np.random.default_rng(5).uniform(-0.3, 0.3, 21)
+    J, h = problem.jacobian(x), 1e-6
+    for k in range(21):
+        step = h * (np.arange(21) == k)
+        expected = (problem.residuals(x + step) - problem.residuals(x - step)) / (2 * h)
+        assert J[:, k] == pytest.approx(expected, rel=1e-5, abs=1e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_exact_data_give_the_exact_pose(seed):
+    link, true = motion(seed=seed), truth(seed)
+    data = measured(link, true)
+    found = fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS).estimate
+    # the priors on bias, scale and gravity pull by what little they weigh
+    assert found.p == pytest.approx(true.p, abs=2e-4)
+    assert Rotation.from_matrix(found.R.T @ true.R).magnitude() < 2e-4
+    assert found.late == pytest.approx(true.late, abs=2e-4)
+    assert found.angular_velocity_bias == pytest.approx(true.angular_velocity_bias, abs=5e-4)
+
+
+def test_the_closed_form_is_near_enough_to_start_from():
+    for seed in range(20):
+        link, true = motion(seed=seed), truth(seed)
+        found = start(link, measured(link, true, NOISE, seed), PARAMS.gravity)
+        assert np.linalg.norm(found.p - true.p) < 0.02
+        assert Rotation.from_matrix(found.R.T @ true.R).magnitude() < 0.05
+        assert np.linalg.det(found.R) == pytest.approx(1.0)
+
+
+def nees(found: Fit, true: Estimate) -> float:
+    e = np.concatenate([Rotation.from_matrix(found.estimate.R.T @ true.R).as_rotvec(), true.p - found.estimate.p])
+    return float(e @ np.linalg.solve(found.covariance[:6, :6], e))
+
+
+def test_the_covariance_is_honest():
+    link, told = motion(), []
+    for seed in range(150):
+        true = truth(seed)
+        data = measured(link, true, NOISE, seed)
+        told.append(nees(fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS), true))
+    # the mean of 150 chi-squares of 6 degrees of freedom is within 6 +- 4 * sqrt(12 / 150), but that the covariance of
+    # 40 blocks is itself uncertain, which adds some
+    assert 4.9 < np.mean(told) < 8.5
+
+
+def test_the_covariance_counts_errors_that_last():
+    link, true = motion(), truth()
+    slow = np.repeat(np.random.default_rng(9).standard_normal((len(TIME) // 20, 6)), 20, axis=0)
+    exact = measured(link, true)
+    lasting = Measured(exact.values + NOISE * slow, exact.rates)
+    fast = measured(link, true, NOISE)
+    sigma = [np.trace(fit(link, d, true, NOISE, PARAMS).covariance[3:6, 3:6]) ** 0.5 for d in (fast, lasting)]
+    assert sigma[1] > 2.5 * sigma[0]
+
+
+def test_large_differences_count_less_when_robust():
+    link, true = motion(), truth()
+    data = measured(link, true, NOISE)
+    data.values[200:260] += 5.0
+    plain = fit(link, data, true, NOISE, PARAMS).estimate
+    robust = fit(link, data, true, NOISE, PARAMS, robust=True).estimate
+    assert np.linalg.norm(robust.p - true.p) < 0.25 * np.linalg.norm(plain.p - true.p)
+
+
+def test_what_one_upright_axis_does_not_tell_stays_unknown_and_the_rest_is_found():
+    # turns about x, which is also up, as the first link of an arm on a table does
+    link, true = motion(axes=1), truth(2)
+    data = measured(link, true, NOISE)
+    found = fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS)
+    pose = found.covariance[:6, :6]
+    assert np.all(np.isfinite(pose))
+    sigma = np.sqrt(np.linalg.eigvalsh(pose[3:, 3:]))
+    assert sigma[-1] > 0.3, "the height along the axis cannot be known"
+    axis = found.estimate.R.T @ [1.0, 0.0, 0.0]
+    assert np.sqrt(axis @ pose[:3, :3] @ axis) > 0.5, "nor the heading about it"
+    distance = [np.linalg.norm(e.p[1:]) for e in (found.estimate, true)]
+    assert distance[0] == pytest.approx(distance[1], abs=3e-3)
+    tilt = [e.R.T @ [1.0, 0.0, 0.0] for e in (found.estimate, true)]
+    assert tilt[0] == pytest.approx(tilt[1], abs=2e-2)
+
+
+def test_gravity_of_another_place_does_not_move_the_unit():
+    for gravity in (9.78, 9.832):
+        link, true = motion(seed=4), truth(4, gravity)
+        data = measured(link, true)
+        found = fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS).estimate
+        assert found.p == pytest.approx(true.p, abs=2e-4)

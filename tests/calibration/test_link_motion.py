@@ -1,0 +1,102 @@
+"""Link motions against finite differences of where points are, and against MuJoCo."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from pretouch.calibration.link_motion import ArmMotion, skew
+from pretouch.calibration.params import CalibrationParams
+from pretouch.traces import JointTrace
+
+PARAMS = CalibrationParams()
+FREQUENCIES = np.array([0.3, 0.4, 0.5, 0.35, 0.7, 0.6, 0.9])
+
+
+def swing(model, time):
+    """Joint positions (T, n) and their two derivatives, from sines."""
+    wt = 2 * np.pi * FREQUENCIES * np.asarray(time)[:, None] + np.arange(7)
+    w = 2 * np.pi * FREQUENCIES
+    amplitude = 0.3
+    center = model.description.q_ready
+    return center + amplitude * np.sin(wt), amplitude * w * np.cos(wt), -amplitude * w**2 * np.sin(wt)
+
+
+@pytest.fixture(scope="module")
+def arm(panda_model):
+    time = 100.0 + np.arange(0, 6.0, 0.001)
+    return ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]), PARAMS)
+
+
+def test_joints_come_out_as_they_went_in(arm, panda_model):
+    q, qd, _ = swing(panda_model, arm.time)
+    assert arm.usable.sum() > 100
+    assert arm.q[arm.usable] == pytest.approx(q[arm.usable], abs=1e-4)
+    assert arm.qd[arm.usable] == pytest.approx(qd[arm.usable], abs=5e-4)
+    assert np.diff(arm.time) == pytest.approx(1 / PARAMS.rate_hz)
+
+
+def test_near_the_ends_nothing_is_usable(arm):
+    assert not arm.usable[arm.time < 100.25].any()
+    assert not arm.usable[arm.time > 105.74].any()
+    assert arm.usable[(arm.time > 100.27) & (arm.time < 105.72)].all()
+
+
+@pytest.mark.parametrize("link", ["panda_link1", "panda_link2", "panda_link5", "panda_link7", "panda_hand"])
+def test_a_point_of_a_link_moves_as_its_motion_says(arm, panda_model, link):
+    index, p, h = panda_model.link_index(link), np.array([0.03, -0.07, 0.11]), 1e-3
+    motion = arm.link(index)
+
+    def pose(time):
+        kin = panda_model.kinematics(swing(panda_model, [time])[0][0])
+        return kin.rotation[index], kin.position[index] + kin.rotation[index] @ p
+
+    for i in np.flatnonzero(arm.usable)[::17]:
+        (before, at, after) = (pose(arm.time[i] + dt) for dt in (-h, 0.0, h))
+        R = at[0]
+        acceleration = R.T @ (after[1] - 2 * at[1] + before[1]) / h**2
+        turn = R.T @ (after[0] - before[0]) / (2 * h)
+        assert motion.w[i] == pytest.approx([turn[2, 1], turn[0, 2], turn[1, 0]], abs=2e-3)
+        assert motion.a[i] + motion.lever[i] @ p == pytest.approx(acceleration, abs=1e-2)
+        assert motion.up[i] == pytest.approx(R[2], abs=1e-4)
+
+
+def test_angular_accelerations_are_those_of_mujoco(arm, panda_model):
+    model = mujoco.MjModel.from_xml_path(str(panda_model.description.mjcf))
+    data = mujoco.MjData(model)
+    for i in np.flatnonzero(arm.usable)[::25]:
+        q, qd, qdd = (x[0] for x in swing(panda_model, arm.time[i : i + 1]))
+        data.qpos[:7], data.qvel[:7], data.qacc[:7] = q, qd, qdd
+        mujoco.mj_inverse(model, data)
+        mujoco.mj_rnePostConstraint(model, data)
+        for link in ("panda_link3", "panda_hand"):
+            index = panda_model.link_index(link)
+            six = np.zeros(6)
+            mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, index, six, 1)
+            motion = arm.link(index)
+            assert motion.alpha[i] == pytest.approx(six[:3], abs=2e-2)
+            assert motion.a[i] + 9.81 * motion.up[i] == pytest.approx(six[3:], abs=1e-2)
+
+
+def test_gaps_in_joint_positions_are_not_used(panda_model):
+    time = np.arange(0, 8.0, 0.001)
+    time = time[(time < 3.0) | (time > 3.4)]
+    arm = ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]), PARAMS)
+    assert not arm.usable[(arm.time > 2.75) & (arm.time < 3.65)].any()
+    assert arm.usable[(arm.time > 2.0) & (arm.time < 2.7)].all()
+    q = swing(panda_model, arm.time)[0]
+    assert arm.q[arm.usable] == pytest.approx(q[arm.usable], abs=1e-3)
+
+
+def test_a_hundred_positions_a_second_are_enough(panda_model, arm):
+    time = 100.0 + np.arange(0, 6.0, 0.01)
+    slow = ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]), PARAMS)
+    both = arm.usable[: len(slow.time)] & slow.usable
+    hand = panda_model.link_index("panda_hand")
+    difference = slow.link(hand).a[both] - arm.link(hand).a[: len(slow.time)][both]
+    assert np.abs(difference).max() < 1e-3
+
+
+def test_skew_is_the_cross_product():
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(size=(2, 5, 3))
+    assert np.einsum("nij,nj->ni", skew(a), b) == pytest.approx(np.cross(a, b))

@@ -1,0 +1,188 @@
+"""Planned motions against the limits they were planned for, looked at a thousand times a second."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pretouch.calibration.plan import Plan, Swing
+from pretouch.calibration.plan_information import Observability
+from pretouch.calibration.plan_params import PlanParams
+from pretouch.calibration.plan_report import report_on
+from pretouch.calibration.plan_route import approach
+from pretouch.calibration.planner import plan_motion
+from pretouch.errors import CalibrationError, ParameterError
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+
+QUICK = PlanParams(duration_s=30.0, poses=3, swings=1)
+STARTS = {
+    "ready": [0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4],
+    "aside": [1.8, 0.2, -0.4, -1.8, 0.3, 2.0, -1.0],
+    "upright": [-0.5, -0.3, 0.2, -1.2, -0.2, 1.4, 0.0],
+}
+
+
+@cache
+def model(name: str) -> RobotModel:
+    return RobotModel({"panda": panda, "fr3": fr3}[name]())
+
+
+@cache
+def planned(name: str) -> Plan:
+    return plan_motion(model(name))
+
+
+def envelope_at(arm: RobotModel, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """Largest speeds (T, n) towards the end that each joint moves to."""
+    e = arm.description.envelope
+    if e is None:
+        return np.full(q.shape, np.inf)
+    up = -e.offset + np.sqrt(np.maximum(0.0, e.slope * (e.q_upper - q)))
+    down = -e.offset + np.sqrt(np.maximum(0.0, e.slope * (q - e.q_lower)))
+    return np.maximum(0.0, np.where(qd > 0, up, down))
+
+
+def assert_kept(arm: RobotModel, plan: Plan, params: PlanParams) -> None:
+    samples, description = plan.sampled(1000.0), arm.description
+    assert plan.duration <= params.duration_s + 1e-6
+    assert np.all(samples.q >= arm.q_min + params.margin_rad)
+    assert np.all(samples.q <= arm.q_max - params.margin_rad)
+    assert np.all(np.abs(samples.qd) <= params.speed_share * description.qd_max)
+    assert np.all(np.abs(samples.qd) <= params.speed_share * envelope_at(arm, samples.q, samples.qd) + 1e-9)
+    assert np.all(np.abs(samples.qdd) <= params.acceleration_share * description.qdd_max)
+    ends = capsule_ends(arm, kinematics_of(arm, samples.q))
+    speed = np.linalg.norm(np.diff(ends, axis=0), axis=-1) * 1000.0
+    assert speed.max() <= params.speed_m_s
+    radius = arm.capsules.radius
+    moving = arm.capsules.link > arm.link_index(f"{description.name}_link0")
+    assert (ends[..., 2].min(axis=2) - radius)[:, moving].min() >= params.floor_m + params.clearance_m
+    # at that speed two parts come at most 14 mm nearer to each other in a hundredth of a second
+    coarse = self_distances(arm, ends[::10]).min(axis=1)
+    near = np.repeat(coarse < params.clearance_m + 0.014, 10)[: len(ends)]
+    assert self_distances(arm, ends[near]).min(initial=np.inf) >= params.clearance_m
+    assert coarse.min() >= params.clearance_m
+
+
+@pytest.mark.parametrize("name", ["panda", "fr3"])
+def test_the_motion_planned_by_default_keeps_all_limits(name: str):
+    assert_kept(model(name), planned(name), PlanParams())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", [0, 1, 5])
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("name", ["panda", "fr3"])
+def test_motions_from_elsewhere_and_with_other_limits_keep_them(name: str, start: str, variant: int):
+    params = replace(
+        PlanParams(duration_s=45.0, poses=4, swings=2), variant=variant, speed_m_s=0.7 + 0.2 * variant,
+        speed_share=0.5 + 0.1 * variant, clearance_m=0.03 - 0.005 * variant, floor_m=-0.1 * variant,
+    )  # fmt: skip
+    plan = plan_motion(model(name), params, np.array(STARTS[start]))
+    assert_kept(model(name), plan, params)
+    np.testing.assert_array_equal(plan.start, STARTS[start])
+
+
+@pytest.mark.parametrize("name", ["panda", "fr3"])
+def test_it_begins_and_ends_at_the_start_with_the_poses_asked_for(name: str):
+    plan = planned(name)
+    np.testing.assert_array_equal(plan.start, model(name).description.q_ready)
+    np.testing.assert_array_equal(plan.end, plan.start)
+    assert plan.duration == pytest.approx(60.0, abs=0.01)
+    assert len(plan.still) == 1 + PlanParams().poses
+    assert all(end - begin == pytest.approx(1.5) for begin, end in plan.still)
+    assert len(plan.swings) == PlanParams().swings
+
+
+def test_no_two_joints_swing_at_one_frequency():
+    for swing in planned("panda").swings:
+        tones = np.sort(swing.frequency.ravel())
+        assert np.diff(tones).min() > 0.02
+        assert 0.2 <= tones[0] <= tones[-1] <= 1.2
+
+
+def test_the_same_request_gives_the_same_motion_and_another_variant_another(panda_model: RobotModel):
+    first, again = plan_motion(panda_model, QUICK), plan_motion(panda_model, QUICK)
+    np.testing.assert_array_equal(first.sampled(50.0).q, again.sampled(50.0).q)
+    assert not np.array_equal(plan_motion(panda_model, replace(QUICK, variant=1)).postures, first.postures)
+
+
+@pytest.mark.parametrize("name", ["panda", "fr3"])
+def test_it_tells_more_of_every_link_than_moving_one_joint_after_the_other(name: str):
+    arm = model(name)
+    begins = np.linspace(0.0, 60.0, arm.n + 1)
+    turns = tuple(
+        Swing(b, 60.0 / arm.n, 1.0, 0.3 * np.eye(arm.n)[[j]], np.full((1, arm.n), 0.4), np.zeros((1, arm.n)))
+        for j, b in enumerate(begins[:-1])
+    )
+    naive = Plan(begins, np.tile(arm.description.q_ready, (arm.n + 1, 1)), turns)
+    knowledge = Observability(arm)
+    ours, theirs = (np.array(knowledge.sigmas(knowledge.prior + knowledge.of_plan(p))) for p in (planned(name), naive))
+    assert np.all(ours < theirs)
+    assert ours[0].max() < 1e-3
+    assert np.rad2deg(ours[1].max()) < 0.05
+
+
+def test_the_report_says_what_is_known_and_what_room_is_needed(panda_model: RobotModel):
+    plan = planned("panda")
+    report = report_on(panda_model, plan, PlanParams())
+    assert [item.link for item in report.outlook] == [f"panda_{x}" for x in ("link2", "link3", "link4", "link5",
+                                                                            "link6", "link7", "hand")]  # fmt: skip
+    assert report.not_known == ("panda_link1",)
+    assert report.standing == pytest.approx(7 * 1.5)
+    tcp = kinematics_of(panda_model, plan.sampled(20.0).q).position[:, panda_model.ee]
+    assert np.all(tcp > report.low)
+    assert np.all(tcp < report.high)
+    assert report.nearest >= 0.03
+    assert report.floor >= 0.03
+    assert 0.3 < report.speed <= 0.7
+    for words in ("panda_link2", "panda_link1", "base frame", "deg"):
+        assert words in str(report)
+
+
+def test_the_way_to_its_start_keeps_clear_and_within_limits(panda_model: RobotModel):
+    plan = planned("panda")
+    q = np.array(STARTS["aside"])
+    way = approach(panda_model, q, plan, PlanParams())
+    np.testing.assert_array_equal(way.start, q)
+    np.testing.assert_array_equal(way.end, plan.start)
+    assert_kept(panda_model, way, PlanParams(margin_rad=0.0))
+
+
+def test_a_way_through_the_arm_itself_is_refused(panda_model: RobotModel):
+    """From the hand on one side of the forearm to the other, past it."""
+    side = panda_model.description.q_ready.copy()
+    side[4:] = 1.5, 0.6, -1.5
+    other = side * [1, 1, 1, 1, -1, 1, -1]
+    to = Plan(np.array([0.0, 1.0]), np.array([other, other]))
+    with pytest.raises(CalibrationError, match=r"cannot go straight .* by hand"):
+        approach(panda_model, side, to, PlanParams())
+
+
+@pytest.mark.parametrize(
+    ("params", "start", "words"),
+    [
+        (PlanParams(duration_s=20.0), None, r"20 s is too short: .* takes \d+ s; give it the time"),
+        (PlanParams(margin_rad=1.6), None, r"leaves nothing of the range of .*joint4.* choose a smaller margin_rad"),
+        (PlanParams(clearance_m=0.09), None, r"No motion can begin at .* come within .* of each other"),
+        (PlanParams(floor_m=0.5), None, r"No motion can begin at .*the arm and the floor"),
+        (PlanParams(), [0.0, 0.0, 0.0, -3.0, 0.0, 0.0, 0.0], "No motion can begin at"),
+        (PlanParams(), [0.0, 0.0], "give 7 finite joint positions"),
+        (PlanParams(), [np.nan] * 7, "give 7 finite joint positions"),
+        (PlanParams(), [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 2.85], "joint7 comes nearer to its limit than 0.1 rad"),
+        (PlanParams(speed_m_s=0.01), None, r"\d can be reached, and 6 are asked: .* or a higher speed"),
+    ],
+)
+def test_an_impossible_request_says_why(panda_model: RobotModel, params: PlanParams, start, words: str):
+    with pytest.raises(CalibrationError, match=words):
+        plan_motion(panda_model, params, None if start is None else np.array(start))
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"duration_s": 91.0}, {"swings": 0}, {"speed_share": 0.0}, {"fastest_hz": 2.5}, {"slowest_hz": 1.5}]
+)
+def test_parameters_beyond_their_range_are_refused(wrong: dict[str, float]):
+    with pytest.raises(ParameterError, match=next(iter(wrong))):
+        PlanParams(**wrong)
