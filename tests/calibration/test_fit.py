@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pretouch.calibration.fit import Estimate, Fit, Measured, _Problem, fit, start
+from pretouch.calibration.fit import Estimate, Fit, Measured, Problem, fit, start
 from pretouch.calibration.link_motion import LinkMotion
 from pretouch.calibration.params import CalibrationParams
 
@@ -49,7 +49,7 @@ def measured(link, true, noise=None, seed=0):
 
 def test_the_jacobian_is_that_of_finite_differences():
     link, true = motion(), truth()
-    problem = _Problem(link, measured(link, truth(3)), true, NOISE, PARAMS)
+    problem = Problem(link, measured(link, truth(3)), true, NOISE, PARAMS)
     x = np.random.default_rng(5).uniform(-0.3, 0.3, 21)
     J, h = problem.jacobian(x), 1e-6
     for k in range(21):

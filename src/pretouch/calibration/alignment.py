@@ -45,14 +45,16 @@ def align(
     energy = np.sqrt(_overlap((a**2).sum(axis=1), sensing, length) * _overlap(turned, (b**2).sum(axis=1), length))
     lags = np.arange(length)
     lags[lags > length - len(a)] -= length
-    norm = np.linalg.svd(cross, compute_uv=False).sum(axis=1)
     shared = _overlap(turned, sensing, length)
     # a tenth of the shorter one must overlap, or chance would make two short pieces alike
     fair = (np.abs(lags) * step <= most) & (shared > 0.1 * min(turned.sum(), sensing.sum())) & (energy > 1e-9)
     if not fair.any():
         return Alignment(0.0, 0.0)
-    likeness = np.where(fair, norm / np.where(energy > 1e-9, energy, 1.0), 0.0)
-    best = int(np.argmax(likeness))
+    looked = fair | np.roll(fair, 1) | np.roll(fair, -1)  # the peak's neighbours are needed too
+    norm = np.linalg.svd(cross[looked], compute_uv=False).sum(axis=1)
+    likeness = np.zeros(length)
+    likeness[looked] = norm / np.maximum(energy[looked], 1e-9)
+    best = int(np.argmax(np.where(fair, likeness, 0.0)))
     return Alignment(float(lags[best] + _peak(likeness, best)) * step, float(min(likeness[best], 1.0)))
 
 

@@ -102,8 +102,8 @@ def start(motion: LinkMotion, measured: Measured, gravity: float) -> Estimate:
     return Estimate(R, found[:3], found[3:] @ R, bias, none, none, 0.0, 0.0, gravity)
 
 
-class _Problem:
-    """Residuals of the unknowns x (21,), relative to an estimate, each divided by its standard deviation."""
+class Problem:
+    """The least squares for the unknowns x (21,): the pose relative to an estimate, the rest itself."""
 
     def __init__(
         self, motion: LinkMotion, measured: Measured, base: Estimate, noise: FloatArray, params: CalibrationParams
@@ -116,6 +116,7 @@ class _Problem:
         self.expected = np.append(np.zeros(_GRAVITY), params.gravity)
 
     def residuals(self, x: FloatArray) -> FloatArray:
+        """Differences from data and priors (6 N + 21,), each divided by its standard deviation."""
         differences = self.base.moved(x).differences(self.motion, self.measured) / self.noise
         return np.concatenate([differences.reshape(-1), (x - self.expected) / self.prior])
 
@@ -131,6 +132,7 @@ class _Problem:
         return weights
 
     def jacobian(self, x: FloatArray) -> FloatArray:
+        """Return their derivatives (6 N + 21, 21)."""
         motion, N = self.motion, len(self.motion.w)
         e = self.base.moved(x)
         J = np.zeros((N, 6, _UNKNOWNS))
@@ -185,7 +187,7 @@ def fit(
         params: priors, and the length of the blocks that the covariance is made of.
         robust: let large differences count less.
     """
-    problem = _Problem(motion, measured, begin, noise, params)
+    problem = Problem(motion, measured, begin, noise, params)
     x = np.concatenate([
         np.zeros(6), begin.acceleration_bias, begin.angular_velocity_bias, [begin.late, begin.lag],
         begin.acceleration_scale, begin.angular_velocity_scale, [begin.gravity],
@@ -200,7 +202,7 @@ def fit(
     estimate = begin.moved(x)
     spread = np.sqrt(np.mean(estimate.differences(motion, measured) ** 2, axis=0))
     # the unknowns on the manifold at the answer, not at the start
-    J = _Problem(motion, measured, estimate, noise, params).jacobian(np.concatenate([np.zeros(6), x[6:]]))
+    J = Problem(motion, measured, estimate, noise, params).jacobian(np.concatenate([np.zeros(6), x[6:]]))
     per_block = max(1, round(params.block_s * params.rate_hz))
     return Fit(estimate, _covariance(J, problem.residuals(x), per_block), spread)
 

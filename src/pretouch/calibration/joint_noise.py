@@ -1,0 +1,56 @@
+"""What noise of joint positions does to a place.
+
+Accelerations of the joints, differentiated from noisy positions, look like motion of their own. They shrink the levers
+that a fit finds, in all directions in which the true motion is weak, and the residuals do not show it. By how much is
+known: with noise n of a joint's acceleration about the axis c through o, a point p feels n c x (p - o), and the model
+says that its derivative by p is n [c]x. Their product is the pull on p.
+"""
+
+import numpy as np
+
+from pretouch.calibration.fit import PLACE
+from pretouch.calibration.link_motion import ArmMotion
+from pretouch.calibration.locate import Located
+from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.signals import interpolated, smooth, times
+from pretouch.traces import JointTrace
+from pretouch.types import FloatArray
+
+_EVERY = 10
+"""Of the arm's instants, one in so many is looked at."""
+
+
+class JointNoise:
+    """Noise of measured joint positions, taken as white."""
+
+    def __init__(self, arm: ArmMotion, joints: JointTrace, params: CalibrationParams) -> None:
+        fine = times(joints.stamp[0], joints.stamp[-1])
+        rest = joints.q - interpolated(joints.stamp, fine, smooth(joints.stamp, joints.q, fine, params))
+        rate = 1 / float(np.median(np.diff(joints.stamp)))
+        passed = min(1.0, 2 * params.cutoff_hz / rate)
+        # of normal noise, half the values are within 0.6745 standard deviations
+        variance = (np.median(np.abs(rest), axis=0) / 0.6745) ** 2 / max(1 - passed, 0.1)
+        density = 2 * variance / rate
+        self.acceleration: FloatArray = np.sqrt(density * (2 * np.pi) ** 4 * params.cutoff_hz**5 / 5)
+        """(n,) standard deviation of the joints' accelerations after the low-pass [rad/s^2]."""
+        self._model = arm.model
+        kin = [arm.model.kinematics(q) for q in arm.q[::_EVERY]]
+        self._position = np.array([k.position for k in kin])
+        self._rotation = np.array([k.rotation for k in kin])
+        self._anchor, self._axis = np.array([k.anchor for k in kin]), np.array([k.axis for k in kin])
+
+    def covariance(self, located: Located) -> FloatArray:
+        """Covariance (6, 6) of a place, with the error that noise of the joints makes added to it.
+
+        Of rotation vector in the sensor frame [rad] and position in the link frame [m].
+        """
+        R, origin = self._rotation[:, located.link], self._position[:, located.link]
+        pull = np.zeros(3)
+        for j in np.flatnonzero(self._model.moved_by[located.link]):
+            axis = np.einsum("nji,nj->ni", R, self._axis[:, j])
+            lever = located.estimate.p - np.einsum("nji,nj->ni", R, self._anchor[:, j] - origin)
+            felt = np.cross(axis, lever)
+            pull += self.acceleration[j] ** 2 * np.cross(felt, axis).mean(axis=0)
+        information = located.used.sum() / located.noise[3] ** 2
+        error = located.covariance[:, PLACE] @ (information * pull)
+        return located.covariance + np.outer(error, error)

@@ -1,0 +1,108 @@
+"""The pose of one unit on a given link: fits in rounds, until clock and outliers are settled."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.calibration.fit import Estimate, Fit, Measured, fit, start
+from pretouch.calibration.imu_signal import ImuSignal
+from pretouch.calibration.link_motion import ArmMotion, LinkMotion
+from pretouch.calibration.params import CalibrationParams
+from pretouch.types import BoolArray, FloatArray
+
+_ROUNDS = 4
+_SETTLED_S = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """Where a unit sits if it sits on a link."""
+
+    link: int
+    """Index of the link."""
+    estimate: Estimate
+    covariance: FloatArray
+    """(6, 6) of rotation vector in the sensor frame [rad] and position in the link frame [m]."""
+    noise: FloatArray
+    """(6,) root mean square of what is not explained, each sensor's the same for its axes [rad/s, m/s^2]."""
+    assumed_late: float
+    """By how much its clock was taken as late; what is left is in the estimate [s]."""
+    known: BoolArray
+    """(N,) at which of the arm's instants both sides were measured."""
+    used: BoolArray
+    """(N,) at which of them the model explains what was measured."""
+
+    @property
+    def late(self) -> float:
+        """By how much the unit's clock is late [s]."""
+        return self.assumed_late + self.estimate.late
+
+    @property
+    def pose(self) -> FloatArray:
+        """T_link_sensor (4, 4)."""
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = self.estimate.R, self.estimate.p
+        return T
+
+
+def known_instants(arm: ArmMotion, signal: ImuSignal, late: float) -> BoolArray:
+    """Tell at which of the arm's instants (N,) both sides were measured, if the unit's clock is late by so much [s]."""
+    return arm.usable & signal.usable(arm.time + late)
+
+
+def enough(arm: ArmMotion, which: BoolArray, params: CalibrationParams) -> bool:
+    """Tell whether instants (N,) are enough to find anything from."""
+    return bool(which.sum() * (arm.time[1] - arm.time[0]) >= params.shortest_s)
+
+
+def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float, params: CalibrationParams) -> Located | None:
+    """Find where on a link a unit sits whose clock is late by about so much [s]; None if too little was measured."""
+    motion = arm.link(link)
+    noise = np.repeat((params.tolerated_angular_velocity, params.tolerated_acceleration), 3) / 10
+    estimate: Estimate | None = None
+    for _ in range(_ROUNDS):
+        known = known_instants(arm, signal, late)
+        if not enough(arm, known, params):
+            return None
+        here, measured = motion.at(known), signal.at(arm.time[known] + late)
+        found = fit(here, measured, estimate or start(here, measured, params.gravity), noise, params, robust=True)
+        estimate, assumed = found.estimate, late
+        late += estimate.late
+        if abs(estimate.late) < _SETTLED_S:
+            break
+    inliers = explained(found.estimate, here, measured, params)
+    used = known.copy()
+    used[known] = inliers
+    if not enough(arm, used, params):
+        inliers, used = np.ones_like(inliers), known
+    here, measured = here.at(inliers), Measured(measured.values[inliers], measured.rates[inliers])
+    found, noise = _final(found, here, measured, noise, params)
+    covariance = found.covariance[:6, :6]
+    return Located(link, found.estimate, 0.5 * (covariance + covariance.T), noise, assumed, known, used)
+
+
+def explained(estimate: Estimate, motion: LinkMotion, measured: Measured, params: CalibrationParams) -> BoolArray:
+    """Tell at which instants (N,) the model is near what was measured."""
+    size = sizes(estimate.differences(motion, measured))
+    return np.all(size <= limits(size, params), axis=1)
+
+
+def sizes(differences: FloatArray) -> FloatArray:
+    """Sizes (N, 2) of differences (N, 6), by sensor [rad/s, m/s^2]."""
+    return np.linalg.norm(differences.reshape(-1, 2, 3), axis=2)
+
+
+def limits(size: FloatArray, params: CalibrationParams) -> FloatArray:
+    """Largest sizes (2,) of differences that are no outliers [rad/s, m/s^2]."""
+    tolerated = np.array([params.tolerated_angular_velocity, params.tolerated_acceleration])
+    return np.maximum(tolerated, params.outlier_factor * np.median(size, axis=0))
+
+
+def _final(
+    found: Fit, motion: LinkMotion, measured: Measured, noise: FloatArray, params: CalibrationParams
+) -> tuple[Fit, FloatArray]:
+    """Fit without robustness, weighted by what each sensor leaves unexplained (6,)."""
+    for _ in range(2):
+        found = fit(motion, measured, found.estimate, noise, params)
+        noise = np.repeat(np.sqrt((found.noise.reshape(2, 3) ** 2).mean(axis=1)), 3)
+    return found, noise

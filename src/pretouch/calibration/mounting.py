@@ -1,0 +1,136 @@
+"""How a unit sits on the surface of its link, as far as capsules tell."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.calibration.result import Finding
+from pretouch.robot.model import RobotModel
+from pretouch.types import FloatArray
+
+DEEPEST = 0.02
+"""A unit that is found further inside a capsule [m] cannot be there: capsules are no further off the true surface."""
+_OFF, _FARTHEST = 0.1, 0.5
+"""Height above its link at which a unit is worth a word, and beyond which it cannot sit there [m]."""
+_INWARDS = -0.5
+"""Cosine between beam and outward normal below which a beam points into the link."""
+_CLEAR = 1e-4
+"""Height at which a unit that was moved out of a capsule is left [m]."""
+_TRIES = 20
+_INSIDE, _FACING = 3.0, 0.02
+"""Where links are weighed: how much worse being inside is than being off by as much, and how far off a beam along the
+surface is worth [m]."""
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A point of the surface of a link, below a unit."""
+
+    height: float
+    """Of the unit above it [m]; negative inside."""
+    normal: FloatArray
+    """(3,) unit vector outwards, link frame."""
+
+
+def seat(model: RobotModel, link: int, p: FloatArray) -> Seat | None:
+    """Return where the surface of a link is nearest to a point p (3,) in its frame [m]; None if it has no capsule."""
+    nearest: Seat | None = None
+    own = model.capsules.of_links(np.array([link]))
+    for a, b, radius in zip(own.a, own.b, own.radius, strict=True):
+        along = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
+        away = p - a - along * (b - a)
+        distance = float(np.linalg.norm(away))
+        if nearest is None or distance - radius < nearest.height:
+            nearest = Seat(distance - float(radius), away / max(distance, 1e-9))
+    return nearest
+
+
+def likely_member(model: RobotModel, body: tuple[int, ...], link: int, T: FloatArray) -> int:
+    """Return the link, of those fixed to each other, on whose surface a unit most likely sits.
+
+    Nearest to it, and looked away from. Links without a capsule are chosen only if none has one.
+
+    Args:
+        model: the arm.
+        body: indices of the links.
+        link: one of them.
+        T: (4, 4) pose of the unit on that link.
+    """
+
+    def oddity(member: int) -> float:
+        """In metres."""
+        there, _ = seen_from(model, member, link, T, np.eye(6))
+        found = seat(model, member, there[:3, 3])
+        if found is None:
+            return np.inf
+        away = found.height if found.height > 0 else -_INSIDE * found.height
+        return away + _FACING * (1 - float(found.normal @ there[:3, 2]))
+
+    best = min(body, key=oddity)
+    return best if np.isfinite(oddity(best)) else link
+
+
+def seen_from(model: RobotModel, link: int, other: int, T: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return pose (4, 4) and covariance (6, 6) in the frame of `link`, given in that of `other`, to which it is fixed.
+
+    The covariance is of rotation vector in the sensor frame [rad] and position in the link frame [m].
+    """
+    kin = model.kinematics(model.q_mid)
+    R = kin.rotation[link].T @ kin.rotation[other]
+    T_link_other = np.eye(4)
+    T_link_other[:3, :3] = R
+    T_link_other[:3, 3] = kin.rotation[link].T @ (kin.position[other] - kin.position[link])
+    turned = np.eye(6)
+    turned[3:, 3:] = R
+    return T_link_other @ T, turned @ C @ turned.T
+
+
+def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Finding]:
+    """Say what is odd about where a unit sits and looks, T_link_sensor (4, 4)."""
+    below = seat(model, link, T[:3, 3])
+    name = model.links[link]
+    if below is None:
+        below = Seat(float(np.linalg.norm(T[:3, 3])), T[:3, 2])
+    findings = []
+    if below.height < 0:
+        findings.append(_inside(name, -below.height, moved_out(model, link, T[:3, 3]) is not None))
+    elif below.height > _OFF:
+        findings.append(_far(name, below.height))
+    facing = float(below.normal @ T[:3, 2])
+    if facing < _INWARDS:
+        tilt = np.rad2deg(np.arccos(np.clip(facing, -1.0, 1.0)))
+        sentence = (
+            f"Its beam, the z axis, points into {name}, {tilt:.0f} degrees from outwards: turn the board over, or give"
+            " the IMU's data in the axes of the range finder."
+        )
+        findings.append(Finding("inwards", sentence, True))
+    return findings
+
+
+def moved_out(model: RobotModel, link: int, p: FloatArray) -> FloatArray | None:
+    """Return the point (3,) outside all capsules of a link that p (3,) is moved to; None if there is none near by."""
+    at = p
+    for _ in range(_TRIES):
+        below = seat(model, link, at)
+        if below is None or below.height >= 0:
+            return at if np.linalg.norm(at - p) <= 2 * DEEPEST else None
+        at = at + (_CLEAR - below.height) * below.normal
+    return None
+
+
+def _inside(name: str, depth: float, way_out: bool) -> Finding:
+    if depth > DEEPEST or not way_out:
+        sentence = (
+            f"It lies {1000 * depth:.0f} mm inside {name}, where nothing can sit: check its link, and the arm's model."
+        )
+        return Finding("inside", sentence, True)
+    sentence = (
+        f"It lies {1000 * depth:.1f} mm inside the capsules that stand for {name}: a skin file has it moved out to"
+        " their surface, and that much less certain."
+    )
+    return Finding("inside", sentence, False)
+
+
+def _far(name: str, height: float) -> Finding:
+    sentence = f"It lies {1000 * height:.0f} mm off {name}: check that it sits on a bracket as high as that."
+    return Finding("far", sentence, height > _FARTHEST)

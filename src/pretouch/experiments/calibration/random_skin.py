@@ -1,0 +1,60 @@
+"""Skins whose units are anywhere on the arm, to try calibration on."""
+
+import numpy as np
+
+from pretouch.errors import ExperimentError, SkinError
+from pretouch.robot.body import Capsules
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
+from pretouch.types import FloatArray
+
+HEIGHT = 0.008
+"""Of the IMU above the surface of its link [m]: on its board, in its case."""
+
+_TRIES = 1000
+"""A place may lie inside a neighbouring capsule of the same link; this often another is drawn."""
+
+
+def random_skin(model: RobotModel, seed: int, first_link: bool = False) -> Skin:
+    """Put one unit on each link of `mounted_links`, anywhere on its surface, turned anyhow about its beam."""
+    rng = np.random.default_rng([seed, 11])
+    return Skin([_random_unit(model, link, rng) for link in mounted_links(model, first_link)], model)
+
+
+def mounted_links(model: RobotModel, first_link: bool = False) -> tuple[str, ...]:
+    """Return the links that have a surface and that two joints move at least.
+
+    What turns about one axis only cannot be found along that axis: `first_link` takes such links too.
+    """
+    least = 1 if first_link else 2
+    covered = set(model.capsules.link.tolist())
+    joints = model.moved_by.sum(axis=1)
+    return tuple(name for i, name in enumerate(model.links) if i in covered and joints[i] >= least)
+
+
+def _random_unit(model: RobotModel, link: str, rng: np.random.Generator) -> SensorUnit:
+    surface = model.capsules.of_links(np.array([model.link_index(link)]))
+    for _ in range(_TRIES):
+        unit = SensorUnit(f"on_{link}", link, _random_pose(surface, rng))
+        try:
+            Skin([unit], model)
+        except SkinError:
+            continue
+        return unit
+    raise ExperimentError(f"No place for a unit was found on {link}: its capsules lie inside each other, part them.")
+
+
+def _random_pose(surface: Capsules, rng: np.random.Generator) -> FloatArray:
+    """Draw a pose (4, 4) on the side of one of some capsules, link frame: z outwards, `HEIGHT` above it [m]."""
+    k = rng.integers(len(surface))
+    along = surface.b[k] - surface.a[k]
+    outwards = rng.normal(size=3)
+    outwards -= along * (outwards @ along) / max(along @ along, 1e-12)
+    z = outwards / np.linalg.norm(outwards)
+    x = np.cross(rng.normal(size=3), z)
+    x /= np.linalg.norm(x)
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    pose[:3, 3] = surface.a[k] + rng.uniform() * along + (surface.radius[k] + HEIGHT) * z
+    return pose

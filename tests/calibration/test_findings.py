@@ -1,0 +1,226 @@
+"""What is wrong with data is recognised and named."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.calibration.calibrate import calibrate
+from pretouch.calibration.data import CalibrationData
+from pretouch.errors import CalibrationError
+from pretouch.sensing.skin import Skin
+from pretouch.traces import ImuTrace, JointTrace
+from tests.calibration.faulty import (
+    dead,
+    joints_late,
+    on_the_table,
+    saturated,
+    silent,
+    stuck,
+    swapped,
+    unit_of,
+    with_knocks,
+    with_losses,
+    without_joints,
+)  # fmt: skip
+from tests.calibration.made import turned
+
+LINK4, HAND = "on_panda_link4", "on_panda_hand"
+
+
+def changed(data: CalibrationData, unit: str, stamp=None, acceleration=None, angular_velocity=None) -> CalibrationData:
+    one = unit_of(data, unit)
+    values = [
+        old if new is None else new
+        for old, new in (
+            (one.imu.stamp, stamp),
+            (one.imu.acceleration, acceleration),
+            (one.imu.angular_velocity, angular_velocity),
+        )
+    ]
+    other = replace(one, imu=ImuTrace(*values))
+    return replace(data, units=tuple(other if u.id == unit else u for u in data.units))
+
+
+def scaled(data: CalibrationData, unit: str, acceleration=1.0, angular_velocity=1.0) -> CalibrationData:
+    imu = unit_of(data, unit).imu
+    return changed(data, unit, None, imu.acceleration * acceleration, imu.angular_velocity * angular_velocity)
+
+
+def with_nan(data: CalibrationData, unit: str, every: int) -> CalibrationData:
+    felt = unit_of(data, unit).imu.acceleration.copy()
+    felt[::every] = np.nan
+    return changed(data, unit, acceleration=felt)
+
+
+def begun_anew(data: CalibrationData, unit: str) -> CalibrationData:
+    stamp = unit_of(data, unit).imu.stamp.copy()
+    stamp[4000:] -= stamp[4000]
+    return changed(data, unit, stamp)
+
+
+def jittered(data: CalibrationData, unit: str) -> CalibrationData:
+    stamp = unit_of(data, unit).imu.stamp.copy()
+    stamp[10::100] = stamp[9::100][: len(stamp[10::100])]
+    return changed(data, unit, stamp)
+
+
+def empty(data: CalibrationData, unit: str) -> CalibrationData:
+    return changed(data, unit, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+def thinned(data: CalibrationData, unit: str, every: int) -> CalibrationData:
+    imu = unit_of(data, unit).imu
+    return changed(data, unit, imu.stamp[::every], imu.acceleration[::every], imu.angular_velocity[::every])
+
+
+def backwards(data: CalibrationData, unit: str) -> CalibrationData:
+    imu = unit_of(data, unit).imu
+    return changed(data, unit, None, imu.acceleration[::-1], imu.angular_velocity[::-1])
+
+
+REFUSED = {
+    "silent": (empty, "sent no IMU samples"),
+    "shape": (lambda data, unit: changed(data, unit, acceleration=np.zeros((5, 3))), r"\(5, 3\)"),
+    "short": (lambda data, unit: silent(data, unit, 3.0, 99.0), "at least 5 s are needed"),
+    "slow": (lambda data, unit: thinned(data, unit, 8), "every 38.5 ms"),
+    "clock": (begun_anew, "began anew"),
+    "not_finite": (lambda data, unit: with_nan(data, unit, 2), "50.0% of its samples are not finite"),
+    "stuck": (lambda data, unit: stuck(data, unit, "acceleration", 1, 20.0), "accelerometer y stays at .* for 25.0 s"),
+    "gravity": (lambda data, unit: scaled(data, unit, 1 / 9.80665), "look like g: multiply by 9.80665"),
+    "gyroscope_scale": (lambda data, unit: scaled(data, unit, 1.0, np.rad2deg(1.0)), "look like degrees/s"),
+    "mirrored": (lambda data, unit: scaled(data, unit, 1.0, np.array([1, 1, -1])), "axes are mirrored"),
+    "scale": (lambda data, unit: scaled(data, unit, np.array([1, 1, -1])), "accelerometer z .* correct its sign"),
+    "never_moved": (on_the_table, "never moved"),
+    "no_link": (backwards, "fits no link"),
+    "too_little": (lambda data, unit: saturated(data, unit, angular_velocity_max=0.3), "Less than 5 s remain"),
+    "unusable": (lambda data, unit: silent(data, unit, 20.0, 99.0), "could not be used"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_a_unit_whose_data_cannot_be_trusted_is_refused_with_the_reason(panda_model, good, kind):
+    fault, words = REFUSED[kind]
+    found = {unit.id: unit for unit in calibrate(panda_model, fault(good, LINK4)).units}
+    assert not found[LINK4].accepted
+    assert found[HAND].accepted
+    assert found[HAND].findings == ()
+    (finding,) = [one for one in found[LINK4].findings if one.kind == kind]
+    assert finding.refused
+    assert re.search(words, finding.sentence), finding.sentence
+
+
+BEARABLE = {
+    "lost": (with_losses, "Gaps in its samples"),
+    "unordered": (jittered, "1.0% of its samples are no later"),
+    "not_finite": (lambda data, unit: with_nan(data, unit, 20), "5.0% of its samples are not finite"),
+    "outliers": (lambda data, unit: with_knocks(data, unit, 20), "did not move as its link"),
+}
+
+
+@pytest.mark.parametrize("kind", BEARABLE)
+def test_what_can_be_borne_is_named_and_the_place_is_still_found(panda_model, good, pair, kind):
+    fault, words = BEARABLE[kind]
+    unit = calibrate(panda_model, fault(good, LINK4)).units[0]
+    assert unit.accepted
+    (finding,) = unit.findings
+    assert finding.kind == kind
+    assert words in finding.sentence
+    assert np.linalg.norm(unit.place.T_link_sensor[:3, 3] - pair.units[0].T_link_sensor[:3, 3]) < 1e-3
+
+
+@pytest.mark.parametrize("sensor", ["acceleration", "angular_velocity"])
+def test_a_sensor_that_gives_zeros_is_named_once(panda_model, good, sensor):
+    unit = calibrate(panda_model, dead(good, LINK4, sensor)).units[0]
+    assert [finding.kind for finding in unit.findings] == ["stuck"]
+
+
+def test_few_saturated_samples_are_left_out_and_many_refuse(panda_model, good, pair):
+    peak = np.abs(unit_of(good, HAND).imu.angular_velocity).max()
+    few = calibrate(panda_model, saturated(good, HAND, angular_velocity_max=0.97 * peak)).units[1]
+    assert few.accepted
+    assert [finding.kind for finding in few.findings] == ["saturated"]
+    assert "set a larger range" in few.findings[0].sentence
+    assert np.linalg.norm(few.place.T_link_sensor[:3, 3] - pair.units[1].T_link_sensor[:3, 3]) < 1e-3
+    many = calibrate(panda_model, saturated(good, HAND, angular_velocity_max=0.6 * peak)).units[1]
+    assert not many.accepted
+
+
+def test_swapped_units_are_both_named(panda_model, good):
+    link4, hand = calibrate(panda_model, swapped(good, LINK4, HAND)).units
+    assert [finding.kind for finding in link4.findings] == ["swapped"]
+    assert [finding.kind for finding in hand.findings] == ["swapped"]
+    assert f"Swapped with {HAND}" in link4.findings[0].sentence
+    assert f"Swapped with {LINK4}" in hand.findings[0].sentence
+    assert not link4.accepted
+    assert not hand.accepted
+
+
+def test_a_unit_on_another_link_than_said_is_refused_and_its_link_named(panda_model, good):
+    data = replace(good, units=(replace(good.units[0], link="panda_link2"), good.units[1]))
+    unit = calibrate(panda_model, data).units[0]
+    (finding,) = unit.findings
+    assert (finding.kind, unit.accepted, unit.place.link) == ("wrong_link", False, "panda_link4")
+    assert "said to sit on panda_link2, but its data fit panda_link4" in finding.sentence
+
+
+def test_a_clock_that_is_off_by_more_than_expected_is_measured(panda_model, good):
+    for unit in calibrate(panda_model, joints_late(good, 12.0)).units:
+        (finding,) = unit.findings
+        assert finding.kind == "clock"
+        assert finding.refused
+        assert unit.place.clock_offset == pytest.approx(-12.0, abs=0.05)
+
+
+def test_a_board_that_is_mounted_upside_down_is_refused(panda_model, moving_arm, pair):
+    unit = turned(pair.units[0], np.array([np.pi, 0.0, 0.0]), np.zeros(3))
+    (finding,) = calibrate(panda_model, moving_arm.data(Skin([unit], panda_model))).units[0].findings
+    assert (finding.kind, finding.refused) == ("inwards", True)
+
+
+def joints(data: CalibrationData, stamp=None, q=None) -> CalibrationData:
+    was = data.joints
+    return replace(data, joints=JointTrace(was.stamp if stamp is None else stamp, was.q if q is None else q))
+
+
+def cut(data: CalibrationData, which: slice) -> CalibrationData:
+    return joints(data, data.joints.stamp[which], data.joints.q[which])
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (lambda data: joints(data, q=data.joints.q[:, :6]), "of the 7 joints of panda"),
+        (lambda data: joints(data, data.joints.stamp[::-1]), "go back"),
+        (lambda data: joints(data, q=np.rad2deg(data.joints.q)), "give radians"),
+        (lambda data: joints(data, q=np.tile(data.joints.q[0], (len(data.joints.q), 1))), "did not move"),
+        (lambda data: cut(data, slice(0, 0)), "There are 0 joint states"),
+        (lambda data: cut(data, slice(0, 400)), "at least 5 s of motion"),
+        (lambda data: cut(data, slice(None, None, 20)), "every 0.0962 s"),
+        (lambda data: without_joints(data, 2.0, 42.0), "without gaps make up"),
+        (lambda data: joints(data, data.joints.stamp + 1e6 * (data.joints.stamp > 20)), "spread over"),
+    ],
+)  # fmt: skip
+def test_joints_that_nothing_can_be_made_from_are_an_error_with_the_reason(panda_model, good, fault, words):
+    with pytest.raises(CalibrationError, match=words):
+        calibrate(panda_model, fault(good))
+
+
+def test_missing_joint_states_are_named_and_left_out(panda_model, good, pair):
+    found = calibrate(panda_model, without_joints(good, 10.0, 14.0))
+    (finding,) = found.findings
+    assert finding.kind == "joints_missing"
+    assert "4.01 s in all" in finding.sentence
+    assert "from 10.0 s" in finding.sentence
+    for unit, true in zip(found.units, pair.units, strict=True):
+        assert unit.accepted
+        assert np.linalg.norm(unit.place.T_link_sensor[:3, 3] - true.T_link_sensor[:3, 3]) < 1e-3
+
+
+def test_repeated_and_broken_joint_states_are_left_out(panda_model, good):
+    stamp, q = good.joints.stamp.copy(), good.joints.q.copy()
+    stamp[5::50], q[7::50] = stamp[4::50], np.nan
+    found = calibrate(panda_model, joints(good, stamp, q))
+    assert [finding.kind for finding in found.findings] == ["joints_not_finite", "joints_repeated"]
+    assert all(unit.accepted for unit in found.units)

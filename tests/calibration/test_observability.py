@@ -1,0 +1,103 @@
+"""What a motion tells of a pose, and what not."""
+
+import numpy as np
+import pytest
+
+from pretouch.calibration.calibrate import calibrate
+from pretouch.calibration.observability import Axis, observability
+from pretouch.calibration.params import CalibrationParams
+from pretouch.experiments.calibration.random_skin import random_skin
+from pretouch.sensing.skin import Skin
+from tests.calibration.made import MovingArm
+
+PARAMS = CalibrationParams()
+AXIS = Axis("panda_joint3", np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.0, 1.0]))
+
+
+def pose(x: float, y: float, z: float) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    T[:3, 3] = x, y, z
+    return T
+
+
+def covariance(*free: tuple[np.ndarray, float]) -> np.ndarray:
+    """Everything is known well, but for these twists (6,) in the link frame, each by its standard deviation."""
+    C = np.diag(np.repeat((1e-4, 1e-4), 3) ** 2)
+    for twist, sigma in free:
+        C += sigma**2 * np.outer(twist, twist)
+    back = np.eye(6)
+    back[:3, :3] = pose(0, 0, 0)[:3, :3].T
+    return back @ C @ back.T
+
+
+def test_a_pose_that_is_known_leaves_nothing_to_say():
+    known = observability(covariance(), pose(0.1, 0.0, 0.2), AXIS, PARAMS)
+    assert known.unknown == ()
+    assert known.known == ()
+    assert known.position_sigma == pytest.approx([1e-4] * 3)
+    assert known.orientation_sigma == pytest.approx([1e-4] * 3)
+
+
+def test_a_place_along_the_joint_s_axis_is_named_after_the_joint():
+    known = observability(covariance((np.eye(6)[5], 0.3)), pose(0.1, 0.0, 0.2), AXIS, PARAMS)
+    assert known.unknown == ("where it sits along the axis of panda_joint3",)
+    assert known.position_sigma[2] == pytest.approx(0.3, rel=1e-3)
+    assert np.abs(known.position_directions[2]) == pytest.approx([0, 0, 1], abs=1e-6)
+
+
+def test_a_turn_about_the_joint_s_axis_is_seen_through_the_place_that_it_moves():
+    T = pose(0.1, 0.0, 0.2)
+    about = np.concatenate([AXIS.direction, np.cross(AXIS.direction, T[:3, 3] - AXIS.point)])
+    known = observability(covariance((about, 1.0), (np.eye(6)[5], 0.3)), T, AXIS, PARAMS)
+    assert known.unknown == (
+        "where it sits along the axis of panda_joint3",
+        "its angle about the axis of panda_joint3",
+    )
+    # from the axis at (0, 0.1) to the unit at (0.1, 0): the root of 0.02
+    assert "141.4 mm (sigma 0.1 mm)" in known.known[0]
+    assert "0.0" in known.known[1]
+
+
+def test_any_other_direction_is_named_by_its_coordinates():
+    along = np.concatenate([np.zeros(3), [0.6, 0.8, 0.0]])
+    turn = np.concatenate([[1.0, 0.0, 0.0], np.zeros(3)])
+    known = observability(covariance((along, 0.05), (turn, 0.2)), pose(0.1, 0.0, 0.2), AXIS, PARAMS)
+    assert known.unknown == (
+        "its position along (0.60, 0.80, 0.00) of the link (sigma 50 mm)",
+        "its orientation about x of the link (sigma 11.5 degrees)",
+    )
+
+
+def test_link_1_tells_its_distance_from_the_vertical_and_how_it_faces_and_no_more(panda_model, moving_arm):
+    for seed in range(3):
+        true = random_skin(panda_model, seed, first_link=True).units[0]
+        unit = calibrate(panda_model, moving_arm.data(Skin([true], panda_model), seed)).units[0]
+        assert [(finding.kind, finding.refused) for finding in unit.findings] == [("unobservable", True)]
+        sentence = unit.findings[0].sentence
+        assert "where it sits along the axis of panda_joint1, and its angle about the axis of panda_joint1" in sentence
+        assert "panda_joint1 alone moves panda_link1" in sentence
+        found, T = unit.place.T_link_sensor, true.T_link_sensor
+        # the axis is z of the link
+        assert np.hypot(*found[:2, 3]) == pytest.approx(np.hypot(*T[:2, 3]), abs=2e-3)
+        assert found[2, :3] == pytest.approx(T[2, :3], abs=0.01)
+        assert seen_from_axis(found) == pytest.approx(seen_from_axis(T), abs=0.02)
+
+
+def seen_from_axis(T: np.ndarray) -> np.ndarray:
+    """The sensor's axes along outwards, around and up."""
+    x, y = T[:2, 3] / np.hypot(*T[:2, 3])
+    return np.array([[x, y, 0], [-y, x, 0], [0, 0, 1]]) @ T[:3, :3]
+
+
+def test_a_link_below_which_one_joint_moved_is_not_known_along_its_axis(panda_model, whole_skin):
+    arm = MovingArm(panda_model, 30.0, stand=(0,))
+    found = calibrate(panda_model, arm.data(Skin(whole_skin.units[:3], panda_model)))
+    link2, link3, link4 = found.units
+    (finding,) = link2.findings
+    assert finding.kind == "unobservable"
+    assert finding.sentence == (
+        "Not known: where it sits along the axis of panda_joint2. Move panda_joint1 (it moved by 0.0 degrees) more."
+    )
+    assert link3.accepted
+    assert link4.accepted

@@ -1,0 +1,96 @@
+"""From a calibration to a skin file."""
+
+import numpy as np
+import pytest
+
+from pretouch.calibration.calibrate import calibrate
+from pretouch.calibration.mounting import moved_out, seat
+from pretouch.calibration.skin_of import skin_of
+from pretouch.errors import CalibrationError
+from pretouch.sensing.skin import Skin, load_skin, save_skin
+from tests.calibration.faulty import on_the_table
+from tests.calibration.made import turned
+
+
+@pytest.fixture(scope="module")
+def found(panda_model, good):
+    return calibrate(panda_model, good)
+
+
+def test_a_skin_carries_places_and_their_uncertainties(panda_model, found, pair, tmp_path):
+    made = skin_of(found, panda_model)
+    assert (made.located, made.kept, made.left_out) == (pair.ids, (), ())
+    save_skin(made.skin, tmp_path / "skin.toml")
+    for unit, calibrated in zip(load_skin(tmp_path / "skin.toml", panda_model).units, found.units, strict=True):
+        assert unit.T_link_sensor == pytest.approx(calibrated.place.T_link_sensor, abs=1e-9)
+        assert unit.position_sigma == calibrated.place.position_sigma
+        # half a degree either way of how well a board is glued on
+        assert unit.orientation_sigma == pytest.approx(np.deg2rad(0.29), rel=0.01)
+
+
+def test_a_unit_that_is_refused_stays_where_the_skin_had_it_or_is_left_out(panda_model, good, pair):
+    found = calibrate(panda_model, on_the_table(good, "on_panda_link4"))
+    alone = skin_of(found, panda_model)
+    assert (alone.skin.ids, alone.left_out) == (("on_panda_hand",), ("on_panda_link4",))
+    kept = skin_of(found, panda_model, pair)
+    assert (kept.skin.ids, kept.kept, kept.located) == (pair.ids, ("on_panda_link4",), ("on_panda_hand",))
+    assert kept.skin.units[0] is pair.units[0]
+
+
+def test_units_that_were_not_calibrated_stay(panda_model, found, whole_skin):
+    made = skin_of(found, panda_model, whole_skin)
+    assert made.skin.ids == whole_skin.ids
+    assert made.located == ("on_panda_link4", "on_panda_hand")
+    assert len(made.kept) == 5
+
+
+def test_without_any_unit_there_is_no_skin(panda_model, good):
+    found = calibrate(panda_model, on_the_table(on_the_table(good, "on_panda_link4"), "on_panda_hand"))
+    with pytest.raises(CalibrationError, match="nothing to make a skin of"):
+        skin_of(found, panda_model)
+
+
+class _Anywhere(Skin):
+    def __init__(self, units):
+        self.units = tuple(units)
+
+
+def test_a_unit_a_little_inside_its_capsule_is_moved_out_and_less_certain(panda_model, moving_arm, pair):
+    true = pair.units[0]
+    deep = turned(true, np.zeros(3), -0.011 * true.T_link_sensor[:3, 2])
+    found = calibrate(panda_model, moving_arm.data(_Anywhere([deep])))
+    (finding,) = found.units[0].findings
+    assert (finding.kind, finding.refused) == ("inside", False)
+    assert "3.0 mm inside the capsules" in finding.sentence
+    (unit,) = skin_of(found, panda_model).skin.units
+    assert unit.position_sigma == pytest.approx(0.003, abs=3e-4)
+    assert np.linalg.norm(unit.T_link_sensor[:3, 3] - deep.T_link_sensor[:3, 3]) == pytest.approx(0.003, abs=5e-4)
+
+
+def test_a_unit_deep_inside_its_capsule_is_refused(panda_model, moving_arm, pair):
+    true = pair.units[0]
+    deep = turned(true, np.zeros(3), -0.04 * true.T_link_sensor[:3, 2])
+    (unit,) = calibrate(panda_model, moving_arm.data(_Anywhere([deep]))).units
+    assert [(finding.kind, finding.refused) for finding in unit.findings] == [("inside", True)]
+
+
+def test_a_unit_on_a_high_bracket_is_worth_a_word(panda_model, moving_arm, pair):
+    true = pair.units[0]
+    high = turned(true, np.zeros(3), 0.15 * true.T_link_sensor[:3, 2])
+    (unit,) = calibrate(panda_model, moving_arm.data(_Anywhere([high]))).units
+    assert [(finding.kind, finding.refused) for finding in unit.findings] == [("far", False)]
+
+
+def test_points_inside_a_link_are_moved_to_its_surface(panda_model):
+    rng = np.random.default_rng(0)
+    for link in sorted(set(panda_model.capsules.link.tolist())):
+        own = panda_model.capsules.of_links(np.array([link]))
+        for _ in range(50):
+            k = rng.integers(len(own))
+            normal = rng.normal(size=3)
+            normal /= np.linalg.norm(normal)
+            p = own.a[k] + rng.uniform() * (own.b[k] - own.a[k]) + (own.radius[k] - 0.005) * normal
+            out = moved_out(panda_model, link, p)
+            if out is not None:
+                assert seat(panda_model, link, out).height >= 0
+                assert np.linalg.norm(out - p) <= 0.04
