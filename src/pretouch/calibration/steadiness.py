@@ -21,8 +21,8 @@ _WORTH = 30.0
 _SIGNIFICANT = 30.0
 """Squared size, in standard deviations, from which on a difference of three numbers is a slip: chance gives it once in
 700 000 times."""
-_EDGE = 0.05
-"""Share of the run at either end in which no slip is looked for."""
+_EDGE_BLOCKS = 6
+"""Blocks at either end of the run in which no slip is looked for: fewer do not tell how sure their pose is."""
 _ITERATIONS = 6
 _APART = np.repeat((0.5, 0.1), 3)
 """Standard deviation of a slip before anything is measured [rad, m]: keeps what a part does not tell finite."""
@@ -61,7 +61,7 @@ def find_slip(course: Course, estimate: Estimate, params: CalibrationParams) -> 
     first, gain = _best_split(_Rows(course, estimate, params), per_block)
     if gain < _WORTH:
         return None
-    before, after, first = _two_poses(course, estimate, first, params)
+    before, after, first = _two_poses(course, estimate, first, per_block, params)
     return _compared(course, before, after, first, per_block, params)
 
 
@@ -100,7 +100,8 @@ def _best_split(rows: _Rows, per_block: int) -> tuple[int, float]:
     gradient = np.add.reduceat(-np.einsum("nij,ni->nj", rows.J, rows.residuals), begins, axis=0)
     inverse = np.linalg.inv(information.sum(axis=0) + rows.prior_J.T @ rows.prior_J)
     step = inverse @ (gradient.sum(axis=0) - rows.prior_J.T @ rows.prior_residuals)
-    allowed = (begins > _EDGE * N) & (begins < (1 - _EDGE) * N)
+    block = np.arange(len(begins))
+    allowed = (block >= _EDGE_BLOCKS) & (block <= len(begins) - _EDGE_BLOCKS)
     if not allowed.any():
         return 0, 0.0
     after = np.cumsum(information[::-1], axis=0)[::-1][allowed][:, :, :_POSE]
@@ -112,14 +113,14 @@ def _best_split(rows: _Rows, per_block: int) -> tuple[int, float]:
 
 
 def _two_poses(
-    course: Course, estimate: Estimate, first: int, params: CalibrationParams
+    course: Course, estimate: Estimate, first: int, per_block: int, params: CalibrationParams
 ) -> tuple[Estimate, Estimate, int]:
     """Fit a pose before and one after some instant, by Gauss and Newton, and that instant with them."""
     before = after = estimate
     for _ in range(_ITERATIONS):
         early, late = _Rows(course, before, params), _Rows(course, after, params)
         if before is not after:
-            first = int(np.argmin(_costs(early, late)))
+            first = int(np.argmin(_costs(early, late, per_block)))
         J, residuals = _joined(early, late, first)
         step = np.linalg.lstsq(J, -residuals, rcond=None)[0]
         rest = _rest(before) + step[_POSE:-_POSE]
@@ -129,11 +130,11 @@ def _two_poses(
     return before, after, first
 
 
-def _costs(early: _Rows, late: _Rows) -> FloatArray:
+def _costs(early: _Rows, late: _Rows, per_block: int) -> FloatArray:
     """Sums of squares (N,) if the second pose holds from each instant on; infinite near the ends."""
     first, second = ((rows.residuals**2).sum(axis=1) for rows in (early, late))
     costs = np.concatenate([[0.0], np.cumsum(first)[:-1]]) + np.cumsum(second[::-1])[::-1]
-    edge = int(np.ceil(_EDGE * len(costs)))
+    edge = _EDGE_BLOCKS * per_block
     costs[:edge] = costs[len(costs) - edge :] = np.inf
     return costs
 
@@ -169,7 +170,7 @@ def _compared(
     ]
     if not any(beyond):
         return None
-    costs = _costs(early, late)
+    costs = _costs(early, late, per_block)
     likely = np.flatnonzero(costs < costs.min() + _WORTH)
     return Slip(
         float(course.time[max(0, likely[0] - 1)]), float(course.time[likely[-1]]),
@@ -178,7 +179,10 @@ def _compared(
 
 
 def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatArray:
-    """Covariance (6, 6) of the second pose less the first, for errors that depend on each other within blocks."""
+    """Covariance (6, 6) of the second pose less the first, for errors that depend on each other within blocks.
+
+    The few blocks of a short part may agree by chance: what they would say if all errors were independent is added.
+    """
     unknowns = J.shape[1]
     N = (len(residuals) - unknowns) // 6
     data = 6 * N
@@ -187,4 +191,4 @@ def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatAr
     few = len(blocks) / max(1, len(blocks) - unknowns / 6)
     inverse = np.linalg.inv(J.T @ J)
     difference = inverse[-_POSE:] - inverse[:_POSE]
-    return difference @ (few * blocks.T @ blocks + J[data:].T @ J[data:]) @ difference.T
+    return difference @ (few * blocks.T @ blocks + J[data:].T @ J[data:] + J.T @ J) @ difference.T
