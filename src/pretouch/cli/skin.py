@@ -1,5 +1,6 @@
 """What `pretouch skin` does: each command by its own file."""
 
+from pretouch.cli.skin_calibrate_options import Calibrate
 from pretouch.cli.skin_commands import Keys, Monitor, Provision, Simulate, SkinCommand
 
 
@@ -10,6 +11,10 @@ def skin(command: SkinCommand) -> int:
             from pretouch.cli.skin_monitor import monitor
 
             return monitor(command)
+        case Calibrate():
+            from pretouch.cli.skin_calibrate import calibrate_skin
+
+            return calibrate_skin(command)
         case Simulate():
             from pretouch.cli.skin_simulate import simulate_units
 

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from pretouch.cli.skin_calibrate_options import Calibrate
 from pretouch.hardware.address import HOST, PORT
 
 
@@ -110,6 +111,9 @@ class Simulate:
     """Names of units whose range finder repeats its first reading, separated by commas."""
     hand: bool = True
     """Whether a person's hand comes and goes."""
+    calibration_joints: str = ""
+    """MCAP file to write the arm's joint states to: once all units are heard it makes the calibration motion instead
+    of its path, and the simulation ends. For `pretouch skin calibrate --joints`."""
     profile: str = "paper"
     """Profile of the arm's controller, or PROFILE:GROUP.FIELD=VALUE."""
     seed: int = 0
@@ -120,6 +124,7 @@ class Simulate:
 
 SkinCommand = (
     Annotated[Monitor, tyro.conf.subcommand("monitor")]
+    | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
     | Annotated[Simulate, tyro.conf.subcommand("simulate")]
     | Annotated[Provision, tyro.conf.subcommand("provision")]
     | Annotated[Keys, tyro.conf.subcommand("keys")]
@@ -128,6 +133,6 @@ SkinCommand = (
 
 @dataclass(frozen=True)
 class Skin:
-    """Sensor units: watch them, set them up, or simulate them."""
+    """Sensor units: watch them, set them up, find where they sit, or simulate them."""
 
     what: SkinCommand

@@ -1,10 +1,11 @@
-"""What `pretouch skin monitor --record` writes of what it sees."""
+"""What `pretouch skin monitor --record` and `pretouch skin calibrate` write of what they see."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 
 from pretouch.hardware.monitor import Turn
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.hardware.traffic import imu_batch
+from pretouch.hardware.traffic import Received, imu_batch
 from pretouch.hardware.wire import Flag
 from pretouch.recording.skin_recording import Diagnosis, Level, SkinRecording
 
@@ -13,14 +14,18 @@ _LEVELS = {"warning": Level.WARN, "fault": Level.ERROR}
 
 def record(recording: SkinRecording, turn: Turn, receiver: SkinReceiver, diagnose: bool) -> None:
     """Keep the samples of a turn, and if asked for how the units are."""
-    for heard in turn.heard:
-        unit = receiver.units[heard.unit].id
-        recording.sample(unit, heard, bool(heard.sample.flags & Flag.RANGE_NEW))
-        batch = imu_batch(heard)
-        if batch is not None:
-            recording.imu(unit, batch.stamp, batch.acceleration, batch.angular_velocity)
+    record_samples(recording, turn.heard, [unit.id for unit in receiver.units])
     if diagnose:
         recording.health(turn.time, _diagnoses(turn))
+
+
+def record_samples(recording: SkinRecording, heard: Iterable[Received], ids: Sequence[str]) -> None:
+    """Keep samples of the units of these ids, in their order in the skin, with what their IMUs measured."""
+    for one in heard:
+        recording.sample(ids[one.unit], one, bool(one.sample.flags & Flag.RANGE_NEW))
+        batch = imu_batch(one)
+        if batch is not None:
+            recording.imu(ids[one.unit], batch.stamp, batch.acceleration, batch.angular_velocity)
 
 
 def _diagnoses(turn: Turn) -> list[Diagnosis]:

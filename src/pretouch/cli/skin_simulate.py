@@ -3,22 +3,31 @@
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from pretouch.cli.arms import arm_model
 from pretouch.cli.skin_commands import Simulate
 from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
+from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.params import profile as find_profile
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import NetworkParams, WayParams
-from pretouch.serving.simulate import SimulateOptions, run
+from pretouch.serving.simulate import run, run_motion
+from pretouch.serving.simulated_arm import SimulateOptions
 from pretouch.sim.imu import ImuParams
+from pretouch.types import RobotState
+
+_say = partial(print, flush=True)
 
 
 def simulate_units(command: Simulate) -> None:
     """Simulate until interrupted, or for the given time."""
     c = command
+    if c.calibration_joints and c.duration:
+        raise HardwareError("--duration does not go with --calibration-joints, which ends with the motion.")
     up = WayParams(
         loss=c.loss, loss_run=c.loss_run, delay_s=c.delay, jitter_s=c.jitter, overtaken=c.overtaken, doubled=c.doubled
     )
@@ -30,17 +39,40 @@ def simulate_units(command: Simulate) -> None:
     model = arm_model(c.arm)
     skin = load_skin(Path(c.skin), model) if c.skin else paper_skin(model)
     options = SimulateOptions(
-        model, skin, _keys(keys_file(c.keys), skin), c.host, c.port, fleet, profile=profile, hand=c.hand,
+        model, skin, keys_for(keys_file(c.keys), skin), c.host, c.port, fleet, profile=profile, hand=c.hand,
         silenced=frozenset(words(c.silenced)), stuck=frozenset(words(c.stuck)), seed=c.seed, duration_s=c.duration,
     )  # fmt: skip
-    run(options, lambda: False, partial(print, flush=True))
+    if c.calibration_joints:
+        _make_motion(options, Path(c.calibration_joints))
+    else:
+        run(options, lambda: False, _say)
 
 
-def _keys(place: Path, skin: Skin) -> Keys:
+def _make_motion(options: SimulateOptions, place: Path) -> None:
+    """Let the arm make the calibration motion, and record its joint states."""
+    from pretouch.calibration.planner import plan_motion
+    from pretouch.recording.skin_recording import SkinRecording
+
+    joints = options.model.joints
+    with SkinRecording(place) as recording:
+
+        def keep(state: RobotState) -> None:
+            q, qd = np.array(state.q)[None], np.array(state.qd)[None]
+            recording.joints(np.array([state.stamp]), q, qd, joints)
+
+        _say("The motion is being planned.")
+        run_motion(options, plan_motion(options.model), keep, lambda: bool(recording.trouble), _say)
+        recording.close()
+        if recording.trouble:
+            raise HardwareError(recording.trouble)
+    _say(f"Joint states: {place}.")
+
+
+def keys_for(place: Path, skin: Skin) -> Keys:
     """Return the keys of a file, made for the skin's units if it is not there."""
     if place.exists():
         return keys_or_none(place)
     keys = with_new(Keys(), skin.ids)
     save_keys(keys, place)
-    print(f"Made keys for {len(keys)} units: {place}", flush=True)
+    _say(f"Made keys for {len(keys)} units: {place}")
     return keys

@@ -1,0 +1,30 @@
+"""What `pretouch skin calibrate` does, by the way it is asked to."""
+
+from pathlib import Path
+
+from pretouch.cli.arms import arm_model
+from pretouch.cli.skin_calibrate_files import Outputs
+from pretouch.cli.skin_calibrate_motion import write_motion
+from pretouch.cli.skin_calibrate_options import Calibrate, way_of
+from pretouch.cli.skin_calibrate_recording import Sources, calibrate_recording
+
+
+def calibrate_skin(command: Calibrate) -> int:
+    """Calibrate; return 1 if a unit was refused or the motion was not finished, or else 0."""
+    way = way_of(command)
+    if way == "simulate":
+        from pretouch.cli.skin_calibrate_study import study_skins
+
+        study_skins(command)
+        return 0
+    if way == "plan":
+        write_motion(command)
+        return 0
+    outputs = Outputs.of(command)
+    if way == "robot":
+        from pretouch.cli.skin_calibrate_live import calibrate_live
+
+        return calibrate_live(command, outputs)
+    c = command.recorded
+    joints, skin = (Path(text) if text else None for text in (c.joints, command.skin))
+    return calibrate_recording(arm_model(command.arm), Sources(Path(c.recording), joints, c.topic, skin), outputs)

@@ -1,0 +1,143 @@
+"""What `pretouch skin calibrate --robot` does: the arm makes the motion, all is recorded, and that is calibrated."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from itertools import count
+from pathlib import Path
+from shlex import join
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from pretouch.calibration.perform import PerformParams
+from pretouch.calibration.plan import Plan
+from pretouch.calibration.plan_params import PlanParams
+from pretouch.calibration.plan_route import approach
+from pretouch.cli.arms import arm_model
+from pretouch.cli.ending import Terminated
+from pretouch.cli.skin_calibrate_files import Outputs, check_free
+from pretouch.cli.skin_calibrate_motion import planned
+from pretouch.cli.skin_calibrate_options import Calibrate
+from pretouch.cli.skin_calibrate_recording import Sources, calibrate_recording
+from pretouch.cli.skin_calibrate_session import Session
+from pretouch.cli.skin_keys import keys_file
+from pretouch.cli.skin_simulate import keys_for
+from pretouch.cli.writing import check_writable
+from pretouch.errors import CalibrationError, HardwareError
+from pretouch.hardware.address import EVERYWHERE, HOST
+from pretouch.hardware.network_skin import NetworkSkin
+from pretouch.recording.skin_recording import SkinRecording
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import load_skin, paper_skin
+from pretouch.serving.simulated_arm import CATCH_UP_S, SimulatedArm, SimulateOptions
+
+_ROBOTS = ("simulated",)
+
+
+def calibrate_live(command: Calibrate, outputs: Outputs) -> int:
+    """Calibrate the units of an arm that is moved; return 1 if a unit was refused or the motion ended early, or 0."""
+    if command.live.robot not in _ROBOTS:
+        raise HardwareError(
+            f"The arm {command.live.robot!r} cannot be moved from here: choose {' or '.join(_ROBOTS)}, or make the"
+            " motion of --plan with a driver of your own and calibrate from its --recording."
+        )
+    if not outputs.skin:
+        raise CalibrationError("No skin file to write is given: name one with --out.")
+    if not command.live.units_host:
+        raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
+    place = _recording_place(command, outputs.skin)
+    model = arm_model(command.arm)
+    with _session(command, model) as session:
+        plan, params = planned(model, command.motion)
+        if not command.live.yes:
+            _ask(plan)
+        print("Waiting for the units.", flush=True)
+        session.wait_for_units()
+        stopped = _recorded(session, model, plan, params, place, _go_on(command, place))
+    if stopped:
+        return 1
+    skin = Path(command.skin) if command.skin else None
+    return calibrate_recording(model, Sources(place, skin=skin), outputs)
+
+
+def _recording_place(command: Calibrate, out: Path) -> Path:
+    """Return the recording to write, which is not there yet."""
+    beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
+    place = Path(command.live.record or next(one for one in beside if not one.exists()))
+    check_free("recording", place, replace=False)
+    check_writable("recording", place)
+    return place
+
+
+@contextmanager
+def _session(command: Calibrate, model: RobotModel) -> Iterator[Session]:
+    """Hear the units of a simulated arm."""
+    skin = load_skin(Path(command.skin), model) if command.skin else paper_skin(model)
+    keys = keys_for(keys_file(command.live.keys), skin)
+    host = command.live.units_host
+    with NetworkSkin(skin.ids, keys, host, command.live.units_port) as source:
+        here = HOST if host == EVERYWHERE else host
+        options = SimulateOptions(model, skin, keys, here, source.address[1], hand=False, seed=command.seed)
+        with SimulatedArm(options, model.description.q_ready, PerformParams().period_s, late=CATCH_UP_S) as arm:
+            yield Session(arm, model, source, skin.ids)
+        if arm.clock.left_out:
+            print(f"This machine is too slow by {arm.clock.left_out:.1f} s for the simulation: its data have gaps.")
+
+
+def _ask(plan: Plan) -> None:
+    """Have a person let the arm move; CalibrationError if none does."""
+    print("Nobody may be within the arm's reach, and nothing in the room above, while it moves.", flush=True)
+    try:
+        answer = input(f"Let it move for {plan.duration:.0f} s? [y/N] ")
+    except EOFError:
+        raise CalibrationError("There is no terminal to ask at whether the arm may move: give --yes.") from None
+    if answer.strip().lower() not in ("y", "yes"):
+        raise CalibrationError("The arm was not moved: answer y to let it.")
+
+
+def _recorded(
+    session: Session, model: RobotModel, plan: Plan, params: PlanParams, place: Path, go_on: str
+) -> str | None:
+    """Let the arm move, and record all; return why it was stopped, or None."""
+    with SkinRecording(place) as recording:
+        session.record(recording)
+        try:
+            stopped = _moved(session, model, plan, params)
+        except (KeyboardInterrupt, Terminated):
+            with suppress(OSError):  # the terminal may be gone
+                print(f"The arm was stopped. {recording.close()} {go_on}", flush=True)
+            raise
+        except BaseException:
+            print(recording.close(), flush=True)
+            raise
+        kept = recording.close()
+    print(f"The motion was ended early. {stopped}\n{kept} {go_on}" if stopped else kept, flush=True)
+    return stopped
+
+
+def _moved(session: Session, model: RobotModel, plan: Plan, params: PlanParams) -> str | None:
+    """Bring the arm to where the plan begins, and let it follow that; return why it was stopped, or None."""
+    columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        q, ways = session.posture(), [plan]
+        if np.abs(q - plan.start).max() > PerformParams().start_tolerance_rad / 2:
+            ways.insert(0, approach(model, q, plan, params))
+        for way in ways:
+            task = bar.add_task("motion" if way is plan else "way to its start", total=way.duration)
+            stopped = session.follow(way, partial(_progress, bar, task))
+            if stopped:
+                return stopped
+        session.stand()
+    return None
+
+
+def _progress(bar: Progress, task: TaskID, since: float) -> None:
+    bar.update(task, completed=since)
+
+
+def _go_on(command: Calibrate, place: Path) -> str:
+    """Say how to calibrate from a recording."""
+    words = ["pretouch", "skin", "calibrate", "--recording", str(place), "--arm", command.arm, "--out", command.out]
+    return f"What it tells can be tried: {join([*words, *(['--skin', command.skin] if command.skin else [])])}"

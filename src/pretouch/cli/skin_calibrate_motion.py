@@ -1,0 +1,41 @@
+"""What `pretouch skin calibrate --plan` does: the motion for one's own driver."""
+
+from pathlib import Path
+
+from pretouch.calibration.plan import Plan
+from pretouch.calibration.plan_params import PlanParams
+from pretouch.calibration.plan_report import report_on
+from pretouch.calibration.planner import plan_motion
+from pretouch.cli.arms import arm_model
+from pretouch.cli.skin_calibrate_files import check_free
+from pretouch.cli.skin_calibrate_options import Calibrate, MotionOptions
+from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.robot.model import RobotModel
+
+
+def plan_params(options: MotionOptions) -> PlanParams:
+    """Return what is asked of the motion."""
+    return PlanParams(
+        duration_s=options.duration, variant=options.variant, reach_rad=options.reach, speed_m_s=options.speed,
+        clearance_m=options.clearance, floor_m=options.floor,
+    )  # fmt: skip
+
+
+def planned(model: RobotModel, options: MotionOptions) -> tuple[Plan, PlanParams]:
+    """Plan the motion, and print what it is good for and the room it takes."""
+    params = plan_params(options)
+    print("The motion is being planned.", flush=True)
+    plan = plan_motion(model, params)
+    print(report_on(model, plan, params), flush=True)
+    return plan, params
+
+
+def write_motion(command: Calibrate) -> None:
+    """Plan the motion and write it as CSV."""
+    place = Path(command.motion.plan)
+    check_free("motion", place, command.replace)
+    check_writable("file", place)
+    plan, _ = planned(arm_model(command.arm), command.motion)
+    with unwritable_said("file", place):
+        plan.save(place)
+    print(f"Motion: {place}. Let nobody be within the arm's reach while it is made.")

@@ -1,0 +1,107 @@
+"""The answer of `pretouch skin calibrate`: a table, sentences, the skin file, and all numbers."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from pretouch.calibration.result import Calibration, UnitCalibration
+from pretouch.calibration.skin_of import skin_of
+from pretouch.cli.skin_calibrate_files import Outputs
+from pretouch.cli.skin_calibrate_numbers import numbers
+from pretouch.cli.writing import unwritable_said
+from pretouch.errors import CalibrationError
+from pretouch.experiments.campaign import write_json
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin, save_skin
+
+_COLUMNS = (
+    "unit", "link", "position\n[mm]", "sigma\n[mm]", "sigma\n[deg]", "clock\n[ms]", "residual\n[m/s^2]", "verdict",
+)  # fmt: skip
+_TEXT = (0, 1, 7)
+"""Columns that hold no numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a calibration found, and what it was asked with."""
+
+    model: RobotModel
+    calibration: Calibration
+    believed: Skin | None
+    """The skin as it was believed to be."""
+    clock_ahead: float
+    """By how much the units' clock was ahead of the joints' [s], taken off before; NaN if that was not found."""
+    notes: tuple[str, ...]
+    """What is to be known of the data, a sentence each."""
+
+
+def give(answer: Answer, outputs: Outputs) -> int:
+    """Show and write an answer; return 1 if a unit was refused, or else 0."""
+    console = Console(highlight=False)
+    console.print(_table(answer))
+    notes = [*answer.notes, *(finding.sentence for finding in answer.calibration.findings)]
+    for sentence in (*notes, *_sentences(answer)):
+        console.print(sentence, soft_wrap=True, markup=False)
+    if outputs.json:
+        with unwritable_said("file", outputs.json):
+            write_json(numbers(answer.model, answer.calibration, answer.clock_ahead, notes), outputs.json)
+        console.print(f"Numbers: {outputs.json}", soft_wrap=True, markup=False)
+    if outputs.skin:
+        console.print(_written(answer, outputs), soft_wrap=True, markup=False)
+    return int(not all(unit.accepted for unit in answer.calibration.units))
+
+
+def _table(answer: Answer) -> Table:
+    shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    for i, name in enumerate(_COLUMNS):
+        shown.add_column(escape(name), justify="left" if i in _TEXT else "right", no_wrap=i > 1, overflow="fold")
+    for unit in answer.calibration.units:
+        style = "" if unit.accepted else "bold red"
+        shown.add_row(*map(escape, _cells(unit)), style="yellow" if unit.accepted and unit.findings else style)
+    return shown
+
+
+def _cells(unit: UnitCalibration) -> tuple[str, ...]:
+    place, verdict = unit.place, "good" if unit.accepted else "refused"
+    if place is None:
+        return unit.id, *("-" for _ in _COLUMNS[2:]), verdict
+    return (
+        unit.id,
+        place.link,
+        " ".join(f"{1000 * value:.1f}" for value in place.T_link_sensor[:3, 3]),
+        f"{1000 * place.position_sigma:.2f}",
+        f"{np.rad2deg(place.orientation_sigma):.3f}",
+        f"{1000 * place.clock_offset:.2f}",
+        f"{place.acceleration_residual:.3f}",
+        verdict,
+    )
+
+
+def _sentences(answer: Answer) -> Iterator[str]:
+    """Say what is to be known of each unit, refused ones first."""
+    for unit in sorted(answer.calibration.units, key=lambda unit: unit.accepted):
+        for finding in unit.findings:
+            yield f"{unit.id}{' is refused' if finding.refused else ''}: {finding.sentence}"
+
+
+def _written(answer: Answer, outputs: Outputs) -> str:
+    """Write the skin file, and say what it holds."""
+    if outputs.skin is None:
+        raise CalibrationError("No skin file is asked for: give one with --out.")
+    try:
+        made = skin_of(answer.calibration, answer.model, answer.believed)
+    except CalibrationError as error:
+        return f"{error} {outputs.skin} is not written."
+    if not made.located:
+        return f"No unit's place was found well enough: {outputs.skin} is not written."
+    save_skin(made.skin, outputs.skin)
+    said = [f"Skin file: {outputs.skin} has {len(made.located)} units where they were found."]
+    if made.kept:
+        said.append(f"As they were before, and not calibrated: {', '.join(made.kept)}.")
+    if made.left_out:
+        said.append(f"Left out: {', '.join(made.left_out)}.")
+    return " ".join(said)

@@ -1,0 +1,134 @@
+"""A simulated arm in real time, whose units tell a receiver what they measure as real ones do."""
+
+from dataclasses import dataclass, field
+from typing import Self
+
+from pretouch.checks import Checked, NonNegative
+from pretouch.control.path import Circle, Path
+from pretouch.errors import HardwareError, ParameterError
+from pretouch.hardware.keys import Keys
+from pretouch.params import Profile
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.serving.fleet import Fleet, FleetParams
+from pretouch.serving.real_time import LATE_S, RealTime
+from pretouch.sim.imu import ImuParams, Imus
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import SceneSpec
+from pretouch.types import FloatArray, RobotState
+
+SETTLE_S = 0.2
+"""Time the arm stands before its time begins [s]: the observer's transient is over."""
+CATCH_UP_S = 5.0
+"""How late a machine may be that makes up for it [s]: for motions in which no time may be left out."""
+
+
+def _fleet() -> FleetParams:
+    return FleetParams(imu=ImuParams())
+
+
+@dataclass(frozen=True)
+class SimulateOptions(Checked):
+    """What to simulate, and where to send it."""
+
+    model: RobotModel
+    """The arm."""
+    skin: Skin
+    """Its units."""
+    keys: Keys
+    """Keys of all of them; the receiver has the same."""
+    host: str
+    """Name or address of the receiver."""
+    port: int
+    """Its UDP port."""
+    fleet: FleetParams = field(default_factory=_fleet)
+    """Units, their IMUs and reboots, and the network to the receiver."""
+    path: Path = field(default_factory=Circle)
+    """What the end-effector follows."""
+    profile: Profile = field(default_factory=Profile)
+    """Parameters of the controller."""
+    hand: bool = True
+    """Whether a person's hand comes and goes."""
+    silenced: frozenset[str] = frozenset()
+    """Names of units that send nothing."""
+    stuck: frozenset[str] = frozenset()
+    """Names of units whose range finder repeats its first reading."""
+    seed: int = 0
+    """Decides all that is random."""
+    duration_s: NonNegative = 0.0
+    """How long [s]; 0: until it is stopped."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        unknown = sorted((self.silenced | self.stuck) - set(self.skin.ids))
+        if unknown:
+            raise HardwareError(f"There is no unit {', '.join(unknown)}: choose from {', '.join(self.skin.ids)}.")
+        if self.seed < 0:
+            raise ParameterError(f"SimulateOptions.seed is {self.seed}: it must be at least 0.")
+
+
+class SimulatedArm:
+    """An arm with units, in real time: the ports `Robot` and `Clock`; a context manager, for the sockets.
+
+    All happens while somebody waits for a tick: one thread.
+    """
+
+    def __init__(
+        self, options: SimulateOptions, q: FloatArray, period: float, scene: SceneSpec | None = None,
+        late: float = LATE_S,
+    ) -> None:  # fmt: skip
+        """Let an arm stand at q (n,) [rad] and switch its units on. Control period and `late` are as of `RealTime`.
+
+        A receiver that cannot be found, and a unit without a key, are a HardwareError.
+        """
+        skin, seed = options.skin, options.seed
+        self.fleet = Fleet(skin.ids, options.keys, options.fleet, seed, (options.host, options.port))
+        """Its units."""
+        try:
+            for name, unit in zip(skin.ids, self.fleet.units, strict=True):
+                unit.silent, unit.stuck = name in options.silenced, name in options.stuck
+            self.plant = Plant(options.model, scene or SceneSpec(), PlantParams(), q, seed)
+            self.clock = RealTime(self.plant, period, late)
+            real, fleet = self.clock.real, self.fleet
+            RangeFinders(self.plant, skin, RangeFinderParams(), seed, lambda sample: fleet.take_range(real(sample)))
+            if options.fleet.imu is not None:
+                Imus(self.plant, skin, options.fleet.imu, seed, lambda sample: fleet.take_imu(real(sample)))
+        except BaseException:
+            self.fleet.close()
+            raise
+
+    def begin(self) -> None:
+        """Let its time begin."""
+        self.plant.advance(SETTLE_S)
+        self.clock.begin(self.fleet)
+
+    def read(self) -> RobotState:
+        """Return the newest state, by the simulated time."""
+        return self.plant.read()
+
+    def command(self, qd: FloatArray) -> None:
+        """Take joint velocities (n,) [rad/s] as the set-point until the next command."""
+        self.plant.command(qd)
+
+    def tick(self) -> float:
+        """Wait for the next control period and return the simulated time [s]."""
+        tick = self.clock.tick()
+        self.plant.take_log()  # nobody reads it, and it would grow without an end
+        return tick
+
+    def monotonic(self, simulated: float) -> float:
+        """Return an instant of the simulated time by this machine's monotonic clock [s]."""
+        return self.clock.monotonic(simulated)
+
+    @property
+    def in_session(self) -> bool:
+        """Whether all its units that are not silenced are in a session with a receiver."""
+        return all(unit.in_session for unit in self.fleet.units if not unit.silent)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.fleet.close()

@@ -1,0 +1,47 @@
+"""A simulated arm with three units that makes a short calibration motion, recorded as the wire brings it."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.calibration.perform import perform
+from pretouch.calibration.plan import Plan, Swing
+from pretouch.cli.skin_record import record_samples
+from pretouch.recording.skin_recording import SkinRecording
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.serving.fleet import FleetParams
+from pretouch.serving.wire_skin import WireSkin
+from pretouch.sim.imu import ImuParams
+from pretouch.sim.plant import Plant, PlantClock
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams
+from pretouch.sim.scene import SceneSpec
+from pretouch.traces import JointTrace
+
+
+def swinging(model: RobotModel, duration: float = 10.0) -> Plan:
+    """All joints at once, about the ready posture."""
+    tones = np.geomspace(0.3, 1.2, 14).reshape(2, 7)
+    swing = Swing(0.5, duration - 1.0, 1.0, 0.35 / (2 * np.pi * tones), tones, np.arange(14.0).reshape(2, 7))
+    q = model.description.q_ready
+    return Plan(np.array([0.0, 0.5, duration - 0.5, duration]), np.array([q] * 4), (swing,))
+
+
+def record_motion(model: RobotModel, skin: Skin, place: Path, joints_too: bool = True) -> JointTrace:
+    """Record units, and joints if asked for, while the arm swings; return where the joints were."""
+    plan = swinging(model)
+    plant = Plant(model, SceneSpec(), PlantParams(), plan.start, 0)
+    fleet = FleetParams(imu=ImuParams(misalignment_deg=0.0))
+    with WireSkin(plant, skin, RangeFinderParams(), fleet, 0) as wire, SkinRecording(place) as recording:
+        plant.advance(2.0)  # the receiver knows the units' clocks
+
+        def keep(_tick: float) -> None:
+            state = plant.read()
+            if joints_too:
+                recording.joints(np.array([state.stamp]), state.q[None].copy(), None, model.joints)
+            record_samples(recording, wire.receiver.take_samples(), skin.ids)
+
+        done = perform(plant, PlantClock(plant, 0.01), model, plan, on_tick=keep)
+    assert done.stopped is None
+    return done.joints

@@ -1,0 +1,162 @@
+"""`pretouch skin calibrate`: what goes together, the study in simulation, and the motion for one's own driver."""
+
+import csv
+import json
+import socket
+
+import numpy as np
+import pytest
+
+from pretouch import cli
+from pretouch.cli import skin_calibrate_study
+from pretouch.experiments.calibration.study import OURS, Study, Trial
+
+ROW = {
+    "skin": 0, "unit": "on_panda_hand", "link": "panda_hand", "accepted": True, "position_error_m": 0.0002,
+    "orientation_error_deg": 0.004, "position_sigma_m": 0.0001, "orientation_sigma_deg": 0.003, "nees_position": 3.0,
+    "nees_orientation": 3.0, "nees_pose": 6.0, "clock_error_s": 0.0007, "link_found": True,
+}  # fmt: skip
+
+
+def calibrate(*words):
+    return cli.main(["skin", "calibrate", *map(str, words)])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "Nothing says what to calibrate from: give --simulate, --recording FILE, --plan FILE, or --robot ARM."),
+        (("--keys", "k.toml"), "Nothing says what to calibrate from"),
+        (("--simulate", "--recording", "x.mcap"), "--simulate and --recording are given: choose one of them."),
+        (("--plan", "m.csv", "--robot", "simulated"), "--plan and --robot are given: choose one of them."),
+        (("--simulate", "--joints", "x.csv"), "--joints does not go with --simulate: leave it out."),
+        (("--simulate", "--out", "s.toml", "--yes"), "--out, --yes do not go with --simulate: leave them out."),
+        (("--recording", "x.mcap", "--find-links"), "--find-links does not go with --recording: leave it out."),
+        (("--recording", "x.mcap", "--duration", "30"), "--duration does not go with --recording"),
+        (("--recording", "x.mcap", "--seed", "1"), "--seed does not go with --recording"),
+        (("--plan", "m.csv", "--units-port", "1"), "--units-port does not go with --plan"),
+        (("--robot", "simulated", "--joints", "x"), "--joints does not go with --robot"),
+        (("--simulate", "--skins", "0"), "The number of skins is 0"),
+        (("--simulate", "--seed", "-1"), "The seed is -1: it must be at least 0."),
+        (("--simulate", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
+        (("--recording", "/nowhere.mcap"), "The recording /nowhere.mcap cannot be read: there is none."),
+        (("--recording", "x.mcap", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
+        (("--recording", "x.mcap", "--out", "/dev/null/x.toml"), "/dev/null/x.toml cannot be written"),
+        (("--recording", "x.mcap", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
+        (("--plan", "m.csv", "--duration", "100"), "PlanParams.duration_s is 100.0: it must be at most 90"),
+        (("--plan", "/dev/null/m.csv"), "/dev/null/m.csv cannot be written"),
+        (("--robot", "fr3", "--out", "s.toml"), "The arm 'fr3' cannot be moved from here: choose simulated"),
+        (("--robot", "simulated"), "No skin file to write is given: name one with --out."),
+        (("--robot", "simulated", "--out", "s.toml"), "No file of keys is given: name one with --keys."),
+        (("--robot", "simulated", "--out", "s.toml", "--keys", "k.toml", "--units-host", ""), "--units-host is empty"),
+        (("--robot", "simulated", "--out", "s.toml", "--record", "/dev/null/x.mcap"), "x.mcap cannot be written"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_said_in_one_sentence(tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    assert calibrate(*words) == 2
+    told = capsys.readouterr()
+    assert said in told.err
+    assert told.err.count("\n") == 1
+    assert "planned" not in told.out or "PlanParams" in said
+
+
+def test_files_that_are_there_are_not_written_over_unasked(tmp_path, capsys):
+    there = tmp_path / "there"
+    there.write_text("mine")
+    for words in (
+        ("--recording", "x.mcap", "--out", there),
+        ("--plan", there),
+        ("--robot", "simulated", "--keys", "k.toml", "--out", there),
+        ("--robot", "simulated", "--keys", "k.toml", "--out", tmp_path / "s.toml", "--record", there),
+    ):
+        assert calibrate(*words) == 2
+        assert f"{there} is there already: give another name, or --replace." in capsys.readouterr().err
+    assert there.read_text() == "mine"
+
+
+def test_a_port_that_is_taken_is_said_before_anything_is_planned(tmp_path, capsys):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+        files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml")
+        assert calibrate("--robot", "simulated", *files, "--units-port", port) == 2
+    told = capsys.readouterr()
+    assert f"Port {port} of 127.0.0.1 is taken" in told.err
+    assert "planned" not in told.out
+
+
+def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypatch):
+    files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml", "--units-port", 0)
+    for answer in ("", "n", "maybe"):
+        monkeypatch.setattr("builtins.input", lambda question, answer=answer: answer)
+        assert calibrate("--robot", "simulated", *files) == 2
+        told = capsys.readouterr()
+        assert "The arm needs the room x" in told.out
+        assert "Nobody may be within the arm's reach" in told.out
+        assert "The arm was not moved: answer y to let it." in told.err
+
+    def nobody(_question):
+        raise EOFError
+
+    monkeypatch.setattr("builtins.input", nobody)
+    assert calibrate("--robot", "simulated", *files) == 2
+    assert "There is no terminal to ask at whether the arm may move: give --yes." in capsys.readouterr().err
+    assert [place.name for place in tmp_path.iterdir()] == ["k.toml"]
+
+
+def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, monkeypatch):
+    asked = []
+
+    def study(model, skins, seed, compared, links_known, plan, progress):
+        asked.append((model.description.name, skins, seed, compared, links_known, plan))
+        progress(1, 1)
+        return Study([Trial(0, OURS, OURS, [ROW], 1.5)], {OURS: 60.0})
+
+    monkeypatch.setattr(skin_calibrate_study, "study", study)
+    place = tmp_path / "new" / "rows.json"
+    assert calibrate("--simulate", "--skins", 20, "--json", place) == 0
+    told = json.loads(place.read_text())
+    assert told["rows"] == [ROW]
+    assert (told["motion_s"], told["compute_s"]) == (60.0, 1.5)
+    said = capsys.readouterr().out
+    assert "Where units sit, found in 60 s of motion" in said
+    assert "panda_hand" in said
+    assert f"Numbers: {place}" in said
+    assert calibrate("--simulate", "--compared", "--find-links", "--seed", 3, "--arm", "fr3") == 0
+    assert asked == [("panda", 20, 0, False, True, None), ("fr3", 20, 3, True, False, None)]
+
+
+def test_the_motion_is_written_for_another_driver_with_what_it_is_good_for(panda_model, tmp_path, capsys):
+    place = tmp_path / "motion.csv"
+    assert calibrate("--plan", place, "--duration", 45) == 0
+    said = capsys.readouterr().out
+    assert said.index("45 s, ") < said.index("The arm needs the room") < said.index("Let nobody be within")
+    assert "panda_link1       not where along the axis" in said
+    with place.open() as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["time", *(f"q{i}" for i in range(1, 8)), *(f"qd{i}" for i in range(1, 8))]
+    table = np.array(rows[1:], dtype=float)
+    assert table[-1, 0] == pytest.approx(45.0)
+    for row in table[[0, -1]]:
+        assert row[1:8] == pytest.approx(panda_model.description.q_ready, abs=1e-6)
+        assert row[8:] == pytest.approx(np.zeros(7), abs=1e-6)
+
+
+def test_a_rehearsal_ends_with_its_motion_and_takes_no_duration(tmp_path, capsys):
+    words = ("--keys", tmp_path / "k.toml", "--calibration-joints", tmp_path / "j.mcap", "--duration", 5)
+    assert cli.main(["skin", "simulate", *map(str, words)]) == 2
+    assert "--duration does not go with --calibration-joints" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_study_of_one_skin_finds_all_units_to_a_millimetre(tmp_path):
+    place = tmp_path / "rows.json"
+    assert calibrate("--simulate", "--skins", 1, "--find-links", "--json", place) == 0
+    told = json.loads(place.read_text())
+    assert len(told["rows"]) == 7
+    assert told["motion_s"] <= 90.0
+    for row in told["rows"]:
+        assert row["position_error_m"] < 0.001
+        assert row["orientation_error_deg"] < 0.1

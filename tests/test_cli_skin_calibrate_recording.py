@@ -1,0 +1,156 @@
+"""`pretouch skin calibrate --recording`: from what was recorded to a skin file."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pretouch import cli
+from pretouch.cli import skin_calibrate_recording
+from pretouch.recording.calibration_data import read_measured
+from pretouch.sensing.skin import Skin, load_skin, save_skin
+from pretouch.traces import JointTrace
+from tests.calibrated_arm import record_motion
+
+LATE = 1.7e9
+"""Of the joints' clock in a file of their own [s]: the time of day against a monotonic clock."""
+
+
+@pytest.fixture(scope="module")
+def skin(panda_model, paper_skin):
+    units = {unit.id: unit for unit in paper_skin.units}
+    return Skin([units[name] for name in ("forearm_left", "hand_left", "hand_front")], panda_model)
+
+
+@pytest.fixture(scope="module")
+def recorded(panda_model, skin, tmp_path_factory):
+    """A folder with `units.mcap`, all in one, and `joints.csv`, the joint states by another clock."""
+    folder = tmp_path_factory.mktemp("recorded")
+    joints = record_motion(panda_model, skin, folder / "units.mcap")
+    with (folder / "joints.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["time_s", *(f"q{i}_rad" for i in range(1, 8))])
+        rows.writerows([f"{t + LATE:.6f}", *q] for t, q in zip(joints.stamp, joints.q.tolist(), strict=True))
+    return folder
+
+
+def calibrate(*words):
+    return cli.main(["skin", "calibrate", *map(str, words)])
+
+
+def assert_same_places(found, true, ids=None):
+    for unit in found.units:
+        if ids and unit.id not in ids:
+            continue
+        there = true.units[true.ids.index(unit.id)]
+        assert unit.link == there.link
+        T, wanted = unit.T_link_sensor, there.T_link_sensor
+        assert np.linalg.norm(T[:3, 3] - wanted[:3, 3]) < 0.001
+        assert np.rad2deg(Rotation.from_matrix(T[:3, :3].T @ wanted[:3, :3]).magnitude()) < 0.1
+
+
+def test_a_recording_of_units_and_joints_becomes_a_skin_file(panda_model, skin, recorded, tmp_path, capsys):
+    out, numbers = tmp_path / "skin.toml", tmp_path / "numbers.json"
+    assert calibrate("--recording", recorded / "units.mcap", "--out", out, "--json", numbers) == 0
+    said = capsys.readouterr().out
+    assert f"Skin file: {out} has 3 units where they were found." in said
+    made = load_skin(out, panda_model)
+    assert sorted(made.ids) == sorted(skin.ids)
+    assert_same_places(made, skin)
+    told = json.loads(numbers.read_text())
+    assert told["clock_ahead_s"] == 0.0
+    for unit in told["units"]:
+        place, written = unit["place"], made.units[made.ids.index(unit["unit"])]
+        assert unit["accepted"]
+        assert place["position_m"] == pytest.approx(written.T_link_sensor[:3, 3], abs=1e-9)
+        assert place["position_sigma_m"] == pytest.approx(written.position_sigma)
+        floor = told["board_misalignment_sigma_rad"]
+        assert written.orientation_sigma == pytest.approx(np.hypot(place["orientation_sigma_rad"], floor))
+        assert np.array(place["covariance"]).shape == (6, 6)
+        assert unit["unit"] in said
+        assert unit["observability"]["unknown"] == []
+
+
+def test_joint_states_of_another_clock_are_aligned(panda_model, skin, recorded, tmp_path, capsys):
+    out, numbers = tmp_path / "skin.toml", tmp_path / "numbers.json"
+    words = ("--joints", recorded / "joints.csv", "--out", out, "--json", numbers)
+    assert calibrate("--recording", recorded / "units.mcap", *words) == 0
+    said = capsys.readouterr().out
+    assert "Joint states are the columns q1_rad to q7_rad of" in said
+    assert f"s behind that of {recorded / 'joints.csv'}." in said
+    assert_same_places(load_skin(out, panda_model), skin)
+    told = json.loads(numbers.read_text())
+    assert told["clock_ahead_s"] == pytest.approx(-LATE, abs=0.05)
+    assert all(abs(unit["place"]["clock_offset_s"]) < 0.01 for unit in told["units"])
+
+
+def test_a_skin_that_is_wrong_about_a_link_keeps_that_unit_as_it_was(panda_model, skin, recorded, tmp_path, capsys):
+    link6 = replace(skin.units[1], link="panda_link6", T_link_sensor=skin.units[1].T_link_sensor)
+    silent = replace(skin.units[0], id="lost")
+    believed = Skin([silent, link6, skin.units[2]], panda_model)
+    old, out = tmp_path / "old.toml", tmp_path / "new.toml"
+    save_skin(believed, old)
+    assert calibrate("--recording", recorded / "units.mcap", "--skin", old, "--out", out) == 1
+    said = capsys.readouterr().out
+    assert f"{old} does not name forearm_left: their links are found." in said
+    assert "hand_left is refused: It is said to sit on panda_link6" in said
+    assert "lost is refused: It sent no IMU samples" in said
+    assert "As they were before, and not calibrated: lost, hand_left." in said
+    made = load_skin(out, panda_model)
+    assert made.ids == ("lost", "hand_left", "hand_front", "forearm_left")
+    np.testing.assert_allclose(made.T_link_sensor[:2], believed.T_link_sensor[:2], atol=1e-9)
+    assert_same_places(made, skin, ("hand_front", "forearm_left"))
+
+
+def test_a_skin_file_is_replaced_only_if_that_is_said(panda_model, skin, recorded, tmp_path, capsys):
+    place = tmp_path / "skin.toml"
+    save_skin(skin, place)
+    before = place.read_bytes()
+    assert calibrate("--recording", recorded / "units.mcap", "--skin", place, "--out", place) == 2
+    assert place.read_bytes() == before
+    assert calibrate("--recording", recorded / "units.mcap", "--skin", place, "--out", place, "--replace") == 0
+    assert load_skin(place, panda_model).position_sigma.all()
+
+
+def test_joint_states_that_are_missing_are_asked_for(panda_model, skin, recorded, tmp_path, capsys, monkeypatch):
+    whole = read_measured(recorded / "units.mcap")
+    monkeypatch.setattr(skin_calibrate_recording, "read_measured", lambda place: replace(whole, joints=None))
+    assert calibrate("--recording", "units.mcap") == 2
+    assert "units.mcap has no joint states: give the file that has them with --joints" in capsys.readouterr().err
+
+
+def test_units_without_an_imu_are_named(recorded, capsys, monkeypatch):
+    whole = read_measured(recorded / "units.mcap")
+    monkeypatch.setattr(skin_calibrate_recording, "read_measured", lambda place: replace(whole, units={}))
+    assert calibrate("--recording", "units.mcap") == 2
+    assert "units.mcap holds no IMU data" in capsys.readouterr().err
+
+
+def test_joint_states_in_another_order_are_put_in_that_of_the_arm(panda_model, skin, recorded, tmp_path, monkeypatch):
+    whole = read_measured(recorded / "units.mcap")
+    turned = JointTrace(whole.joints.stamp, whole.joints.q[:, ::-1])
+    monkeypatch.setattr(
+        skin_calibrate_recording, "read_measured",
+        lambda place: replace(whole, joints=turned, joint_names=whole.joint_names[::-1]),
+    )  # fmt: skip
+    assert calibrate("--recording", "units.mcap", "--out", tmp_path / "skin.toml") == 0
+    assert_same_places(load_skin(tmp_path / "skin.toml", panda_model), skin)
+
+
+def test_nothing_is_written_where_no_unit_is_good(recorded, tmp_path, capsys, monkeypatch):
+    whole = read_measured(recorded / "units.mcap")
+    held = JointTrace(whole.joints.stamp, np.flip(whole.joints.q, axis=0))
+    monkeypatch.setattr(skin_calibrate_recording, "read_measured", lambda place: replace(whole, joints=held))
+    assert calibrate("--recording", "units.mcap", "--out", tmp_path / "skin.toml") == 1
+    assert f"{tmp_path / 'skin.toml'} is not written." in capsys.readouterr().out
+    assert not (tmp_path / "skin.toml").exists()
+
+
+def test_joint_states_of_another_arm_are_refused(recorded, capsys):
+    assert calibrate("--recording", recorded / "units.mcap", "--topic", "/joint_states") == 2
+    assert "A --topic needs --joints" in capsys.readouterr().err
+    assert calibrate("--recording", recorded / "units.mcap", "--arm", "fr3") == 2
+    assert "has no states of fr3_joint1" in capsys.readouterr().err
