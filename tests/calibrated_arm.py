@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pretouch.calibration.perform import perform
-from pretouch.calibration.plan import Plan, Swing
+from pretouch.calibration.motion.perform import perform
+from pretouch.calibration.motion.plan import Plan, Swing
 from pretouch.cli.skin_record import record_samples
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel

@@ -11,10 +11,10 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from pretouch.calibration.perform import PerformParams
-from pretouch.calibration.plan import Plan
-from pretouch.calibration.plan_params import PlanParams
-from pretouch.calibration.plan_route import approach
+from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.perform import PerformParams
+from pretouch.calibration.motion.plan import Plan
+from pretouch.calibration.motion.route import approach
 from pretouch.cli.arms import arm_model
 from pretouch.cli.ending import Terminated
 from pretouch.cli.skin_calibrate_files import Outputs, check_free

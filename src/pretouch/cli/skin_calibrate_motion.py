@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from pretouch.calibration.plan import Plan
-from pretouch.calibration.plan_params import PlanParams
-from pretouch.calibration.plan_report import report_on
-from pretouch.calibration.planner import plan_motion
+from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.plan import Plan
+from pretouch.calibration.motion.planner import plan_motion
+from pretouch.calibration.motion.report import report_on
 from pretouch.cli.arms import arm_model
 from pretouch.cli.skin_calibrate_files import check_free
 from pretouch.cli.skin_calibrate_options import Calibrate, MotionOptions

@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from pretouch.calibration.perform import perform
-from pretouch.calibration.plan import Plan
+from pretouch.calibration.motion.perform import perform
+from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.skin_record import record_samples
 from pretouch.errors import HardwareError, RecordingError
 from pretouch.hardware.network_skin import NetworkSkin

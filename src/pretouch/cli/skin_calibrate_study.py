@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from pretouch.calibration.planner import plan_motion
+from pretouch.calibration.motion.planner import plan_motion
 from pretouch.cli.arms import arm_model
 from pretouch.cli.skin_calibrate_motion import plan_params
 from pretouch.cli.skin_calibrate_options import Calibrate, MotionOptions

@@ -50,7 +50,7 @@ def simulate_units(command: Simulate) -> None:
 
 def _make_motion(options: SimulateOptions, place: Path) -> None:
     """Let the arm make the calibration motion, and record its joint states."""
-    from pretouch.calibration.planner import plan_motion
+    from pretouch.calibration.motion.planner import plan_motion
     from pretouch.recording.skin_recording import SkinRecording
 
     joints = options.model.joints

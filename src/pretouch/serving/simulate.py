@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.calibration.perform import PerformParams, perform
-from pretouch.calibration.plan import Plan
+from pretouch.calibration.motion.perform import PerformParams, perform
+from pretouch.calibration.motion.plan import Plan
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError
 from pretouch.loop import Cycle

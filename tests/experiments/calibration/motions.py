@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pretouch.calibration.plan import Plan, Swing
+from pretouch.calibration.motion.plan import Plan, Swing
 
 START = np.array([0.0, -0.4, 0.0, -2.0, 0.0, 1.8, 0.6])
 

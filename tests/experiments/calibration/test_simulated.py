@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pretouch.calibration.plan import Plan
+from pretouch.calibration.motion.plan import Plan
 from pretouch.errors import ExperimentError
 from pretouch.experiments.calibration.random_skin import random_skin
 from pretouch.experiments.calibration.simulated import clock_errors, simulate

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pretouch.calibration.plan_params import PlanParams
+from pretouch.calibration.motion.params import PlanParams
 from pretouch.errors import ExperimentError
 from pretouch.experiments.calibration.swings import watanabe_plan
 

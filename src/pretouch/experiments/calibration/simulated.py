@@ -3,8 +3,8 @@
 import numpy as np
 
 from pretouch.calibration.data import CalibrationData, UnitData
-from pretouch.calibration.perform import PerformParams, perform
-from pretouch.calibration.plan import Plan
+from pretouch.calibration.motion.perform import PerformParams, perform
+from pretouch.calibration.motion.plan import Plan
 from pretouch.errors import ExperimentError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

@@ -12,8 +12,8 @@ import numpy as np
 
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.data import CalibrationData
-from pretouch.calibration.plan import Plan
-from pretouch.calibration.planner import plan_motion
+from pretouch.calibration.motion.plan import Plan
+from pretouch.calibration.motion.planner import plan_motion
 from pretouch.errors import ExperimentError
 from pretouch.experiments.calibration.errors import NOT_FOUND, Row, error_row, place_row, pose_error
 from pretouch.experiments.calibration.random_skin import random_skin

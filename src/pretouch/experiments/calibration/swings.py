@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pretouch.calibration.plan import Plan, Swing
-from pretouch.calibration.plan_limits import MotionLimits
-from pretouch.calibration.plan_params import PlanParams
+from pretouch.calibration.motion.limits import MotionLimits
+from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.plan import Plan, Swing
 from pretouch.errors import ExperimentError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray

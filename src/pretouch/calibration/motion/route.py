@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pretouch.calibration.plan import Plan, Swing
-from pretouch.calibration.plan_limits import RATE_HZ, MotionLimits
-from pretouch.calibration.plan_params import PlanParams
+from pretouch.calibration.motion.limits import RATE_HZ, MotionLimits
+from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.plan import Plan, Swing
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray

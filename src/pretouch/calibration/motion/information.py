@@ -7,8 +7,8 @@ scale of each axis, and gravity.
 import numpy as np
 
 from pretouch.calibration.link_motion import ArmMotion, LinkMotion, skew
+from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.plan import Plan
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import kinematics_of
 from pretouch.traces import JointTrace

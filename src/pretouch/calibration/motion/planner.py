@@ -13,11 +13,11 @@ from itertools import islice
 import numpy as np
 from scipy.stats import qmc
 
-from pretouch.calibration.plan import Plan, Swing
-from pretouch.calibration.plan_information import Observability
-from pretouch.calibration.plan_limits import MotionLimits
-from pretouch.calibration.plan_params import PlanParams
-from pretouch.calibration.plan_route import Route, Router
+from pretouch.calibration.motion.information import Observability
+from pretouch.calibration.motion.limits import MotionLimits
+from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.plan import Plan, Swing
+from pretouch.calibration.motion.route import Route, Router
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.calibration.plan import Plan
+from pretouch.calibration.motion.plan import Plan
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.control.joint_box import box_and_brake, joint_limits
 from pretouch.errors import CalibrationError

@@ -6,12 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pretouch.calibration.plan import Plan, Swing
-from pretouch.calibration.plan_information import Observability
-from pretouch.calibration.plan_params import PlanParams
-from pretouch.calibration.plan_report import report_on
-from pretouch.calibration.plan_route import approach
-from pretouch.calibration.planner import plan_motion
+from pretouch.calibration.motion.information import Observability
+from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.plan import Plan, Swing
+from pretouch.calibration.motion.planner import plan_motion
+from pretouch.calibration.motion.report import report_on
+from pretouch.calibration.motion.route import approach
 from pretouch.errors import CalibrationError, ParameterError
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel

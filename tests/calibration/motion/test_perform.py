@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.calibration.perform import Performance, PerformParams, perform
-from pretouch.calibration.plan import Plan, Swing
+from pretouch.calibration.motion.perform import Performance, PerformParams, perform
+from pretouch.calibration.motion.plan import Plan, Swing
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant import Plant, PlantClock

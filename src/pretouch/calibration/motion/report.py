@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.calibration.plan import Plan
-from pretouch.calibration.plan_information import Observability
-from pretouch.calibration.plan_limits import RATE_HZ, MotionLimits, point_speed
-from pretouch.calibration.plan_params import PlanParams
+from pretouch.calibration.motion.information import Observability
+from pretouch.calibration.motion.limits import RATE_HZ, MotionLimits, point_speed
+from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.plan import Plan
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of
 from pretouch.types import FloatArray

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.calibration.plan import Plan, Swing
+from pretouch.calibration.motion.plan import Plan, Swing
 
 TONES = np.array([[0.3, 0.5], [0.9, 1.1]])
 

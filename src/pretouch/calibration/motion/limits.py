@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pretouch.calibration.plan import Plan, PlanSamples
-from pretouch.calibration.plan_params import PlanParams
+from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.plan import Plan, PlanSamples
 from pretouch.errors import CalibrationError
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel

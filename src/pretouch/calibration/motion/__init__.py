@@ -1,0 +1,1 @@
+"""The motion by which units are calibrated: chosen, kept within limits, and made."""
