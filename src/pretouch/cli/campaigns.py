@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
 
+from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError, PretouchError
 from pretouch.experiments.campaign import (
@@ -51,7 +50,7 @@ def run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) ->
         raise
     summary = _keep(parts, json_file)["summary"]
     console = Console(highlight=False)
-    _show(console, summary)
+    show(console, tables(summary))
     console.print(f"Figures and page: {write_report(parts, summary, folder)}", soft_wrap=True, markup=False)
     console.print(f"Numbers: {json_file}", soft_wrap=True, markup=False)
 
@@ -90,17 +89,3 @@ def _play(parts: list[tuple[Request, Path]]) -> None:
         for request, out in parts:
             bar.update(task, description=f"{', '.join(request.experiments)}; {left} trials left")
             run_campaign(request, out, advance)
-
-
-def _show(console: Console, summary: dict[str, Any]) -> None:
-    for table in tables(summary):
-        console.print()
-        console.print(table.title, style="bold", markup=False)
-        drawn = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-        for i, text in enumerate(table.header):
-            drawn.add_column(escape(text), justify="left" if i < table.names else "right")
-        for row in table.rows:
-            drawn.add_row(*map(escape, row))
-        console.print(drawn)
-        console.print(table.note, style="dim", markup=False)
-    console.print()

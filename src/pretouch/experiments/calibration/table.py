@@ -28,8 +28,8 @@ def by_link(study: Study) -> TextTable:
         f"Where units sit, found in {study.motion_s[OURS]:.0f} s of motion:"
         f" {len(links)} units on each of {len(rows) // len(links)} random skins",
         (
-            "link", "link\nfound", "position\n[mm]", "largest\n[mm]", "sigma\n[mm]", "turn\n[deg]", "largest\n[deg]",
-            "sigma\n[deg]", "NEES\nposition", "NEES\nturn", "NEES\nboth", "clock\n[ms]",
+            "link", "found", "place\n[mm]", "most\n[mm]", "sigma\n[mm]", "turn\n[deg]", "most\n[deg]", "sigma\n[deg]",
+            "NEES\nplace", "NEES\nturn", "NEES\nboth", "clock\n[ms]",
         ),
         (*shown, _line(ALL, rows)),
         "Medians; NEES, the error squared over its covariance, are means: 3, 3 and 6 if the covariance is honest."
