@@ -20,7 +20,7 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.traces import JointTrace
 
 
-def swinging(model: RobotModel, duration: float = 10.0) -> Plan:
+def swinging(model: RobotModel, duration: float = 17.0) -> Plan:
     """All joints at once, about the ready posture."""
     tones = np.geomspace(0.3, 1.2, 14).reshape(2, 7)
     swing = Swing(0.5, duration - 1.0, 1.0, 0.35 / (2 * np.pi * tones), tones, np.arange(14.0).reshape(2, 7))

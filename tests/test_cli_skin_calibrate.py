@@ -2,15 +2,23 @@
 
 import csv
 import json
+import re
 import socket
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli import skin_calibrate_study
+from pretouch.cli import skin_calibrate_live, skin_calibrate_study
 from pretouch.experiments.calibration.study import OURS, Study, Trial
+from pretouch.foreign.joints import read_joints
+from pretouch.robot.self_distance import capsule_ends, kinematics_of
+from pretouch.serving.simulated_arm import SimulatedArm
 
+ASIDE = np.array([-1.2, 0, 0, 0, 0, 0, 0])
+"""From the ready posture to where the arm of a test stands [rad]: to its right."""
 ROW = {
     "skin": 0, "unit": "on_panda_hand", "link": "panda_hand", "accepted": True, "position_error_m": 0.0002,
     "orientation_error_deg": 0.004, "position_sigma_m": 0.0001, "orientation_sigma_deg": 0.003, "nees_position": 3.0,
@@ -67,12 +75,44 @@ def test_files_that_are_there_are_not_written_over_unasked(tmp_path, capsys):
     for words in (
         ("--recording", "x.mcap", "--out", there),
         ("--plan", there),
+        ("--recording", "x.mcap", "--json", there),
         ("--robot", "simulated", "--keys", "k.toml", "--out", there),
+        ("--robot", "simulated", "--keys", "k.toml", "--out", tmp_path / "s.toml", "--json", there),
         ("--robot", "simulated", "--keys", "k.toml", "--out", tmp_path / "s.toml", "--record", there),
     ):
         assert calibrate(*words) == 2
         assert f"{there} is there already: give another name, or --replace." in capsys.readouterr().err
     assert there.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--recording", "mine", "--json", "mine"), "--json mine would be written over --recording mine: give --json"),
+        (("--recording", "mine", "--out", "./mine"), "--out ./mine would be written over --recording mine"),
+        (("--recording", "mine", "--out", "link"), "--out link would be written over --recording mine"),
+        (("--recording", "x", "--joints", "mine", "--out", "mine"), "--out mine would be written over --joints mine"),
+        (("--recording", "x", "--joints", "bag", "--json", "bag/mine"), "would be written over --joints bag"),
+        (("--recording", "x", "--skin", "mine", "--json", "mine"), "--json mine would be written over --skin mine"),
+        (("--recording", "x", "--out", "new", "--json", "new"), "--json new would be written over --out new"),
+        (("--robot", "simulated", "--out", "new", "--record", "new"), "--record new would be written over --out new"),
+        (("--robot", "simulated", "--out", "s", "--keys", "mine", "--json", "mine"), "written over --keys mine"),
+    ],
+)
+def test_no_file_is_written_over_another_one_of_the_same_command(tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bag").mkdir()
+    for place in (tmp_path / "mine", tmp_path / "bag" / "mine"):
+        place.write_text("mine")
+    (tmp_path / "link").symlink_to("mine")
+    assert calibrate(*words, "--replace") == 2
+    assert said in capsys.readouterr().err
+    assert (tmp_path / "mine").read_text() == (tmp_path / "bag" / "mine").read_text() == "mine"
+
+
+def test_a_table_is_no_recording_of_units(tmp_path, capsys):
+    assert calibrate("--recording", tmp_path / "joints.csv") == 2
+    assert "give that with --recording, and joint states with --joints." in capsys.readouterr().err
 
 
 def test_a_port_that_is_taken_is_said_before_anything_is_planned(tmp_path, capsys):
@@ -105,6 +145,39 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
     assert [place.name for place in tmp_path.iterdir()] == ["k.toml"]
 
 
+def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(skin_calibrate_live, "SimulatedArm", elsewhere)
+    questions = []
+    monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
+    files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml", "--units-port", 0)
+    assert calibrate("--robot", "simulated", *files, "--duration", 45) == 2
+    said = capsys.readouterr().out
+    told = re.search(r"the way to its start takes (\d+) s and needs the room x (\S+) to .*, y (\S+) to", said)
+    assert told
+    assert abs(int(re.findall(r"\d+", questions[0])[0]) - 45 - int(told[1])) <= 1
+    body = panda_model.capsules
+    ends = capsule_ends(panda_model, kinematics_of(panda_model, (panda_model.description.q_ready + ASIDE)[None]))
+    assert float(told[3]) < (ends - body.radius[:, None, None])[..., 1].min() + 0.01
+    assert float(told[3]) < float(re.search(r"The arm needs the room .*, y (\S+) to", said)[1])
+
+
+def elsewhere(options, q, *words, **more):
+    return SimulatedArm(options, q + ASIDE, *words, **more)
+
+
+def test_nobody_who_reads_on_ends_the_command_quietly_with_the_motion_written(tmp_path):
+    words = ("skin", "calibrate", "--plan", "m.csv", "--duration", "45")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pretouch.cli", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        cwd=tmp_path,
+    )  # fmt: skip
+    process.stdout.readline()
+    process.stdout.close()
+    assert (process.wait(timeout=60), process.stderr.read()) == (1, "")
+    process.stderr.close()
+    assert (tmp_path / "m.csv").stat().st_size > 1e6
+
+
 def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, monkeypatch):
     asked = []
 
@@ -115,7 +188,9 @@ def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, m
 
     monkeypatch.setattr(skin_calibrate_study, "study", study)
     place = tmp_path / "new" / "rows.json"
-    assert calibrate("--simulate", "--skins", 20, "--json", place) == 0
+    for _ in range(2):
+        assert calibrate("--simulate", "--skins", 20, "--json", place) == 0
+        assert asked.pop() == ("panda", 20, 0, False, True, None)
     told = json.loads(place.read_text())
     assert told["rows"] == [ROW]
     assert (told["motion_s"], told["compute_s"]) == (60.0, 1.5)
@@ -124,7 +199,7 @@ def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, m
     assert "panda_hand" in said
     assert f"Numbers: {place}" in said
     assert calibrate("--simulate", "--compared", "--find-links", "--seed", 3, "--arm", "fr3") == 0
-    assert asked == [("panda", 20, 0, False, True, None), ("fr3", 20, 3, True, False, None)]
+    assert asked == [("fr3", 20, 3, True, False, None)]
 
 
 def test_the_motion_is_written_for_another_driver_with_what_it_is_good_for(panda_model, tmp_path, capsys):
@@ -135,9 +210,10 @@ def test_the_motion_is_written_for_another_driver_with_what_it_is_good_for(panda
     assert "panda_link1       not where along the axis" in said
     with place.open() as file:
         rows = list(csv.reader(file))
-    assert rows[0] == ["time", *(f"q{i}" for i in range(1, 8)), *(f"qd{i}" for i in range(1, 8))]
+    assert rows[0] == ["time_s", *(f"q{i}_rad" for i in range(1, 8)), *(f"qd{i}_rad_s" for i in range(1, 8))]
+    np.testing.assert_allclose(read_joints(place, panda_model).trace.q, np.array(rows[1:], dtype=float)[:, 1:8])
     table = np.array(rows[1:], dtype=float)
-    assert table[-1, 0] == pytest.approx(45.0)
+    assert table[-1, 0] == pytest.approx(45.0, abs=0.002)
     for row in table[[0, -1]]:
         assert row[1:8] == pytest.approx(panda_model.description.q_ready, abs=1e-6)
         assert row[8:] == pytest.approx(np.zeros(7), abs=1e-6)

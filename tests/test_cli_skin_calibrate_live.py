@@ -6,14 +6,18 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pretouch import cli
+from pretouch.cli import skin_calibrate_live
+from pretouch.cli.ending import Terminated, ends_raise, exit_code
 from pretouch.cli.skin_calibrate_session import Session, signals_noted
-from pretouch.errors import HardwareError
+from pretouch.errors import HardwareError, RecordingError
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.sensing.skin import load_skin
@@ -132,6 +136,57 @@ def test_signals_that_are_ignored_stay_so():
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+def test_the_signal_that_came_first_ends_the_command_whatever_comes_while_others_are_heard_again(monkeypatch):
+    really = signal.signal
+
+    def interrupted(number, handler):
+        before = really(number, handler)
+        if number == signal.SIGINT and came:
+            monkeypatch.undo()
+            signal.raise_signal(signal.SIGINT)
+        return before
+
+    with ends_raise(), suppress(Terminated, KeyboardInterrupt), signals_noted() as came:
+        monkeypatch.setattr(signal, "signal", interrupted)
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+    assert exit_code() == 128 + signal.SIGTERM
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """The command without an arm: it stands, and makes its motion at once."""
+
+    @contextmanager
+    def session(*_):
+        yield SimpleNamespace(wait_for_units=lambda: None)
+
+    monkeypatch.setattr(skin_calibrate_live, "_session", session)
+    monkeypatch.setattr(skin_calibrate_live, "_ways", lambda *_: [])
+    monkeypatch.setattr(skin_calibrate_live, "_recorded", lambda *_: print("It moves."))
+
+
+@pytest.mark.parametrize(("error", "code"), [(RecordingError("The disk is bad."), 2), (KeyboardInterrupt(), 130)])
+def test_how_to_calibrate_from_the_recording_is_said_before_the_motion_and_after_a_failure(
+    at_once, tmp_path, monkeypatch, capsys, error, code
+):
+    def fails(*_):
+        raise error
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(skin_calibrate_live, "calibrate_recording", fails)
+    (tmp_path / "skin.toml").touch()
+    taken = "skin-calibration-1.mcap"
+    assert cli.main(["skin", "calibrate", *FILES, "--json", taken, "--skin", "skin.toml", "--replace"]) == code
+    command = (
+        "pretouch skin calibrate --recording skin-calibration-2.mcap --arm panda --out skin.toml --skin skin.toml"
+        f" --json {taken} --replace\n"
+    )
+    before, after = capsys.readouterr().out.split("It moves.\n")
+    assert before.endswith(f"All that is measured is kept in skin-calibration-2.mcap. To calibrate from it: {command}")
+    assert after.endswith(f"What was measured is in skin-calibration-2.mcap. To calibrate from it: {command}")
 
 
 @pytest.mark.slow

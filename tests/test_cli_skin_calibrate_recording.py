@@ -81,10 +81,23 @@ def test_joint_states_of_another_clock_are_aligned(panda_model, skin, recorded, 
     said = capsys.readouterr().out
     assert "Joint states are the columns q1_rad to q7_rad of" in said
     assert f"s behind that of {recorded / 'joints.csv'}." in said
+    assert "no other unit agrees" not in said
     assert_same_places(load_skin(out, panda_model), skin)
     told = json.loads(numbers.read_text())
     assert told["clock_ahead_s"] == pytest.approx(-LATE, abs=0.05)
     assert all(abs(unit["place"]["clock_offset_s"]) < 0.01 for unit in told["units"])
+
+
+def test_an_offset_of_clocks_that_one_unit_alone_tells_is_said_to_be_so(recorded, capsys, monkeypatch):
+    whole = read_measured(recorded / "units.mcap")
+    alone = {"hand_left": whole.units["hand_left"]}
+    monkeypatch.setattr(
+        skin_calibrate_recording, "read_measured", lambda place: replace(whole, units=alone, complete=False)
+    )
+    assert calibrate("--recording", "units.mcap", "--joints", recorded / "joints.csv") == 0
+    said = capsys.readouterr().out
+    assert "Only hand_left tells that: no other unit agrees with it" in said
+    assert "units.mcap was not ended in order, or is damaged: what can be read of it is used." in said
 
 
 def test_a_skin_that_is_wrong_about_a_link_keeps_that_unit_as_it_was(panda_model, skin, recorded, tmp_path, capsys):

@@ -242,7 +242,10 @@ def undisturbed() -> Iterator[None]:
 def come_to_rest(limits: JointLimits, robot: Robot, clock: Clock, q: FloatArray, qd: FloatArray) -> None:
     """Command the arm from its last command to rest, within its limits.
 
-    Where the arm is by then is reckoned from the commands: the robot's state may be what ended the loop.
+    Where the arm is by then is reckoned from the commands: the robot's state may be what ended the loop. Ticks and
+    commands that fail do not end it: after a tick that failed the next command follows at once, and a command that
+    failed is given again, for up to twice the time that braking takes. Raises the first of their errors at the end,
+    whether the arm was brought to rest or not.
 
     Args:
         limits: of the joints, with the period.
@@ -253,10 +256,20 @@ def come_to_rest(limits: JointLimits, robot: Robot, clock: Clock, q: FloatArray,
     """
     # each cycle takes one period's worth of acceleration from the joint that needs longest; one more for rounding
     longest = math.ceil(float((limits.qd_max / limits.qdd_max).max()) / limits.period) + 1
-    for _ in range(longest):
+    errors: list[Exception] = []
+    for _ in range(2 * longest):
         if not np.any(qd):
-            return
-        clock.tick()
+            break
+        try:
+            clock.tick()
+        except Exception as error:
+            errors.append(error)
         q = q + qd * limits.period
-        _, _, qd = box_and_brake(q, qd, limits.table)
-        robot.command(qd)
+        _, _, slower = box_and_brake(q, qd, limits.table)
+        try:
+            robot.command(slower)
+            qd = slower
+        except Exception as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]

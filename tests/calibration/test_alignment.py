@@ -71,3 +71,10 @@ def test_two_recordings_of_different_length_are_aligned():
     found = align(turning(TIME), ALL, turning(later + 8.0), np.ones(len(later), bool), STEP, np.inf)
     assert found.late == pytest.approx(-8.0, abs=0.01)
     assert found.likeness > 0.97
+
+
+def test_units_recorded_for_much_longer_than_the_joints_are_aligned():
+    later = np.arange(0, 200, STEP)
+    found = align(turning(TIME), ALL, turning(later - 150.0), np.ones(len(later), bool), STEP, np.inf)
+    assert found.late == pytest.approx(150.0, abs=0.01)
+    assert found.likeness > 0.97

@@ -1,5 +1,6 @@
 """From joint positions and IMU data to where units sit, on data made by finite differences."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,11 @@ from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.data import CalibrationData
 from pretouch.errors import CalibrationError, RobotModelError
 from pretouch.experiments.calibration.random_skin import random_skin
+from pretouch.sensing.skin import Skin
 from pretouch.traces import ImuTrace
-from tests.calibration.made import EXACT, pose_error
+from tests.calibration import made
+from tests.calibration.faulty import joints_late, on_the_table, slipped, without_joints
+from tests.calibration.made import EXACT, Noise, pose_error, turned
 
 
 def test_exact_data_give_the_exact_place(panda_model, moving_arm, pair):
@@ -115,3 +119,83 @@ def with_a_long_wait(data: CalibrationData, wait: float) -> CalibrationData:
         )
         units.append(replace(unit, imu=trace))
     return CalibrationData(data.joints, tuple(units))
+
+
+LINK4, HAND = "on_panda_link4", "on_panda_hand"
+
+
+@pytest.mark.parametrize("at", [40.5, 42.0, 43.5])
+def test_a_unit_that_falls_off_near_the_end_is_refused_with_the_instant(panda_model, good, at):
+    link4, hand = calibrate(panda_model, slipped(good, on_the_table(good, LINK4), LINK4, at)).units
+    assert not link4.accepted
+    (finding,) = [finding for finding in link4.findings if finding.refused]
+    assert finding.kind == "slipped"
+    assert hand.findings == ()
+    if at > 41.0:
+        assert float(re.search(r"came off, ([0-9.]+) s after", finding.sentence)[1]) == pytest.approx(at, abs=0.3)
+
+
+def test_a_unit_that_is_put_on_after_the_begin_is_refused_with_the_instant(panda_model, good):
+    link4, _ = calibrate(panda_model, slipped(on_the_table(good, LINK4), good, LINK4, 3.0)).units
+    (finding,) = [finding for finding in link4.findings if finding.refused]
+    assert (finding.kind, link4.accepted) == ("slipped", False)
+    assert float(re.search(r"put on, ([0-9.]+) s after", finding.sentence)[1]) == pytest.approx(3.0, abs=0.3)
+
+
+def test_a_unit_that_turns_near_the_end_is_refused(panda_model, moving_arm, good, pair):
+    skin = Skin([turned(unit, np.array([0.0, 0.0, np.deg2rad(30)]), np.zeros(3)) for unit in pair.units], panda_model)
+    link4, _ = calibrate(panda_model, slipped(good, moving_arm.data(skin), LINK4, 42.0)).units
+    assert ("slipped", True) in [(finding.kind, finding.refused) for finding in link4.findings]
+
+
+def test_clocks_that_are_all_off_by_the_same_are_named_once(panda_model, good):
+    (finding,) = calibrate(panda_model, joints_late(good, 12.0)).findings
+    assert (finding.kind, finding.refused) == ("clocks", False)
+    assert "early by about 12.00 s" in finding.sentence
+
+
+def test_one_clock_that_is_off_is_said_of_its_unit_alone(panda_model, good):
+    late = replace(good.units[0], imu=replace(good.units[0].imu, stamp=good.units[0].imu.stamp + 3.0))
+    found = calibrate(panda_model, replace(good, units=(late, good.units[1])))
+    assert found.findings == ()
+    assert [finding.kind for finding in found.units[0].findings] == ["clock"]
+
+
+def test_joints_with_gaps_nearly_everywhere_are_named_with_what_is_left(panda_model, good):
+    data = good
+    for begin in np.arange(0.0, 27.0, 0.3):
+        data = without_joints(data, begin, begin + 0.06)
+    kinds = {finding.kind: finding.sentence for finding in calibrate(panda_model, data).findings}
+    assert re.search(r"Of 45.0 s of joint states, 1[0-9].[0-9] s", kinds["joints_little_used"])
+
+
+def test_noise_of_the_joints_is_named_where_it_is_what_hides_a_place(panda_model, moving_arm, pair):
+    found = calibrate(panda_model, moving_arm.data(pair, noise=Noise(joints=1e-3)))
+    (finding,) = [finding for finding in found.units[0].findings if finding.kind == "unobservable"]
+    assert "The noise of the joint positions hides it" in finding.sentence
+    assert "rad/s^2" in finding.sentence
+
+
+@pytest.fixture
+def leaning_by(moving_arm, pair, monkeypatch):
+    def data(degrees: float) -> CalibrationData:
+        angle = np.deg2rad(degrees)
+        monkeypatch.setattr(made, "UP", 9.81 * np.array([np.sin(angle), 0.0, np.cos(angle)]))
+        return moving_arm.data(pair)
+
+    return data
+
+
+def test_an_arm_that_leans_is_named_and_its_units_are_found(panda_model, pair, leaning_by):
+    found = calibrate(panda_model, leaning_by(1.0))
+    (finding,) = found.findings
+    assert (finding.kind, finding.refused) == ("leaning", False)
+    # up is on the side of +x of the base's z, so the arm leans to the other side
+    assert "leans by 1.0 degrees, mostly towards -x of its base" in finding.sentence
+    for unit, true in zip(found.units, pair.units, strict=True):
+        assert unit.accepted
+        assert np.linalg.norm(pose_error(true.T_link_sensor, unit.place.T_link_sensor)[3:]) < 1e-3
+
+
+def test_an_arm_that_hardly_leans_is_not_worth_a_word(panda_model, leaning_by):
+    assert calibrate(panda_model, leaning_by(0.15)).findings == ()

@@ -5,9 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.data import CalibrationData
+from pretouch.calibration.joint_checks import checked_joints
+from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.result import Calibration
 from pretouch.errors import CalibrationError
 from pretouch.sensing.skin import Skin
 from pretouch.traces import ImuTrace, JointTrace
@@ -83,7 +87,7 @@ def backwards(data: CalibrationData, unit: str) -> CalibrationData:
 REFUSED = {
     "silent": (empty, "sent no IMU samples"),
     "shape": (lambda data, unit: changed(data, unit, acceleration=np.zeros((5, 3))), r"\(5, 3\)"),
-    "short": (lambda data, unit: silent(data, unit, 3.0, 99.0), "at least 5 s are needed"),
+    "short": (lambda data, unit: silent(data, unit, 3.0, 99.0), "at least 15 s are needed"),
     "slow": (lambda data, unit: thinned(data, unit, 8), "every 38.5 ms"),
     "clock": (begun_anew, "began anew"),
     "not_finite": (lambda data, unit: with_nan(data, unit, 2), "50.0% of its samples are not finite"),
@@ -94,7 +98,7 @@ REFUSED = {
     "scale": (lambda data, unit: scaled(data, unit, np.array([1, 1, -1])), "accelerometer z .* correct its sign"),
     "never_moved": (on_the_table, "never moved"),
     "no_link": (backwards, "fits no link"),
-    "too_little": (lambda data, unit: saturated(data, unit, angular_velocity_max=0.3), "Less than 5 s remain"),
+    "too_little": (lambda data, unit: saturated(data, unit, angular_velocity_max=0.3), "Less than 15 s remain"),
     "unusable": (lambda data, unit: silent(data, unit, 20.0, 99.0), "could not be used"),
 }
 
@@ -196,7 +200,7 @@ def cut(data: CalibrationData, which: slice) -> CalibrationData:
         (lambda data: joints(data, q=np.rad2deg(data.joints.q)), "give radians"),
         (lambda data: joints(data, q=np.tile(data.joints.q[0], (len(data.joints.q), 1))), "did not move"),
         (lambda data: cut(data, slice(0, 0)), "There are 0 joint states"),
-        (lambda data: cut(data, slice(0, 400)), "at least 5 s of motion"),
+        (lambda data: cut(data, slice(0, 400)), "at least 15 s of motion"),
         (lambda data: cut(data, slice(None, None, 20)), "every 0.0962 s"),
         (lambda data: without_joints(data, 2.0, 42.0), "without gaps make up"),
         (lambda data: joints(data, data.joints.stamp + 1e6 * (data.joints.stamp > 20)), "spread over"),
@@ -224,3 +228,101 @@ def test_repeated_and_broken_joint_states_are_left_out(panda_model, good):
     found = calibrate(panda_model, joints(good, stamp, q))
     assert [finding.kind for finding in found.findings] == ["joints_not_finite", "joints_repeated"]
     assert all(unit.accepted for unit in found.units)
+
+
+def errors(found: Calibration, skin: Skin) -> np.ndarray:
+    """Errors of the positions [m]."""
+    pairs = zip(found.units, skin.units, strict=True)
+    return np.array([np.linalg.norm((unit.place.T_link_sensor - true.T_link_sensor)[:3, 3]) for unit, true in pairs])
+
+
+def some_late(data: CalibrationData, late: float) -> CalibrationData:
+    """One in a hundred joint states is stamped late [s], but no later than the next one."""
+    stamp = data.joints.stamp
+    chosen = np.random.default_rng(0).random(len(stamp)) < 0.01
+    return joints(data, np.maximum.accumulate(stamp + late * chosen))
+
+
+def in_pairs(data: CalibrationData, apart: float) -> CalibrationData:
+    """Joint states come two at a time, stamped on receipt [s]."""
+    stamp = data.joints.stamp.copy()
+    stamp[:-1:2] = stamp[1::2][: len(stamp[:-1:2])] - apart
+    return joints(data, stamp)
+
+
+@pytest.mark.parametrize(
+    ("fault", "left_out"),
+    [(lambda data: some_late(data, 0.0045), r"\d\d"), (lambda data: in_pairs(data, 1e-4), r"\d{4}")],
+)
+def test_joint_states_with_nearly_the_same_stamp_are_named_and_all_but_the_last_left_out(
+    panda_model, good, pair, fault, left_out
+):
+    found = calibrate(panda_model, fault(good))
+    (finding,) = found.findings
+    assert finding.kind == "joints_bunched"
+    assert re.match(rf"{left_out} joint states of \d+ .* stamp", finding.sentence), finding.sentence
+    assert all(unit.accepted for unit in found.units)
+    assert errors(found, pair).max() < 1e-3
+
+
+def test_a_fast_stretch_of_joint_states_is_thinned_not_lost(panda_model, good, pair):
+    keep = (good.joints.stamp < 10) | (np.arange(len(good.joints.stamp)) % 6 == 0)
+    found = calibrate(panda_model, joints(good, good.joints.stamp[keep], good.joints.q[keep]))
+    assert all(unit.accepted for unit in found.units)
+    assert not [finding for finding in found.findings if finding.kind == "joints_missing"]
+    assert errors(found, pair).max() < 1e-3
+
+
+def held_for(data: CalibrationData, states: int) -> CalibrationData:
+    """Joint positions are read anew for one in so many states only."""
+    return joints(data, q=data.joints.q[np.arange(len(data.joints.q)) // states * states])
+
+
+@pytest.mark.parametrize("states", [2, 4, 8])
+def test_joint_values_given_more_than_once_are_named_and_taken_once(panda_model, good, pair, states):
+    found = calibrate(panda_model, held_for(good, states))
+    (finding,) = found.findings
+    assert finding.kind == "joints_held"
+    assert "repeat the values of the one before" in finding.sentence
+    assert all(unit.accepted for unit in found.units)
+    assert errors(found, pair).max() < 1e-3
+
+
+def test_an_arm_that_stands_repeats_its_values_for_good_reason(panda_model, good):
+    q = good.joints.q.copy()
+    q[4000:4400] = q[4000]
+    joints_then, findings = checked_joints(panda_model, JointTrace(good.joints.stamp, q), CalibrationParams())
+    assert findings == ()
+    assert len(joints_then.stamp) == len(q)
+
+
+def test_joint_values_that_change_too_seldom_are_an_error_with_their_rate(panda_model, good):
+    with pytest.raises(CalibrationError, match=r"every 0\.0962 s \(10\.4 Hz\): at least 25 Hz"):
+        calibrate(panda_model, held_for(good, 20))
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1])
+def test_joint_states_at_the_least_rate_will_do_and_below_it_the_rate_is_named(panda_model, good, pair, jitter):
+    was, rng = good.joints, np.random.default_rng(0)
+    exact = CubicSpline(was.stamp, was.q)
+
+    def at(rate: float) -> CalibrationData:
+        stamp = np.arange(0.5, was.stamp[-1] - 0.5, 1 / rate)
+        stamp += jitter / rate * rng.uniform(-1, 1, len(stamp))
+        return joints(good, stamp, exact(stamp))
+
+    assert errors(calibrate(panda_model, at(25.0)), pair).max() < 1e-3
+    with pytest.raises(CalibrationError, match=r"\(20\.\d Hz\): at least 25 Hz are needed"):
+        calibrate(panda_model, at(20.5))
+
+
+@pytest.mark.parametrize(("sensor", "axis"), [("acceleration", "accelerometer"), ("angular_velocity", "gyroscope")])
+def test_an_axis_that_is_cut_off_at_a_range_nobody_declared_is_told_from_a_stuck_one(panda_model, good, sensor, axis):
+    cut_off = getattr(unit_of(good, LINK4).imu, sensor).copy()
+    cut_off[:, 1] = np.minimum(cut_off[:, 1], np.quantile(cut_off[:, 1], 0.5))
+    unit = calibrate(panda_model, changed(good, LINK4, **{sensor: cut_off})).units[0]
+    (finding,) = unit.findings
+    assert (finding.kind, finding.refused) == ("cut_off", True)
+    assert f"{axis} y stays at its largest value" in finding.sentence
+    assert "range" in finding.sentence
+    assert "replace" not in finding.sentence

@@ -24,15 +24,17 @@ def motion(axes=3, seed=0):
     w = np.where(on, np.sin(angle), 0.0)
     alpha = np.where(on, 2 * np.pi * frequency * np.cos(angle), 0.0)
     a = 0.8 * np.sin(angle[:, ::-1] + 1.0) if axes > 1 else np.zeros_like(w)
-    up = Rotation.from_rotvec(np.where(on, -np.cos(angle), 0.0)).as_matrix()[:, 2]
-    return LinkMotion(w, a, up if axes > 1 else np.tile([1.0, 0.0, 0.0], (len(TIME), 1)), alpha)
+    turned = Rotation.from_rotvec(np.where(on, -np.cos(angle), 0.0)).as_matrix().swapaxes(1, 2)
+    upright = np.eye(3) if axes > 1 else np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return LinkMotion(w, a, turned @ upright, alpha)
 
 
-def truth(seed=0, gravity=9.81):
+def truth(seed=0, gravity=(0.0, 0.0, 9.81)):
     rng = np.random.default_rng([seed, 1])
     return Estimate(
         Rotation.random(random_state=seed).as_matrix(), rng.uniform(-0.1, 0.1, 3), rng.uniform(-0.4, 0.4, 3),
-        rng.uniform(-0.1, 0.1, 3), rng.uniform(-0.01, 0.01, 3), rng.uniform(-0.01, 0.01, 3), 0.004, 0.0003, gravity,
+        rng.uniform(-0.1, 0.1, 3), rng.uniform(-0.01, 0.01, 3), rng.uniform(-0.01, 0.01, 3), 0.004, 0.0003,
+        np.array(gravity),
     )  # fmt: skip
 
 
@@ -50,10 +52,10 @@ def measured(link, true, noise=None, seed=0):
 def test_the_jacobian_is_that_of_finite_differences():
     link, true = motion(), truth()
     problem = Problem(link, measured(link, truth(3)), true, NOISE, PARAMS)
-    x = np.random.default_rng(5).uniform(-0.3, 0.3, 21)
+    x = np.random.default_rng(5).uniform(-0.3, 0.3, 23)
     J, h = problem.jacobian(x), 1e-6
-    for k in range(21):
-        step = h * (np.arange(21) == k)
+    for k in range(23):
+        step = h * (np.arange(23) == k)
         expected = (problem.residuals(x + step) - problem.residuals(x - step)) / (2 * h)
         assert J[:, k] == pytest.approx(expected, rel=1e-5, abs=1e-4)
 
@@ -96,6 +98,19 @@ def test_the_covariance_is_honest():
     assert 4.9 < np.mean(told) < 8.5
 
 
+def test_few_blocks_are_not_believed_beyond_what_independent_errors_would_say():
+    # six seconds: the 23 unknowns can make six blocks agree, whatever the errors are
+    link, told = motion(), []
+    short = slice(0, 150)
+    for seed in range(60):
+        true = truth(seed)
+        data = measured(link, true, NOISE, seed)
+        part = LinkMotion(link.w[short], link.a[short], link.R_link_base[short], link.alpha[short])
+        told.append(nees(fit(part, Measured(data.values[short], data.rates[short]), true, NOISE, PARAMS), true))
+    assert np.mean(told) < 6.0
+    assert np.max(told) < 30.0
+
+
 def test_the_covariance_counts_errors_that_last():
     link, true = motion(), truth()
     slow = np.repeat(np.random.default_rng(9).standard_normal((len(TIME) // 20, 6)), 20, axis=0)
@@ -103,7 +118,7 @@ def test_the_covariance_counts_errors_that_last():
     lasting = Measured(exact.values + NOISE * slow, exact.rates)
     fast = measured(link, true, NOISE)
     sigma = [np.trace(fit(link, d, true, NOISE, PARAMS).covariance[3:6, 3:6]) ** 0.5 for d in (fast, lasting)]
-    assert sigma[1] > 2.5 * sigma[0]
+    assert sigma[1] > 2.0 * sigma[0]
 
 
 def test_large_differences_count_less_when_robust():
@@ -133,8 +148,16 @@ def test_what_one_upright_axis_does_not_tell_stays_unknown_and_the_rest_is_found
 
 
 def test_gravity_of_another_place_does_not_move_the_unit():
-    for gravity in (9.78, 9.832):
+    for gravity in ((0.0, 0.0, 9.78), (0.0, 0.0, 9.832)):
         link, true = motion(seed=4), truth(4, gravity)
         data = measured(link, true)
         found = fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS).estimate
         assert found.p == pytest.approx(true.p, abs=2e-4)
+
+
+def test_an_arm_off_level_does_not_move_the_unit():
+    link, true = motion(seed=4), truth(4, (0.12, -0.08, 9.809))
+    data = measured(link, true)
+    found = fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS).estimate
+    assert found.p == pytest.approx(true.p, abs=2e-4)
+    assert found.gravity == pytest.approx(true.gravity, abs=2e-3)

@@ -1,14 +1,19 @@
 """Which link a unit sits on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.data import CalibrationData
 from pretouch.calibration.identify import rigid_bodies
+from pretouch.calibration.params import CalibrationParams
 from pretouch.experiments.calibration.random_skin import random_skin
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
+from pretouch.traces import ImuTrace, JointTrace
+from tests.calibration.faulty import swapped, unit_of
 from tests.calibration.made import MovingArm
 
 
@@ -84,3 +89,79 @@ def test_links_fixed_to_each_other_are_told_apart_by_where_the_unit_sits_and_loo
         found = calibrate(panda_model, moving_arm.data(Skin(units, panda_model), seed, links_known=False))
         right += [unit.place.link == true.link for unit, true in zip(found.units, units, strict=True)]
     assert np.mean(right) > 0.8
+
+
+@pytest.fixture(scope="module")
+def seven(panda_model, moving_arm):
+    """A unit on each link; that of link7 would look inwards if it sat there on the hand."""
+    return moving_arm.data(random_skin(panda_model, 7), 7)
+
+
+def kinds(units):
+    return {unit.id: [(finding.kind, finding.refused) for finding in unit.findings] for unit in units if unit.findings}
+
+
+def test_units_swapped_on_links_fixed_to_each_other_are_both_named(panda_model, seven):
+    link7, hand = "on_panda_link7", "on_panda_hand"
+    units = calibrate(panda_model, swapped(seven, link7, hand)).units
+    found = {unit.id: unit for unit in units}
+    assert kinds(units) == {link7: [("swapped", True)], hand: [("swapped", True)]}
+    assert f"Swapped with {hand}: it sits on panda_hand" in found[link7].findings[0].sentence
+    assert f"Swapped with {link7}: it sits on panda_link7" in found[hand].findings[0].sentence
+    assert (found[link7].place.link, found[hand].place.link) == ("panda_hand", "panda_link7")
+
+
+def test_a_unit_on_the_hand_that_is_said_to_sit_on_the_link_before_is_refused(panda_model, seven):
+    unit = replace(unit_of(seven, "on_panda_hand"), link="panda_link7")
+    found = calibrate(panda_model, replace(seven, units=(unit,))).units[0]
+    assert kinds([found]) == {unit.id: [("wrong_link", True)]}
+    assert "its data fit panda_hand" in found.findings[0].sentence
+
+
+def test_units_swapped_in_a_ring_are_all_named(panda_model, seven):
+    link2, link4, hand = "on_panda_link2", "on_panda_link4", "on_panda_hand"
+    units = calibrate(panda_model, swapped(swapped(seven, link4, hand), hand, link2)).units
+    found = {unit.id: unit for unit in units}
+    assert kinds(units) == {name: [("swapped", True)] for name in (link2, link4, hand)}
+    sentence = found[link2].findings[0].sentence
+    assert f"Swapped with {link4} and {hand}: it sits on panda_link4, where {link4} should" in sentence
+    assert f"instead of on panda_link2, where {hand} sits" in sentence
+
+
+def shaken(data, unit, share, arm):
+    """A unit on the table, which turns by a share of what the first link does."""
+    imu = unit_of(data, unit).imu
+    rng = np.random.default_rng(0)
+    turning = share * np.interp(imu.stamp, arm.time, np.gradient(arm.q[:, 0], arm.time))[:, None] * [0.0, 0.0, 1.0]
+    w = turning + 0.002 * rng.standard_normal((len(imu.stamp), 3))
+    felt = [0.1, -0.2, 9.8] + 0.015 * rng.standard_normal((len(imu.stamp), 3))
+    other = replace(unit_of(data, unit), imu=ImuTrace(imu.stamp, felt, w))
+    return replace(data, units=tuple(other if one.id == unit else one for one in data.units))
+
+
+@pytest.mark.parametrize("share", [0.06, 0.2])
+def test_a_unit_on_a_table_that_the_arm_shakes_does_not_sit_on_the_arm(panda_model, moving_arm, good, share):
+    unit = calibrate(panda_model, shaken(good, "on_panda_link4", share, moving_arm)).units[0]
+    (finding,) = unit.findings
+    assert (finding.kind, finding.refused) == ("no_link", True)
+    assert "does not sit on the arm" in finding.sentence
+
+
+def test_a_unit_that_turned_fast_is_not_said_never_to_have_moved(panda_model, good):
+    stamp = np.arange(0.0, 45.0, 0.002)
+    q = panda_model.q_mid + np.sin(2 * np.pi * 10.0 * stamp)[:, None] * np.full(7, 0.9)
+    (unit,) = calibrate(panda_model, CalibrationData(JointTrace(stamp, q), good.units[:1])).units
+    (finding,) = unit.findings
+    assert (finding.kind, finding.refused) == ("no_link", True)
+    assert "no link by less than" in finding.sentence
+
+
+def test_a_clock_is_not_judged_from_what_is_too_little(panda_model, good):
+    imu = good.units[0].imu
+    late = imu.stamp > 8.0
+    trace = ImuTrace(imu.stamp[late] + 100.0, imu.acceleration[late], imu.angular_velocity[late])
+    early = good.joints.stamp < 20.0
+    joints = JointTrace(good.joints.stamp[early], good.joints.q[early])
+    data = CalibrationData(joints, (replace(good.units[0], imu=trace),))
+    unit = calibrate(panda_model, data, CalibrationParams(shortest_s=15.0)).units[0]
+    assert kinds([unit]) == {unit.id: [("too_little", True)]}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.calibration.calibrate import calibrate
+from pretouch.calibration.identify import Identifier
 from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.params import CalibrationParams
@@ -54,3 +55,11 @@ def test_a_good_motion_hardly_feels_it(panda_model, moving_arm, pair):
     assert JointNoise(arm, data.joints, PARAMS).acceleration.max() < 0.05
     for unit in calibrate(panda_model, data).units:
         assert unit.place.position_sigma < 5e-4
+
+
+def test_noisy_joints_make_a_position_less_certain_in_every_direction(panda_model, moving_arm, pair):
+    data = moving_arm.data(pair, noise=Noise(joints=1e-4))
+    arm = ArmMotion(panda_model, data.joints, PARAMS)
+    located = Identifier(arm, PARAMS).identify(data.units[0]).located
+    added = (JointNoise(arm, data.joints, PARAMS).covariance(located) - located.covariance)[3:, 3:]
+    assert np.linalg.matrix_rank(added, tol=1e-6 * np.linalg.norm(added)) == 3

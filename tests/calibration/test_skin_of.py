@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from pretouch.calibration.calibrate import calibrate
-from pretouch.calibration.mounting import moved_out, seat
+from pretouch.calibration.mounting import moved_out
 from pretouch.calibration.skin_of import skin_of
 from pretouch.errors import CalibrationError
+from pretouch.sensing.seat import seat
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from tests.calibration.faulty import on_the_table
 from tests.calibration.made import turned

@@ -89,9 +89,7 @@ def test_one_of_two_arms_is_taken_by_its_full_names(tmp_path, panda_model):
 def test_the_arm_that_moved_is_chosen_by_its_topic(tmp_path, panda_model):
     bag = write_bag(tmp_path / "bag", states(topic="/a") + states(MOVING + 0.1, topic="/b"))
     np.testing.assert_array_equal(read_joints(bag, panda_model, "/b").trace.q, MOVING + 0.1)
-    with pytest.raises(
-        RecordingError, match="several topics of sensor_msgs/JointState: choose one by --joints, /a, /b"
-    ):
+    with pytest.raises(RecordingError, match="several topics of sensor_msgs/JointState: choose one by --topic, /a, /b"):
         read_joints(bag, panda_model)
     with pytest.raises(RecordingError, match="has no topic '/c'"):
         read_joints(bag, panda_model, "/c")
@@ -131,6 +129,7 @@ def short(**changed):
         (short(q4_rad=np.full(50, np.nan)), "has 0 samples of all joints.* 50 samples are not finite"),
         (short(time_s=np.full(50, 3.0)), "has 1 sample of all joints.* a stamp came again 49 times"),
         (short(time_s=np.linspace(0, 1e9, 50)), "span 1e[+]09 s: check their unit"),
+        (short(time_s=np.tile(np.arange(25) / 10, 2)), "goes back by 2.4 s at sample 26 of 50: give one recording"),
     ],
 )
 def test_what_is_wrong_with_a_csv_file_is_said_in_one_line(tmp_path, panda_model, columns, words):
@@ -169,7 +168,7 @@ def test_a_message_without_positions_is_passed_over(tmp_path, panda_model):
         ("none.csv", "", "there is none"),
         ("a.xlsx", "", "has an ending that is none of .mcap, .db3, .bag, .csv"),
         ("folder", "", "has no metadata.yaml"),
-        ("a.csv", "/joint_states", "is a CSV file and has no topics"),
+        ("a.csv", "/joint_states", "is a CSV file and has no topics: leave out --topic"),
         ("a.csv", "", "is empty"),
         ("a.mcap", "", "cannot be read as a bag or MCAP file"),
     ],

@@ -2,13 +2,15 @@
 
 import numpy as np
 
+from pretouch.calibration.arm_findings import clocks_apart, leaning, little_used
 from pretouch.calibration.data import CalibrationData, UnitData
-from pretouch.calibration.findings import error_findings, misplaced, share_findings, slip_finding, unknown_finding
+from pretouch.calibration.findings import end_finding, error_findings, share_findings, slip_finding, unknown_finding
 from pretouch.calibration.identify import Identified, Identifier
 from pretouch.calibration.joint_checks import check_known, checked_joints, held, moved_joints, standing_joints
 from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
+from pretouch.calibration.misplaced import misplaced
 from pretouch.calibration.mounting import likely_member, mounting_findings, seen_from
 from pretouch.calibration.observability import Axis, Observability, observability
 from pretouch.calibration.params import CalibrationParams
@@ -34,12 +36,14 @@ def calibrate(model: RobotModel, data: CalibrationData, params: CalibrationParam
     joints = held(joints, moved)
     arm = ArmMotion(model, joints, params)
     check_known(arm, params)
-    notes += standing_joints(model, moved)
+    notes += (*standing_joints(model, moved), *little_used(arm))
     identifier = Identifier(arm, params)
     found = {unit.id: _identified(identifier, unit, params) for unit in data.units}
     wrong = misplaced(model, {unit.id: unit.link for unit in data.units}, found)
     noise = JointNoise(arm, joints, params)
     units = tuple(_settled(arm, noise, unit, found[unit.id], wrong.get(unit.id), params) for unit in data.units)
+    trusted = [at for unit in units if unit.accepted and (at := found[unit.id].located) is not None]
+    notes += (*clocks_apart(units, params), *leaning(trusted))
     return Calibration(units, notes, float(np.deg2rad(params.board_misalignment_deg)))
 
 
@@ -71,19 +75,26 @@ def _settled(
     if found.located is None:
         return UnitCalibration(unit.id, None, tuple(findings))
     located, model = found.located, arm.model
-    doubts = [
-        *_slip(arm, found, located, params),
-        *share_findings(arm, located, params),
-        *error_findings(located, params),
-    ]
+    doubts = _doubts(arm, found, located, params)
     link = located.link
     if unit.link is None or wrong:
         link = likely_member(model, found.body, link, located.pose)
     T, covariance = seen_from(model, link, located.link, located.pose, noise.covariance(located))
     known = _observability(arm, link, T, covariance, params)
     if not any(doubt.refused for doubt in doubts):
-        doubts += unknown_finding(arm, link, known, params) or mounting_findings(model, link, T)
+        bare = _observability(arm, link, T, seen_from(model, link, located.link, T, located.covariance)[1], params)
+        hiding = None if bare.unknown else noise.acceleration
+        doubts += unknown_finding(arm, link, known, hiding, params) or mounting_findings(model, link, T)
     return UnitCalibration(unit.id, _place(arm, located, link, T, covariance), (*findings, *doubts), known)
+
+
+def _doubts(arm: ArmMotion, found: Identified, located: Located, params: CalibrationParams) -> list[Finding]:
+    """Say why a place may not be trusted, other than where it is."""
+    shares = share_findings(arm, located, params)
+    slips = _slip(arm, found, located, params)
+    if not slips and (at_end := end_finding(arm, located)) is not None:
+        slips, shares = [at_end], [finding for finding in shares if finding.kind != "outliers"]
+    return [*slips, *shares, *error_findings(located, params)]
 
 
 def _slip(arm: ArmMotion, found: Identified, located: Located, params: CalibrationParams) -> list[Finding]:

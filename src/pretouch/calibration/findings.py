@@ -2,60 +2,20 @@
 
 import numpy as np
 
-from pretouch.calibration.identify import Identified
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
 from pretouch.calibration.observability import Observability
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding
 from pretouch.calibration.steadiness import Slip
-from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 _UNUSUAL = 5.0
 """Standard deviations, as assumed, from which on an error of a sensor is not its own."""
 _MANY = 0.05
 """Share of outliers from which on they are worth a word."""
-
-
-def misplaced(model: RobotModel, given: dict[str, str | None], found: dict[str, Identified]) -> dict[str, Finding]:
-    """Name units that sit elsewhere than they are said to: by id. Those that sit in each other's place are swapped.
-
-    Args:
-        model: the arm.
-        given: link of each unit, as the user says.
-        found: what is known of each unit's link.
-    """
-    wrong = {
-        name: said
-        for name, said in given.items()
-        if said is not None and found[name].body and model.link_index(said) not in found[name].body
-    }
-
-    def takes(name: str, other: str) -> bool:
-        """Whether one sits where the other one is said to."""
-        return name != other and model.link_index(wrong[other]) in found[name].body
-
-    findings = {}
-    for name, said in wrong.items():
-        links = _on(model, found[name].body)
-        owners = [other for other in wrong if takes(name, other)]
-        mutual = [other for other in owners if takes(other, name)]
-        sentence = f"It is said to sit on {said}, but its data fit {links}: correct its link, or move it."
-        if owners:
-            other = (mutual or owners)[0]
-            sentence = f"It sits on {links}, where {other} should, instead of on {said}: correct its link, or move it."
-        if mutual:
-            sentence = f"Swapped with {mutual[0]}: it sits on {links}, where {mutual[0]} should, instead of on {said};"
-            sentence += " exchange the two, or their ids."
-        findings[name] = Finding("swapped" if mutual else "wrong_link", sentence, True)
-    return findings
-
-
-def _on(model: RobotModel, body: tuple[int, ...]) -> str:
-    """Name the links of a rigid body that have a surface, or all if none has."""
-    covered = [i for i in body if i in model.capsules.link]
-    return " or ".join(model.links[i] for i in covered or body)
+_LONG_S = 0.5
+"""Outliers that last for longer, up to an end of the run, are of a unit that is not there [s]."""
 
 
 def slip_finding(slip: Slip, begin: float) -> Finding:
@@ -66,6 +26,24 @@ def slip_finding(slip: Slip, begin: float) -> Finding:
         " calibrate again."
     )
     return Finding("slipped", sentence, True)
+
+
+def end_finding(arm: ArmMotion, located: Located) -> Finding | None:
+    """Say when a unit began, or ceased, to move as its link, near an end of the run: one pose does not hold there."""
+    known = np.flatnonzero(located.known)
+    fits = np.flatnonzero(located.used[known])
+    if not len(fits):
+        return None
+    long = _LONG_S / float(arm.time[1] - arm.time[0])
+    if len(known) - 1 - fits[-1] > long:
+        since = arm.time[known[fits[-1]]] - arm.time[0]
+        what = f"It slipped, or came off, {since:.1f} s after the first joint state: from then on"
+    elif fits[0] > long:
+        until = arm.time[known[fits[0]]] - arm.time[0]
+        what = f"It slipped, or was put on, {until:.1f} s after the first joint state: until then"
+    else:
+        return None
+    return Finding("slipped", f"{what} it did not move as its link. Fasten it and calibrate again.", True)
 
 
 def share_findings(arm: ArmMotion, located: Located, params: CalibrationParams) -> list[Finding]:
@@ -119,15 +97,33 @@ def error_findings(located: Located, params: CalibrationParams) -> list[Finding]
     return findings
 
 
-def unknown_finding(arm: ArmMotion, link: int, known: Observability, params: CalibrationParams) -> list[Finding]:
-    """Say what of a place is not known, why, and what to do."""
+def unknown_finding(
+    arm: ArmMotion, link: int, known: Observability, noise: FloatArray | None, params: CalibrationParams
+) -> list[Finding]:
+    """Say what of a place is not known, why, and what to do.
+
+    Args:
+        arm: the run.
+        link: index of the link.
+        known: what of the place is known.
+        noise: (n,) of the joints' accelerations [rad/s^2], if it is what hides the place.
+        params: what has not moved.
+    """
     if not known.unknown:
         return []
     model, moving = arm.model, arm.model.moved_by[link]
     swing: FloatArray = np.ptp(arm.q[arm.usable], axis=0)
     lazy = np.flatnonzero(moving & (swing < 10 * params.least_swing_rad))
     names = ", ".join(f"{model.joints[j]} (it moved by {np.rad2deg(swing[j]):.1f} degrees)" for j in lazy)
-    way_out = f"Move {names} more." if len(lazy) else "Move for longer, or faster, and turn about more axes."
+    way_out = "Move for longer, or faster, and turn about more axes."
+    if len(lazy):
+        way_out = f"Move {names} more."
+    elif noise is not None:
+        worst = int(np.argmax(np.where(moving, noise, 0.0)))
+        way_out = (
+            f"The noise of the joint positions hides it, most that of {model.joints[worst]}, which passes for"
+            f" {noise[worst]:.2g} rad/s^2: record them with all their digits, each with its own stamp."
+        )
     if moving.sum() == 1:
         joint = model.joints[int(np.flatnonzero(moving)[0])]
         way_out = f"{joint} alone moves {model.links[link]}, so no motion tells it: measure it by hand."

@@ -1,13 +1,15 @@
 """The pose of one IMU on its link, with its errors, by least squares on the manifold of poses.
 
-The model, for a link that moves with w and alpha, whose origin has the acceleration a, and where u is up (link frame):
+The model, for a link that moves with w and alpha, and whose origin has the acceleration a (link frame):
 
     gyroscope      (1 + k_g) * R^T w + b_g
-    accelerometer  (1 + k_a) * R^T (a + L p + g u) + b_a,   L = [alpha]x + [w]x [w]x
+    accelerometer  (1 + k_a) * R^T (a + L p + R_link_base g) + b_a,   L = [alpha]x + [w]x [w]x
 
 with R, p = T_link_sensor, biases b and errors of scale k per axis; read at a clock that is late by an offset, the
-accelerometer by a little more than the gyroscope. Gravity's magnitude g is an unknown too: it differs by 0.5 % between
-places, and taken as known it would pass for an error of scale, and scale the levers with it.
+accelerometer by a little more than the gyroscope. What holds against gravity, g in the base frame, is an unknown too.
+Its magnitude differs by 0.5 % between places: taken as known it would pass for an error of scale, and scale the levers
+with it. Its direction differs from the base's z by as much as the arm stands off level: half a degree, taken for none,
+would move units by millimetres.
 """
 
 from dataclasses import dataclass
@@ -20,14 +22,14 @@ from pretouch.calibration.link_motion import LinkMotion, skew
 from pretouch.calibration.params import CalibrationParams
 from pretouch.types import FloatArray
 
-TURN, PLACE = slice(0, 3), slice(3, 6)
-"""Of the unknowns: rotation in the sensor frame [rad], position in the link frame [m]."""
+TURN, PLACE, GRAVITY = slice(0, 3), slice(3, 6), slice(20, 23)
+"""Of the unknowns: rotation in the sensor frame [rad], position in the link frame [m], and what holds against gravity,
+in the base frame [m/s^2]."""
 _ACC_BIAS, _GYRO_BIAS, _CLOCK, _LAG = slice(6, 9), slice(9, 12), 12, 13
 _ACC_SCALE, _GYRO_SCALE = slice(14, 17), slice(17, 20)
-_GRAVITY = 20
-_UNKNOWNS = 21
+_UNKNOWNS = 23
 _REWEIGHTINGS = 4
-_POSE_PRIOR = np.array([np.pi, np.pi, np.pi, 0.5, 0.5, 0.5])
+POSE_PRIOR = np.array([np.pi, np.pi, np.pi, 0.5, 0.5, 0.5])
 """Standard deviation of the pose before anything is measured [rad, m]: no unit is further from its link's origin. Only
 what a motion does not tell at all depends on it."""
 
@@ -62,20 +64,20 @@ class Estimate:
     """By how much the clock is late, beyond what was assumed [s]."""
     lag: float
     """By how much the accelerometer is later than the gyroscope [s]."""
-    gravity: float
-    """[m/s^2]."""
+    gravity: FloatArray
+    """(3,) proper acceleration of what is at rest, base frame [m/s^2]."""
 
     def moved(self, x: FloatArray) -> "Estimate":
-        """Return the estimate that differs from this one by x (21,): the pose by x on the manifold, the rest is x."""
+        """Return the estimate that differs from this one by x (23,): the pose by x on the manifold, the rest is x."""
         return Estimate(
             self.R @ Rotation.from_rotvec(x[TURN]).as_matrix(), self.p + x[PLACE], x[_ACC_BIAS], x[_GYRO_BIAS],
             x[_ACC_SCALE], x[_GYRO_SCALE], float(x[_CLOCK]), float(x[_LAG]),
-            float(x[_GRAVITY]),
+            x[GRAVITY],
         )  # fmt: skip
 
     def felt(self, motion: LinkMotion) -> FloatArray:
         """Proper acceleration (N, 3) at the IMU, link frame [m/s^2]."""
-        return motion.a + motion.lever @ self.p + self.gravity * motion.up
+        return motion.a + motion.lever @ self.p + motion.R_link_base @ self.gravity
 
     def expected(self, motion: LinkMotion) -> FloatArray:
         """What the IMU should measure (N, 6), but for the clock."""
@@ -93,30 +95,31 @@ def start(motion: LinkMotion, measured: Measured, gravity: float) -> Estimate:
     w, values = motion.w, measured.values
     U, _, Vt = np.linalg.svd((w - w.mean(axis=0)).T @ (values[:, :3] - values[:, :3].mean(axis=0)))
     R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-    # R values = a + g u + L p + R b, with priors so that what a motion does not tell stays small
+    # R values = a + R_link_base g + L p + R b, with priors so that what a motion does not tell stays small
     left = np.concatenate([motion.lever, np.broadcast_to(np.eye(3), motion.lever.shape)], axis=2).reshape(-1, 6)
-    right = (values[:, 3:] @ R.T - motion.a - gravity * motion.up).reshape(-1)
+    right = (values[:, 3:] @ R.T - motion.a - gravity * motion.R_link_base[:, :, 2]).reshape(-1)
     found = np.linalg.solve(left.T @ left + np.diag([1e-2] * 3 + [1e-3] * 3), left.T @ right)
     none = np.zeros(3)
     bias = values[:, :3].mean(axis=0) - w.mean(axis=0) @ R
-    return Estimate(R, found[:3], found[3:] @ R, bias, none, none, 0.0, 0.0, gravity)
+    return Estimate(R, found[:3], found[3:] @ R, bias, none, none, 0.0, 0.0, np.array([0.0, 0.0, gravity]))
 
 
 class Problem:
-    """The least squares for the unknowns x (21,): the pose relative to an estimate, the rest itself."""
+    """The least squares for the unknowns x (23,): the pose relative to an estimate, the rest itself."""
 
     def __init__(
         self, motion: LinkMotion, measured: Measured, base: Estimate, noise: FloatArray, params: CalibrationParams
     ) -> None:
         self.motion, self.measured, self.base, self.noise = motion, measured, base, noise
         self.prior = np.concatenate([
-            _POSE_PRIOR, np.full(3, params.acceleration_bias), np.full(3, params.angular_velocity_bias),
-            [np.inf, params.delay_difference_s], np.full(6, params.scale_error), [params.gravity_error],
+            POSE_PRIOR, np.full(3, params.acceleration_bias), np.full(3, params.angular_velocity_bias),
+            [np.inf, params.delay_difference_s], np.full(6, params.scale_error),
+            np.full(2, params.gravity * np.deg2rad(params.lean_deg)), [params.gravity_error],
         ])  # fmt: skip
-        self.expected = np.append(np.zeros(_GRAVITY), params.gravity)
+        self.expected = np.append(np.zeros(_UNKNOWNS - 1), params.gravity)
 
     def residuals(self, x: FloatArray) -> FloatArray:
-        """Differences from data and priors (6 N + 21,), each divided by its standard deviation."""
+        """Differences from data and priors (6 N + 23,), each divided by its standard deviation."""
         differences = self.base.moved(x).differences(self.motion, self.measured) / self.noise
         return np.concatenate([differences.reshape(-1), (x - self.expected) / self.prior])
 
@@ -132,7 +135,7 @@ class Problem:
         return weights
 
     def jacobian(self, x: FloatArray) -> FloatArray:
-        """Return their derivatives (6 N + 21, 21)."""
+        """Return their derivatives (6 N + 23, 23)."""
         motion, N = self.motion, len(self.motion.w)
         e = self.base.moved(x)
         J = np.zeros((N, 6, _UNKNOWNS))
@@ -141,7 +144,7 @@ class Problem:
         for half, v in enumerate(turned):
             J[:, 3 * half : 3 * half + 3, TURN] = skew(v) @ _right_jacobian(x[TURN])
         J[:, 3:, PLACE] = e.R.T @ motion.lever
-        J[:, 3:, _GRAVITY] = motion.up @ e.R
+        J[:, 3:, GRAVITY] = e.R.T @ motion.R_link_base
         J *= scales[:, None]
         for i in range(3):
             J[:, i, _GYRO_BIAS.start + i] = J[:, 3 + i, _ACC_BIAS.start + i] = 1.0
@@ -168,7 +171,7 @@ class Fit:
 
     estimate: Estimate
     covariance: FloatArray
-    """(21, 21) of all unknowns; `TURN` and `PLACE` say where the pose is."""
+    """(23, 23) of all unknowns; `TURN` and `PLACE` say where the pose is."""
     noise: FloatArray
     """(6,) standard deviation of what the model does not explain [rad/s, m/s^2], by axis."""
 
@@ -190,7 +193,7 @@ def fit(
     problem = Problem(motion, measured, begin, noise, params)
     x = np.concatenate([
         np.zeros(6), begin.acceleration_bias, begin.angular_velocity_bias, [begin.late, begin.lag],
-        begin.acceleration_scale, begin.angular_velocity_scale, [begin.gravity],
+        begin.acceleration_scale, begin.angular_velocity_scale, begin.gravity,
     ])  # fmt: skip
     for _ in range(_REWEIGHTINGS if robust else 1):
         weights = problem.weights(x) if robust else problem.equal
@@ -208,15 +211,17 @@ def fit(
 
 
 def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatArray:
-    """Covariance (21, 21) that holds for errors that depend on each other within blocks of so many instants.
+    """Covariance (23, 23) that holds for errors that depend on each other within blocks of so many instants.
 
-    The usual (J^T J)^-1 takes every residual as independent, and is far too small for errors that a motion repeats.
+    The usual (J^T J)^-1 takes every residual as independent, and is far too small for errors that a motion repeats. Few
+    blocks may agree by chance, so the fewer there are, the more of the usual is added.
     """
     data = len(residuals) - _UNKNOWNS
     N = data // 6
     scores = np.einsum("nik,ni->nk", J[:data].reshape(N, 6, _UNKNOWNS), residuals[:data].reshape(N, 6))
     blocks = np.add.reduceat(scores, np.arange(0, N, per_block), axis=0)
     prior = J[data:]
-    inverse = np.linalg.inv(J.T @ J)
-    few = len(blocks) / max(1, len(blocks) - _UNKNOWNS / 6)
-    return inverse @ (few * blocks.T @ blocks + prior.T @ prior) @ inverse
+    H, count = J.T @ J, len(blocks)
+    inverse = np.linalg.inv(H)
+    told = count / max(1, count - _UNKNOWNS / 6) * blocks.T @ blocks + prior.T @ prior
+    return inverse @ (told + (_UNKNOWNS / count) ** 2 * H) @ inverse

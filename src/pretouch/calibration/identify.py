@@ -21,6 +21,10 @@ _AMBIGUOUS = 1.5
 """Two fits whose differences, both sensors' multiplied, are within this factor tell no link apart."""
 _STILL = 0.05
 """Share of the least turning of any link that a unit measures at most if it was left lying somewhere."""
+_RESTS = np.deg2rad(2.0)
+"""What turns faster than this, root mean square, moved [rad/s]."""
+_COUPLED = 0.3
+"""A gyroscope that measures a smaller share of what a link turned is on something that the arm shakes."""
 _SCALE = 0.1
 """By how much a gyroscope's scale may be off at first sight."""
 _MISTAKEN = (
@@ -83,7 +87,7 @@ class Identifier:
         meanwhile = usable & (np.abs(stamps - np.median(self.arm.time)) < self._half_s)
         values = signal.at(stamps).values[meanwhile if meanwhile.any() else usable, :3]
         if _rms(values) < _STILL * min(self._turning.values()):
-            return Identified(findings=[_never_moved(values)])
+            return Identified(findings=[_never_moved(values, min(self._turning.values()))])
         matches = self._matches(signal, self.arm.time, self.params.clock_error_s)
         best = max(match.alignment.likeness for match in matches)
         findings: list[Finding] = []
@@ -114,14 +118,16 @@ class Identifier:
         """Choose among matches that are about as good."""
         close.sort(key=lambda match: -match.alignment.likeness)
         if not enough(self.arm, known_instants(self.arm, signal, close[0].alignment.late), self.params):
-            return Identified(findings=[*findings, _too_little(self.params)])
-        problem = self._gyroscope(signal, close[0])
-        if problem:
+            return Identified(findings=[_too_little(self.params)])
+        problem = self._gyroscope(signal, close[0], given)
+        if problem is not None and problem.kind == "no_link":
+            return Identified(findings=[problem])
+        if problem is not None:
             return Identified(close[0].body, signal, None, [*findings, problem])
         fits = [(match.body, self._fit(signal, match, given)) for match in close]
         told = [(body, located) for body, located in fits if located is not None]
         if not told:
-            return Identified(close[0].body, signal, None, [*findings, _too_little(self.params)])
+            return Identified(close[0].body, signal, None, [_too_little(self.params)])
         scores = {body: float(located.noise[0] * located.noise[3]) for body, located in told}
         alike = [(body, located) for body, located in told if scores[body] <= _AMBIGUOUS * min(scores.values())]
         body, located = min(alike, key=lambda one: (given not in one[0], scores[one[0]]))
@@ -134,14 +140,20 @@ class Identifier:
         link = given if given is not None and given in match.body else match.body[0]
         return locate(self.arm, signal, link, match.alignment.late, self.params)
 
-    def _gyroscope(self, signal: ImuSignal, match: _Match) -> Finding | None:
+    def _gyroscope(self, signal: ImuSignal, match: _Match, given: int | None) -> Finding | None:
         """Find a gyroscope whose scale is wrong, or whose axes are mirrored."""
         known = known_instants(self.arm, signal, match.alignment.late)
         w = self.arm.link(match.body[0]).w[known]
         sensed = signal.at(self.arm.time[known] + match.alignment.late).values[:, :3]
         scale = _rms(sensed) / max(_rms(w), 1e-9)
         if abs(scale - 1) > _SCALE:
-            return _wrong_scale(scale)
+            mistaken = _mistaken(scale)
+            if not mistaken and scale < _COUPLED and given not in match.body:
+                return _shaken(scale, self.arm.model.links[match.body[0]])
+            sentence = (
+                f"Its gyroscope measures {scale:.3g} times what its link turned: {mistaken or 'check its scale'}."
+            )
+            return Finding("gyroscope_scale", sentence, True)
         U, size, Vt = np.linalg.svd((w - w.mean(axis=0)).T @ (sensed - sensed.mean(axis=0)))
         if size[2] > 0.01 * size[0] and np.linalg.det(U @ Vt) < 0:
             sentence = "Its gyroscope's axes are mirrored: one has the wrong sign, or two are exchanged; correct them."
@@ -164,8 +176,15 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(((values - values.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-def _never_moved(values: FloatArray) -> Finding:
+def _never_moved(values: FloatArray, least: float) -> Finding:
+    """Say that a unit turned much less than any link; `least` is the turning of the one that turned least [rad/s]."""
     turned = np.rad2deg(_rms(values))
+    if turned > np.rad2deg(_RESTS):
+        sentence = (
+            f"It fits no link of this arm: it turned by {turned:.2g} degrees/s, and no link by less than"
+            f" {np.rad2deg(least):.2g} degrees/s. Check the joints' stamps and units, and those of its gyroscope."
+        )
+        return Finding("no_link", sentence, True)
     sentence = (
         f"It never moved: its gyroscope varied by {turned:.2g} degrees/s while the arm moved. Clip it onto a link that"
         " a joint moves."
@@ -197,6 +216,14 @@ def _too_little(params: CalibrationParams) -> Finding:
     return Finding("too_little", sentence, True)
 
 
-def _wrong_scale(scale: float) -> Finding:
-    why = next((why for factor, why in _MISTAKEN if abs(scale / factor - 1) < _SCALE), "check its scale")
-    return Finding("gyroscope_scale", f"Its gyroscope measures {scale:.3g} times what its link turned: {why}.", True)
+def _mistaken(scale: float) -> str:
+    """Say what mistake makes a gyroscope measure so many times what is right; nothing if none is known to."""
+    return next((why for factor, why in _MISTAKEN if abs(scale / factor - 1) < _SCALE), "")
+
+
+def _shaken(scale: float, link: str) -> Finding:
+    sentence = (
+        f"It does not sit on the arm: it turned as {link}, but {scale:.2g} times as much, as on something that the arm"
+        " shakes. Clip it onto its link, or check its gyroscope's scale."
+    )
+    return Finding("no_link", sentence, True)

@@ -6,6 +6,7 @@ from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding
 from pretouch.calibration.signals import gaps
+from pretouch.calibration.stamp_checks import median_period, of_several_clocks
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
@@ -13,8 +14,13 @@ from pretouch.types import BoolArray, FloatArray
 
 _BEYOND = 0.2
 """How far beyond its limits no joint is ever measured [rad]."""
-_SPARSE = 100
-"""Stamps that span more than this many times the time their samples take are not all of one clock."""
+_BUNCHED = 0.5
+"""Share of the mean period within which two states have nearly the same stamp: nothing is interpolated over so little
+time but the error of the stamps."""
+_FEW = 0.1
+"""Share of states with the stamp of another one from which on they come in batches."""
+_REGULAR = 0.8
+"""Share of the longest gap that joint states may be apart, so that a little jitter makes no gaps."""
 
 
 def checked_joints(
@@ -34,12 +40,13 @@ def checked_joints(
     findings = [] if finite.all() else [_not_finite(finite)]
     joints = JointTrace(stamp[finite], q[finite])
     _check_order(joints.stamp)
-    fresh = np.append(True, np.diff(joints.stamp) > 0)[: len(joints.stamp)]
-    if not fresh.all():
-        findings.append(_repeated(fresh))
-    joints = JointTrace(joints.stamp[fresh], joints.q[fresh])
     _check_range(model, joints.q)
-    _check_rate(joints.stamp, params)
+    _check_span(joints.stamp, params)
+    for kept, named in ((_own_stamp, _repeated), (_spaced, _bunched), (_renewed, _held)):
+        keep = kept(joints, params)
+        findings += [] if keep.all() else [named(keep)]
+        joints = JointTrace(joints.stamp[keep], joints.q[keep])
+    _check_rate(joints, params)
     return joints, (*findings, *_missing(joints.stamp, params))
 
 
@@ -89,12 +96,67 @@ def _not_finite(finite: BoolArray) -> Finding:
     return Finding("joints_not_finite", sentence, False)
 
 
-def _repeated(fresh: BoolArray) -> Finding:
+def _own_stamp(joints: JointTrace, params: CalibrationParams) -> BoolArray:
+    """Tell which states (T,) to keep of those with the same stamp: the last, stamped on receipt the least late.
+
+    A few with different values are all left out: of these, the last may as well have the stamp of the one before.
+    """
+    same = np.diff(joints.stamp) == 0
+    keep = np.append(~same, True)
+    others = same & _changes(joints.q)
+    if others.mean() < _FEW:
+        keep &= ~np.append(False, others)
+    return np.asarray(keep)
+
+
+def _repeated(keep: BoolArray) -> Finding:
     sentence = (
-        f"{np.sum(~fresh)} joint states of {len(fresh)} have the stamp of the one before and were left out: record each"
-        " state once."
+        f"{np.sum(~keep)} joint states of {len(keep)} have the stamp of another one and were left out: record each"
+        " state once, with its own stamp."
     )
     return Finding("joints_repeated", sentence, False)
+
+
+def _spaced(joints: JointTrace, params: CalibrationParams) -> BoolArray:
+    """Tell which states (T,) no other follows closely: stamped on receipt, the last is the least late."""
+    stamp, steps = joints.stamp, np.diff(joints.stamp)
+    regular = steps[steps <= params.longest_gap_s]
+    keep = np.ones(len(stamp), np.bool_)
+    if len(regular):
+        nearest, following = _BUNCHED * float(regular.mean()), np.inf
+        for i in range(len(stamp) - 1, -1, -1):
+            keep[i] = following - stamp[i] >= nearest
+            following = stamp[i] if keep[i] else following
+    return keep
+
+
+def _bunched(keep: BoolArray) -> Finding:
+    sentence = (
+        f"{np.sum(~keep)} joint states of {len(keep)} have nearly the stamp of the one after and were left out: stamp"
+        " states where they are measured, not where they arrive."
+    )
+    return Finding("joints_bunched", sentence, False)
+
+
+def _renewed(joints: JointTrace, params: CalibrationParams) -> BoolArray:
+    """Tell which states (T,) are not of a value that was only held until the next one came; an arm may stand longer."""
+    same = np.append(False, ~_changes(joints.q))
+    first = np.flatnonzero(~same)
+    lasts = np.append(np.diff(joints.stamp[first]), np.inf)
+    return np.asarray(~same | np.repeat(lasts > params.longest_gap_s, np.diff(np.append(first, len(same)))))
+
+
+def _changes(q: FloatArray) -> BoolArray:
+    """Tell at which states but the first (T - 1,) any position differs from that before."""
+    return np.asarray((np.diff(q, axis=0) != 0).any(axis=1))
+
+
+def _held(keep: BoolArray) -> Finding:
+    sentence = (
+        f"{np.sum(~keep)} joint states of {len(keep)} repeat the values of the one before and were left out: record"
+        " states at the rate at which joints are measured."
+    )
+    return Finding("joints_held", sentence, False)
 
 
 def _check_order(stamp: FloatArray) -> None:
@@ -118,23 +180,29 @@ def _check_range(model: RobotModel, q: FloatArray) -> None:
         )
 
 
-def _check_rate(stamp: FloatArray, params: CalibrationParams) -> None:
+def _check_span(stamp: FloatArray, params: CalibrationParams) -> None:
     span = float(np.ptp(stamp)) if len(stamp) else 0.0
     if span < params.shortest_s:
         raise CalibrationError(
             f"There are {len(stamp)} joint states in {span:.3g} s: at least {params.shortest_s:g} s of motion are"
             " needed, 60 s are good."
         )
-    period = float(np.median(np.diff(stamp)))
-    if span > _SPARSE * period * len(stamp):
+    if of_several_clocks(stamp):
         raise CalibrationError(
-            f"{len(stamp)} joint states, mostly {period:.3g} s apart, are spread over {span:.3g} s: give those of one"
-            " run, on one clock, in seconds."
+            f"{len(stamp)} joint states, mostly {median_period(stamp):.3g} s apart, are spread over {span:.3g} s: give"
+            " those of one run, on one clock, in seconds."
         )
-    if period > params.longest_gap_s:
+
+
+def _check_rate(joints: JointTrace, params: CalibrationParams) -> None:
+    """Refuse states, or changes of their values, that are too far apart."""
+    changed = np.append(True, _changes(joints.q))
+    periods = [median_period(stamp) for stamp in (joints.stamp, joints.stamp[changed]) if len(stamp) > 1]
+    period, enough = max(periods), _REGULAR * params.longest_gap_s
+    if period > 1.05 * enough:
         raise CalibrationError(
-            f"Joint states came every {period:.3g} s: at least every {params.longest_gap_s:g} s are needed; record them"
-            " at 100 Hz or more."
+            f"New joint positions came every {period:.3g} s ({1 / period:.3g} Hz): at least {1 / enough:.3g} Hz are"
+            " needed; record them at 100 Hz or more."
         )
 
 

@@ -8,7 +8,7 @@ says that its derivative by p is n [c]x. Their product is the pull on p.
 
 import numpy as np
 
-from pretouch.calibration.fit import PLACE
+from pretouch.calibration.fit import PLACE, POSE_PRIOR
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
 from pretouch.calibration.params import CalibrationParams
@@ -18,6 +18,9 @@ from pretouch.types import FloatArray
 
 _EVERY = 10
 """Of the arm's instants, one in so many is looked at."""
+_ASIDE = 1 / 3
+"""Variance of the pull in every direction, as a share of its square: of errors that noise makes, those across the
+expected one are smaller, but count for more where the motion is strong."""
 
 
 class JointNoise:
@@ -52,5 +55,8 @@ class JointNoise:
             felt = np.cross(axis, lever)
             pull += self.acceleration[j] ** 2 * np.cross(felt, axis).mean(axis=0)
         information = located.used.sum() / located.noise[3] ** 2
-        error = located.covariance[:, PLACE] @ (information * pull)
-        return located.covariance + np.outer(error, error)
+        moved = information * located.covariance[:, PLACE]
+        C = located.covariance + moved @ (np.outer(pull, pull) + pull @ pull * _ASIDE * np.eye(3)) @ moved.T
+        # what a motion does not tell is no less certain than before it
+        C = C - C @ np.linalg.solve(C + np.diag(POSE_PRIOR**2), C)
+        return (C + C.T) / 2

@@ -20,8 +20,8 @@ class LinkMotion:
     """(N, 3) angular velocity [rad/s]."""
     a: FloatArray
     """(N, 3) acceleration of its origin [m/s^2]."""
-    up: FloatArray
-    """(N, 3) unit vectors against gravity, which is along -z of the base frame."""
+    R_link_base: FloatArray
+    """(N, 3, 3) turns vectors of the base frame, such as gravity, into the link's."""
     alpha: FloatArray
     """(N, 3) angular acceleration [rad/s^2]."""
 
@@ -32,7 +32,7 @@ class LinkMotion:
 
     def at(self, which: BoolArray) -> "LinkMotion":
         """Return the motion at some of the instants."""
-        return LinkMotion(self.w[which], self.a[which], self.up[which], self.alpha[which])
+        return LinkMotion(self.w[which], self.a[which], self.R_link_base[which], self.alpha[which])
 
 
 def skew(v: FloatArray) -> FloatArray:
@@ -87,9 +87,9 @@ class ArmMotion:
         if index not in self._links:
             w, alpha, a, point = self._chain[int(self.model.moved_by[index].sum())]
             a = a + _lever_acceleration(w, alpha, self._position[:, index] - point)
-            R = self._rotation[:, index]
-            w, a, alpha = (np.einsum("nji,nj->ni", R, v) for v in (w, a, alpha))
-            self._links[index] = LinkMotion(w, a, R[:, 2], alpha)
+            R = self._rotation[:, index].swapaxes(1, 2)
+            w, a, alpha = (np.einsum("nij,nj->ni", R, v) for v in (w, a, alpha))
+            self._links[index] = LinkMotion(w, a, R, alpha)
         return self._links[index]
 
 

@@ -1,11 +1,10 @@
 """How a unit sits on the surface of its link, as far as capsules tell."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pretouch.calibration.result import Finding
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.seat import Seat, seat
 from pretouch.types import FloatArray
 
 DEEPEST = 0.02
@@ -14,35 +13,14 @@ _OFF, _FARTHEST = 0.1, 0.5
 """Height above its link at which a unit is worth a word, and beyond which it cannot sit there [m]."""
 _INWARDS = -0.5
 """Cosine between beam and outward normal below which a beam points into the link."""
+_CLOSE, _NEAR, _OUTWARDS = 0.005, 0.05, 0.5
+"""Depth [m], height [m] and cosine between beam and outward normal within which a unit sits as one does."""
 _CLEAR = 1e-4
 """Height at which a unit that was moved out of a capsule is left [m]."""
 _TRIES = 20
 _INSIDE, _FACING = 3.0, 0.02
 """Where links are weighed: how much worse being inside is than being off by as much, and how far off a beam along the
 surface is worth [m]."""
-
-
-@dataclass(frozen=True)
-class Seat:
-    """A point of the surface of a link, below a unit."""
-
-    height: float
-    """Of the unit above it [m]; negative inside."""
-    normal: FloatArray
-    """(3,) unit vector outwards, link frame."""
-
-
-def seat(model: RobotModel, link: int, p: FloatArray) -> Seat | None:
-    """Return where the surface of a link is nearest to a point p (3,) in its frame [m]; None if it has no capsule."""
-    nearest: Seat | None = None
-    own = model.capsules.of_links(np.array([link]))
-    for a, b, radius in zip(own.a, own.b, own.radius, strict=True):
-        along = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
-        away = p - a - along * (b - a)
-        distance = float(np.linalg.norm(away))
-        if nearest is None or distance - radius < nearest.height:
-            nearest = Seat(distance - float(radius), away / max(distance, 1e-9))
-    return nearest
 
 
 def likely_member(model: RobotModel, body: tuple[int, ...], link: int, T: FloatArray) -> int:
@@ -68,6 +46,12 @@ def likely_member(model: RobotModel, body: tuple[int, ...], link: int, T: FloatA
 
     best = min(body, key=oddity)
     return best if np.isfinite(oddity(best)) else link
+
+
+def sits_well(model: RobotModel, link: int, T: FloatArray) -> bool:
+    """Tell whether a unit, T (4, 4) on a link, sits on its surface and looks away from it, beyond doubt."""
+    below = seat(model, link, T[:3, 3])
+    return below is not None and -_CLOSE < below.height < _NEAR and float(below.normal @ T[:3, 2]) > _OUTWARDS
 
 
 def seen_from(model: RobotModel, link: int, other: int, T: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -32,6 +32,8 @@ class CalibrationParams(Checked):
     """Standard gravity, before anything is measured [m/s^2]."""
     gravity_error: Positive = 0.02
     """Its standard deviation [m/s^2]: from 9.780 at the equator to 9.832 at the poles."""
+    lean_deg: Positive = 1.0
+    """Standard deviation of the angle by which the arm's base is off level, towards either side [degrees]."""
     delay_difference_s: Positive = 0.0005
     """The same of the delay by which the accelerometer's filter lags behind the gyroscope's [s]."""
     tolerated_acceleration: Positive = 0.2
@@ -52,8 +54,8 @@ class CalibrationParams(Checked):
     added to what a skin file says of an orientation. Up to half a degree either way: how well a board is glued on."""
     unusable: Fraction = 0.3
     """A unit of whose instants a larger share is left out is refused."""
-    shortest_s: Positive = 5.0
-    """Time of usable data below which nothing is tried [s]."""
+    shortest_s: Positive = 15.0
+    """Time of usable data below which nothing is tried [s]: fewer blocks do not tell how sure an answer is."""
     least_swing_rad: Positive = 0.05
     """A joint that moves by less has not moved: what it parts cannot be told apart [rad]."""
     likeness: Fraction = 0.9

@@ -83,4 +83,5 @@ class Calibration:
     findings: tuple[Finding, ...] = ()
     """What is to be known of the joints' data."""
     orientation_floor: float = 0.0
-    """Standard deviation of the angle between an IMU's axes and its range finder's, which no IMU can tell [rad]."""
+    """Standard deviation, about each axis, of the angle between an IMU's axes and its range finder's [rad]; no IMU can
+    tell it."""

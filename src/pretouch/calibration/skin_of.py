@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.calibration.mounting import moved_out, seat
+from pretouch.calibration.mounting import moved_out
 from pretouch.calibration.result import Calibration, UnitCalibration
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.seat import seat
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import LARGEST_ORIENTATION_SIGMA, LARGEST_POSITION_SIGMA, SensorUnit
 
@@ -51,7 +52,10 @@ def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = Non
 
 
 def _sensor_unit(unit: UnitCalibration, model: RobotModel, orientation_floor: float) -> SensorUnit:
-    """Return a unit of a skin; one that lies inside its link's capsules is moved out, as its findings say."""
+    """Return a unit of a skin; one that lies inside its link's capsules is moved out, as its findings say.
+
+    Its orientation's standard deviation is about each axis: of the fit's worst one, and how well the board is glued on.
+    """
     place = unit.place
     if place is None:
         raise CalibrationError(f"Unit {unit.id} has no place: leave it out.")

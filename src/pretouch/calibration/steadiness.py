@@ -84,11 +84,11 @@ class _Rows:
 
 
 def _rest(estimate: Estimate) -> FloatArray:
-    """Return all unknowns but the pose (15,), in the order of the fit."""
+    """Return all unknowns but the pose (17,), in the order of the fit."""
     e = estimate
     return np.concatenate([
         e.acceleration_bias, e.angular_velocity_bias, [e.late, e.lag], e.acceleration_scale, e.angular_velocity_scale,
-        [e.gravity],
+        e.gravity,
     ])  # fmt: skip
 
 
@@ -140,7 +140,7 @@ def _costs(early: _Rows, late: _Rows, per_block: int) -> FloatArray:
 
 
 def _joined(early: _Rows, late: _Rows, first: int) -> tuple[FloatArray, FloatArray]:
-    """Return Jacobian (6 N + 33, 27) and residuals of first pose, shared unknowns, second pose; priors last."""
+    """Return Jacobian (6 N + 35, 29) and residuals of first pose, shared unknowns, second pose; priors last."""
     N, unknowns = early.J.shape[0], early.J.shape[2]
     J = np.zeros((N, 6, unknowns + _POSE))
     J[:first, :, :unknowns] = early.J[:first]

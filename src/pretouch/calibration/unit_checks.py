@@ -9,6 +9,7 @@ from pretouch.calibration.imu_signal import saturated
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding
 from pretouch.calibration.signals import gaps
+from pretouch.calibration.stamp_checks import median_period, of_several_clocks
 from pretouch.traces import ImuTrace
 from pretouch.types import BoolArray, FloatArray
 
@@ -18,8 +19,6 @@ _STUCK_S = 1.0
 """A value that stays the same for longer, while others vary, does not come from a sensor that works [s]."""
 _VARIES = np.repeat((0.05, 0.3), 3)
 """By how much others vary then at least: angular velocities [rad/s], accelerations [m/s^2]."""
-_SPARSE = 100
-"""Stamps that span more than this many times the time their samples take are not all of one clock."""
 _AXES = ("gyroscope x", "gyroscope y", "gyroscope z", "accelerometer x", "accelerometer y", "accelerometer z")
 _MISTAKEN = (
     (9.80665, "m/s^2 is needed and these look like g: multiply by 9.80665"),
@@ -83,11 +82,11 @@ def _sparse(stamp: FloatArray, params: CalibrationParams) -> list[Finding]:
     if span < params.shortest_s:
         sentence = f"It has {len(stamp)} samples in {span:.3g} s: at least {params.shortest_s:g} s are needed."
         return [Finding("short", sentence, True)]
-    period, needed = float(np.median(np.diff(stamp))), 0.25 / params.cutoff_hz
+    period, needed = median_period(stamp), 0.25 / params.cutoff_hz
     if period > needed:
         sentence = f"Its samples came every {1000 * period:.3g} ms: at least every {1000 * needed:.3g} ms are needed."
         return [Finding("slow", sentence, True)]
-    if span > _SPARSE * period * len(stamp):
+    if of_several_clocks(stamp):
         sentence = f"Its {len(stamp)} samples are spread over {span:.3g} s: give those of one run, stamped in seconds."
         return [Finding("clock", sentence, True)]
     return []
@@ -107,24 +106,37 @@ def _losses(unit: UnitData, params: CalibrationParams) -> list[Finding]:
 
 
 def _stuck(unit: UnitData) -> list[Finding]:
-    """Find axes whose value stays the same for long while another one of the unit varies."""
+    """Find axes whose value stays the same for long while another one varies: they are stuck, or cut off there."""
     imu = unit.imu
     values = np.hstack([imu.angular_velocity, imu.acceleration])
     if not np.ptp(values, axis=0).any():
         sentence = f"All its {len(values)} samples are the same: restart the unit, or replace it."
         return [Finding("stuck", sentence, True)]
-    stuck = []
+    stuck: list[str] = []
+    cut: list[str] = []
     for axis, name in enumerate(_AXES):
         begin, end = _longest_run(values[:, axis])
         others = np.ptp(values[begin:end], axis=0) > _VARIES
         lasted = imu.stamp[end - 1] - imu.stamp[begin]
         if lasted > _STUCK_S and others.any() and not _full(unit, axis, begin):
-            si = "m/s^2" if axis > 2 else "rad/s"
-            stuck.append(f"its {name} stays at {values[begin, axis]:.4g} {si} for {lasted:.1f} s")
-    if not stuck:
-        return []
-    sentence = f"While others vary, {', '.join(stuck)}: restart the unit, or replace it."
-    return [Finding("stuck", sentence, True)]
+            where, extreme = values[begin, axis], _extreme(values[:, axis], begin, axis)
+            at = f"{f'its {extreme} value, ' if extreme else ''}{where:.4g} {'m/s^2' if axis > 2 else 'rad/s'}"
+            (cut if extreme else stuck).append(f"its {name} stays at {at} for {lasted:.1f} s")
+    findings = []
+    if stuck:
+        sentence = f"While others vary, {', '.join(stuck)}: restart the unit, or replace it."
+        findings.append(Finding("stuck", sentence, True))
+    if cut:
+        sentence = f"While others vary, {', '.join(cut)}: that ends its range; set a larger one, or declare it."
+        findings.append(Finding("cut_off", sentence, True))
+    return findings
+
+
+def _extreme(values: FloatArray, sample: int, axis: int) -> str:
+    """Say whether a value of an axis (M,) that varies is its "largest" or "smallest" one; empty for any other."""
+    if np.ptp(values) <= _VARIES[axis]:
+        return ""
+    return {values.max(): "largest", values.min(): "smallest"}.get(values[sample], "")
 
 
 def _longest_run(values: FloatArray) -> tuple[int, int]:

@@ -1,5 +1,7 @@
 """What `pretouch skin calibrate` does, by the way it is asked to."""
 
+import os
+import sys
 from pathlib import Path
 
 from pretouch.cli.arms import arm_model
@@ -10,7 +12,18 @@ from pretouch.cli.skin_calibrate_recording import Sources, calibrate_recording
 
 
 def calibrate_skin(command: Calibrate) -> int:
-    """Calibrate; return 1 if a unit was refused or the motion was not finished, or else 0."""
+    """Calibrate; return 1 if a unit was refused, the motion was not finished, or nobody reads on, or else 0."""
+    try:
+        code = _calibrated(command)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        with open(os.devnull, "w") as nowhere:  # what is still in the buffer goes there
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())
+        return 1
+    return code
+
+
+def _calibrated(command: Calibrate) -> int:
     way = way_of(command)
     if way == "simulate":
         from pretouch.cli.skin_calibrate_study import study_skins

@@ -1,12 +1,16 @@
 """Files that `pretouch skin calibrate` writes."""
 
+import os
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Self
 
 from pretouch.cli.skin_calibrate_options import Calibrate
 from pretouch.cli.writing import check_writable
 from pretouch.errors import CalibrationError
+
+_WRITTEN = {"out", "json", "record"}
 
 
 @dataclass(frozen=True)
@@ -18,12 +22,17 @@ class Outputs:
 
     @classmethod
     def of(cls, command: Calibrate) -> Self:
-        """Return what is asked for; CalibrationError or ExperimentError for what could not be written."""
+        """Return what is asked for.
+
+        CalibrationError or ExperimentError for what could not be written, or would take the place of another file.
+        """
         made = cls(Path(command.out) if command.out else None, Path(command.json) if command.json else None)
+        _check_apart(command)
         if made.skin:
             check_free("skin file", made.skin, command.replace)
             check_writable("skin file", made.skin)
         if made.json:
+            check_free("file", made.json, command.replace)
             check_writable("file", made.json)
         return made
 
@@ -32,3 +41,24 @@ def check_free(what: str, place: Path, replace: bool) -> None:
     """Raise CalibrationError for a file that is there and not to be replaced."""
     if place.is_file() and not replace:
         raise CalibrationError(f"The {what} {place} is there already: give another name, or --replace.")
+
+
+def same_file(one: Path, other: Path) -> bool:
+    """Whether `other` is the file `one` by another name, be it there or not, or lies in the folder `one`."""
+    if one.exists() and other.exists() and one.samefile(other):
+        return True
+    first, second = Path(os.path.realpath(one)), Path(os.path.realpath(other))
+    return second.is_relative_to(first)
+
+
+def _check_apart(command: Calibrate) -> None:
+    """Raise CalibrationError where a file to write is one to read, or another to write; --out may be --skin."""
+    given = {
+        "recording": command.recorded.recording, "joints": command.recorded.joints, "keys": command.live.keys,
+        "skin": command.skin, "out": command.out, "json": command.json, "record": command.live.record,
+    }  # fmt: skip
+    for (one, first), (other, second) in combinations(((name, text) for name, text in given.items() if text), 2):
+        if other in _WRITTEN and (one, other) != ("skin", "out") and same_file(Path(first), Path(second)):
+            raise CalibrationError(
+                f"--{other} {second} would be written over --{one} {first}: give --{other} another name."
+            )

@@ -11,15 +11,15 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.perform import PerformParams
 from pretouch.calibration.motion.plan import Plan
+from pretouch.calibration.motion.report import report_on
 from pretouch.calibration.motion.route import approach
 from pretouch.cli.arms import arm_model
 from pretouch.cli.ending import Terminated
-from pretouch.cli.skin_calibrate_files import Outputs, check_free
+from pretouch.cli.skin_calibrate_files import Outputs, check_free, same_file
 from pretouch.cli.skin_calibrate_motion import planned
-from pretouch.cli.skin_calibrate_options import Calibrate
+from pretouch.cli.skin_calibrate_options import Calibrate, MotionOptions
 from pretouch.cli.skin_calibrate_recording import Sources, calibrate_recording
 from pretouch.cli.skin_calibrate_session import Session
 from pretouch.cli.skin_keys import keys_file
@@ -47,25 +47,33 @@ def calibrate_live(command: Calibrate, outputs: Outputs) -> int:
         raise CalibrationError("No skin file to write is given: name one with --out.")
     if not command.live.units_host:
         raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
-    place = _recording_place(command, outputs.skin)
-    model = arm_model(command.arm)
+    place = _recording_place(command, outputs)
+    model, again = arm_model(command.arm), _again(command, place)
     with _session(command, model) as session:
-        plan, params = planned(model, command.motion)
+        ways = _ways(session, model, command.motion)
         if not command.live.yes:
-            _ask(plan)
+            _ask(sum(way.duration for way in ways))
         print("Waiting for the units.", flush=True)
         session.wait_for_units()
-        stopped = _recorded(session, model, plan, params, place, _go_on(command, place))
+        print(f"All that is measured is kept in {place}. {again}", flush=True)
+        stopped = _recorded(session, ways, place, again)
     if stopped:
         return 1
     skin = Path(command.skin) if command.skin else None
-    return calibrate_recording(model, Sources(place, skin=skin), outputs)
+    try:
+        return calibrate_recording(model, Sources(place, skin=skin), outputs)
+    except BaseException:
+        with suppress(OSError):  # the terminal may be gone
+            print(f"The calibration was not finished. What was measured is in {place}. {again}", flush=True)
+        raise
 
 
-def _recording_place(command: Calibrate, out: Path) -> Path:
+def _recording_place(command: Calibrate, outputs: Outputs) -> Path:
     """Return the recording to write, which is not there yet."""
+    out, others = Path(command.out), [file for file in (outputs.skin, outputs.json) if file]
     beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
-    place = Path(command.live.record or next(one for one in beside if not one.exists()))
+    free = (one for one in beside if not one.exists() and not any(same_file(file, one) for file in others))
+    place = Path(command.live.record or next(free))
     check_free("recording", place, replace=False)
     check_writable("recording", place)
     return place
@@ -86,46 +94,55 @@ def _session(command: Calibrate, model: RobotModel) -> Iterator[Session]:
             print(f"This machine is too slow by {arm.clock.left_out:.1f} s for the simulation: its data have gaps.")
 
 
-def _ask(plan: Plan) -> None:
-    """Have a person let the arm move; CalibrationError if none does."""
+def _ways(session: Session, model: RobotModel, options: MotionOptions) -> list[Plan]:
+    """Return the motion, with the way to its start before it if the arm is elsewhere, and print the room for both."""
+    plan, params = planned(model, options)
+    print(report_on(model, plan, params), flush=True)
+    q = session.posture()
+    if np.abs(q - plan.start).max() <= PerformParams().start_tolerance_rad / 2:
+        return [plan]
+    way = approach(model, q, plan, params)
+    room = report_on(model, way, params)
+    ranges = ", ".join(f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", room.low, room.high, strict=True))
+    print(f"Before that, the way to its start takes {way.duration:.0f} s and needs the room {ranges} m.", flush=True)
+    return [way, plan]
+
+
+def _ask(duration: float) -> None:
+    """Have a person let the arm move for a time [s]; CalibrationError if none does."""
     print("Nobody may be within the arm's reach, and nothing in the room above, while it moves.", flush=True)
     try:
-        answer = input(f"Let it move for {plan.duration:.0f} s? [y/N] ")
+        answer = input(f"Let it move for {duration:.0f} s? [y/N] ")
     except EOFError:
         raise CalibrationError("There is no terminal to ask at whether the arm may move: give --yes.") from None
     if answer.strip().lower() not in ("y", "yes"):
         raise CalibrationError("The arm was not moved: answer y to let it.")
 
 
-def _recorded(
-    session: Session, model: RobotModel, plan: Plan, params: PlanParams, place: Path, go_on: str
-) -> str | None:
+def _recorded(session: Session, ways: list[Plan], place: Path, again: str) -> str | None:
     """Let the arm move, and record all; return why it was stopped, or None."""
     with SkinRecording(place) as recording:
         session.record(recording)
         try:
-            stopped = _moved(session, model, plan, params)
+            stopped = _moved(session, ways)
         except (KeyboardInterrupt, Terminated):
             with suppress(OSError):  # the terminal may be gone
-                print(f"The arm was stopped. {recording.close()} {go_on}", flush=True)
+                print(f"The arm was stopped. {recording.close()} {again}", flush=True)
             raise
         except BaseException:
             print(recording.close(), flush=True)
             raise
         kept = recording.close()
-    print(f"The motion was ended early. {stopped}\n{kept} {go_on}" if stopped else kept, flush=True)
+    print(f"The motion was ended early. {stopped}\n{kept} {again}" if stopped else kept, flush=True)
     return stopped
 
 
-def _moved(session: Session, model: RobotModel, plan: Plan, params: PlanParams) -> str | None:
-    """Bring the arm to where the plan begins, and let it follow that; return why it was stopped, or None."""
+def _moved(session: Session, ways: list[Plan]) -> str | None:
+    """Let the arm go to the start of the motion and make it; return why it was stopped, or None."""
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        q, ways = session.posture(), [plan]
-        if np.abs(q - plan.start).max() > PerformParams().start_tolerance_rad / 2:
-            ways.insert(0, approach(model, q, plan, params))
         for way in ways:
-            task = bar.add_task("motion" if way is plan else "way to its start", total=way.duration)
+            task = bar.add_task("motion" if way is ways[-1] else "way to its start", total=way.duration)
             stopped = session.follow(way, partial(_progress, bar, task))
             if stopped:
                 return stopped
@@ -137,7 +154,9 @@ def _progress(bar: Progress, task: TaskID, since: float) -> None:
     bar.update(task, completed=since)
 
 
-def _go_on(command: Calibrate, place: Path) -> str:
-    """Say how to calibrate from a recording."""
+def _again(command: Calibrate, place: Path) -> str:
+    """Say how to calibrate from the recording alone."""
     words = ["pretouch", "skin", "calibrate", "--recording", str(place), "--arm", command.arm, "--out", command.out]
-    return f"What it tells can be tried: {join([*words, *(['--skin', command.skin] if command.skin else [])])}"
+    for option, value in (("--skin", command.skin), ("--json", command.json)):
+        words += [option, value] if value else []
+    return f"To calibrate from it: {join([*words, *(['--replace'] if command.replace else [])])}"

@@ -22,20 +22,20 @@ def plan_params(options: MotionOptions) -> PlanParams:
 
 
 def planned(model: RobotModel, options: MotionOptions) -> tuple[Plan, PlanParams]:
-    """Plan the motion, and print what it is good for and the room it takes."""
+    """Plan the motion, and say so, for it takes some seconds."""
     params = plan_params(options)
     print("The motion is being planned.", flush=True)
-    plan = plan_motion(model, params)
-    print(report_on(model, plan, params), flush=True)
-    return plan, params
+    return plan_motion(model, params), params
 
 
 def write_motion(command: Calibrate) -> None:
-    """Plan the motion and write it as CSV."""
+    """Plan the motion, write it as CSV, and print what it is good for and the room it takes."""
     place = Path(command.motion.plan)
     check_free("motion", place, command.replace)
     check_writable("file", place)
-    plan, _ = planned(arm_model(command.arm), command.motion)
-    with unwritable_said("file", place):
+    model = arm_model(command.arm)
+    plan, params = planned(model, command.motion)
+    with unwritable_said("file", place):  # first, for nobody may read on what is printed
         plan.save(place)
-    print(f"Motion: {place}. Let nobody be within the arm's reach while it is made.")
+    print(report_on(model, plan, params))
+    print(f"Motion: {place}. Let nobody be within the arm's reach while it is made.", flush=True)

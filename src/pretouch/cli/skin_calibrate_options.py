@@ -27,7 +27,7 @@ class RecordingOptions:
     """From what was recorded while the arm made a calibration motion."""
 
     recording: str = ""
-    """Recording of the units, by `pretouch skin monitor --record`, or of a run."""
+    """Recording of the units, by `pretouch skin monitor --record`, or of a run with real units."""
     joints: str = ""
     """Joint states, if they are not in the recording: a CSV file (time_s,q1_rad,...), an MCAP file or a bag. Its clock
     may be any."""
@@ -58,13 +58,15 @@ class MotionOptions:
     """The motion: it begins and ends in the arm's ready posture."""
 
     plan: str = ""
-    """CSV file to write the motion to, for your own driver (time, q1 to qn, qd1 to qdn), instead of making it."""
+    """CSV file to write the motion to, for your own driver (time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s),
+    instead of making it."""
     duration: float = 60.0
     """How long it takes [s], at most 90."""
     variant: int = 0
     """Another number, another motion: if there is no room for this one."""
     reach: float = 0.5
-    """Furthest a joint stands from its position at the start [rad]: less, and the arm needs less room."""
+    """Furthest from its position at the start [rad] a joint is where the arm stands: less, and the arm needs less room.
+    Swings about these postures go beyond, by some 0.4 rad."""
     speed: float = 0.7
     """Largest speed of any part of the arm [m/s]."""
     clearance: float = 0.03
@@ -90,7 +92,7 @@ class Calibrate:
     out: str = ""
     """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
     json: str = ""
-    """File for all numbers."""
+    """File for all numbers. With --simulate it is written over, as other commands do with theirs."""
     replace: bool = False
     """Write over files that are there."""
     arm: Literal["panda", "fr3"] = "panda"

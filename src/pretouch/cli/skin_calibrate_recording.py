@@ -14,6 +14,7 @@ from pretouch.cli.skin_calibrate_files import Outputs
 from pretouch.cli.skin_calibrate_result import Answer, give
 from pretouch.errors import CalibrationError
 from pretouch.foreign.joints import read_joints
+from pretouch.foreign.samples import TABLES
 from pretouch.recording.calibration_data import Measured, MeasuredUnit, read_measured
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin
@@ -38,22 +39,30 @@ class Sources:
 
 def calibrate_recording(model: RobotModel, sources: Sources, outputs: Outputs) -> int:
     """Calibrate from recordings, show and write the answer; return 1 if a unit was refused, or else 0."""
+    if sources.recording.suffix.lower() in TABLES:
+        raise CalibrationError(
+            f"{sources.recording} is a table, and no recording of units: give that with --recording, and joint states"
+            " with --joints."
+        )
     believed = load_skin(sources.skin, model) if sources.skin else None
     measured = read_measured(sources.recording)
     joints, notes = _joints(model, measured, sources)
     if not measured.complete:
-        notes = [f"{sources.recording} was not ended in order: what it holds is used.", *notes]
+        notes = [f"{sources.recording} was not ended in order, or is damaged: what can be read of it is used.", *notes]
     data = CalibrationData(joints, _units(measured, believed))
     if not data.units:
         raise CalibrationError(
-            f"{sources.recording} holds no IMU data: record units that have an IMU, or see `pretouch skin monitor`."
+            f"{sources.recording} holds no IMU data: record units that have an IMU by `pretouch skin monitor --record`,"
+            " or a run with such units; a simulated run has none."
         )
     if believed:
         notes += _differences(measured, believed, sources.skin)
-    found, ahead = aligned(model, data) if sources.joints else (calibrate(model, data), 0.0)
+    found, ahead, told_by = aligned(model, data) if sources.joints else (calibrate(model, data), 0.0, ())
     if sources.joints and np.isfinite(ahead):
         way = "ahead of" if ahead > 0 else "behind"
         notes.append(f"The clock of {sources.recording} is {abs(ahead):.3f} s {way} that of {sources.joints}.")
+        if len(told_by) == 1:
+            notes.append(f"Only {told_by[0]} tells that: no other unit agrees with it, and all poses rest on it.")
     return give(Answer(model, found, believed, ahead, tuple(notes)), outputs)
 
 
@@ -102,27 +111,29 @@ def _differences(measured: Measured, believed: Skin, place: Path | None) -> list
     return [f"{place} does not name {', '.join(others)}: their links are found."] if others else []
 
 
-def aligned(model: RobotModel, data: CalibrationData) -> tuple[Calibration, float]:
-    """Calibrate where joints and units have different clocks; return too by how much the units' is ahead [s].
+def aligned(model: RobotModel, data: CalibrationData) -> tuple[Calibration, float, tuple[str, ...]]:
+    """Calibrate where joints and units have different clocks.
 
-    All units were recorded by one clock: the offset on which two of them agree is taken for all. Where no unit tells
-    it, it is NaN.
+    All units were recorded by one clock: the offset on which two of them agree is taken for all, or else that of the
+    first which tells one. Returned too are by how much the units' clock is ahead [s], NaN where no unit tells it, and
+    the names of the units that told it.
     """
-    ahead = _ahead(model, data)
+    ahead, told_by = _ahead(model, data)
     late = ahead if np.isfinite(ahead) else 0.0
     units = tuple(replace(unit, imu=replace(unit.imu, stamp=unit.imu.stamp - late)) for unit in data.units)
-    return calibrate(model, replace(data, units=units)), ahead
+    return calibrate(model, replace(data, units=units)), ahead, told_by
 
 
-def _ahead(model: RobotModel, data: CalibrationData) -> float:
-    offsets: list[float] = []
+def _ahead(model: RobotModel, data: CalibrationData) -> tuple[float, tuple[str, ...]]:
+    offsets: dict[str, float] = {}
     for unit in data.units:
         found = calibrate(model, replace(data, units=(unit,))).units[0]
         # one whose clock is far off is refused for that, but by how much is found
         if found.place is None or any(finding.refused and finding.kind != "clock" for finding in found.findings):
             continue
         offset = found.place.clock_offset
-        if any(abs(offset - other) < CalibrationParams().clock_error_s for other in offsets):
-            return offset
-        offsets.append(offset)
-    return offsets[0] if offsets else np.nan
+        for name, other in offsets.items():
+            if abs(offset - other) < CalibrationParams().clock_error_s:
+                return offset, (name, unit.id)
+        offsets[unit.id] = offset
+    return next(((offset, (name,)) for name, offset in offsets.items()), (np.nan, ()))

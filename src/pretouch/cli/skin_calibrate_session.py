@@ -114,7 +114,7 @@ class Session:
 
 @contextmanager
 def signals_noted() -> Iterator[list[int]]:
-    """Only note signals that end the command, until the context ends: the first one comes then."""
+    """Only note signals that end the command, until the context ends: the first one comes then, before any other."""
     came: list[int] = []
 
     def note(number: int, _frame: FrameType | None) -> None:
@@ -126,7 +126,10 @@ def signals_noted() -> Iterator[list[int]]:
     try:
         yield came
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        for number in came[:1]:
-            signal.raise_signal(number)
+        try:
+            for number in came[:1]:
+                signal.signal(number, before[number])
+                signal.raise_signal(number)
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)

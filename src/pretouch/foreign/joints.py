@@ -16,6 +16,8 @@ from pretouch.values import value
 
 _NUMBERED = re.compile(r"q(\d{1,2})|(?!.*finger).*joint_?(\d{1,2})")
 """Names of joints by their numbers: q1, panda_joint1, left_joint_1."""
+_LATE_S = 0.5
+"""How far a stamp may lie before an earlier one [s]: messages overtake each other by less, two recordings by more."""
 
 
 @value
@@ -82,7 +84,7 @@ def _places(place: Path, names: tuple[str, ...], model: RobotModel) -> dict[int,
 
 def _of_csv(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tuple[str, ...]]:
     if topic:
-        raise RecordingError(f"{place} is a CSV file and has no topics: leave out --joints.")
+        raise RecordingError(f"{place} is a CSV file and has no topics: leave out --topic.")
     rows = read_rows(place)
     header = next(rows, None)
     if header is None:
@@ -141,7 +143,7 @@ def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
     picked = _Picked(place, model)
     try:
         there = [c for c in reader.connections if c.msgcount]
-        connections = one_topic(place, there, JOINTS, "--joints", topic)
+        connections = one_topic(place, there, JOINTS, "--topic", topic)
         states = Topic(connections[0].topic, model.n, picked)
         fill(place, reader, connections, [states])
     finally:
@@ -184,13 +186,26 @@ def _usable(place: Path, series: Series) -> tuple[Series, tuple[str, ...]]:
     without = int(np.count_nonzero(~finite))
     said = "1 sample is" if without == 1 else f"{without} samples are"
     notes = (f"Joints: {said} not finite numbers and left out.",) if without else ()
-    series, more = in_order(Series(series.time[finite], series.values[finite]), "Joints")
+    series = Series(series.time[finite], series.values[finite])
+    _check_overlap(place, series)
+    series, more = in_order(series, "Joints")
     if len(series) < 2:
         why = " ".join(
             (f"{place} has {len(series)} sample{'' if len(series) == 1 else 's'} of all joints.", *notes, *more)
         )
         raise RecordingError(f"{why} Give a longer recording, with a time of its own for each sample.")
     return series, notes + more
+
+
+def _check_overlap(place: Path, series: Series) -> None:
+    """Refuse a file whose time begins anew: sorted, two motions would be one."""
+    back = (np.maximum.accumulate(series.time) - series.time) / 1e9 if len(series) else np.zeros(1)
+    if back.max() > _LATE_S:
+        first = int(np.argmax(back > _LATE_S))
+        raise RecordingError(
+            f"The time in {place} goes back by {back[first]:.3g} s at sample {first + 1} of {len(series)}: give one"
+            " recording of one arm, cut where its time goes on without a break."
+        )
 
 
 def _check_reach(place: Path, series: Series, model: RobotModel) -> None:

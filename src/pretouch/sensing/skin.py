@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.errors import SkinError
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.seat import seat
 from pretouch.sensing.unit import (
     LARGEST_NUMBER,
     LARGEST_ORIENTATION_SIGMA,
@@ -71,12 +72,9 @@ def _check_place(unit: SensorUnit, model: RobotModel) -> None:
             f"Unit {unit.id} is mounted on {unit.link!r}, which {model.description.name} does not have:"
             f" choose from {', '.join(links)}."
         )
-    own = model.capsules.of_links(np.array([model.link_index(unit.link)]))
     p = unit.T_link_sensor[:3, 3]
-    height = np.inf if len(own) else float(np.linalg.norm(p))
-    for a, b, radius in zip(own.a, own.b, own.radius, strict=True):
-        along = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
-        height = min(height, float(np.linalg.norm(p - a - along * (b - a)) - radius))
+    below = seat(model, model.link_index(unit.link), p)
+    height = float(np.linalg.norm(p)) if below is None else below.height
     if height < 0:
         raise SkinError(f"Unit {unit.id} lies {-1000 * height:.1f} mm inside {unit.link}: move it out to the surface.")
     if height > _FAR:

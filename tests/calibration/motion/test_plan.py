@@ -76,7 +76,7 @@ def test_the_file_holds_what_another_program_needs_to_play_it(tmp_path: Path):
     plan().save(tmp_path / "plan.csv", rate=50.0)
     with (tmp_path / "plan.csv").open(newline="") as file:
         header, *rows = csv.reader(file)
-    assert header == ["time", "q1", "q2", "qd1", "qd2"]
+    assert header == ["time_s", "q1_rad", "q2_rad", "qd1_rad_s", "qd2_rad_s"]
     table = np.array(rows, dtype=np.float64)
     np.testing.assert_allclose(np.diff(table[:, 0]), 0.02, atol=1e-8)
     q, qd = plan().at(table[321, 0])

@@ -1,4 +1,4 @@
-"""Planned motions against the limits they were planned for, looked at a thousand times a second."""
+"""Planned motions against the limits they were planned for, looked at more often than the planner does."""
 
 from dataclasses import replace
 from functools import cache
@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pretouch.calibration.motion import planner
 from pretouch.calibration.motion.information import Observability
 from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.plan import Plan, Swing
@@ -45,8 +46,8 @@ def envelope_at(arm: RobotModel, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     return np.maximum(0.0, np.where(qd > 0, up, down))
 
 
-def assert_kept(arm: RobotModel, plan: Plan, params: PlanParams) -> None:
-    samples, description = plan.sampled(1000.0), arm.description
+def assert_kept(arm: RobotModel, plan: Plan, params: PlanParams, rate: float = 1000.0) -> None:
+    samples, description = plan.sampled(rate), arm.description
     assert plan.duration <= params.duration_s + 1e-6
     assert np.all(samples.q >= arm.q_min + params.margin_rad)
     assert np.all(samples.q <= arm.q_max - params.margin_rad)
@@ -54,21 +55,41 @@ def assert_kept(arm: RobotModel, plan: Plan, params: PlanParams) -> None:
     assert np.all(np.abs(samples.qd) <= params.speed_share * envelope_at(arm, samples.q, samples.qd) + 1e-9)
     assert np.all(np.abs(samples.qdd) <= params.acceleration_share * description.qdd_max)
     ends = capsule_ends(arm, kinematics_of(arm, samples.q))
-    speed = np.linalg.norm(np.diff(ends, axis=0), axis=-1) * 1000.0
+    speed = np.linalg.norm(np.diff(ends, axis=0), axis=-1) / np.diff(samples.time)[:, None, None]
     assert speed.max() <= params.speed_m_s
     radius = arm.capsules.radius
     moving = arm.capsules.link > arm.link_index(f"{description.name}_link0")
     assert (ends[..., 2].min(axis=2) - radius)[:, moving].min() >= params.floor_m + params.clearance_m
-    # at that speed two parts come at most 14 mm nearer to each other in a hundredth of a second
-    coarse = self_distances(arm, ends[::10]).min(axis=1)
-    near = np.repeat(coarse < params.clearance_m + 0.014, 10)[: len(ends)]
+    # two parts at that speed come nearer to each other by no more than twice the way of one
+    stride = round(rate / 50.0)
+    coarse = self_distances(arm, ends[::stride]).min(axis=1)
+    near = np.repeat(coarse < params.clearance_m + 2.0 * params.speed_m_s * stride / rate, stride)[: len(ends)]
     assert self_distances(arm, ends[near]).min(initial=np.inf) >= params.clearance_m
     assert coarse.min() >= params.clearance_m
 
 
 @pytest.mark.parametrize("name", ["panda", "fr3"])
 def test_the_motion_planned_by_default_keeps_all_limits(name: str):
+    assert_kept(model(name), planned(name), PlanParams(), rate=250.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["panda", "fr3"])
+def test_the_motion_planned_by_default_keeps_all_limits_each_millisecond(name: str):
     assert_kept(model(name), planned(name), PlanParams())
+
+
+def test_a_swing_that_loses_its_room_when_it_is_prolonged_is_not_left_out(monkeypatch: pytest.MonkeyPatch):
+    pattern = planner._Planner._pattern
+
+    def cramped(self: planner._Planner, number: int, posture: np.ndarray, duration: float) -> Swing | None:
+        return pattern(self, number, posture, duration) if duration == planner._EXPECTED_S else None
+
+    monkeypatch.setattr(planner._Planner, "_pattern", cramped)
+    with pytest.raises(
+        CalibrationError, match=r"no room for swings of [\d.]+ s in 1 of 1 postures: ask for another variant"
+    ):
+        plan_motion(model("panda"), QUICK)
 
 
 @pytest.mark.slow
@@ -82,6 +103,7 @@ def test_motions_from_elsewhere_and_with_other_limits_keep_them(name: str, start
     )  # fmt: skip
     plan = plan_motion(model(name), params, np.array(STARTS[start]))
     assert_kept(model(name), plan, params)
+    assert min(swing.amplitude.max() for swing in plan.swings) > 0.05
     np.testing.assert_array_equal(plan.start, STARTS[start])
 
 

@@ -1,7 +1,7 @@
 """What a motion tells of the pose of a unit on each link, before anything is measured: Fisher information.
 
 The unknowns are those of `pretouch.calibration.fit`: the pose, the biases, the clock, the accelerometer's delay, the
-scale of each axis, and gravity.
+scale of each axis, and gravity in the base frame.
 """
 
 import numpy as np
@@ -18,8 +18,8 @@ _ACCELERATION_NOISE, _ANGULAR_VELOCITY_NOISE = 0.01, 0.001
 """Standard deviation of what the model of a moving arm does not explain [m/s^2, rad/s]: twice that of the simulated
 arm, for what is between a real arm's joint sensors and its links."""
 _TURN, _PLACE, _ACC_BIAS, _GYRO_BIAS, _CLOCK, _LAG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12, 13
-_ACC_SCALE, _GYRO_SCALE, _GRAVITY = slice(14, 17), slice(17, 20), 20
-_UNKNOWNS = 21
+_ACC_SCALE, _GYRO_SCALE, _GRAVITY = slice(14, 17), slice(17, 20), slice(20, 23)
+_UNKNOWNS = 23
 _POSE_PRIOR = np.array([np.pi] * 3 + [0.5] * 3)
 """Standard deviation of a pose of which nothing is known [rad, m]."""
 
@@ -42,30 +42,32 @@ class Observability:
         p = self._params
         prior = np.concatenate([
             _POSE_PRIOR, np.full(3, p.acceleration_bias), np.full(3, p.angular_velocity_bias),
-            [p.clock_error_s, p.delay_difference_s], np.full(6, p.scale_error), [p.gravity_error],
+            [p.clock_error_s, p.delay_difference_s], np.full(6, p.scale_error),
+            np.full(2, p.gravity * np.deg2rad(p.lean_deg)), [p.gravity_error],
         ])  # fmt: skip
         self.prior: FloatArray = np.broadcast_to(np.diag(prior**-2.0), (len(self.links), _UNKNOWNS, _UNKNOWNS))
-        """(L', 21, 21) information before the arm moves."""
+        """(L', 23, 23) information before the arm moves."""
 
     def of_plan(self, plan: Plan) -> FloatArray:
-        """Information (L', 21, 21) from a motion, without the prior."""
+        """Information (L', 23, 23) from a motion, without the prior."""
         samples = plan.sampled(2.0 * self._params.rate_hz)
         arm = ArmMotion(self._model, JointTrace(samples.time, samples.q), self._params)
         motions = [arm.link(link).at(arm.usable) for link in self.links.tolist()]
         return np.array([self._of_motion(i, motion) for i, motion in enumerate(motions)])
 
     def of_standing(self, q: FloatArray, duration: float) -> FloatArray:
-        """Information (S, L', 21, 21) from standing in each of S postures (S, n) [rad] for some time [s]."""
-        up = kinematics_of(self._model, q).rotation[:, :, 2]
+        """Information (S, L', 23, 23) from standing in each of S postures (S, n) [rad] for some time [s]."""
+        R_link_base = kinematics_of(self._model, q).rotation.swapaxes(2, 3)
         none, count = np.zeros((1, 3)), duration * self._params.rate_hz
         return count * np.array([
-            [self._of_motion(i, LinkMotion(w=none, a=none, up=row[None, link], alpha=none))
-             for i, link in enumerate(self.links.tolist())] for row in up
+            [self._of_motion(i, LinkMotion(w=none, a=none, R_link_base=row[None, link], alpha=none))
+             for i, link in enumerate(self.links.tolist())] for row in R_link_base
         ])  # fmt: skip
 
     def _of_motion(self, which: int, motion: LinkMotion) -> FloatArray:
-        """Information (21, 21) about a unit on one link whose axes are the link's."""
-        felt = motion.a + motion.lever @ self._place[int(self.links[which])] + self._params.gravity * motion.up
+        """Information (23, 23) about a unit on one link whose axes are the link's."""
+        up = self._params.gravity * motion.R_link_base[:, :, 2]
+        felt = motion.a + motion.lever @ self._place[int(self.links[which])] + up
         N, eye = len(felt), np.eye(3)
         J = np.zeros((N, 6, _UNKNOWNS))
         for rows, v, bias, scale in ((slice(0, 3), motion.w, _GYRO_BIAS, _GYRO_SCALE),
@@ -73,7 +75,7 @@ class Observability:
             J[:, rows, _TURN], J[:, rows, bias], J[:, rows, scale] = skew(v), eye, v[:, :, None] * eye
             if N > 1:
                 J[:, rows, _CLOCK] = np.gradient(v, 1 / self._params.rate_hz, axis=0)
-        J[:, 3:, _LAG], J[:, 3:, _GRAVITY], J[:, 3:, _PLACE] = J[:, 3:, _CLOCK], motion.up, motion.lever
+        J[:, 3:, _LAG], J[:, 3:, _GRAVITY], J[:, 3:, _PLACE] = J[:, 3:, _CLOCK], motion.R_link_base, motion.lever
         J[:, :3] /= _ANGULAR_VELOCITY_NOISE
         J[:, 3:] /= _ACCELERATION_NOISE
         return np.einsum("nij,nik->jk", J, J, optimize=True)
@@ -83,7 +85,7 @@ class Observability:
         """Standard deviations (...) of the position [m] and orientation [rad] in their worst directions.
 
         Args:
-            information: (..., 21, 21), the prior included.
+            information: (..., 23, 23), the prior included.
         """
         covariance = np.linalg.inv(information)
         place, turn = (np.linalg.eigvalsh(covariance[..., part, part])[..., -1] for part in (_PLACE, _TURN))

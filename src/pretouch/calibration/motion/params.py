@@ -26,7 +26,8 @@ class PlanParams(Checked):
     fastest_hz: Annotated[float, Check(low=0.0, open_low=True, high=2.0)] = 1.2
     """Frequency of the fastest sine [Hz]; no two have the same."""
     reach_rad: Positive = 0.5
-    """Furthest a joint stands from its position at the start [rad]: less, and the arm needs less room."""
+    """Furthest from its position at the start [rad] a joint is where the arm stands: less, and the arm needs less room.
+    Swings go beyond."""
     margin_rad: NonNegative = 0.1
     """Distance kept from joint limits, and from where a speed envelope lets a joint no longer move [rad]."""
     speed_share: Share = 0.5

@@ -120,12 +120,12 @@ class Plan:
         return PlanSamples(time, *self._states(time))
 
     def save(self, path: Path, rate: float = 1000.0) -> None:
-        """Write it as CSV for another program to play: time [s], q1 to qn [rad], qd1 to qdn [rad/s]."""
+        """Write it as CSV for another program to play: time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s."""
         numbers = range(1, len(self.start) + 1)
         samples = self.sampled(rate)
         with path.open("w", newline="") as file:
             writer = csv.writer(file)
-            writer.writerow(["time", *(f"q{i}" for i in numbers), *(f"qd{i}" for i in numbers)])
+            writer.writerow(["time_s", *(f"q{i}_rad" for i in numbers), *(f"qd{i}_rad_s" for i in numbers)])
             table = np.column_stack([samples.time, samples.q, samples.qd])
             writer.writerows([f"{number:.9g}" for number in row] for row in table.tolist())
 

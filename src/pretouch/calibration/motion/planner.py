@@ -34,6 +34,8 @@ _DRAWN = 512
 """Points of the sequence among which they are sought."""
 _SHRINK = 0.85
 """Factor on the amplitudes of a swing that has no room, again and again."""
+_NARROWED = 0.5
+"""Least factor on them by which the limits a swing breaks are met at once."""
 _SMALLEST = 0.05
 """Share of its amplitudes below which a swing is given up."""
 _GOAL = np.array([1e-3, 2e-3])
@@ -112,7 +114,8 @@ class _Planner:
         def plan(factor: float) -> Plan:
             return Plan(np.array([0.0, swing.duration]), still, (swing.scaled(factor),))
 
-        factor = 1.0 / max(1.0, *self._limits.use(plan(1.0).sampled(20.0)))
+        # where a wide swing touches an envelope's end it may have no speed at all, and a narrower one much
+        factor = max(_NARROWED, 1.0 / max(1.0, *self._limits.use(plan(1.0).sampled(20.0))))
         while self._limits.broken(plan(factor), 20.0):
             factor *= _SHRINK
             if factor < _SMALLEST:
@@ -120,7 +123,7 @@ class _Planner:
         return swing.scaled(factor)
 
     def _choose_swings(self, postures: FloatArray, swings: list[Swing | None]) -> tuple[list[int], FloatArray]:
-        """Return the candidates to swing about, and what is then known (L', 21, 21)."""
+        """Return the candidates to swing about, and what is then known (L', 23, 23)."""
         usable = [i for i, swing in enumerate(swings) if swing is not None]
         wanted = min(self._params.swings, self._params.poses)
         if len(usable) < wanted:
@@ -144,7 +147,7 @@ class _Planner:
         return [others[i] for i in picked]
 
     def _greedy(self, told: FloatArray, information: FloatArray, count: int) -> tuple[list[int], FloatArray]:
-        """Pick `count` of the candidates (S, L', 21, 21), one by one, by what is known with each."""
+        """Pick `count` of the candidates (S, L', 23, 23), one by one, by what is known with each."""
         picked: list[int] = []
         for _ in range(count):
             sigmas = np.stack(self._knowledge.sigmas(information + told), axis=-1) / _GOAL
@@ -161,10 +164,15 @@ class _Planner:
             needed = route.duration + _SHORTEST_S * len(patterns)
             raise CalibrationError(
                 f"A motion of {self._params.duration_s:g} s is too short: this one, with {self._params.poses} poses and"
-                f" {len(patterns)} swings, takes {np.ceil(needed):g} s; give it the time, or ask for fewer."
+                f" {len(patterns)} swings, takes {np.ceil(needed):g} s; give it that time (--duration, duration_s)."
             )
         made = {stop: self._pattern(number, postures[number], left) for stop, number in patterns.items()}
         swings = {stop: swing for stop, swing in made.items() if swing is not None}
+        if len(swings) < len(made):
+            raise CalibrationError(
+                f"Where the arm is to swing it has no room for swings of {left:g} s in {len(made) - len(swings)} of"
+                f" {len(made)} postures: ask for another variant, or for less clearance_m or margin_rad."
+            )
         plan = route.with_swings(swings, left)
         trouble = self._limits.broken(plan)
         while trouble and all(swing.amplitude.max() > 0.01 for swing in plan.swings):

@@ -17,7 +17,7 @@ from pretouch.calibration.motion.planner import plan_motion
 from pretouch.errors import ExperimentError
 from pretouch.experiments.calibration.errors import NOT_FOUND, Row, error_row, place_row, pose_error
 from pretouch.experiments.calibration.random_skin import random_skin
-from pretouch.experiments.calibration.simulated import clock_errors, simulate
+from pretouch.experiments.calibration.simulated import DATA_SHEET, clock_errors, simulate
 from pretouch.experiments.calibration.swings import watanabe_plan
 from pretouch.experiments.calibration.watanabe import watanabe
 from pretouch.experiments.workers import interrupt_held_back, workers
@@ -27,6 +27,9 @@ from pretouch.sensing.skin import Skin
 
 OURS, WATANABE = "pretouch", "Watanabe et al."
 """Names of methods and of motions."""
+WATANABE_UNBIASED = "the same, no bias or scale error"
+"""Name of their method with accelerometers that err by noise, counts and clocks only: what it was made for."""
+_UNBIASED = replace(DATA_SHEET, acceleration_bias_mg=0.0, scale_error=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +150,9 @@ class _Task:
         trials = [self._trial(OURS, *_ours(model, skin, data, seed, self.links_known))]
         if self.compared:
             trials.append(self._trial(WATANABE, *_watanabes(model, skin, data, self.plan)))
+        if self.compared and self.motion == WATANABE:
+            data = simulate(model, skin, self.plan, seed, _UNBIASED)
+            trials.append(self._trial(WATANABE_UNBIASED, *_watanabes(model, skin, data, self.plan)))
         return trials
 
     def _trial(self, method: str, rows: list[Row], took: float) -> Trial:

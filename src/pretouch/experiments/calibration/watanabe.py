@@ -76,7 +76,7 @@ def _residuals(arm: ArmMotion, unit: UnitData, standing: list[BoolArray]) -> Cal
         raise ExperimentError(f"The link of unit {unit.id} is not known: this method cannot find it, name it.")
     motion, sensed = arm.link(arm.model.link_index(unit.link)), _acceleration(unit, arm.time)
     moving = arm.usable & ~np.any(standing, axis=0)
-    proper = motion.a + _GRAVITY * motion.up
+    proper = motion.a + _GRAVITY * motion.R_link_base[:, :, 2]
     # while the arm stands, that is against gravity; the paper compares with the mean, the authors' program with this
     f = np.array([proper[which].mean(axis=0) for which in standing if which.any()])
     felt = np.array([sensed[which].mean(axis=0) for which in standing if which.any()])

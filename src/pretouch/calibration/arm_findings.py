@@ -1,0 +1,61 @@
+"""What is to be said of the run and the arm, once the places of its units are found."""
+
+import numpy as np
+
+from pretouch.calibration.link_motion import ArmMotion
+from pretouch.calibration.locate import Located
+from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.result import Finding, UnitCalibration
+
+_LEAST_LEAN = np.deg2rad(0.3)
+"""How far an arm leans that is worth a word [rad]."""
+_SIGNIFICANT = 4.0
+"""Standard deviations from which on an arm leans."""
+
+
+def little_used(arm: ArmMotion) -> list[Finding]:
+    """Say so if less than half of the run can be used."""
+    step = float(arm.time[1] - arm.time[0])
+    whole, used = step * len(arm.time), step * float(arm.usable.sum())
+    if used >= 0.5 * whole:
+        return []
+    sentence = (
+        f"Of {whole:.1f} s of joint states, {used:.1f} s have no gap near by and could be used: record every state."
+    )
+    return [Finding("joints_little_used", sentence, False)]
+
+
+def clocks_apart(units: tuple[UnitCalibration, ...], params: CalibrationParams) -> list[Finding]:
+    """Say so if the clocks of all units that have a place are off by about the same."""
+    placed = [unit for unit in units if unit.place is not None]
+    late = np.array([unit.place.clock_offset for unit in placed if unit.place is not None])
+    off = all(any(finding.kind == "clock" for finding in unit.findings) for unit in placed)
+    if len(placed) < 2 or not off or np.ptp(late) > params.clock_error_s:
+        return []
+    middle = float(np.median(late))
+    late_or_early = "late" if middle > 0 else "early"
+    sentence = (
+        f"The clocks of all units are {late_or_early} by about {abs(middle):.2f} s: joints and units were stamped by"
+        " different clocks. Correct the stamps of all units by that."
+    )
+    return [Finding("clocks", sentence, False)]
+
+
+def leaning(units: list[Located]) -> list[Finding]:
+    """Say how far the base leans, from the units whose place can be trusted."""
+    if not units:
+        return []
+    gravity = np.array([unit.estimate.gravity for unit in units])
+    # the base's z leans away from up, to where up does not point
+    lean = -np.median(gravity[:, :2] / gravity[:, 2:], axis=0)
+    sigma = float(np.median([np.sqrt(np.linalg.eigvalsh(unit.gravity_covariance[:2, :2])[-1]) for unit in units]))
+    sigma /= float(np.median(gravity[:, 2]))
+    angle = float(np.arctan(np.linalg.norm(lean)))
+    if angle < _LEAST_LEAN or angle < _SIGNIFICANT * sigma:
+        return []
+    axis = int(np.argmax(np.abs(lean)))
+    sentence = (
+        f"The arm leans by {np.rad2deg(angle):.1f} degrees, mostly towards {'-' if lean[axis] < 0 else '+'}{'xy'[axis]}"
+        " of its base. The places allow for it; what else takes the base as level does not."
+    )
+    return [Finding("leaning", sentence, False)]
