@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli import skin_calibrate_live, skin_calibrate_study
+from pretouch.cli.calibrate import live
+from pretouch.cli.calibrate import study as study_way
 from pretouch.experiments.calibration.study import OURS, Study, Trial
 from pretouch.foreign.joints import read_joints
 from pretouch.robot.self_distance import capsule_ends, kinematics_of
@@ -146,7 +147,7 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
 
 
 def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(skin_calibrate_live, "SimulatedArm", elsewhere)
+    monkeypatch.setattr(live, "SimulatedArm", elsewhere)
     questions = []
     monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
     files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml", "--units-port", 0)
@@ -186,7 +187,7 @@ def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, m
         progress(1, 1)
         return Study([Trial(0, OURS, OURS, [ROW], 1.5)], {OURS: 60.0})
 
-    monkeypatch.setattr(skin_calibrate_study, "study", study)
+    monkeypatch.setattr(study_way, "study", study)
     place = tmp_path / "new" / "rows.json"
     for _ in range(2):
         assert calibrate("--simulate", "--skins", 20, "--json", place) == 0

@@ -14,9 +14,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pretouch import cli
-from pretouch.cli import skin_calibrate_live
+from pretouch.cli.calibrate import live
+from pretouch.cli.calibrate.session import Session, signals_noted
 from pretouch.cli.ending import Terminated, ends_raise, exit_code
-from pretouch.cli.skin_calibrate_session import Session, signals_noted
 from pretouch.errors import HardwareError, RecordingError
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
@@ -163,9 +163,9 @@ def at_once(monkeypatch):
     def session(*_):
         yield SimpleNamespace(wait_for_units=lambda: None)
 
-    monkeypatch.setattr(skin_calibrate_live, "_session", session)
-    monkeypatch.setattr(skin_calibrate_live, "_ways", lambda *_: [])
-    monkeypatch.setattr(skin_calibrate_live, "_recorded", lambda *_: print("It moves."))
+    monkeypatch.setattr(live, "_session", session)
+    monkeypatch.setattr(live, "_ways", lambda *_: [])
+    monkeypatch.setattr(live, "_recorded", lambda *_: print("It moves."))
 
 
 @pytest.mark.parametrize(("error", "code"), [(RecordingError("The disk is bad."), 2), (KeyboardInterrupt(), 130)])
@@ -176,7 +176,7 @@ def test_how_to_calibrate_from_the_recording_is_said_before_the_motion_and_after
         raise error
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(skin_calibrate_live, "calibrate_recording", fails)
+    monkeypatch.setattr(live, "calibrate_recording", fails)
     (tmp_path / "skin.toml").touch()
     taken = "skin-calibration-1.mcap"
     assert cli.main(["skin", "calibrate", *FILES, "--json", taken, "--skin", "skin.toml", "--replace"]) == code

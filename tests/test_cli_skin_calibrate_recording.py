@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pretouch import cli
-from pretouch.cli import skin_calibrate_recording
+from pretouch.cli.calibrate import recording as recording_way
 from pretouch.recording.calibration_data import read_measured
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.traces import JointTrace
@@ -91,9 +91,7 @@ def test_joint_states_of_another_clock_are_aligned(panda_model, skin, recorded, 
 def test_an_offset_of_clocks_that_one_unit_alone_tells_is_said_to_be_so(recorded, capsys, monkeypatch):
     whole = read_measured(recorded / "units.mcap")
     alone = {"hand_left": whole.units["hand_left"]}
-    monkeypatch.setattr(
-        skin_calibrate_recording, "read_measured", lambda place: replace(whole, units=alone, complete=False)
-    )
+    monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, units=alone, complete=False))
     assert calibrate("--recording", "units.mcap", "--joints", recorded / "joints.csv") == 0
     said = capsys.readouterr().out
     assert "Only hand_left tells that: no other unit agrees with it" in said
@@ -130,14 +128,14 @@ def test_a_skin_file_is_replaced_only_if_that_is_said(panda_model, skin, recorde
 
 def test_joint_states_that_are_missing_are_asked_for(panda_model, skin, recorded, tmp_path, capsys, monkeypatch):
     whole = read_measured(recorded / "units.mcap")
-    monkeypatch.setattr(skin_calibrate_recording, "read_measured", lambda place: replace(whole, joints=None))
+    monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, joints=None))
     assert calibrate("--recording", "units.mcap") == 2
     assert "units.mcap has no joint states: give the file that has them with --joints" in capsys.readouterr().err
 
 
 def test_units_without_an_imu_are_named(recorded, capsys, monkeypatch):
     whole = read_measured(recorded / "units.mcap")
-    monkeypatch.setattr(skin_calibrate_recording, "read_measured", lambda place: replace(whole, units={}))
+    monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, units={}))
     assert calibrate("--recording", "units.mcap") == 2
     assert "units.mcap holds no IMU data" in capsys.readouterr().err
 
@@ -146,7 +144,7 @@ def test_joint_states_in_another_order_are_put_in_that_of_the_arm(panda_model, s
     whole = read_measured(recorded / "units.mcap")
     turned = JointTrace(whole.joints.stamp, whole.joints.q[:, ::-1])
     monkeypatch.setattr(
-        skin_calibrate_recording, "read_measured",
+        recording_way, "read_measured",
         lambda place: replace(whole, joints=turned, joint_names=whole.joint_names[::-1]),
     )  # fmt: skip
     assert calibrate("--recording", "units.mcap", "--out", tmp_path / "skin.toml") == 0
@@ -156,7 +154,7 @@ def test_joint_states_in_another_order_are_put_in_that_of_the_arm(panda_model, s
 def test_nothing_is_written_where_no_unit_is_good(recorded, tmp_path, capsys, monkeypatch):
     whole = read_measured(recorded / "units.mcap")
     held = JointTrace(whole.joints.stamp, np.flip(whole.joints.q, axis=0))
-    monkeypatch.setattr(skin_calibrate_recording, "read_measured", lambda place: replace(whole, joints=held))
+    monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, joints=held))
     assert calibrate("--recording", "units.mcap", "--out", tmp_path / "skin.toml") == 1
     assert f"{tmp_path / 'skin.toml'} is not written." in capsys.readouterr().out
     assert not (tmp_path / "skin.toml").exists()

@@ -1,6 +1,6 @@
 """What `pretouch skin` does: each command by its own file."""
 
-from pretouch.cli.skin_calibrate_options import Calibrate
+from pretouch.cli.calibrate.options import Calibrate
 from pretouch.cli.skin_commands import Keys, Monitor, Provision, Simulate, SkinCommand
 
 
@@ -12,7 +12,7 @@ def skin(command: SkinCommand) -> int:
 
             return monitor(command)
         case Calibrate():
-            from pretouch.cli.skin_calibrate import calibrate_skin
+            from pretouch.cli.calibrate.command import calibrate_skin
 
             return calibrate_skin(command)
         case Simulate():

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from pretouch.cli.skin_calibrate_options import Calibrate
+from pretouch.cli.calibrate.options import Calibrate
 from pretouch.hardware.address import HOST, PORT
 
 

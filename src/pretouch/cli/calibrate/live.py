@@ -16,12 +16,12 @@ from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.report import report_on
 from pretouch.calibration.motion.route import approach
 from pretouch.cli.arms import arm_model
+from pretouch.cli.calibrate.motion import planned
+from pretouch.cli.calibrate.options import Calibrate, MotionOptions
+from pretouch.cli.calibrate.outputs import Outputs, check_free, same_file
+from pretouch.cli.calibrate.recording import Sources, calibrate_recording
+from pretouch.cli.calibrate.session import Session
 from pretouch.cli.ending import Terminated
-from pretouch.cli.skin_calibrate_files import Outputs, check_free, same_file
-from pretouch.cli.skin_calibrate_motion import planned
-from pretouch.cli.skin_calibrate_options import Calibrate, MotionOptions
-from pretouch.cli.skin_calibrate_recording import Sources, calibrate_recording
-from pretouch.cli.skin_calibrate_session import Session
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_simulate import keys_for
 from pretouch.cli.writing import check_writable

@@ -7,8 +7,8 @@ from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import plan_motion
 from pretouch.calibration.motion.report import report_on
 from pretouch.cli.arms import arm_model
-from pretouch.cli.skin_calibrate_files import check_free
-from pretouch.cli.skin_calibrate_options import Calibrate, MotionOptions
+from pretouch.cli.calibrate.options import Calibrate, MotionOptions
+from pretouch.cli.calibrate.outputs import check_free
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.robot.model import RobotModel
 

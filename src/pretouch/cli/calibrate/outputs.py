@@ -6,7 +6,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Self
 
-from pretouch.cli.skin_calibrate_options import Calibrate
+from pretouch.cli.calibrate.options import Calibrate
 from pretouch.cli.writing import check_writable
 from pretouch.errors import CalibrationError
 

@@ -10,8 +10,8 @@ from pretouch.calibration.data import CalibrationData, UnitData
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Calibration
 from pretouch.calibration.stamps import instants, retimed
-from pretouch.cli.skin_calibrate_files import Outputs
-from pretouch.cli.skin_calibrate_result import Answer, give
+from pretouch.cli.calibrate.answer import Answer, give
+from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.errors import CalibrationError
 from pretouch.foreign.joints import read_joints
 from pretouch.foreign.samples import TABLES

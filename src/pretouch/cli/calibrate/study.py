@@ -7,8 +7,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from pretouch.calibration.motion.planner import plan_motion
 from pretouch.cli.arms import arm_model
-from pretouch.cli.skin_calibrate_motion import plan_params
-from pretouch.cli.skin_calibrate_options import Calibrate, MotionOptions
+from pretouch.cli.calibrate.motion import plan_params
+from pretouch.cli.calibrate.options import Calibrate, MotionOptions
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import CalibrationError

@@ -10,8 +10,8 @@ from rich.table import Table
 
 from pretouch.calibration.result import Calibration, UnitCalibration
 from pretouch.calibration.skin_of import skin_of
-from pretouch.cli.skin_calibrate_files import Outputs
-from pretouch.cli.skin_calibrate_numbers import numbers
+from pretouch.cli.calibrate.numbers import numbers
+from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.cli.writing import unwritable_said
 from pretouch.errors import CalibrationError
 from pretouch.experiments.campaign import write_json

@@ -5,10 +5,10 @@ import sys
 from pathlib import Path
 
 from pretouch.cli.arms import arm_model
-from pretouch.cli.skin_calibrate_files import Outputs
-from pretouch.cli.skin_calibrate_motion import write_motion
-from pretouch.cli.skin_calibrate_options import Calibrate, way_of
-from pretouch.cli.skin_calibrate_recording import Sources, calibrate_recording
+from pretouch.cli.calibrate.motion import write_motion
+from pretouch.cli.calibrate.options import Calibrate, way_of
+from pretouch.cli.calibrate.outputs import Outputs
+from pretouch.cli.calibrate.recording import Sources, calibrate_recording
 
 
 def calibrate_skin(command: Calibrate) -> int:
@@ -26,7 +26,7 @@ def calibrate_skin(command: Calibrate) -> int:
 def _calibrated(command: Calibrate) -> int:
     way = way_of(command)
     if way == "simulate":
-        from pretouch.cli.skin_calibrate_study import study_skins
+        from pretouch.cli.calibrate.study import study_skins
 
         study_skins(command)
         return 0
@@ -35,7 +35,7 @@ def _calibrated(command: Calibrate) -> int:
         return 0
     outputs = Outputs.of(command)
     if way == "robot":
-        from pretouch.cli.skin_calibrate_live import calibrate_live
+        from pretouch.cli.calibrate.live import calibrate_live
 
         return calibrate_live(command, outputs)
     c = command.recorded

@@ -1,0 +1,1 @@
+"""What `pretouch skin calibrate` does."""
