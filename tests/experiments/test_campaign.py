@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from pretouch.errors import ExperimentError, ParameterError, SkinError
-from pretouch.experiments import campaign
+from pretouch.experiments import campaign, workers
 from pretouch.experiments.campaign import (
     Request,
     finished,
@@ -89,7 +89,7 @@ def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
     assert len(seen) == 1
     assert {file: file.stat().st_mtime_ns for file in kept} == kept
     assert finished(one, tmp_path) == rows
-    monkeypatch.setattr(campaign, "ProcessPoolExecutor", None)
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", None)
     run_campaign(one, tmp_path, seen.append)
     assert len(seen) == 1
 
@@ -189,7 +189,7 @@ def _play_with(monkeypatch, result):
             raise _EnoughError
         return futures
 
-    monkeypatch.setattr(campaign, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", Pool)
     monkeypatch.setattr(campaign, "as_completed", completed)
     return asked
 

@@ -186,7 +186,7 @@ def test_a_way_through_the_arm_itself_is_refused(panda_model: RobotModel):
 @pytest.mark.parametrize(
     ("params", "start", "words"),
     [
-        (PlanParams(duration_s=20.0), None, r"20 s is too short: .* takes \d+ s; give it the time"),
+        (PlanParams(duration_s=20.0), None, r"20 s is too short: .* takes \d+ s; give it that time"),
         (PlanParams(margin_rad=1.6), None, r"leaves nothing of the range of .*joint4.* choose a smaller margin_rad"),
         (PlanParams(clearance_m=0.09), None, r"No motion can begin at .* come within .* of each other"),
         (PlanParams(floor_m=0.5), None, r"No motion can begin at .*the arm and the floor"),
