@@ -57,8 +57,9 @@ def test_what_is_said_of_errors_is_true_of_them(panda_model, moving_arm):
         for unit, true in zip(calibrate(panda_model, moving_arm.data(skin, seed)).units, skin.units, strict=True):
             error = pose_error(true.T_link_sensor, unit.place.T_link_sensor)
             nees.append(error @ np.linalg.solve(unit.place.covariance, error))
-    # 42 values of a chi-squared distribution of 6 degrees of freedom: their mean has the standard deviation 0.53
-    assert 4.0 < np.mean(nees) < 9.0
+    # 42 values of a chi-squared distribution of 6 degrees of freedom: their mean has the standard deviation 0.53; the
+    # covariance is widened for the few blocks of 45 s, so it may be less
+    assert 3.0 < np.mean(nees) < 8.0
 
 
 def test_covariances_are_symmetric_and_positive_even_where_nothing_is_known(panda_model, moving_arm):

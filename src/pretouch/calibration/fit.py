@@ -224,4 +224,4 @@ def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatAr
     H, count = J.T @ J, len(blocks)
     inverse = np.linalg.inv(H)
     told = count / max(1, count - _UNKNOWNS / 6) * blocks.T @ blocks + prior.T @ prior
-    return inverse @ (told + (_UNKNOWNS / count) ** 2 * H) @ inverse
+    return inverse @ (told + (_UNKNOWNS / count) ** 3 * H) @ inverse
