@@ -12,7 +12,7 @@ from pretouch.calibration.params import CalibrationParams
 
 PARAMS = CalibrationParams()
 NOISE = np.repeat((0.003, 0.02), 3)
-TIME = np.arange(0, 40, 1 / PARAMS.rate_hz)
+TIME = np.arange(0, 60, 1 / PARAMS.rate_hz)
 
 
 def motion(axes=3, seed=0):
@@ -94,7 +94,7 @@ def test_the_covariance_is_honest():
         data = measured(link, true, NOISE, seed)
         told.append(nees(fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS), true))
     # the mean of 150 chi-squares of 6 degrees of freedom is within 6 +- 4 * sqrt(12 / 150), but that the covariance of
-    # 40 blocks is itself uncertain, which adds some
+    # 60 blocks is itself uncertain, which adds some
     assert 4.9 < np.mean(told) < 8.5
 
 
@@ -118,7 +118,7 @@ def test_the_covariance_counts_errors_that_last():
     lasting = Measured(exact.values + NOISE * slow, exact.rates)
     fast = measured(link, true, NOISE)
     sigma = [np.trace(fit(link, d, true, NOISE, PARAMS).covariance[3:6, 3:6]) ** 0.5 for d in (fast, lasting)]
-    assert sigma[1] > 2.0 * sigma[0]
+    assert sigma[1] > 2.5 * sigma[0]
 
 
 def test_large_differences_count_less_when_robust():
