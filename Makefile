@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live meshes browser micropython test test-slow lint bench peers format clean
+.PHONY: setup demo live franka ros2 meshes browser micropython test test-slow lint bench peers format clean
 
 setup: $(STAMP)
 
@@ -21,6 +21,14 @@ demo: setup
 
 live: setup
 	$(BIN)/pretouch live
+
+# the vendor's libraries for the Panda and the FR3, 30 MB
+franka: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[franka]'
+
+# DDS, which ROS 2 speaks: no ROS installation is needed
+ros2: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[ros2]'
 
 # the vendor's surfaces of the arm, for the page: 131 MB
 meshes: setup

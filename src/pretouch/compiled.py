@@ -12,7 +12,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 _NOT_COMPILED = (
     "cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording", "calibration",
-    "traces.py",
+    "importing", "session", "traces.py",
 )  # fmt: skip
 
 

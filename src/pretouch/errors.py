@@ -44,6 +44,10 @@ class HardwareError(PretouchError, RuntimeError):
     """Sensor units, their keys, or the network between cannot be used as asked."""
 
 
+class RobotError(PretouchError, RuntimeError):
+    """A real arm, or the connection to it, cannot be used as asked."""
+
+
 class CalibrationError(PretouchError, ValueError):
     """A calibration, or the motion for it, cannot be had as asked."""
 

@@ -1,0 +1,1 @@
+"""Franka arms over the vendor's own client libraries."""
