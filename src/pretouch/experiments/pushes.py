@@ -63,6 +63,11 @@ def against(face: FloatArray, rng: np.random.Generator, tilt: float = 0.25) -> F
     return np.asarray(inwards / np.linalg.norm(inwards))
 
 
+def hand_of(model: RobotModel) -> int:
+    """Return the index of a Franka arm's hand, whose faces are pushed."""
+    return model.link_index(f"{model.description.name}_hand")
+
+
 @dataclass
 class Pusher:
     """Brings the hand before a face of the robot's hand, follows it, pushes as planned, and goes home in between."""
@@ -73,7 +78,7 @@ class Pusher:
     """(touch, release) [s] of each push so far, None for one that never touched."""
 
     def __post_init__(self) -> None:
-        self._link = self.model.link_index("panda_hand")
+        self._link = hand_of(self.model)
         self._touch: float | None = None
         self._release = -np.inf
         self._direction = np.zeros(3)
@@ -144,7 +149,7 @@ class Visitor:
     visits: tuple[Visit, ...]
 
     def __post_init__(self) -> None:
-        self._link = self.model.link_index("panda_hand")
+        self._link = hand_of(self.model)
         self._inside = False
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:

@@ -1,0 +1,106 @@
+"""What `pretouch serve-fci` does: builds scene, arm and units, and serves them until it is told to end."""
+
+import csv
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.cli.arms import arm_model
+from pretouch.cli.ending import ended
+from pretouch.cli.serve_fci_command import ServeFci
+from pretouch.control.path import Circle
+from pretouch.control.path import Path as ArmPath
+from pretouch.errors import HardwareError, ParameterError
+from pretouch.hardware.keys import load_keys
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import load_skin, paper_skin
+from pretouch.serving.fci.arm import ArmSetup, ServedArm
+from pretouch.serving.fci.options import ServeOptions, drop_of
+from pretouch.serving.fci.pushes import push_of
+from pretouch.serving.fci.server import FciServer
+from pretouch.serving.fci.units import UnitsSetup
+from pretouch.serving.simulate import Visitor
+from pretouch.sim.hand import HandScript
+from pretouch.sim.posture import brought_to
+from pretouch.sim.scene import HandSpec, SceneSpec
+
+_say = partial(print, flush=True)
+
+
+def serve_fci(command: ServeFci) -> None:
+    """Serve until interrupted, or, if asked to, until the first client has gone."""
+    c = command
+    drop = drop_of(c.drop) if c.drop else None
+    options = ServeOptions(c.host, c.port, c.lockstep, c.patience, c.grace, drop, c.once)
+    with (
+        ServedArm(_setup(command)) as arm,
+        _truth(c.truth) as watch,
+        FciServer(arm, options, watch, _say) as server,
+    ):
+        host, port = server.address
+        pace = "lockstep" if c.lockstep else "real time"
+        _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}).")
+        server.serve(ended)
+
+
+def _setup(c: ServeFci) -> ArmSetup:
+    model = arm_model(c.robot)
+    if c.hand and c.scene != "empty":
+        raise ParameterError(f"--hand goes with --scene empty: in {c.scene} there is what the experiment has.")
+    if c.seed < 0:
+        raise ParameterError(f"--seed is {c.seed}: give 0 or more.")
+    scene, hand, path = _scene(c, model)
+    q = brought_to(model, path.point(0.0)) if c.start == "path" else model.description.q_ready.copy()
+    return ArmSetup(model, c.robot, q, scene, hand, tuple(map(push_of, c.push)), _units(c, model), c.seed)
+
+
+def _scene(c: ServeFci, model: RobotModel) -> tuple[SceneSpec, HandScript | None, ArmPath]:
+    """Return what is there, what its hand does, and the path of the end-effector."""
+    from pretouch.experiments import dynamic, static
+    from pretouch.experiments.pushes import Pusher
+
+    match c.scene:
+        case "static":
+            return static.scene(c.trajectory, c.side, c.stiffness, c.seed), None, static.path(c.trajectory, c.side)
+        case "dynamic":
+            return SceneSpec(hand=HandSpec()), Pusher(model, dynamic.pushes(c.seed)), Circle()
+    path = static.path(c.trajectory, c.side)
+    if c.hand:
+        return SceneSpec(hand=HandSpec(start=Visitor.away)), Visitor(model.ee), path
+    return SceneSpec(), None, path
+
+
+def _units(c: ServeFci, model: RobotModel) -> UnitsSetup | None:
+    if not c.units:
+        return None
+    host, _, port = c.units.rpartition(":")
+    if not host or not port.isdecimal():
+        raise HardwareError(f"--units is {c.units!r}: give address and port of the receiver, as 127.0.0.1:7337.")
+    if not c.keys:
+        raise HardwareError("--units needs --keys, the file with the keys that the receiver has.")
+    skin = load_skin(Path(c.skin), model) if c.skin else paper_skin(model)
+    return UnitsSetup(skin, load_keys(Path(c.keys)), (host, int(port)))
+
+
+@contextmanager
+def _truth(place: str) -> Iterator[Callable[[float, ServedArm], None]]:
+    """Open the file of the truth, if there is to be one."""
+    if not place:
+        yield lambda _time, _arm: None
+        return
+    try:
+        Path(place).touch()
+    except OSError as error:
+        raise ParameterError(f"The truth cannot be written to {place} ({error.strerror}): give another file.") from None
+    with Path(place).open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["time_s", *(f"force_{axis}_N" for axis in "xyz"), *(f"q{i}_rad" for i in range(1, 8))])
+
+        def watch(time: float, arm: ServedArm) -> None:
+            q = np.asarray(arm.plant.mj_data.qpos[: arm.model.n])
+            table.writerow([f"{time:.3f}", *map(repr, arm.true_force.tolist()), *map(repr, q.tolist())])
+
+        yield watch

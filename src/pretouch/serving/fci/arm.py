@@ -1,0 +1,155 @@
+"""The simulated arm behind its control box: modes, motions, limits and reflexes, one millisecond at a time."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from pretouch.errors import RobotModelError
+from pretouch.robot.model import RobotModel
+from pretouch.serving.fci.collision import Contacts
+from pretouch.serving.fci.frames import frames_of
+from pretouch.serving.fci.limits import PERIOD_S, motion_limits
+from pretouch.serving.fci.motion import Ending, Motion, Setpoint
+from pretouch.serving.fci.pushes import Pushes, TcpPush
+from pretouch.serving.fci.torques import JointTorques
+from pretouch.serving.fci.units import ServedUnits, UnitsSetup
+from pretouch.serving.fci.wire import JOINTS, Impedance, RobotKind, RobotMode
+from pretouch.sim.hand import Hand, HandScript
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.scene import SceneSpec
+from pretouch.types import FloatArray
+
+SETTLE_S = 0.2
+"""Time the arm stands before its time begins [s]: the observer's transient is over."""
+_COMES_TO_REST = 500
+"""So many milliseconds after a motion the arm has braked and no longer swings."""
+
+
+@dataclass(frozen=True)
+class ArmSetup:
+    """What is served, and what happens to it."""
+
+    model: RobotModel
+    kind: RobotKind
+    q: FloatArray
+    """(7,) where it stands at first [rad]."""
+    scene: SceneSpec
+    hand: HandScript | None = None
+    """What the hand of the scene does."""
+    pushes: tuple[TcpPush, ...] = ()
+    """Forces at the end-effector; their time begins as the arm has settled."""
+    units: UnitsSetup | None = None
+    """Its sensor units, if they are switched on."""
+    seed: int = 0
+    """Decides the arm's errors and noise."""
+
+
+class ServedArm:
+    """One arm, as its owner's client sees it. A context manager, for its units' sockets."""
+
+    def __init__(self, setup: ArmSetup) -> None:
+        """Let it stand; its time begins."""
+        model = setup.model
+        if model.n != JOINTS:
+            raise RobotModelError(f"{model.description.name} has {model.n} joints: only arms with {JOINTS} speak FCI.")
+        self.model, self.kind = model, setup.kind
+        self.plant = Plant(model, setup.scene, PlantParams(), setup.q, setup.seed)
+        self.limits, self.contacts, self.frames = motion_limits(model, setup.kind), Contacts(), frames_of(model)
+        self.torques = JointTorques(self.plant)
+        self.units = None if setup.units is None else ServedUnits(self.plant, setup.units, setup.seed)
+        if setup.hand is not None:
+            Hand(self.plant, setup.hand)
+        self.pushes = Pushes(self.plant, setup.pushes, SETTLE_S)
+        self.mode = RobotMode.IDLE
+        self.errors: tuple[str, ...] = ()
+        """What is wrong now, by the vendor's names."""
+        self.reflex_reason: tuple[str, ...] = ()
+        """What ended the last motion."""
+        self.motion: Motion | None = None
+        self.success_rate = 0.0
+        """Fraction of the last commands of the motion, or of the one before, that came in time."""
+        self.qd, self.qdd = np.zeros(JOINTS), np.zeros(JOINTS)
+        """Commanded velocities [rad/s] and accelerations [rad/s^2], (7,)."""
+        self._since_motion = _COMES_TO_REST
+        for _ in range(round(SETTLE_S / PERIOD_S)):
+            self._pass_time()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.units is not None:
+            self.units.close()
+
+    @property
+    def moving(self) -> bool:
+        """Whether a motion runs."""
+        return self.motion is not None
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether no motion runs and the arm has braked."""
+        return self.motion is None and not self.qd.any()
+
+    @property
+    def settled(self) -> bool:
+        """Whether it no longer swings after a motion, either."""
+        return self.at_rest and self._since_motion >= _COMES_TO_REST
+
+    def begin(self, impedance: Impedance) -> None:
+        """Begin a motion, at rest and without errors: whoever calls it has looked."""
+        self.motion, self.mode, self.reflex_reason = Motion(self.limits, impedance), RobotMode.MOVE, ()
+        self.success_rate = 0.0
+
+    def stop(self) -> None:
+        """End the motion: the arm brakes."""
+        self.motion, self._since_motion = None, 0
+        if self.mode is RobotMode.MOVE:
+            self.mode = RobotMode.IDLE
+
+    def recover(self) -> None:
+        """Forget errors."""
+        self.errors, self.mode = (), RobotMode.IDLE
+        self.contacts.forget()
+
+    def step(self, setpoint: Setpoint | None) -> Ending | None:
+        """Let a millisecond pass under the command that came for it, None if none did; say how a motion ended."""
+        ending = None
+        if self.motion is not None:
+            ending = self.motion.follow(self.report.q_commanded, setpoint)
+            self.qd, self.qdd, self.success_rate = self.motion.qd, self.motion.qdd, self.motion.success_rate
+            if ending is not None:
+                self._end(ending.errors)
+        if self.motion is None:
+            slower = self.limits.braked(self.qd)
+            self.qd, self.qdd = slower, (slower - self.qd) / PERIOD_S
+            self._since_motion += 1
+        self.plant.command(self.qd)
+        self._pass_time()
+        return self._feel() or ending
+
+    def _pass_time(self) -> None:
+        self.plant.advance(PERIOD_S)
+        self.report = self.plant.read()
+        self.torques.update(self.report.q)
+        self.true_force = self.plant.true_force + self.pushes.force
+        """(3,) all forces on the arm [N], base frame."""
+        self.plant.take_log()
+
+    def _feel(self) -> Ending | None:
+        """Look for contacts; a collision is a reflex, which ends a motion."""
+        wrench = np.zeros(6) if self.report.wrench is None else self.report.wrench
+        reflexes = self.contacts.feel(self.report.tau_ext, wrench, self.qdd)
+        if not reflexes or self.mode is RobotMode.REFLEX:
+            return None
+        moved = self.moving
+        self._end(reflexes)
+        return Ending("reflex", reflexes) if moved else None
+
+    def _end(self, errors: tuple[str, ...]) -> None:
+        self.stop()
+        if errors:
+            self.errors = self.reflex_reason = errors
+            self.mode = RobotMode.REFLEX

@@ -1,0 +1,86 @@
+"""The robot's own reaction to external forces: thresholds, contacts, collisions. Pure but for its own memory."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from pretouch.serving.fci.wire import JOINTS
+from pretouch.types import BoolArray, FloatArray
+
+_DEFAULT = 20.0
+"""Thresholds before any are set [Nm, N]: those the vendor's examples set."""
+_MOVING = 1e-3
+"""Commanded acceleration from which the thresholds for accelerations hold [rad/s^2]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """From where on there is a contact (lower) and a collision (upper)."""
+
+    lower_torque: FloatArray
+    """(7,) [Nm]"""
+    upper_torque: FloatArray
+    """(7,) [Nm]"""
+    lower_force: FloatArray
+    """(6,) [N, Nm]"""
+    upper_force: FloatArray
+    """(6,) [N, Nm]"""
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionBehavior:
+    """Thresholds while the robot speeds up or slows down, and at constant speed."""
+
+    accelerating: Thresholds
+    steady: Thresholds
+
+    @classmethod
+    def of(cls, values: FloatArray) -> Self | None:
+        """Read the body (52,) of the request that sets it; None if a number in it is no threshold."""
+        if not np.all(np.isfinite(values)) or np.any(values < 0):
+            return None
+        torques, forces = values[: 4 * JOINTS].reshape(4, JOINTS), values[4 * JOINTS :].reshape(4, 6)
+        return cls(
+            Thresholds(torques[0], torques[1], forces[0], forces[1]),
+            Thresholds(torques[2], torques[3], forces[2], forces[3]),
+        )
+
+
+def default_behavior() -> CollisionBehavior:
+    """Return what holds before anything is set."""
+    same = Thresholds(*(np.full(n, _DEFAULT) for n in (JOINTS, JOINTS, 6, 6)))
+    return CollisionBehavior(same, same)
+
+
+class Contacts:
+    """Which joints and directions are in contact, and which in collision; the latter until they are forgotten."""
+
+    def __init__(self) -> None:
+        self.behavior = default_behavior()
+        self.joint_contact, self.cartesian_contact = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
+        self.joint_collision, self.cartesian_collision = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
+
+    def feel(self, torques: FloatArray, wrench: FloatArray, qdd: FloatArray) -> tuple[str, ...]:
+        """Take external torques (7,) [Nm] and the wrench (6,) [N, Nm]; return the reflexes they cause.
+
+        `qdd` (7,) are the commanded accelerations [rad/s^2].
+        """
+        moving = bool(np.any(np.abs(qdd) > _MOVING))
+        limits = self.behavior.accelerating if moving else self.behavior.steady
+        torque, force = np.abs(torques), np.abs(wrench)
+        self.joint_contact, self.cartesian_contact = torque > limits.lower_torque, force > limits.lower_force
+        joint, cartesian = torque > limits.upper_torque, force > limits.upper_force
+        self.joint_collision, self.cartesian_collision = (
+            self.joint_collision | joint,
+            self.cartesian_collision | cartesian,
+        )
+        return _named(cartesian, "cartesian_reflex") + _named(joint, "joint_reflex")
+
+    def forget(self) -> None:
+        """Forget collisions."""
+        self.joint_collision, self.cartesian_collision = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
+
+
+def _named(crossed: BoolArray, name: str) -> tuple[str, ...]:
+    return (name,) if np.any(crossed) else ()

@@ -1,0 +1,64 @@
+"""Masses of an arm's links and of its hand, as its MJCF has them."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from pretouch.robot.model import RobotModel
+from pretouch.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """A rigid body's mass, in a frame that its owner names."""
+
+    mass: float
+    """[kg]"""
+    com: FloatArray
+    """(3,) centre of mass [m]."""
+    inertia: FloatArray
+    """(3, 3) about the centre of mass [kg m^2]."""
+
+
+def inertials(model: RobotModel) -> list[Inertial]:
+    """Return the inertial of each link of the model, in the link's frame."""
+    mj = mujoco.MjModel.from_xml_path(str(model.description.mjcf))
+    found = []
+    for body in range(mj.nbody):
+        matrix = np.zeros(9)
+        mujoco.mju_quat2Mat(matrix, mj.body_iquat[body])
+        R = matrix.reshape(3, 3)
+        inertia = R @ np.diag(mj.body_inertia[body]) @ R.T
+        found.append(Inertial(float(mj.body_mass[body]), mj.body_ipos[body].copy(), inertia))
+    return found
+
+
+def hand_of(model: RobotModel, flange: int) -> Inertial:
+    """Return what the flange's link carries, as one body in the flange's frame."""
+    kin = model.kinematics(model.description.q_ready)
+    R, origin = kin.rotation[flange], kin.position[flange]
+    parts = [
+        _moved(inertial, R.T @ kin.rotation[link], R.T @ (kin.position[link] - origin))
+        for link, inertial in enumerate(inertials(model))
+        if link > flange and inertial.mass > 0
+    ]
+    return together(parts)
+
+
+def together(parts: list[Inertial]) -> Inertial:
+    """Return several bodies in one frame as one."""
+    mass = sum(part.mass for part in parts)
+    if not mass:
+        return Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+    com = np.asarray(sum((part.mass * part.com for part in parts), np.zeros(3)) / mass)
+    inertia = np.zeros((3, 3))
+    for part in parts:
+        r = part.com - com
+        inertia += part.inertia + part.mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return Inertial(mass, com, inertia)
+
+
+def _moved(inertial: Inertial, R: FloatArray, p: FloatArray) -> Inertial:
+    """Return a body in another frame, in which its own one is turned by R (3, 3) and at p (3,) [m]."""
+    return Inertial(inertial.mass, R @ inertial.com + p, R @ inertial.inertia @ R.T)

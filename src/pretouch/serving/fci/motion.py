@@ -1,0 +1,92 @@
+"""One motion: commands in, what the joints are to do, or why it ended. Pure but for its own memory."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.serving.fci.limits import PERIOD_S, MotionLimits
+from pretouch.serving.fci.wire import Impedance
+from pretouch.types import FloatArray
+
+LOST_MOST = 20
+"""So many commands lost in a row end a motion."""
+FIRST_WITHIN = 500
+"""The first command of a motion has to come within so many milliseconds."""
+_COUNTED = 100
+"""The success rate is of the last so many milliseconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """What a command says."""
+
+    qd: FloatArray
+    """(n,) joint velocities for the next millisecond [rad/s]."""
+    finished: bool = False
+    """Whether the motion ends with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a motion ended."""
+
+    status: str
+    """As of `Protocol.move`."""
+    errors: tuple[str, ...] = ()
+    """Why, if it was a reflex."""
+
+
+class Motion:
+    """A joint velocity motion from its request until it ends."""
+
+    def __init__(self, limits: MotionLimits, impedance: Impedance) -> None:
+        """Begin at rest."""
+        n = len(limits.qd)
+        self._limits, self.impedance = limits, impedance
+        self.qd, self.qdd = np.zeros(n), np.zeros(n)
+        """Commanded velocities [rad/s] and accelerations [rad/s^2], (n,)."""
+        self.begun = False
+        """Whether a command has come."""
+        self._lost = 0
+        self._received: deque[bool] = deque(maxlen=_COUNTED)
+
+    @property
+    def success_rate(self) -> float:
+        """Fraction of the last commands that were received in time."""
+        return sum(self._received) / len(self._received) if self._received else 0.0
+
+    def follow(self, q: FloatArray, setpoint: Setpoint | None) -> Ending | None:
+        """Take the command of a millisecond, None if it was lost, at commanded positions q (n,) [rad].
+
+        Where it ended, the commanded velocities are the last ones: whoever moves the arm brakes from there.
+        """
+        if setpoint is None:
+            return self._without(q)
+        self.begun, self._lost = True, 0
+        self._received.append(True)
+        if not np.all(np.isfinite(setpoint.qd)):
+            return Ending("input error", ("joint_motion_generator_velocity_limits_violation",))
+        if setpoint.finished:
+            if self._limits.ends_at_rest(self.qd):
+                return Ending("success")
+            return Ending("reflex", ("joint_motion_generator_velocity_discontinuity",))
+        return self._moved(q, setpoint.qd)
+
+    def _without(self, q: FloatArray) -> Ending | None:
+        """Go on with the same acceleration, as the robot does for a lost command."""
+        self._lost += 1
+        if self._lost >= (LOST_MOST if self.begun else FIRST_WITHIN):
+            return Ending("reflex", ("communication_constraints_violation",))
+        if not self.begun:
+            return None
+        self._received.append(False)
+        return self._moved(q, self.qd + self.qdd * PERIOD_S)
+
+    def _moved(self, q: FloatArray, wanted: FloatArray) -> Ending | None:
+        errors = self._limits.violated(q, self.qd, self.qdd, wanted)
+        if errors:
+            return Ending("reflex", errors)
+        self.qdd = (wanted - self.qd) / PERIOD_S
+        self.qd = wanted
+        return None

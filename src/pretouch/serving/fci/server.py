@@ -1,0 +1,273 @@
+"""The server: one client at a time, states by UDP each millisecond, requests by TCP. One thread."""
+
+import select
+import socket
+import time
+from collections.abc import Callable
+from typing import Self
+
+import numpy as np
+
+from pretouch.serving.fci.arm import ServedArm
+from pretouch.serving.fci.connections import Connection, Door, Gone
+from pretouch.serving.fci.desk import Desk
+from pretouch.serving.fci.limits import PERIOD_S
+from pretouch.serving.fci.motion import Setpoint
+from pretouch.serving.fci.options import ServeOptions
+from pretouch.serving.fci.state import StateDatagram
+from pretouch.serving.fci.urdf import urdf_of
+from pretouch.serving.fci.wire import CONNECT, PROTOCOLS
+
+_LATE_S = 0.003
+"""A machine that is later than this leaves the time out [s]: states in a burst could not be answered in time."""
+_DATAGRAMS_MOST = 256
+"""So many datagrams are looked at in one go: a flood must not stop the clock."""
+_HEARD_BEFORE = 8
+"""Before another client is turned away, what the one that is served has sent is read so many times."""
+_FIRST_WAITS_S = (0.25, 0.75)
+"""In lockstep, how long the first state of a motion, and each that follows, stands without an answer [s]: the vendor's
+clients answer the second one, and give up after a second without a state."""
+_MOTION_EVERY = 1_000_000
+"""In lockstep, each motion begins at a multiple of this [ms], so that its times do not depend on the time before it."""
+
+
+class FciServer:
+    """Serves one arm. A context manager, for the sockets."""
+
+    def __init__(
+        self, arm: ServedArm, options: ServeOptions,
+        watch: Callable[[float, ServedArm], None] = lambda _time, _arm: None, say: Callable[[str], None] = print,
+    ) -> None:  # fmt: skip
+        """Listen; an address that cannot be had is a RobotError.
+
+        Args:
+            arm: to serve.
+            options: where, and at which pace.
+            watch: is called with the robot's time [s] and the arm after each millisecond of the plant.
+            say: is handed a line when a client comes or goes, and when a motion ends otherwise than it should.
+        """
+        self._arm, self._options, self._watch, self._say = arm, options, watch, say
+        self.protocol = PROTOCOLS[arm.kind]
+        urdf_of(arm.model)  # made while no clock runs yet
+        self._door = Door(options.host, options.port)
+        host, port = self._door.sock.getsockname()
+        self.address: tuple[str, int] = (host, port)
+        """Where it listens."""
+        self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._udp.bind((host, 0))
+        self._udp.setblocking(False)
+        self._state = StateDatagram(self.protocol, arm)
+        self._client: Connection | None = None
+        self._client_udp = ("", 0)
+        self._desk: Desk | None = None
+        self._served = False
+        self._tick = 0
+        self._motions = self._unanswered = self._of_motion = 0
+        self._command: np.void | None = None
+        self._next = self._start = 0.0
+        self.left_out = 0.0
+        """Time that the machine was too slow to simulate [s]."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let the client go and listen no more."""
+        if self._client is not None:
+            self._client.close()
+        self._door.close()
+        self._udp.close()
+
+    def serve(self, done: Callable[[], bool] = lambda: False) -> None:
+        """Serve until `done` says so, or, if asked to serve once, until the client has gone."""
+        self._start = self._next = time.monotonic()
+        while not done() and not (self._options.once and self._served and self._client is None):
+            self._send_state()
+            self._wait()
+            self._pass_time(self._setpoint())
+
+    # a millisecond
+
+    def _send_state(self) -> None:
+        if self._client is not None:
+            try:
+                self._udp.sendto(self._state.write(self._tick), self._client_udp)
+            except OSError:  # nobody there any more: its TCP connection tells
+                return
+
+    def _wait(self) -> None:
+        """Wait for the next millisecond, or in lockstep for the command."""
+        arm, now = self._arm, time.monotonic()
+        self._command = None
+        if not self._options.lockstep:
+            self._next += PERIOD_S
+            if now - self._next > _LATE_S:
+                self.left_out += now - self._next
+                self._next = now
+            self._look(self._next)
+            if self._command is None and arm.motion is not None and arm.motion.begun:
+                self._look(self._next + self._options.grace_s, for_command=True)
+        elif arm.motion is None:
+            self._look(now + (PERIOD_S if arm.settled else 0.0))
+        elif arm.motion.begun:
+            self._look(now + self._options.patience_s, for_command=True)
+        else:
+            self._look(now + _FIRST_WAITS_S[min(self._unanswered, 1)], for_command=True)
+
+    def _pass_time(self, setpoint: Setpoint | None) -> None:
+        """Let the plant move on, unless in lockstep it stands."""
+        arm, lockstep = self._arm, self._options.lockstep
+        begins = arm.motion is not None and not arm.motion.begun
+        if lockstep and setpoint is None and (begins or arm.settled):
+            self._unanswered += begins
+            self._tick += 1
+            return
+        if arm.units is not None:
+            arm.units.offset = PERIOD_S * self._tick + self.left_out - arm.plant.time
+        ending = arm.step(setpoint)
+        self._tick += 1
+        if ending is not None and self._desk is not None:
+            self._attempt(lambda desk: desk.motion_ended(ending))
+        self._watch(PERIOD_S * self._tick, arm)
+        if arm.units is not None:
+            arm.units.step(self._robot_time if lockstep else self._wall_time)
+        if self._desk is not None and arm.at_rest:
+            self._attempt(lambda desk: desk.at_rest())
+
+    def _robot_time(self) -> float:
+        return PERIOD_S * self._tick
+
+    def _wall_time(self) -> float:
+        return time.monotonic() - self._start
+
+    # commands
+
+    def _setpoint(self) -> Setpoint | None:
+        """Return what the command says that came for this millisecond, None if it was lost."""
+        command, motion = self._command, self._arm.motion
+        if command is None or motion is None:
+            lost = True
+        else:
+            drop = self._options.drop
+            lost = drop is not None and motion.begun and drop.takes(self._of_motion)
+        self._of_motion += motion is not None and (motion.begun or not lost)
+        if lost or command is None:
+            return None
+        names = command.dtype.names or ()
+        finished = any(command[name] for name in names if name.endswith("_finished"))
+        return Setpoint(np.array(command["dq_c"]), bool(finished))
+
+    def _take_command(self) -> None:
+        """Take in what came by UDP, and keep the newest command that is one for this millisecond."""
+        for _ in range(_DATAGRAMS_MOST):
+            try:
+                data, sender = self._udp.recvfrom(2048)
+            except BlockingIOError:
+                return
+            except OSError:  # news of a state that found nobody
+                continue
+            if self._arm.motion is None or sender != self._client_udp or len(data) != self.protocol.command.itemsize:
+                continue
+            command = np.frombuffer(data, self.protocol.command)[0]
+            number = int(command["message_id"])
+            if number == self._tick:
+                self._command = command
+
+    # clients
+
+    def _look(self, until: float, for_command: bool = False) -> None:
+        """See to all sockets until an instant [s], or until a command has come."""
+        while True:
+            timeout = max(0.0, until - time.monotonic())
+            client = [] if self._client is None else [self._client.sock]
+            waiting = {c.sock: c for c in self._door.waiting}
+            ready, _, _ = select.select([self._udp, self._door.sock, *client, *waiting], [], [], timeout)
+            if self._udp in ready:
+                self._take_command()
+            if client and client[0] in ready:
+                self._hear()
+            if self._door.sock in ready:
+                for _ in range(_HEARD_BEFORE):  # a client that has gone makes room for the next
+                    self._hear()
+                self._door.admit(taken=self._client is not None)
+            for sock in ready:
+                if sock in waiting:
+                    self._greet(waiting[sock])
+            if for_command and (self._command is not None or self._arm.motion is None):
+                return
+            if time.monotonic() >= until:
+                return
+
+    def _greet(self, connection: Connection) -> None:
+        """Hear what a connection speaks; the first that speaks as the robot does is served."""
+        if connection not in self._door.waiting:
+            return
+        try:
+            requests = connection.requests(self.protocol)
+            if not requests:
+                return
+            if requests[0].name != "Connect":
+                raise Gone(f"asks for {requests[0].name} before it has connected")
+            version, port = CONNECT.unpack(requests[0].body)
+            fits = version == self.protocol.version
+            answer = bytes([not fits]) + self.protocol.version.to_bytes(2, "little")
+            connection.send(self.protocol.reply("Connect", requests[0].identifier, answer))
+            if not fits:
+                raise Gone(f"speaks FCI {version}, this robot {self.protocol.version}")
+        except Gone as why:
+            self._door.waiting.remove(connection)
+            connection.close()
+            if str(why) != "closed by the client":
+                self._say(f"Not served: {connection.peer} {why}.")
+            return
+        self._serve_client(connection, port)
+        self._attempt(lambda desk: desk.serve(requests[1:]))
+
+    def _hear(self) -> None:
+        """Serve what the client asks for."""
+        client = self._client
+        if client is not None:
+            self._attempt(lambda desk: desk.serve(client.requests(self.protocol)))
+
+    def _serve_client(self, connection: Connection, port: int) -> None:
+        self._door.waiting.remove(connection)
+        self._door.clear()
+        self._client, self._client_udp, self._served = connection, (connection.peer, port), True
+        self._desk = Desk(
+            connection, self.protocol, self._arm, self._state, self._settle, self._begin_motion, self._say
+        )
+        self._say(f"Client {connection.peer} connected.")
+
+    def _begin_motion(self) -> None:
+        """Note that a motion is about to begin."""
+        self._motions += 1
+        self._unanswered = self._of_motion = 0
+        if self._options.lockstep:
+            start = max(self._motions, self._tick // _MOTION_EVERY + 1) * _MOTION_EVERY
+            self._tick = start - 1
+
+    def _settle(self) -> None:
+        """In lockstep, let the arm come to rest whatever the clock says."""
+        while self._options.lockstep and not self._arm.moving and not self._arm.settled:
+            self._pass_time(None)
+
+    def _attempt(self, do: Callable[[Desk], None]) -> None:
+        """Do something for the client, and let it go where that cannot be done."""
+        if self._desk is None:
+            return
+        try:
+            do(self._desk)
+        except Gone as why:
+            self._let_go(str(why))
+
+    def _let_go(self, why: str) -> None:
+        if self._client is None:
+            return
+        self._say(f"Client {self._client.peer} has gone: {why}.")
+        self._client.close()
+        self._client = self._desk = None
+        if self._arm.moving:
+            self._arm.stop()

@@ -1,0 +1,53 @@
+"""The arm's sensor units, which speak for themselves over UDP: nothing of them is in the robot's interface."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from pretouch.hardware.keys import Keys
+from pretouch.sensing.skin import Skin
+from pretouch.serving.fleet import Fleet, FleetParams
+from pretouch.sim.imu import ImuParams, Imus, ImuSample
+from pretouch.sim.plant import Plant
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, RangeSample
+
+Measured = TypeVar("Measured", RangeSample, ImuSample)
+
+
+@dataclass(frozen=True)
+class UnitsSetup:
+    """Which units there are, and where they send."""
+
+    skin: Skin
+    keys: Keys
+    """Keys of all of them; the receiver has the same."""
+    address: tuple[str, int]
+    """Name or address of the receiver, and its UDP port."""
+
+
+class ServedUnits:
+    """Units mounted on an arm, and the network to their receiver."""
+
+    def __init__(self, plant: Plant, setup: UnitsSetup, seed: int) -> None:
+        """Mount them on an arm that has not moved yet.
+
+        A receiver that cannot be found, and a unit without a key, are a HardwareError.
+        """
+        skin, imu = setup.skin, ImuParams()
+        self._fleet = Fleet(skin.ids, setup.keys, FleetParams(imu=imu), seed, setup.address)
+        self.offset: float | None = None
+        """What their time is ahead of the plant's [s]; None: they measure nothing yet."""
+        RangeFinders(plant, skin, RangeFinderParams(), seed, lambda s: self._hand_on(s, self._fleet.take_range))
+        Imus(plant, skin, imu, seed, lambda s: self._hand_on(s, self._fleet.take_imu))
+
+    def step(self, clock: Callable[[], float]) -> None:
+        """Let them hear and say what is due by their time [s]."""
+        self._fleet.step(clock)
+
+    def close(self) -> None:
+        """Give the sockets back."""
+        self._fleet.close()
+
+    def _hand_on(self, sample: Measured, take: Callable[[Measured], None]) -> None:
+        if self.offset is not None:
+            take(sample._replace(time=sample.time + self.offset))

@@ -1,0 +1,176 @@
+"""The Franka Control Interface on the wire: protocol 5 of the Panda and 10 of the FR3. Little endian, packed."""
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Literal
+
+import numpy as np
+
+PORT = 1337
+"""TCP port of the interface; the vendor's clients know no other."""
+HEADER = struct.Struct("<III")
+"""Number of the command, identifier of the request, size of the whole message [B]."""
+REQUEST_MOST = 1024
+"""No request is longer [B]."""
+CONNECT = struct.Struct("<HH")
+"""Body of the request to connect: version of the client's library, and its UDP port."""
+JOINTS = 7
+"""Joints of any arm that speaks it."""
+
+RobotKind = Literal["panda", "fr3"]
+
+
+class RobotMode(IntEnum):
+    """What the robot does."""
+
+    OTHER = 0
+    IDLE = 1
+    MOVE = 2
+    GUIDING = 3
+    REFLEX = 4
+    USER_STOPPED = 5
+    RECOVERY = 6
+
+
+class Generator(IntEnum):
+    """Motion generators as a request to move numbers them; a state has one more, and 0 for none."""
+
+    JOINT_POSITION = 0
+    JOINT_VELOCITY = 1
+    CARTESIAN_POSITION = 2
+    CARTESIAN_VELOCITY = 3
+
+
+class Impedance(IntEnum):
+    """Controllers, as requests and states number them."""
+
+    JOINT = 0
+    CARTESIAN = 1
+    EXTERNAL = 2
+    NONE = 3
+
+
+ERRORS = (
+    "joint_position_limits_violation", "cartesian_position_limits_violation", "self_collision_avoidance_violation",
+    "joint_velocity_violation", "cartesian_velocity_violation", "force_control_safety_violation", "joint_reflex",
+    "cartesian_reflex", "max_goal_pose_deviation_violation", "max_path_pose_deviation_violation",
+    "cartesian_velocity_profile_safety_violation", "joint_position_motion_generator_start_pose_invalid",
+    "joint_motion_generator_position_limits_violation", "joint_motion_generator_velocity_limits_violation",
+    "joint_motion_generator_velocity_discontinuity", "joint_motion_generator_acceleration_discontinuity",
+    "cartesian_position_motion_generator_start_pose_invalid", "cartesian_motion_generator_elbow_limit_violation",
+    "cartesian_motion_generator_velocity_limits_violation", "cartesian_motion_generator_velocity_discontinuity",
+    "cartesian_motion_generator_acceleration_discontinuity", "cartesian_motion_generator_elbow_sign_inconsistent",
+    "cartesian_motion_generator_start_elbow_invalid", "force_controller_desired_force_tolerance_violation",
+    "start_elbow_sign_inconsistent", "communication_constraints_violation", "power_limit_violation",
+    "cartesian_motion_generator_joint_position_limits_violation",
+    "cartesian_motion_generator_joint_velocity_limits_violation",
+    "cartesian_motion_generator_joint_velocity_discontinuity",
+    "cartesian_motion_generator_joint_acceleration_discontinuity",
+    "cartesian_position_motion_generator_invalid_frame", "controller_torque_discontinuity",
+    "joint_p2p_insufficient_torque_for_planning", "tau_j_range_violation", "instability_detection",
+    "joint_move_in_wrong_direction", "cartesian_spline_violation", "joint_via_plan_limit_violation",
+    "base_acceleration_initialization_timeout", "base_acceleration_invalid_reading",
+)  # fmt: skip
+"""Names of the errors, in the order of the flags in a state."""
+
+_STATE = (
+    ("O_T_EE", 16), ("O_T_EE_d", 16), ("F_T_EE", 16), ("EE_T_K", 16), ("F_T_NE", 16), ("NE_T_EE", 16),
+    ("m_ee", 1), ("I_ee", 9), ("F_x_Cee", 3), ("m_load", 1), ("I_load", 9), ("F_x_Cload", 3), ("elbow", 2),
+    ("elbow_d", 2), ("tau_J", 7), ("tau_J_d", 7), ("dtau_J", 7), ("q", 7), ("q_d", 7), ("dq", 7), ("dq_d", 7),
+    ("ddq_d", 7), ("joint_contact", 7), ("cartesian_contact", 6), ("joint_collision", 7), ("cartesian_collision", 6),
+    ("tau_ext_hat_filtered", 7), ("O_F_ext_hat_K", 6), ("K_F_ext_hat_K", 6), ("O_dP_EE_d", 6), ("O_ddP_O", 3),
+    ("elbow_c", 2), ("delbow_c", 2), ("ddelbow_c", 2), ("O_T_EE_c", 16), ("O_dP_EE_c", 6), ("O_ddP_EE_c", 6),
+    ("theta", 7), ("dtheta", 7),
+)  # fmt: skip
+
+
+def _state(real: str, accelerometers: bool) -> np.dtype[np.void]:
+    fields: list[tuple[str, str, tuple[int, ...]]] = [("message_id", "<u8", ())]
+    fields += [(name, real, () if count == 1 else (count,)) for name, count in _STATE]
+    if accelerometers:
+        fields += [("accelerometer_top", real, (6, 3)), ("accelerometer_bottom", real, (6, 3))]
+    flags = (len(ERRORS),)
+    fields += [
+        ("motion_generator_mode", "u1", ()), ("controller_mode", "u1", ()), ("errors", "u1", flags),
+        ("reflex_reason", "u1", flags), ("robot_mode", "u1", ()), ("control_command_success_rate", real, ()),
+    ]  # fmt: skip
+    return np.dtype(fields)
+
+
+_COMMAND = [
+    ("message_id", "<u8", ()), ("q_c", "<f8", (7,)), ("dq_c", "<f8", (7,)), ("O_T_EE_c", "<f8", (16,)),
+    ("O_dP_EE_c", "<f8", (6,)), ("elbow_c", "<f8", (2,)), ("valid_elbow", "u1", ()),
+    ("motion_generation_finished", "u1", ()), ("tau_J_d", "<f8", (7,)),
+]  # fmt: skip
+
+_MOVE_SIZE = struct.calcsize("<II") + 2 * struct.calcsize("<ddd")
+"""Controller and motion generator, and how far the motion may leave its path and its goal."""
+_COMMON = {
+    "Connect": CONNECT.size, "StopMove": 0, "SetCollisionBehavior": 8 * 52, "SetJointImpedance": 8 * JOINTS,
+    "SetCartesianImpedance": 8 * 6, "SetGuidingMode": 7, "SetEEToK": 8 * 16, "SetNEToEE": 8 * 16, "SetLoad": 8 * 13,
+    "AutomaticErrorRecovery": 0,
+}  # fmt: skip
+"""Sizes of the bodies of requests [B] that are the same in both protocols."""
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """One version of the interface."""
+
+    version: int
+    """Both sides must have the same."""
+    kind: RobotKind
+    """The robot that speaks it."""
+    state: np.dtype[np.void]
+    """Datagram from the robot, once each millisecond."""
+    command: np.dtype[np.void]
+    """Datagram to the robot, in answer to each state of a motion."""
+    requests: tuple[str, ...]
+    """Names of the requests, by their numbers."""
+    sizes: dict[str, int]
+    """Sizes of their bodies [B]."""
+    move: tuple[str, ...]
+    """What becomes of a motion, by the numbers in the answers to the request to move."""
+
+    def reply(self, name: str, identifier: int, body: bytes) -> bytes:
+        """Return the answer to a request."""
+        return HEADER.pack(self.requests.index(name), identifier, HEADER.size + len(body)) + body
+
+
+PANDA = Protocol(
+    version=5,
+    kind="panda",
+    state=_state("<f8", accelerometers=False),
+    command=np.dtype(_COMMAND),
+    requests=(
+        "Connect", "Move", "StopMove", "GetCartesianLimit", "SetCollisionBehavior", "SetJointImpedance",
+        "SetCartesianImpedance", "SetGuidingMode", "SetEEToK", "SetNEToEE", "SetLoad", "SetFilters",
+        "AutomaticErrorRecovery", "LoadModelLibrary",
+    ),
+    sizes={**_COMMON, "Move": _MOVE_SIZE, "GetCartesianLimit": 4, "SetFilters": 8 * 5, "LoadModelLibrary": 2},
+    move=(
+        "success", "started", "preempted", "not possible", "singular", "invalid", "reflex", "emergency",
+        "input error", "aborted",
+    ),
+)  # fmt: skip
+"""Panda, libfranka 0.9."""
+
+FR3 = Protocol(
+    version=10,
+    kind="fr3",
+    state=_state("<f4", accelerometers=True),
+    command=np.dtype([*_COMMAND, ("torque_command_finished", "u1", ())]),
+    requests=(
+        "Connect", "Move", "StopMove", "SetCollisionBehavior", "SetJointImpedance", "SetCartesianImpedance",
+        "SetGuidingMode", "SetEEToK", "SetNEToEE", "SetLoad", "AutomaticErrorRecovery", "GetRobotModel",
+    ),
+    sizes={**_COMMON, "Move": _MOVE_SIZE + 1 + 8 * JOINTS, "GetRobotModel": 0},
+    move=(
+        "success", "started", "preempted", "preempted by safety", "rejected by safety", "not possible", "singular",
+        "invalid", "reflex", "emergency", "input error", "aborted",
+    ),
+)  # fmt: skip
+"""FR3, libfranka 0.18 and later."""
+
+PROTOCOLS: dict[RobotKind, Protocol] = {"panda": PANDA, "fr3": FR3}

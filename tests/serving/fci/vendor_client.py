@@ -1,0 +1,207 @@
+"""A program as anyone would write it with the vendor's library: `vendor_client.py KIND HOST WHAT VALUES...`.
+
+Prints what came of it as JSON. A process of its own: the libraries hold the interpreter, and cannot share a process.
+"""
+
+import hashlib
+import json
+import math
+import os
+import sys
+
+
+def _panda(host):
+    from panda_py import libfranka as lib
+
+    return lib, lib.Robot(host)
+
+
+def _fr3(host):
+    import pylibfranka as lib
+
+    return lib, lib.Robot(host, lib.RealtimeConfig.kIgnore)
+
+
+_FIELDS = (
+    "O_T_EE", "O_T_EE_d", "F_T_EE", "EE_T_K", "m_ee", "F_x_Cee", "m_load", "F_x_Cload", "I_load", "elbow", "tau_J",
+    "tau_J_d", "q", "q_d", "dq", "dq_d", "ddq_d", "joint_contact", "cartesian_contact", "joint_collision",
+    "cartesian_collision", "tau_ext_hat_filtered", "O_F_ext_hat_K", "K_F_ext_hat_K", "theta", "dtheta",
+    "control_command_success_rate",
+)  # fmt: skip
+
+
+def _told(state):
+    """All that a state tells."""
+    told = {name: _plain(getattr(state, name)) for name in _FIELDS}
+    mode, time = str(state.robot_mode).rpartition(".")[2], state.time.to_sec()
+    errors = {name: _names(getattr(state, name)) for name in ("current_errors", "last_motion_errors")}
+    return {"mode": mode.removeprefix("k").lower(), "time": time, **errors, **told}
+
+
+def _fresh(robot):
+    """A state sent after the last request was answered: the first that is read may have been on its way before."""
+    robot.read_once()
+    return _told(robot.read_once())
+
+
+def _plain(value):
+    return list(map(float, value)) if hasattr(value, "__iter__") else float(value)
+
+
+def _names(errors):
+    return sorted(name for name in dir(errors) if not name.startswith("_") and getattr(errors, name) is True)
+
+
+def _control(lib, robot, on_state):
+    """Call `on_state(state, time) -> (velocities, finished)` for each state of a motion; return the error, or None."""
+    time = 0.0
+    try:
+        if hasattr(robot, "control_joint_velocity"):
+
+            def called(state, duration):
+                nonlocal time
+                time += duration.to_sec()
+                velocities, finished = on_state(state, time)
+                command = lib.JointVelocities(velocities)
+                command.motion_finished = finished
+                return command
+
+            robot.control_joint_velocity(called, lib.ControllerMode.kJointImpedance, False, 1000.0)
+            return None
+        control, finished = robot.start_joint_velocity_control(lib.ControllerMode.JointImpedance), False
+        while not finished:
+            state, duration = control.readOnce()
+            time += duration.to_sec()
+            velocities, finished = on_state(state, time)
+            command = lib.JointVelocities(velocities)
+            command.motion_finished = finished
+            control.writeOnce(command)
+    except Exception as error:
+        return str(error)
+
+
+def _behavior(robot, kind, torque, force):
+    """Set the upper thresholds, and half of them as the lower ones."""
+    torques, forces = ([0.5 * torque] * 7, [torque] * 7), ([0.5 * force] * 6, [force] * 6)
+    if kind == "panda":
+        robot.set_collision_behavior(*torques, *torques, *forces, *forces)
+    else:
+        robot.set_collision_behavior(*torques, *forces)
+
+
+def state(lib, robot, kind):
+    return _told(robot.read_once())
+
+
+def move(lib, robot, kind, seconds, jump=0.0):
+    """Move there and back to rest; with a jump of the velocity [rad/s] in the middle."""
+    _behavior(robot, kind, 90.0, 90.0)
+    digest, told = hashlib.sha256(), []
+
+    def on_state(state, time):
+        told.append(_told(state))
+        digest.update(json.dumps(told[-1]).encode())
+        speed = 0.2 * math.sin(math.pi * min(time / seconds, 1.0)) ** 2 + (jump if time > seconds / 2 else 0.0)
+        return [speed, -speed / 2, speed, 0.0, 0.0, speed, -speed], time >= seconds
+
+    error = _control(lib, robot, on_state)
+    after = _told(robot.read_once())
+    robot.automatic_error_recovery()
+    return {
+        "error": error, "digest": digest.hexdigest(), "first": told[0], "last": told[-1], "count": len(told),
+        "after": after, "recovered": _fresh(robot),
+    }  # fmt: skip
+
+
+def hold(lib, robot, kind, seconds, force):
+    """Stand still in a motion, with a collision threshold [N], and tell all states."""
+    _behavior(robot, kind, 90.0, force)
+    told = []
+
+    def on_state(state, time):
+        told.append(_told(state))
+        return [0.0] * 7, time >= seconds
+
+    error = _control(lib, robot, on_state)
+    after = _told(robot.read_once())
+    robot.automatic_error_recovery()
+    return {"error": error, "told": told, "after": after, "recovered": _fresh(robot)}
+
+
+def settings(lib, robot, kind):
+    """Set all that can be set, and read what can be read of it."""
+    turned = [0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.01, 0.02, 0.03, 1.0]
+    robot.set_joint_impedance([1000.0] * 7)
+    robot.set_cartesian_impedance([500.0] * 3 + [50.0] * 3)
+    robot.set_load(0.5, [0.0, 0.01, 0.02], [1e-3, 0.0, 0.0, 0.0, 2e-3, 0.0, 0.0, 0.0, 3e-3])
+    (robot.set_ee if kind == "panda" else robot.set_EE)(turned)
+    (robot.set_k if kind == "panda" else robot.set_K)(turned)
+    if kind == "panda":
+        robot.set_guiding_mode([True] * 6, False)
+    refused = {}
+    for name, do in {
+        "load": lambda: robot.set_load(-1.0, [0.0] * 3, [0.0] * 9),
+        "collision": lambda: _behavior(robot, kind, -1.0, 1.0),
+    }.items():
+        refused[name] = _error(do)
+    return {"state": _fresh(robot), "refused": refused, "turned": turned}
+
+
+def refused(lib, robot, kind):
+    """Ask for what is not served."""
+    if kind == "fr3":
+        modes = ["joint_position", "cartesian_pose", "cartesian_velocity"]
+        asked = {
+            n: (lambda n=n: getattr(robot, f"start_{n}_control")(lib.ControllerMode.JointImpedance)) for n in modes
+        }
+        asked["torque"] = robot.start_torque_control
+        return {name: _error(do) for name, do in asked.items()}
+    q, mode = robot.read_once().q_d, lib.ControllerMode.kJointImpedance
+    pose = robot.read_once().O_T_EE_d
+    return {
+        "joint_position": _error(lambda: robot.control_joint_position(lambda *_: lib.JointPositions(q), mode)),
+        "cartesian_pose": _error(lambda: robot.control_cartesian_pose(lambda *_: lib.CartesianPose(pose), mode)),
+        "torque": _error(lambda: robot.control(lambda *_: lib.Torques([0.0] * 7))),
+        "model": _error(robot.load_model),
+    }
+
+
+def _error(do):
+    try:
+        do()
+    except Exception as error:
+        return str(error)
+    return ""
+
+
+def model(lib, robot, kind):
+    """What the library computes with the model it was given."""
+    made, state = robot.load_model(), robot.read_once()
+    return {
+        "q": list(state.q), "jacobian": list(map(float, _flat(made.zero_jacobian(state)))),
+        "gravity": list(made.gravity(state)), "mass": list(map(float, _flat(made.mass(state)))),
+    }  # fmt: skip
+
+
+def _flat(matrix):
+    import numpy as np
+
+    return np.array(matrix).reshape(-1, order="F")
+
+
+def main():
+    kind, host, what, *values = sys.argv[1:]
+    try:
+        lib, robot = (_panda if kind == "panda" else _fr3)(host)
+    except Exception as error:
+        print(json.dumps({"error": str(error)}), flush=True)
+    else:
+        done = {f.__name__: f for f in (state, move, hold, settings, refused, model)}[what](
+            lib, robot, kind, *map(float, values)
+        )
+        print(json.dumps(done), flush=True)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
