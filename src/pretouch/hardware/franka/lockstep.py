@@ -1,0 +1,139 @@
+"""A controller stepped within the arm's own loop: the same states give the same commands, to the last bit.
+
+For a simulated arm that waits for each command (`pretouch serve-fci --lockstep`). A real arm waits for nobody.
+"""
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+import numpy as np
+
+from pretouch.controller import Controller, ControllerState
+from pretouch.errors import ParameterError
+from pretouch.hardware.franka.client import Client
+from pretouch.hardware.franka.limiter import PERIOD_S, SetPointLimiter
+from pretouch.hardware.franka.limits import LimiterParams, motion_limits
+from pretouch.hardware.franka.state import JOINTS, FrankaState, robot_state
+from pretouch.loop import Cycle, Recorder
+from pretouch.realtime import warm_up
+from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings
+
+_REST = [0.0] * JOINTS
+
+
+def run_in_lockstep(
+    client: Client,
+    controller: Controller,
+    skin_at: Callable[[float], RangeReadings],
+    recorder: Recorder,
+    done: Callable[[ControlStep], bool],
+    resume: Callable[[], bool] = lambda: False,
+    *,
+    params: LimiterParams | None = None,
+    every: int = 10,
+) -> None:
+    """Turn the controller at every so many states of a motion until `done` says so of a step.
+
+    All stamps are of the robot's time, from the first state of the motion on: the simulated arm's time jumps before it.
+    The controller is compiled before the motion begins, for the arm waits less than a second for its first command. The
+    arm comes to rest within its limits before the motion ends, also on Ctrl-C,
+    SIGTERM and whatever goes wrong in a step, which is raised afterwards.
+
+    Args:
+        client: connected to the arm.
+        controller: its period must be `every` milliseconds.
+        skin_at: returns the readings there are at a robot time [s]; asked at every state, used at each step.
+        recorder: keeps the steps.
+        done: whether a step was the last.
+        resume: whether a person now asks to leave a latched HOLD.
+        params: of the way from one set-point to the next.
+        every: states to a step.
+    """
+    if abs(every * PERIOD_S - controller.limits.period) > 1e-9:
+        raise ParameterError(
+            f"The controller has a period of {controller.limits.period!r} s, but is to be stepped every {every} ms:"
+            " make them the same (params.at_rate makes a profile for another rate)."
+        )
+    warm_up(controller, robot_state(client.read(), 0.0))
+    limiter = SetPointLimiter(motion_limits(controller.model, client.kind), params or LimiterParams())
+    turning = _Turning(controller, skin_at, recorder, done, resume, every)
+    with _asked_to_end() as came:
+
+        def answer(state: FrankaState, _since: float) -> tuple[FloatArray, bool]:
+            wanted = _REST if came else turning.wanted(state)
+            velocity = limiter.step(state, wanted)
+            return np.array(velocity), (bool(came) or turning.ended) and limiter.at_rest
+
+        client.control(answer)
+    if turning.error is not None:
+        raise turning.error
+
+
+class _Turning:
+    """The controller, turned by the arm's states."""
+
+    def __init__(
+        self, controller: Controller, skin_at: Callable[[float], RangeReadings], recorder: Recorder,
+        done: Callable[[ControlStep], bool], resume: Callable[[], bool], every: int,
+    ) -> None:  # fmt: skip
+        self._controller, self._skin_at, self._recorder = controller, skin_at, recorder
+        self._done, self._resume, self._every = done, resume, every
+        self._state: ControllerState | None = None
+        self._began, self._turns = 0.0, 0
+        self._wanted = _REST
+        self.ended = False
+        """Whether there is nothing left to do but to come to rest."""
+        self.error: Exception | None = None
+        """What ended it, if it was not `done`."""
+
+    def wanted(self, state: FrankaState) -> list[float]:
+        """Return the set-point after a state."""
+        if self.ended:
+            return _REST
+        try:
+            self._look(state)
+        except Exception as error:
+            self.error, self.ended = error, True
+        return _REST if self.ended else self._wanted
+
+    def _look(self, state: FrankaState) -> None:
+        readings = self._skin_at(state.time)
+        if self._state is None:
+            self._began = state.time
+        if round((state.time - self._began) / PERIOD_S) >= self._turns * self._every:
+            self._turns += 1
+            self._turn(state, readings)
+
+    def _turn(self, state: FrankaState, readings: RangeReadings) -> None:
+        stamp = state.time
+        robot = robot_state(state, stamp)
+        before = self._controller.init(robot) if self._state is None else self._state
+        inputs = Inputs(stamp, robot, readings, self._resume())
+        step, self._state = self._controller.step(before, inputs)
+        self._recorder.record(Cycle(inputs, before, step, self._state))
+        self._wanted = step.command.tolist()
+        self.ended = self._done(step)
+
+
+@contextmanager
+def _asked_to_end() -> Iterator[list[int]]:
+    """Give a list in which Ctrl-C and SIGTERM are noted while the arm moves; they take effect afterwards."""
+    came: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        came.append(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield came  # signals reach the main thread alone
+        return
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield came
+    finally:
+        for ours, handler in before.items():
+            signal.signal(ours, handler)
+        for number in came[:1]:
+            signal.raise_signal(number)

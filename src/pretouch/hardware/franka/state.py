@@ -1,0 +1,113 @@
+"""What a Franka arm reports, as the vendor's libraries give it, and the one place where its sign becomes ours."""
+
+import re
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pretouch.types import FloatArray, RobotState
+
+JOINTS = 7
+"""Joints of a Panda and of an FR3."""
+
+MODES = ("other", "idle", "move", "guiding", "reflex", "user stopped", "automatic error recovery")
+"""The vendor's robot modes, each at its number on the wire."""
+
+_PLAIN = struct.Struct("<4dBHH")
+_ARRAYS = struct.Struct(f"<{6 * JOINTS + 6}d")
+_CUTS = *(slice(JOINTS * i, JOINTS * (i + 1)) for i in range(6)), slice(6 * JOINTS, None)
+PACKED_MOST = _PLAIN.size + _ARRAYS.size + 4096
+"""Bytes that a packed state has at most."""
+_NAME = re.compile(r"[a-z]\w+")
+
+
+@dataclass(frozen=True, slots=True)
+class FrankaState:
+    """One state of the arm in the vendor's terms and signs."""
+
+    time: float
+    """Robot time [s]."""
+    mode: str
+    """One of `MODES`."""
+    errors: tuple[str, ...]
+    """Errors that are pending, by the vendor's names."""
+    last_motion_errors: tuple[str, ...]
+    """What ended the last motion, if it did not end as asked."""
+    q: FloatArray
+    """(7,) measured joint positions [rad]."""
+    qd: FloatArray
+    """(7,) measured joint velocities [rad/s]."""
+    q_d: FloatArray
+    """(7,) joint positions the motion generator is at [rad]."""
+    dq_d: FloatArray
+    """(7,) joint velocities the motion generator is at [rad/s]."""
+    ddq_d: FloatArray
+    """(7,) joint accelerations the motion generator is at [rad/s^2]."""
+    tau_ext: FloatArray
+    """(7,) `tau_ext_hat_filtered` [Nm]: by the arm on its environment."""
+    wrench: FloatArray
+    """(6,) `O_F_ext_hat_K` [N, Nm], base frame: by the arm on its environment; exactly zero near singularities."""
+    success_rate: float
+    """Share of the last 100 commands that reached the arm in time; 0 while no motion runs."""
+    m_ee: float
+    """Mass of the end-effector the arm is told to have [kg]."""
+    m_load: float
+    """Mass of the load the arm is told to carry [kg]."""
+
+
+def robot_state(state: FrankaState, stamp: float) -> RobotState:
+    """Return a state in our terms: force and torques **on the robot by the environment**.
+
+    The vendor's are those by the robot on its environment (libfranka, `robot_state.h`), and a wrench that is exactly
+    zero says that there is no estimate, as near a singularity.
+
+    Args:
+        state: as the arm gave it.
+        stamp: when, by the clock of the caller [s].
+    """
+    wrench = -state.wrench if state.wrench.any() else None
+    return RobotState(stamp, state.q, state.qd, state.q_d, state.dq_d, -state.tau_ext, wrench)
+
+
+def franka_state(raw: Any) -> FrankaState:
+    """Return the state that one of the vendor's libraries gave: both name and number alike what is used here."""
+    array = np.array
+    return FrankaState(
+        time=raw.time.to_sec(), mode=MODES[int(raw.robot_mode)], errors=_names(raw.current_errors),
+        last_motion_errors=_names(raw.last_motion_errors), q=array(raw.q), qd=array(raw.dq), q_d=array(raw.q_d),
+        dq_d=array(raw.dq_d), ddq_d=array(raw.ddq_d), tau_ext=array(raw.tau_ext_hat_filtered),
+        wrench=array(raw.O_F_ext_hat_K), success_rate=raw.control_command_success_rate, m_ee=raw.m_ee,
+        m_load=raw.m_load,
+    )  # fmt: skip
+
+
+def error_names(text: str) -> tuple[str, ...]:
+    """Return the vendor's error names in a list that its library printed: `["joint_reflex"]`."""
+    start = text.find("[")
+    return tuple(_NAME.findall(text[start : text.find("]", start)])) if start >= 0 else ()
+
+
+def _names(errors: Any) -> tuple[str, ...]:
+    return error_names(str(errors)) if errors else ()
+
+
+def packed(state: FrankaState) -> bytes:
+    """Return a state as bytes for another process of this machine, in 3 us."""
+    errors, last = (" ".join(names).encode() for names in (state.errors, state.last_motion_errors))
+    plain = _PLAIN.pack(
+        state.time, state.success_rate, state.m_ee, state.m_load, MODES.index(state.mode), len(errors), len(last)
+    )
+    parts = state.q, state.qd, state.q_d, state.dq_d, state.ddq_d, state.tau_ext, state.wrench
+    return b"".join((plain, *(part.tobytes() for part in parts), errors, last))
+
+
+def unpacked(data: bytes) -> FrankaState:
+    """Return the state that `packed` made bytes of."""
+    time, rate, m_ee, m_load, mode, length, length_last = _PLAIN.unpack_from(data)
+    arrays = np.frombuffer(data, offset=_PLAIN.size, count=6 * JOINTS + 6)
+    names = data[_PLAIN.size + _ARRAYS.size :].decode()
+    errors, last = tuple(names[:length].split()), tuple(names[length : length + length_last].split())
+    q, qd, q_d, dq_d, ddq_d, tau_ext, wrench = (arrays[cut] for cut in _CUTS)
+    return FrankaState(time, MODES[mode], errors, last, q, qd, q_d, dq_d, ddq_d, tau_ext, wrench, rate, m_ee, m_load)

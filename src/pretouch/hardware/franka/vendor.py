@@ -1,0 +1,103 @@
+"""What the vendor's two libraries have in common: all but how to connect, and how to run a motion."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, ClassVar, Literal, Self
+
+from pretouch.hardware.franka import sentences
+from pretouch.hardware.franka.client import OnState
+from pretouch.hardware.franka.collision import CollisionBehavior
+from pretouch.hardware.franka.only_one import OnlyOne
+from pretouch.hardware.franka.state import FrankaState, franka_state
+from pretouch.types import FloatArray
+
+
+class VendorClient:
+    """Base of the `client.Client`s.
+
+    The libraries hold the interpreter's lock while they wait, so no other thread of the process runs during a motion.
+    """
+
+    kind: Literal["panda", "fr3"]
+    server_version: int
+    library: ClassVar[Any]
+    failures: ClassVar[tuple[type[Exception], ...]] = (RuntimeError,)
+    """What the library raises."""
+
+    def __init__(self, address: str, real_time: bool, lock: OnlyOne) -> None:
+        self._address, self._lock = address, lock
+        wanted = self.library.RealtimeConfig
+        try:
+            self._robot: Any = self.library.Robot(address, wanted.kEnforce if real_time else wanted.kIgnore)
+        except Exception as error:
+            sentences.unconnected(address, self.server_version, self.kind, error)
+
+    def read(self) -> FrankaState:
+        """Wait for the next state."""
+        with self._asking("send its state"):
+            return franka_state(self._robot.read_once())
+
+    def control(self, on_state: OnState) -> None:
+        """Run a joint velocity motion until `on_state` says that it is finished."""
+        sentences.check_ready(self.read(), self._address)
+        raised: list[BaseException] = []
+
+        def answer(raw: Any, since: Any) -> Any:
+            try:
+                qd, finished = on_state(franka_state(raw), since.to_sec())
+            except BaseException as error:
+                raised.append(error)
+                raise
+            command = self.library.JointVelocities(qd.tolist())
+            command.motion_finished = finished
+            return command
+
+        try:
+            self._move(answer)
+        except self.failures as error:
+            if raised:
+                raise raised[0] from None
+            sentences.aborted(self._address, error)
+
+    def _move(self, answer: Any) -> None:
+        """Run the library's loop; `answer` takes its state and duration and returns its command."""
+        raise NotImplementedError
+
+    def set_collision_behavior(self, behavior: CollisionBehavior) -> None:
+        """Tell the arm from which forces on it reports a contact, and from which it stops."""
+        with self._asking("take the collision behaviour"):
+            self._robot.set_collision_behavior(*behavior.in_order())
+
+    def set_load(self, mass: float, com: FloatArray, inertia: FloatArray) -> None:
+        """Tell the arm what it carries."""
+        with self._asking("take the load"):
+            self._robot.set_load(mass, com.tolist(), inertia.T.ravel().tolist())
+
+    def recover(self) -> None:
+        """Leave the mode "reflex"."""
+        with self._asking("recover"):
+            self._robot.automatic_error_recovery()
+
+    def stop(self) -> None:
+        """End any motion at once."""
+        with self._asking("stop"):
+            self._robot.stop()
+
+    def close(self) -> None:
+        """Let the arm be used by somebody else."""
+        self._robot = None
+        self._lock.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @contextmanager
+    def _asking(self, what: str) -> Iterator[None]:
+        """Turn what the library raises into a RobotError that says what the arm did not do."""
+        try:
+            yield
+        except self.failures as error:
+            sentences.refused(self._address, what, error)

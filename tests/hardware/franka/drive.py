@@ -1,0 +1,125 @@
+"""Run as a process: drives an arm in lockstep through the vendor's library; prints what came of it as JSON."""
+
+import json
+import sys
+from dataclasses import asdict, dataclass, field
+from hashlib import sha256
+
+import numpy as np
+
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
+from pretouch.errors import RobotError
+from pretouch.hardware.franka.client import Client, connect
+from pretouch.hardware.franka.collision import collision_behavior
+from pretouch.hardware.franka.limiter import SetPointLimiter
+from pretouch.hardware.franka.limits import LimiterParams, motion_limits
+from pretouch.hardware.franka.lockstep import run_in_lockstep
+from pretouch.hardware.franka.sentences import MotionAborted
+from pretouch.hardware.franka.state import FrankaState, packed
+from pretouch.loop import Cycle
+from pretouch.params import profile
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import paper_skin
+from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.types import FloatArray, RangeReadings
+
+LASTS_S = 1.5
+NEVER = RangeReadings(np.full(7, -np.inf), np.zeros(7), np.full(7, 255))
+
+
+@dataclass
+class Result:
+    states: int = 0
+    lost: int = 0
+    digest: str = ""
+    errors: list[str] = field(default_factory=list)
+    trouble: str = ""
+    refused: str = ""
+    mode: str = ""
+    last_errors: list[str] = field(default_factory=list)
+    forces: list[list[float]] = field(default_factory=list)
+    speed: float = 0.0
+
+
+class Staircase:
+    """Velocities that change every 10 ms, with the steps of a reaction to a contact, for so long [s]."""
+
+    def __init__(self, model: RobotModel, kind: str, lasts: float, result: Result) -> None:
+        self._limiter = SetPointLimiter(motion_limits(model, kind), LimiterParams())
+        self._lasts, self._result, self._hash = lasts, result, sha256()
+
+    def answer(self, state: FrankaState, since: float) -> tuple[FloatArray, bool]:
+        result = self._result
+        result.states += 1
+        self._hash.update(packed(state))
+        time = result.states // 10 * 0.01
+        wave = 0.25 * np.sin(6.0 * time) + (0.4 if 0.5 < time < 0.8 or 1.2 < time < 1.3 else 0.0)
+        wanted = [0.0] * 7 if time > self._lasts else (wave * np.array([1.0, -0.5, 0.5, 0.3, 0.2, -1.0, 1.0])).tolist()
+        velocity = np.array(self._limiter.step(state, wanted))
+        result.lost += self._limiter.lost
+        result.forces.append(state.wrench[:3].tolist())
+        result.digest = self._hash.hexdigest()
+        return velocity, time > self._lasts and self._limiter.at_rest
+
+
+def staircase(client: Client, model: RobotModel, result: Result) -> None:
+    client.control(Staircase(model, client.kind, LASTS_S, result).answer)
+
+
+def contact(client: Client, model: RobotModel, result: Result) -> None:
+    """Meet the contact that the server was told to make, recover, and go on."""
+    client.set_collision_behavior(collision_behavior(profile("paper"), model))
+    try:
+        client.control(Staircase(model, client.kind, LASTS_S, result).answer)
+    except MotionAborted as error:
+        result.errors, result.trouble = list(error.errors), str(error)
+    after = client.read()
+    result.mode, result.last_errors = after.mode, list(after.last_motion_errors)
+    try:
+        client.control(Staircase(model, client.kind, LASTS_S, Result()).answer)
+    except RobotError as error:
+        result.refused = str(error)
+    client.recover()
+    client.control(Staircase(model, client.kind, 0.2, Result()).answer)
+
+
+def control(client: Client, model: RobotModel, result: Result, fails: bool = False) -> None:
+    """Follow the paper's circle for a second and a half after the force window is full."""
+    hashed, steps = sha256(), []
+
+    class Recorder:
+        def record(self, cycle: Cycle) -> None:
+            steps.append(cycle.step)
+            hashed.update(cycle.step.command.tobytes() + cycle.step.force.tobytes())
+            if fails and len(steps) == 200:
+                raise OSError("the disk is full")
+
+    skin = paper_skin(model)
+    known: Fixtures = fixtures(SceneSpec())
+    controller = Controller(model, skin, known, Circle(), profile("blind"))
+    try:
+        run_in_lockstep(client, controller, lambda _: NEVER, Recorder(), lambda _: len(steps) >= 250)
+    except OSError as error:
+        result.trouble = str(error)
+    result.states, result.digest = len(steps), hashed.hexdigest()
+    result.speed = float(np.linalg.norm(steps[-1].ee_velocity))
+
+
+def main(kind: str, address: str, task: str) -> None:
+    model, result = RobotModel(panda() if kind == "panda" else fr3()), Result()
+    with connect(address, kind) as client:  # type: ignore[arg-type]
+        tasks = {"staircase": staircase, "contact": contact, "control": control}
+        if task == "fail":
+            control(client, model, result, fails=True)
+        else:
+            tasks[task](client, model, result)
+        if not result.mode:
+            result.mode = client.read().mode
+    print(json.dumps(asdict(result)))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

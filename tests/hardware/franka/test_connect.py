@@ -1,0 +1,88 @@
+"""What stands in the way of an arm is one sentence, and soon."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from pretouch.errors import RobotError
+from pretouch.hardware.franka import client, sentences
+from pretouch.hardware.franka.arm import FrankaArm
+from pretouch.hardware.franka.client import connect, reachable
+from pretouch.hardware.franka.only_one import OnlyOne
+from pretouch.hardware.franka.state import MODES
+from pretouch.robot.model import RobotModel
+from tests.hardware.franka.made import state
+from tests.hardware.franka.served import loopback
+
+
+@pytest.mark.parametrize(
+    ("address", "what"),
+    [
+        ("127.0.99.99", "nobody listens on port 1337 there"),
+        ("no-such-arm.invalid", "there is no machine of that name"),
+        ("a..b", "there is no machine of that name"),
+    ],
+)
+def test_a_wrong_address_is_said_at_once(address: str, what: str) -> None:
+    began = time.monotonic()
+    with pytest.raises(RobotError, match=re.escape(f"No Franka arm at {address}: {what}; check the address")):
+        reachable(address)
+    assert time.monotonic() - began < 10.0
+
+
+def test_an_arm_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    def silent(_address: tuple[str, int], timeout: float) -> None:
+        assert timeout == client.ANSWER_S
+        raise TimeoutError
+
+    monkeypatch.setattr(client.socket, "create_connection", silent)
+    with pytest.raises(RobotError, match="nothing answers within 3 s"):
+        reachable("172.16.0.2")
+
+
+def test_the_sentence_comes_from_the_process_too(panda_model: RobotModel) -> None:
+    with pytest.raises(RobotError, match=r"^No Franka arm at 127\.0\.99\.99: nobody listens .* FCI in Desk\.$"):
+        FrankaArm("127.0.99.99", "panda", panda_model)
+
+
+@pytest.mark.parametrize(("kind", "library"), [("panda", "panda_py"), ("fr3", "pylibfranka")])
+def test_a_missing_library_names_the_extra(monkeypatch: pytest.MonkeyPatch, kind: client.Kind, library: str) -> None:
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(RobotError, match=re.escape("pip install 'pretouch[franka]'")):
+        connect("127.0.99.99", kind)
+
+
+def test_a_kernel_without_real_time_is_refused_where_it_is_demanded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client, "has_real_time_kernel", lambda: False)
+    monkeypatch.setitem(sys.modules, "panda_py", sys)
+    with pytest.raises(RobotError, match="boot one with PREEMPT_RT"):
+        connect("127.0.99.99", "panda", real_time=True)
+
+
+@pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "idle"])
+def test_each_mode_in_which_the_arm_does_not_move_has_a_way_out(mode: str) -> None:
+    with pytest.raises(RobotError, match=f'^The arm at robot is in mode "{mode}" after joint_reflex: .*\\.$'):
+        sentences.check_ready(state(mode=mode, errors=("joint_reflex",)), "robot")
+    sentences.check_ready(state(mode="idle"), "robot")
+
+
+def test_a_process_that_holds_an_arm_is_named_and_lets_go_when_it_is_killed() -> None:
+    address = loopback()
+    holds = f"OnlyOne({address!r}); print(1, flush=True); input()"
+    script = f"from pretouch.hardware.franka.only_one import OnlyOne; held = {holds}"
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout
+        assert process.stdout.readline() == "1\n"
+        with pytest.raises(RobotError, match=f"The arm at {address} is in use by process {process.pid} on"):
+            OnlyOne(address)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+    OnlyOne(address).release()
+    OnlyOne(address).release()

@@ -1,0 +1,95 @@
+"""The limiter against an arm that checks each millisecond, and goes on by itself where a command is lost."""
+
+import numpy as np
+import pytest
+
+from pretouch.errors import RobotError
+from pretouch.hardware.franka.limiter import SetPointLimiter, refusal
+from pretouch.hardware.franka.limits import LimiterParams, MotionLimits, motion_limits
+from pretouch.hardware.franka.state import FrankaState
+from pretouch.robot.model import RobotModel
+from tests.hardware.franka.made import CheckingArm, middle
+
+
+@pytest.fixture(params=["panda", "fr3"])
+def limits(request: pytest.FixtureRequest, panda_model: RobotModel, fr3_model: RobotModel) -> MotionLimits:
+    return motion_limits(panda_model if request.param == "panda" else fr3_model, request.param)
+
+
+def test_any_staircase_of_set_points_keeps_all_limits(limits: MotionLimits) -> None:
+    draw = np.random.default_rng(1)
+    arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
+    wanted = np.zeros(7)
+    for k in range(30_000):
+        if k % 10 == 0 and draw.random() < 0.02:
+            wanted = limits.qd_max * draw.choice([-1.0, 0.0, 0.3, 1.0], 7)
+        arm.take(limiter.step(arm.state(), wanted.tolist()))
+    assert np.abs(arm.q - middle(limits)).max() > 0.5
+
+
+@pytest.mark.parametrize(("lost", "of"), [(3, 50), (15, 200)])
+def test_lost_commands_break_no_limit(limits: MotionLimits, lost: int, of: int) -> None:
+    draw = np.random.default_rng(2)
+    arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
+    wanted, noticed = np.zeros(7), 0
+    for k in range(20_000):
+        if k % 100 == 0:
+            wanted = 0.3 * limits.qd_max * draw.choice([-1.0, 0.0, 1.0], 7) * (-1) ** (k // 100)
+        command = limiter.step(arm.state(), wanted.tolist())
+        noticed += limiter.lost
+        arm.take(None if k % of < lost and k > of else command)
+    assert noticed > 20_000 / of
+
+
+def test_a_command_that_comes_a_millisecond_late_and_is_still_taken_breaks_no_limit(limits: MotionLimits) -> None:
+    arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
+    for k in range(4000):
+        wanted = 0.2 * limits.qd_max * (-1) ** (k // 300)
+        command = limiter.step(arm.state(), wanted.tolist())
+        if k % 20 == 7:
+            arm.take(None)
+            arm.take(command)
+        else:
+            arm.take(command)
+
+
+def test_the_way_to_rest_ends_exactly_at_rest(limits: MotionLimits) -> None:
+    arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
+    assert not limiter.at_rest
+    for _ in range(500):
+        arm.take(limiter.step(arm.state(), (0.3 * limits.qd_max).tolist()))
+    assert not limiter.at_rest
+    for _ in range(1500):
+        arm.take(limiter.step(arm.state(), [0.0] * 7))
+    assert limiter.at_rest
+    assert np.abs(arm.qd).max() < 1e-9
+
+
+def test_without_a_loss_nothing_is_begun_anew(limits: MotionLimits) -> None:
+    arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
+    for _ in range(500):
+        state = arm.state()
+        rounded = FrankaState(*(
+            np.float32(getattr(state, name)).astype(float) if name == "dq_d" else getattr(state, name)
+            for name in FrankaState.__slots__
+        ))  # fmt: skip
+        arm.take(limiter.step(rounded, (0.5 * limits.qd_max).tolist()))
+        assert not limiter.lost
+
+
+def test_an_arm_that_reports_no_numbers_is_an_error_with_a_sentence(limits: MotionLimits) -> None:
+    arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
+    arm.qd = np.full(7, np.nan)
+    with pytest.raises(RobotError, match="look at what it reports"):
+        limiter.step(arm.state(), [0.1] * 7)
+
+
+@pytest.mark.parametrize(
+    ("joint", "value", "words"),
+    [(0, np.nan, "joint 1 was to move at nan"), (6, -np.inf, "joint 7 was"), (3, 2.7, "is its limit")],
+)
+def test_a_set_point_that_is_none_is_named(limits: MotionLimits, joint: int, value: float, words: str) -> None:
+    wanted = [0.0] * 7
+    wanted[joint] = value
+    assert words in refusal(wanted, limits)
+    assert refusal(limits.qd_max.tolist(), limits) == ""

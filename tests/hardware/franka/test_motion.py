@@ -1,0 +1,113 @@
+"""What a motion answers to the arm, without an arm: set-points by hand, states of an arm that does as it is told."""
+
+import time
+
+import numpy as np
+import pytest
+
+from pretouch.hardware.franka.limits import motion_limits
+from pretouch.hardware.franka.motion import Motion
+from pretouch.hardware.franka.orders import Boxes, Order, Wish
+from pretouch.hardware.franka.params import FrankaParams
+from pretouch.hardware.franka.report import Communication
+from pretouch.robot.model import RobotModel
+from tests.hardware.franka.made import CheckingArm, middle
+
+
+class Bench:
+    """An arm in a motion, and the program that orders it about."""
+
+    def __init__(self, model: RobotModel) -> None:
+        limits = motion_limits(model, "panda")
+        self.boxes, self.communication, self.over = Boxes(), Communication(), False
+        self.arm = CheckingArm(limits, middle(limits))
+        self.motion = Motion(limits, FrankaParams(), self.boxes, self.communication, lambda: self.over)
+        self.finished = False
+
+    def order(self, qd: float, age: float = -1000.0, wish: Wish = Wish.MOVE) -> None:
+        """Have all joints wanted to move so fast [rad/s]; one from the future stays fresh."""
+        self.boxes.order(Order(1, wish, time.monotonic() - age, [qd] * 7))
+
+    def run(self, states: int) -> None:
+        for _ in range(states):
+            velocity, self.finished = self.motion.answer(self.arm.state(), 1e-3)
+            if self.finished:
+                assert np.abs(self.arm.qd).max() < 1e-4
+                return
+            self.arm.take(velocity.tolist())
+
+    @property
+    def speed(self) -> float:
+        return float(np.abs(self.arm.qd).max())
+
+
+@pytest.fixture
+def bench(panda_model: RobotModel) -> Bench:
+    made = Bench(panda_model)
+    made.order(0.2)
+    made.run(300)
+    assert made.speed == pytest.approx(0.2)
+    return made
+
+
+def test_stale_set_points_bring_it_to_rest_in_the_motion_and_fresh_ones_move_it_again(bench: Bench) -> None:
+    bench.order(0.2, age=0.1)
+    bench.run(500)
+    assert bench.speed < 1e-9
+    assert not bench.finished
+    assert bench.communication.report().stale == 1
+    bench.order(0.1)
+    bench.run(300)
+    assert bench.speed == pytest.approx(0.1)
+    assert bench.motion.trouble == ""
+
+
+def test_a_set_point_that_is_old_but_not_stale_still_counts(bench: Bench) -> None:
+    bench.order(0.1, age=FrankaParams().stale_after_s - 0.03)
+    bench.run(1)
+    assert bench.communication.report().stale == 0
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -50.0])
+def test_a_set_point_that_is_none_ends_the_motion_at_rest_and_later_ones_do_not_count(
+    bench: Bench, wrong: float
+) -> None:
+    bench.order(wrong)
+    bench.run(1)
+    bench.order(0.2)
+    bench.run(1000)
+    assert bench.finished
+    assert bench.motion.trouble.startswith("The arm was brought to rest: joint 1 was to move at ")
+    told = bench.boxes.told()
+    assert told is not None
+    assert told.trouble == bench.motion.trouble
+
+
+@pytest.mark.parametrize("wish", [Wish.END, Wish.QUIT])
+def test_it_ends_at_rest_when_asked_to(bench: Bench, wish: Wish) -> None:
+    bench.order(0.0, wish=wish)
+    bench.run(1000)
+    assert bench.finished
+    assert bench.motion.trouble == ""
+
+
+def test_it_ends_at_rest_when_the_program_has_died(bench: Bench) -> None:
+    bench.over = True
+    bench.run(1000)
+    assert bench.finished
+
+
+def test_it_does_not_end_before_the_arm_says_that_it_rests(bench: Bench) -> None:
+    bench.order(0.0, wish=Wish.END)
+    bench.run(60)
+    assert not bench.finished
+    assert bench.speed > 1e-4
+
+
+def test_lost_states_are_counted(bench: Bench) -> None:
+    before = bench.communication.report()
+    bench.motion.answer(bench.arm.state(), 4e-3)
+    after = bench.communication.report()
+    assert (before.lost_states, after.lost_states, after.longest_gap) == (0, 3, 4e-3)
+    assert after.cycles == before.cycles + 1
+    assert "3 lost (0.99 %), longest gap 4 ms" in str(after)
