@@ -1,0 +1,104 @@
+"""What the controller does, published: a `Recorder` that never keeps the control loop waiting."""
+
+from queue import SimpleQueue
+from threading import Thread
+from time import monotonic, time_ns
+from typing import Self
+
+from pretouch.controller import Controller
+from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, TEXT, TRANSFORMS, VECTOR, WRENCH
+from pretouch.hardware.ros2.node import Ros2Node
+from pretouch.hardware.ros2.params import OutputParams
+from pretouch.hardware.ros2.shown import Shown, Stamp
+from pretouch.loop import Cycle
+from pretouch.types import Mode
+
+_WAITING_MOST = 16
+"""Steps that may wait to be published; more are left out."""
+
+
+class Ros2Output:
+    """Publishes control steps by a thread of its own; a context manager.
+
+    Contacts and changes of the mode are published each, the rest at a limited rate. Stamps are of the time of day, when
+    a step was taken.
+    """
+
+    def __init__(self, params: OutputParams, controller: Controller, node: Ros2Node) -> None:
+        self._shown = Shown(controller, node.messages, params.base_frame)
+        self._messages, self._link_frames = node.messages, params.links
+        self._period, self._diagnostics_period = 1 / params.rate_hz, 1 / params.diagnostics_hz
+        self._next = self._next_diagnostics = 0.0
+        self._mode: Mode | None = None
+        self.dropped = 0
+        """Steps left out because the thread was busy."""
+        self._queue: SimpleQueue[tuple[Cycle, Stamp] | None] = SimpleQueue()
+        begin = params.namespace.rstrip("/")
+        self._cloud = node.publisher(f"{begin}/obstacles", CLOUD)
+        self._markers = node.publisher(f"{begin}/markers", MARKERS)
+        self._force = node.publisher(f"{begin}/force", WRENCH)
+        self._upper = node.publisher(f"{begin}/threshold_upper", VECTOR)
+        self._lower = node.publisher(f"{begin}/threshold_lower", VECTOR)
+        self._contact = node.publisher(f"{begin}/contact", WRENCH)
+        self._mode_text = node.publisher(f"{begin}/mode", TEXT, latched=True, depth=1)
+        self._diagnostics = node.publisher("/diagnostics", DIAGNOSTICS)
+        self._links = node.publisher("/tf", TRANSFORMS) if params.links else None
+        units = node.publisher("/tf_static", TRANSFORMS, latched=True, depth=1)
+        units.publish(self._shown.units(_now()))
+        self._thread = Thread(target=self._work, name="ros2-output", daemon=True)
+        self._thread.start()
+
+    def record(self, cycle: Cycle) -> None:
+        """Have a turn of the loop published, if it is time."""
+        now, step = monotonic(), cycle.step
+        if now < self._next and step.contact is None and step.mode is self._mode:
+            return
+        if now >= self._next:
+            self._next = now + self._period
+        self._mode = step.mode
+        if self._queue.qsize() >= _WAITING_MOST:
+            self.dropped += 1
+            return
+        self._queue.put((cycle, _now()))
+
+    def close(self) -> None:
+        """Publish what waits, and end."""
+        self._queue.put(None)
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _work(self) -> None:
+        mode: Mode | None = None
+        while (item := self._queue.get()) is not None:
+            cycle, at = item
+            self._publish(cycle, at)
+            changed = cycle.step.mode is not mode
+            mode = cycle.step.mode
+            now = monotonic()
+            if changed or now >= self._next_diagnostics:
+                self._next_diagnostics = now + self._diagnostics_period
+                self._diagnostics.publish(self._shown.diagnostics(cycle, at))
+
+    def _publish(self, cycle: Cycle, at: Stamp) -> None:
+        step, shown = cycle.step, self._shown
+        if step.contact is not None:
+            self._contact.publish(shown.wrench(step.contact.force, at))
+        self._force.publish(shown.wrench(step.force, at))
+        self._upper.publish(shown.vector(step.thresholds.upper, at))
+        self._lower.publish(shown.vector(step.thresholds.lower, at))
+        self._cloud.publish(shown.cloud(step, at))
+        self._markers.publish(shown.markers(step, at))
+        self._mode_text.publish(self._messages.make(TEXT, f"{step.mode.name}: {step.reason}"))
+        if self._links is not None:
+            self._links.publish(shown.links(step, at))
+
+
+def _now() -> Stamp:
+    """Return the time of day."""
+    now = time_ns()
+    return now // 10**9, now % 10**9

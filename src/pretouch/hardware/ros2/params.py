@@ -1,0 +1,167 @@
+"""Settings of a connection to ROS 2: what no topic says of itself, and which topics."""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pretouch.checks import Check, Checked, NonNegative, Positive
+from pretouch.errors import ParameterError
+
+Distribution = Literal["foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical"]
+Sign = Literal["on-robot", "by-robot"]
+Frame = Literal["base", "ee"]
+Zeros = Literal["auto", "missing", "kept"]
+Command = Literal["trajectory", "velocities"]
+
+LOOPBACK = "127.0.0.1"
+ENVIRONMENT = "environment"
+"""The interface that leaves the network to Cyclone DDS and its CYCLONEDDS_URI."""
+UNIT = "{unit}"
+"""Stands in a topic for the id of a sensor unit."""
+_TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_JOINT_TRAJECTORY = "/joint_trajectory_controller/joint_trajectory"
+
+
+@dataclass(frozen=True)
+class NodeParams(Checked):
+    """How to reach the others."""
+
+    distribution: Distribution = "jazzy"
+    """Release of ROS 2 of the others: sensor_msgs/Range is not the same before Iron and since."""
+    domain: Annotated[int, Check(low=-1, high=232)] = -1
+    """Domain; -1: what ROS_DOMAIN_ID says, or else 0."""
+    interface: str = LOOPBACK
+    """Network to use, by the address or the name of this machine's interface: by default this machine alone.
+    `environment`: what CYCLONEDDS_URI says, or else what Cyclone DDS chooses."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not re.fullmatch(r"[\w.:%-]+", self.interface, re.ASCII):
+            raise ParameterError(
+                f"NodeParams.interface is {self.interface!r}: give an address or name of an interface of this machine."
+            )
+
+
+@dataclass(frozen=True)
+class ArmParams(Checked):
+    """An arm behind topics."""
+
+    sign: Sign
+    """Whether the wrench is on the robot by the environment, as ours, or by the robot, as Franka's O_F_ext_hat_K."""
+    frame: Frame
+    """Frame the wrench is given in: the arm's base or its end-effector."""
+    zeros: Zeros = "auto"
+    """Whether a wrench of six zeros only means that there is no estimate; auto: where the force is by the robot."""
+    joint_states: str = "/joint_states"
+    """Topic of sensor_msgs/JointState."""
+    joint_names: tuple[str, ...] = ()
+    """The arm's joints as the messages and the arm's controller call them, in the model's order; () is the model's."""
+    wrench: str = "/wrench"
+    """Topic of geometry_msgs/WrenchStamped."""
+    wrench_timeout_s: Positive = 0.05
+    """Age of a wrench from which it is no estimate any more [s]."""
+    shared_clock: bool = False
+    """Whether the time of ROS is this machine's time of day, to a millisecond: then stamps of headers count, and
+    trajectories say when they begin. Otherwise what counts is when a message comes."""
+    command: Command = "trajectory"
+    """trajectory: trajectory_msgs/JointTrajectory that ends at rest. velocities: std_msgs/Float64MultiArray, for a
+    controller that stops by itself when none comes any more."""
+    command_topic: str = ""
+    """Topic of the commands; '': that of a joint_trajectory_controller, or /CONTROLLER/commands."""
+    controller: str = ""
+    """Name of the controller that takes velocities; it must have a command time-out."""
+    timeout_s: NonNegative = 0.0
+    """That time-out [s], at most 0.5."""
+    hold_s: Annotated[float, Check(low=0.0, high=0.5, open_low=True)] = 0.05
+    """How long a trajectory goes on at the commanded velocity before it brakes, should no other one come [s]. What
+    reaches the arm's controller late or early by t disturbs its acceleration by 6 v t / hold_s^2."""
+    settle_s: Positive = 0.5
+    """Time in which the first trajectory brings the arm to where it was measured [s]: what its controller commanded by
+    then is not known."""
+    follow_most_rad: Positive = 0.15
+    """Distance between a joint's commanded and measured position from which the arm does not follow [rad]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("joint_states", "wrench"):
+            check_topic("ArmParams", name, getattr(self, name))
+        if self.command == "velocities":
+            self._check_controller()
+        check_topic("ArmParams", "command_topic", self.commands_on)
+        if len(set(self.joint_names)) < len(self.joint_names):
+            raise ParameterError(f"ArmParams.joint_names is {', '.join(self.joint_names)}: name each joint once.")
+
+    def _check_controller(self) -> None:
+        if not self.controller or not 0 < self.timeout_s <= 0.5:
+            raise ParameterError(
+                f"ArmParams.controller is {self.controller!r} with timeout_s {self.timeout_s:g}: velocities need the"
+                " name of a controller that stops by itself and its command time-out, at most 0.5 s, or else the arm"
+                " would go on when this program dies; otherwise use trajectory."
+            )
+
+    @property
+    def commands_on(self) -> str:
+        """Topic of the commands."""
+        return self.command_topic or (
+            _JOINT_TRAJECTORY if self.command == "trajectory" else f"/{self.controller.strip('/')}/commands"
+        )
+
+    @property
+    def zeros_missing(self) -> bool:
+        """Whether a wrench of zeros only is none."""
+        return self.zeros == "missing" or (self.zeros == "auto" and self.sign == "by-robot")
+
+
+@dataclass(frozen=True)
+class SkinParams(Checked):
+    """Sensor units behind topics of sensor_msgs/Range."""
+
+    topic: str = f"/skin/{UNIT}/range"
+    """Topic of each unit, or without `{unit}` one topic for all, on which frame_id is the unit's id."""
+    shared_clock: bool = False
+    """See `ArmParams`."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_topic("SkinParams", "topic", self.topic.replace(UNIT, "u"))
+
+
+@dataclass(frozen=True)
+class OutputParams(Checked):
+    """What to publish of the controller's steps."""
+
+    rate_hz: Annotated[float, Check(low=0.0, high=100.0, open_low=True)] = 25.0
+    """Steps published each second, at most; contacts and changes of the mode always are [Hz]."""
+    diagnostics_hz: Annotated[float, Check(low=0.0, high=10.0, open_low=True)] = 1.0
+    """Rate of /diagnostics [Hz]."""
+    namespace: str = "/pretouch"
+    """What our topics begin with."""
+    base_frame: str = ""
+    """Name of the base frame; '': the model's first link."""
+    links: bool = False
+    """Whether the links' transforms go to /tf: only where no robot_state_publisher does that."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_topic("OutputParams", "namespace", self.namespace)
+
+
+def check_topic(owner: str, name: str, topic: str) -> None:
+    """Refuse what ROS 2 does not take as the full name of a topic: a ParameterError."""
+    if not _TOPIC.fullmatch(topic) or not topic.startswith("/"):
+        raise ParameterError(
+            f"{owner}.{name} is {topic!r}: give a topic's full name, as /arm/joint_states: letters, digits and"
+            " underscores between slashes, none beginning with a digit."
+        )
+
+
+def seconds(sec: int, nanosec: int) -> float:
+    """Return a ROS time or duration [s]."""
+    return sec + nanosec / 1e9
+
+
+def parts(duration: float) -> tuple[int, int]:
+    """Return a time or duration [s] as whole seconds and nanoseconds."""
+    nanoseconds = math.floor(duration * 1e9 + 0.5)
+    return nanoseconds // 10**9, nanoseconds % 10**9

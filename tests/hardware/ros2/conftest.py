@@ -1,0 +1,38 @@
+"""What the tests of ROS 2 share: a DDS domain that no other test process of this machine uses."""
+
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+from pretouch.hardware.ros2.node import Ros2Node
+from pretouch.hardware.ros2.params import NodeParams
+
+# beyond 101 its ports are those that the system gives to anybody
+_DOMAINS = range(20, 101)
+
+
+@pytest.fixture(scope="session")
+def domain() -> Iterator[int]:
+    """A domain; a name in the kernel, gone with the process, says that it is taken."""
+    for number in _DOMAINS:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as taken:
+            try:
+                taken.bind(f"\0pretouch-tests-dds-{number}")
+            except OSError:
+                continue
+            yield number
+            return
+    pytest.fail("All DDS domains are taken by other tests.")
+
+
+@pytest.fixture
+def node(domain: int) -> Iterator[Ros2Node]:
+    with Ros2Node(NodeParams(domain=domain)) as made:
+        yield made
+
+
+@pytest.fixture
+def other(domain: int) -> Iterator[Ros2Node]:
+    with Ros2Node(NodeParams(domain=domain)) as made:
+        yield made

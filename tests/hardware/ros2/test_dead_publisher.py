@@ -1,0 +1,60 @@
+"""The program that commands the arm dies: the arm comes to rest, by what it was sent last."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic, sleep
+
+import numpy as np
+import pytest
+
+from pretouch.hardware.ros2.params import ArmParams
+from pretouch.robot.description import panda
+from tests.hardware.ros2.processes import HERE, arm_peer
+
+PANDA = panda()
+HOLD_S = ArmParams("on-robot", "base").hold_s
+LATE_S = 0.1
+"""How late a busy machine may hand a message on [s]."""
+
+
+@pytest.mark.parametrize(
+    "ending",
+    [pytest.param(signal.SIGKILL, id="killed"), pytest.param(signal.SIGSTOP, id="frozen", marks=pytest.mark.slow)],
+)
+def test_an_arm_whose_commands_end_comes_to_rest_within_its_limits(
+    domain: int, tmp_path: Path, ending: signal.Signals
+) -> None:
+    with arm_peer(domain, tmp_path / "log.npy", "--ideal") as arm:
+        command = [sys.executable, str(HERE / "commander.py"), str(domain)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as commander:
+            try:
+                assert commander.stdout is not None
+                for line in commander.stdout:
+                    last = np.array(line.split(), dtype=float)
+                    if np.abs(last).max() > 0.75:
+                        break
+                commander.send_signal(ending)
+                ended = monotonic()
+                sleep(0.8)
+            finally:
+                commander.kill()
+        log = arm.stop()
+    time, q, qd = log[:, 0], log[:, 1:8], log[:, 8:]
+    moving = np.abs(qd).max(axis=1) > 1e-9
+    at_end = np.searchsorted(time, ended)
+    assert np.abs(qd[at_end]).max() > 0.5
+    # a command or two may still have been on its way
+    braking = float((np.abs(qd[at_end : at_end + 20]).max(axis=0) / PANDA.qdd_max).max())
+    rest = time[at_end:][~moving[at_end:]][0] - ended
+    assert rest < HOLD_S + braking + LATE_S
+    assert not moving[-300:].any()
+    # what the controller asked for, differentiated, once the first trajectory has settled
+    dt = np.diff(time)
+    acceleration = np.abs(np.diff(qd, axis=0) / dt[:, None])[700:] / PANDA.qdd_max
+    braked = slice(at_end - 700 + round(1000 * HOLD_S), None)
+    assert acceleration[braked].max() < 1.001
+    assert np.percentile(acceleration, 99) < 1.1  # some messages come late on a busy machine
+    steps = np.diff(q, axis=0)[700:] / dt[700:, None]
+    assert np.abs(steps - (qd[701:] + qd[700:-1]) / 2).max() < 0.05

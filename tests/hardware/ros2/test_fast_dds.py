@@ -1,0 +1,135 @@
+"""Against Fast DDS and Fast CDR, which are under rmw_fastrtps: another DDS, and another encoder, in both directions."""
+
+import math
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from time import sleep
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pretouch.hardware.ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, WRENCH
+from pretouch.hardware.ros2.node import Ros2Node
+from pretouch.hardware.ros2.params import Distribution, NodeParams
+
+HERE = Path(__file__).parent
+LAYOUTS = {
+    JOINT_STATE: "ius[s][d][d][d]",
+    WRENCH: "iusdddddd",
+    RANGE: "iusbfffff",
+    TRAJECTORY: "ius[s][[d][d][d][d]iu]",
+}
+DDS_NAMES = {
+    JOINT_STATE: "sensor_msgs::msg::dds_::JointState_",
+    WRENCH: "geometry_msgs::msg::dds_::WrenchStamped_",
+    RANGE: "sensor_msgs::msg::dds_::Range_",
+    TRAJECTORY: "trajectory_msgs::msg::dds_::JointTrajectory_",
+}
+LINES = {
+    JOINT_STATE: [
+        "12 34 :panda_link0 3 :a :bcd :panda_joint3 3 0.1 nan -inf 0 1 1e-300",
+        f"-1 999999999 : 0 2 1.5 {math.pi!r} 0 0",
+        f"2 0 :{'x' * 3001} 1 : 1 0 1 2 1 3",
+    ],
+    WRENCH: ["1 2 :fr3_link0 1 -2 3.25 nan inf -0.5", "0 0 : 0 0 0 0 0 0"],
+    RANGE: ["7 8 :forearm_1 1 0.5 0.0625 4 inf 0.25", "0 1 :u 0 0 0 0 -inf nan"],
+    TRAJECTORY: [
+        "0 0 : 2 :j1 :j2 2 2 0.1 0.2 2 1 -1 0 0 0 50000000 2 0.3 0.4 2 0 0 0 0 1 0",
+        "0 0 :base 1 :joint 0",
+    ],
+}
+
+
+@pytest.fixture(scope="session")
+def fast_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    compiler = shutil.which("g++")
+    if compiler is None or not Path("/usr/include/fastdds/dds/domain/DomainParticipant.hpp").exists():
+        pytest.skip("needs g++ and libfastrtps-dev")
+    built = tmp_path_factory.mktemp("fast_dds") / "fast_peer"
+    command = [compiler, "-std=c++17", "-O0", "-o", str(built), str(HERE / "fast_peer.cpp")]
+    subprocess.run([*command, "-lfastrtps", "-lfastcdr"], check=True)
+    return built
+
+
+def peer(fast_peer: Path, domain: int, kind: str, *how: str, layout: str = "") -> subprocess.Popen[str]:
+    given = [str(domain), "rt/topic", DDS_NAMES[kind], layout or LAYOUTS[kind], *how]
+    return subprocess.Popen([fast_peer, *given], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def words_of(message: Any) -> Iterator[str]:
+    """Write a message as Fast DDS' peer does, through the fields that rosbags gave it."""
+    if isinstance(message, str):
+        yield f":{message}"
+    elif isinstance(message, list | np.ndarray):
+        yield str(len(message))
+        for element in message:
+            yield from words_of(element)
+    elif isinstance(message, int | float | np.number):
+        yield repr(float(message))
+    else:
+        for name in message.__dataclass_fields__:
+            if name.islower() and name[0] != "_":  # no constant, and not the type
+                yield from words_of(getattr(message, name))
+
+
+def same(one: str, another: str) -> bool:
+    """Whether two lines say the same, numbers by their value."""
+    pairs = list(zip(one.split(" "), another.split(" "), strict=True))
+    return all(a == b if a[:1] == ":" else repr(float(a)) == repr(float(b)) for a, b in pairs)
+
+
+@pytest.mark.parametrize(("kind", "how"), [*((kind, "reliable") for kind in LINES), (JOINT_STATE, "best")])
+def test_what_fast_dds_publishes_is_read(fast_peer: Path, node: Ros2Node, domain: int, kind: str, how: str) -> None:
+    got: list[str] = []
+    subscription = node.subscribe("/topic", kind, lambda message, *_: got.append(" ".join(words_of(message))))
+    with peer(fast_peer, domain, kind, "pub", how) as process:
+        assert node.wait_for(lambda: subscription.publishers == 1, 20)
+        process.communicate("".join(f"{line}\n" for line in LINES[kind]), timeout=30)
+    assert process.returncode == 0
+    assert node.wait_for(lambda: len(got) == len(LINES[kind]), 5)
+    assert all(same(a, b) for a, b in zip(got, LINES[kind], strict=True)), got
+
+
+@pytest.mark.parametrize("kind", LINES)
+def test_fast_dds_reads_what_is_published(
+    fast_peer: Path, node: Ros2Node, other: Ros2Node, domain: int, kind: str
+) -> None:
+    # what is to be published is made from bytes of Fast CDR, read once
+    messages: list[Any] = []
+    subscription = other.subscribe("/topic", kind, lambda message, *_: messages.append(message), reliable=True)
+    with peer(fast_peer, domain, kind, "pub", "reliable") as process:
+        assert other.wait_for(lambda: subscription.publishers == 1, 20)
+        process.communicate("".join(f"{line}\n" for line in LINES[kind]), timeout=30)
+    assert other.wait_for(lambda: len(messages) == len(LINES[kind]), 5)
+    publisher = node.publisher("/topic", kind)
+    with peer(fast_peer, domain, kind, "sub", str(len(messages))) as process:
+        assert node.wait_for(lambda: publisher.subscribers == 2, 20)
+        sleep(0.2)  # until the other side has matched too
+        for message in list(messages):
+            publisher.publish(message)
+        printed, _ = process.communicate(timeout=30)
+    assert process.returncode == 0
+    lines = [line.strip() for line in printed.splitlines()]
+    assert all(same(a, b) for a, b in zip(lines, LINES[kind], strict=True)), lines
+
+
+@pytest.mark.parametrize("distribution", ["humble", "jazzy"])
+def test_a_range_of_the_other_layout_is_not_taken_for_ours(
+    fast_peer: Path, domain: int, distribution: Distribution
+) -> None:
+    theirs = {"humble": "iusbfffff", "jazzy": "iusbffff"}[distribution]
+    line = "7 8 :forearm_1 1 0.5 0.0625 4 1.5" + (" 0.25" if distribution == "humble" else "")
+    got: list[Any] = []
+    with Ros2Node(NodeParams(distribution, domain)) as node:
+        subscription = node.subscribe("/topic", RANGE, lambda message, *_: got.append(message))
+        with peer(fast_peer, domain, RANGE, "pub", "reliable", layout=theirs) as process:
+            assert process.stdin is not None
+            print(line, file=process.stdin, flush=True)
+            assert node.wait_for(lambda: bool(subscription.unreadable), 20)
+            said = subscription.unreadable
+            process.communicate(timeout=30)
+        assert f"sensor_msgs/msg/Range of {distribution}: choose the distribution" in said
+    assert not got

@@ -1,0 +1,184 @@
+"""What is published of the controller's steps, and that the control loop does not wait for it."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from time import perf_counter, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, TEXT, TRANSFORMS, VECTOR, WRENCH
+from pretouch.hardware.ros2.node import Ros2Node
+from pretouch.hardware.ros2.output import Ros2Output
+from pretouch.hardware.ros2.params import OutputParams
+from pretouch.loop import Cycle
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import Inputs
+from tests.following_arm import DT, Arm
+
+TOPICS = {
+    "/pretouch/obstacles": CLOUD, "/pretouch/markers": MARKERS, "/pretouch/force": WRENCH,
+    "/pretouch/threshold_upper": VECTOR, "/pretouch/threshold_lower": VECTOR, "/pretouch/contact": WRENCH,
+    "/pretouch/mode": TEXT, "/diagnostics": DIAGNOSTICS, "/tf": TRANSFORMS, "/tf_static": TRANSFORMS,
+}  # fmt: skip
+LATCHED = ("/pretouch/mode", "/tf_static")
+
+
+class Listener:
+    """Keeps what is published on each of the topics."""
+
+    def __init__(self, node: Ros2Node) -> None:
+        self.heard: dict[str, list[Any]] = defaultdict(list)
+        self._node = node
+        self.subscriptions = {
+            topic: node.subscribe(topic, kind, lambda message, *_, topic=topic: self.heard[topic].append(message),
+                                  reliable=True, latched=topic in LATCHED)
+            for topic, kind in TOPICS.items()
+        }  # fmt: skip
+
+    def last(self, topic: str) -> Any:
+        assert self._node.wait_for(lambda: bool(self.heard[topic]), 5), topic
+        return self.heard[topic][-1]
+
+    def found(self) -> bool:
+        return self._node.wait_for(lambda: all(s.publishers for s in self.subscriptions.values()), 10)
+
+
+class Course:
+    """An arm that follows its commands, whose turns are recorded."""
+
+    def __init__(self, model: RobotModel, skin: Skin, node: Ros2Node, **params: Any) -> None:
+        self.arm = Arm(model, skin)
+        self.output = Ros2Output(OutputParams(**params), self.arm.controller, node)
+
+    def turn(self, force: tuple[float, float, float] = (0.0, 0.0, 0.0), seen: dict[int, float] | None = None) -> Cycle:
+        inputs = Inputs(self.arm.time, self.arm.robot(force), self.arm.readings(seen))
+        before = self.arm.state
+        step = self.arm.step(force, seen)
+        cycle = Cycle(inputs, before, step, self.arm.state)
+        self.output.record(cycle)
+        return cycle
+
+
+@pytest.fixture
+def listener(other: Ros2Node) -> Listener:
+    return Listener(other)
+
+
+@pytest.fixture
+def course(panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener) -> Iterator[Course]:
+    course = Course(panda_model, paper_skin, node, links=True, diagnostics_hz=10.0)
+    assert listener.found()
+    sleep(0.1)  # until they have matched the other way too
+    yield course
+    course.output.close()
+
+
+def test_a_step_is_published_by_standard_messages(
+    course: Course, listener: Listener, panda_model: RobotModel, paper_skin: Skin
+) -> None:
+    for _ in range(3):
+        cycle = course.turn((1.0, 2.0, 3.0), {0: 0.4, 2: 0.3})
+        sleep(0.05)
+    step = cycle.step
+    assert len(step.obstacles.unit) == 2
+    cloud = listener.last("/pretouch/obstacles")
+    assert [(f.name, f.offset, f.datatype) for f in cloud.fields] == [
+        ("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("distance", 12, 7), ("unit", 16, 6),
+    ]  # fmt: skip
+    rows = np.frombuffer(cloud.data.tobytes(), "<f4").reshape(cloud.width, 5)
+    assert (cloud.width, cloud.point_step, cloud.row_step) == (2, 20, 40)
+    assert rows[:, :3] == pytest.approx(step.obstacles.point, abs=1e-6)
+    assert rows[:, 3] == pytest.approx(step.obstacles.body_distance, abs=1e-6)
+    assert rows[:, 4].view("<u4").tolist() == step.obstacles.unit.tolist()
+    force = listener.last("/pretouch/force")
+    assert (force.header.frame_id, force.wrench.force.z) == (panda_model.links[0], 3.0)
+    assert listener.last("/pretouch/threshold_upper").vector.x == pytest.approx(step.thresholds.upper[0])
+    assert listener.last("/pretouch/threshold_lower").vector.y == pytest.approx(step.thresholds.lower[1])
+    assert listener.last("/pretouch/mode").data.startswith("HOLD: The force window is filling")
+    spheres, lines, _, words = listener.last("/pretouch/markers").markers
+    assert [(p.x, p.y, p.z) for p in spheres.points] == [pytest.approx(tuple(p)) for p in step.obstacles.point]
+    assert len(lines.points) == 4
+    assert words.text == "HOLD"
+
+
+def test_links_and_units_lie_where_the_model_has_them(
+    course: Course, listener: Listener, panda_model: RobotModel, paper_skin: Skin
+) -> None:
+    cycle = course.turn()
+    kin = panda_model.kinematics(cycle.step.q)
+    places = {t.child_frame_id: t for t in listener.last("/tf").transforms}
+    for name, position, rotation in zip(panda_model.links[1:], kin.position[1:], kin.rotation[1:], strict=True):
+        p, r = places[name].transform.translation, places[name].transform.rotation
+        assert [p.x, p.y, p.z] == pytest.approx(position, abs=1e-9)
+        assert Rotation.from_quat([r.x, r.y, r.z, r.w]).as_matrix() == pytest.approx(rotation, abs=1e-9)
+    units = listener.last("/tf_static").transforms
+    assert [t.child_frame_id for t in units] == list(paper_skin.ids)
+    assert [t.header.frame_id for t in units] == [unit.link for unit in paper_skin.units]
+
+
+def test_each_contact_and_each_change_of_the_mode_is_published(course: Course, listener: Listener) -> None:
+    for _ in range(105):
+        course.turn()
+    cycle = course.turn((0.0, 40.0, 0.0))
+    contacts = int(cycle.step.contact is not None)
+    for _ in range(60):
+        contacts += course.turn((0.0, 40.0, 0.0)).step.contact is not None
+    assert contacts == 1
+    assert listener.last("/pretouch/contact").wrench.force.y > 10
+    modes = ["HOLD", "TRACK", "REACT"]
+    assert listener._node.wait_for(
+        lambda: [m for m in modes if any(t.data.startswith(m) for t in listener.heard["/pretouch/mode"])] == modes, 5
+    )
+    sleep(0.1)
+    assert len(listener.heard["/pretouch/contact"]) == 1
+
+
+def test_a_silent_unit_is_an_error_in_the_diagnostics(course: Course, listener: Listener, paper_skin: Skin) -> None:
+    readings = course.arm.readings(silent={1: 0.5, 2: 0.2})
+    inputs, before = Inputs(course.arm.time, course.arm.robot(), readings), course.arm.state
+    course.output.record(Cycle(inputs, before, course.arm.step(), course.arm.state))
+    first, *units = listener.last("/diagnostics").status
+    assert first.name == "pretouch: controller"
+    assert (first.level, first.message.split(":")[0]) == (1, "HOLD")
+    assert [unit.level for unit in units][:4] == [0, 2, 1, 0]
+    assert [unit.hardware_id for unit in units] == list(paper_skin.ids)
+    assert units[1].message == "heard 0.50 s ago"
+
+
+def test_steps_are_published_at_the_rate_that_was_asked_for(
+    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
+) -> None:
+    course = Course(panda_model, paper_skin, node, rate_hz=20.0, links=True)
+    assert listener.found()
+    for _ in range(50):
+        course.turn()
+        sleep(DT)
+    course.output.close()
+    assert 5 <= len(listener.heard["/pretouch/force"]) <= 25
+    assert course.output.dropped == 0
+
+
+def test_recording_a_step_takes_the_loop_little_time(course: Course) -> None:
+    took = []
+    for _ in range(100):
+        cycle = course.turn()
+        begin = perf_counter()
+        course.output.record(cycle)
+        took.append(perf_counter() - begin)
+        sleep(DT)
+    assert np.median(took) < 0.3e-3
+
+
+def test_the_last_steps_are_published_before_the_end(
+    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
+) -> None:
+    course = Course(panda_model, paper_skin, node, links=True)
+    assert listener.found()
+    sleep(0.1)
+    course.turn()
+    course.output.close()
+    assert listener.last("/pretouch/mode").data.startswith("HOLD")
