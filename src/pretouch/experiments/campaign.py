@@ -15,15 +15,20 @@ from typing import Any, Literal, cast, get_args
 from pretouch import __version__
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.experiments.cell import Cell, Context, Grid
+from pretouch.experiments.placement import placement_for
 from pretouch.experiments.registry import EXPERIMENTS
 from pretouch.experiments.workers import interrupt_held_back, workers
 from pretouch.params import Orientation, RestrictionMode, profile
 from pretouch.robot.description import panda
+from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
 
 Recorded = Literal["first", "all"]
 """Trials to record: those of the first seed of which figures are drawn, or all."""
+
+
+_FOR_ANY_ARM = ("static",)
 
 
 @dataclass(frozen=True)
@@ -43,12 +48,19 @@ class Request:
     """Skin file, or None for the seven units of the paper's experiment."""
     record: str = "first"
     """Trials to record, `Recorded`."""
+    arm: str | None = None
+    """Folder of an imported arm, or its robot.toml; None for the Panda."""
 
     def __post_init__(self) -> None:
         for name in self.experiments:
             if name not in EXPERIMENTS:
                 known = ", ".join([*EXPERIMENTS, "all"])
                 raise ExperimentError(f"The experiment {name!r} is unknown: choose from {known}.")
+        others = [name for name in self.experiments if name not in _FOR_ANY_ARM]
+        if self.arm is not None and others:
+            raise ExperimentError(
+                f"The experiment {others[0]!r} is laid out for the Panda: with --arm, choose {', '.join(_FOR_ANY_ARM)}."
+            )
         if self.seeds < 1:
             raise ExperimentError(f"The number of seeds is {self.seeds}: give at least 1.")
         if not self.profiles or len(set(self.profiles)) < len(self.profiles):
@@ -74,9 +86,16 @@ class Request:
 
     def context(self) -> Context:
         """Load what all trials share."""
-        model = RobotModel(panda())
-        skin = load_skin(Path(self.skin), model) if self.skin else paper_skin(model)
-        return Context(model, skin, cast(Orientation | None, self.orientation))
+        model = RobotModel(load_description(self.arm) if self.arm else panda())
+        skin = load_skin(self.skin_file, model) if self.skin or self.arm else paper_skin(model)
+        return Context(model, skin, cast(Orientation | None, self.orientation), placement_for(model))
+
+    @property
+    def skin_file(self) -> Path:
+        """The skin's file: the one asked for, or else the arm's own."""
+        if self.skin:
+            return Path(self.skin)
+        return _arm_folder(self.arm) / "skin.toml" if self.arm else PAPER_SKIN
 
     def tasks(self) -> list[tuple[Cell, int]]:
         """Every trial once, seed by seed, so that a stopped run has some of each cell."""
@@ -84,6 +103,10 @@ class Request:
         cells = [cell for name in self.experiments for cell in EXPERIMENTS[name].cells(grid)]
         once = list({cell.name: cell for cell in cells}.values())
         return [(cell, seed) for seed in range(self.seeds) for cell in once]
+
+
+def _arm_folder(arm: str) -> Path:
+    return Path(arm) if Path(arm).is_dir() else Path(arm).parent
 
 
 def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:
@@ -110,15 +133,24 @@ def open_folder(request: Request, out: Path) -> None:
 
 def _fingerprints(request: Request) -> dict[str, str]:
     """Digests of what a request only names: the skin file, and the parameters of each profile."""
-    path = Path(request.skin) if request.skin else PAPER_SKIN
+    path = request.skin_file
     try:
         digests = {"the skin file has": sha256(path.read_bytes()).hexdigest()}
     except OSError as error:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
+    if request.arm:
+        digests["the arm's files have"] = sha256(_arm_files(request.arm)).hexdigest()
     for name in dict.fromkeys(cell.profile for cell, _ in request.tasks()):
         parameters = json.dumps(asdict(profile(name)), sort_keys=True, default=repr)
         digests[f"the parameters of profile {name} have"] = sha256(parameters.encode()).hexdigest()
     return digests
+
+
+def _arm_files(arm: str) -> bytes:
+    """Content of an arm's files."""
+    mjcf = load_description(arm).mjcf
+    file = Path(arm) / FILE if Path(arm).is_dir() else Path(arm)
+    return file.read_bytes() + mjcf.read_bytes()
 
 
 def _check_same(found: dict[str, Any], wanted: dict[str, Any], out: Path) -> None:

@@ -6,6 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import cast
 
+from pretouch.experiments.placement import Placement
 from pretouch.params import Orientation, Profile, RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -66,6 +67,8 @@ class Context:
     skin: Skin
     orientation: Orientation | None = None
     """Whether the hand's orientation is free or held, or None for the profile's own."""
+    placement: Placement = field(default_factory=Placement)
+    """Where the paper's paths are for this arm: the static experiment's."""
     recording: Path | None = None
     """File to record the trial in, if it is to be recorded."""
 

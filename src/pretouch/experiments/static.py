@@ -6,16 +6,18 @@ from typing import Any, cast
 
 import numpy as np
 
-from pretouch.control.path import Circle, Path, line
+from pretouch.control.path import Path
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import mean_over, peak, rounded
+from pretouch.experiments.placement import Placement
 from pretouch.experiments.summary import static_summary
 from pretouch.experiments.tables import shown_controllers, static_tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
-from pretouch.sim.board import FACE_M, Side, board_beside
+from pretouch.sim.board import FACE_M, Side, board_beside, sign_of
 from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import plant_params_of
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import ControlStep
 
@@ -32,6 +34,7 @@ _CENTER_SPREAD_M = 0.02
 """The seed moves the board along x and z by up to this [m]."""
 _TIME_LIMIT_S = 40.0
 _AFTER_DETECTION_S = 1.0
+_PAPER = Placement()
 
 
 def cells(grid: Grid) -> list[Cell]:
@@ -48,20 +51,18 @@ def cells(grid: Grid) -> list[Cell]:
     ]
 
 
-def path(trajectory: str, side: str) -> Path:
+def path(trajectory: str, side: str, placement: Placement = _PAPER) -> Path:
     """Return the paper's path, begun on the side away from the object so that the arm runs into it at speed."""
-    sign = 1.0 if side == "+y" else -1.0
-    if trajectory == "circle":
-        return Circle(start_angle=np.pi if side == "+y" else 0.0)
-    return line((0.4, -0.5 * sign, 0.5), (0.4, 0.5 * sign, 0.5))
+    return placement.path(trajectory, sign_of(cast(Side, side)))
 
 
-def scene(trajectory: str, side: str, stiffness: float, seed: int) -> SceneSpec:
+def scene(trajectory: str, side: str, stiffness: float, seed: int, placement: Placement = _PAPER) -> SceneSpec:
     """Return a board on one side, at another place with each seed."""
-    rng = np.random.default_rng([seed, 10])
+    rng, on = np.random.default_rng([seed, 10]), cast(Side, side)
     face = FACE_M + _FACE_SPREAD_M * rng.uniform(-1, 1)
     aside, above = _CENTER_SPREAD_M * rng.uniform(-1, 1, 2)
-    board = board_beside(path(trajectory, side), cast(Side, side), stiffness, face, aside, above)
+    way = path(trajectory, side, placement)
+    board = board_beside(way, on, stiffness, placement.face(face, on), aside, above, placement.hand(on))
     return SceneSpec(boxes=(board,))
 
 
@@ -72,9 +73,10 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         model=context.model,
         skin=context.skin,
         profile=context.profile(cell),
-        scene=scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
-        path=path(trajectory, side),
+        scene=scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed, context.placement),
+        path=path(trajectory, side, context.placement),
         seed=seed,
+        plant=plant_params_of(context.model.description),
         recording=context.recording,
     )
     record = play(setup, done_after_contact())

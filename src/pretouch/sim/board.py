@@ -1,5 +1,6 @@
 """The board of the paper's static experiment: what the arm's hand runs into beside it."""
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,8 +17,19 @@ _HALF_SIZE_M = (0.15, 0.02, 0.12)
 """Half the size of the board [m]."""
 _OUTWARDS_M = 0.12
 """Its centre is this much farther from the base in x than the hand that meets it [m]."""
-_HAND_HALF_WIDTH_M, _HAND_ABOVE_TCP_M = 0.102, 0.057
-"""Where the side of the robot's hand is from the end-effector's origin, hand upright [m]."""
+
+
+@dataclass(frozen=True)
+class HandSide:
+    """Where the side of the robot's hand that meets the board is, hand as in the ready posture."""
+
+    aside: float = 0.102
+    """How far it is out from the end-effector's origin, along y [m]; the Panda's."""
+    above: float = 0.057
+    """How far it is above the end-effector's origin [m]; the Panda's."""
+
+
+PANDA_SIDE = HandSide()
 
 
 def sign_of(side: Side) -> float:
@@ -26,8 +38,9 @@ def sign_of(side: Side) -> float:
 
 
 def board_beside(
-    path: Path, side: Side, stiffness: float, face: float = FACE_M, aside: float = 0.0, above: float = 0.0
-) -> Box:
+    path: Path, side: Side, stiffness: float, face: float = FACE_M, aside: float = 0.0, above: float = 0.0,
+    hand: HandSide = PANDA_SIDE,
+) -> Box:  # fmt: skip
     """Return a board, 0.3 m by 0.24 m, where the robot's hand on a path first meets its plane.
 
     It does not reach inwards to where the forearm, which is wider than the hand, would meet it first.
@@ -39,15 +52,16 @@ def board_beside(
         face: distance of its face from the plane y = 0 [m].
         aside: by how much it is moved along x [m].
         above: by how much it is moved along z [m].
+        hand: where the side of the hand is that meets it.
     """
     sign = sign_of(side)
     ahead = map(path.point, np.linspace(0.0, path.length, 2000))
-    meeting = next((p for p in ahead if sign * p[1] >= face - _HAND_HALF_WIDTH_M), None)
+    meeting = next((p for p in ahead if sign * p[1] >= face - hand.aside), None)
     if meeting is None:
         raise PathError(f"The path never comes to the board at y = {sign * face:g} m: choose another path or side.")
     center = (
         meeting[0] + _OUTWARDS_M + aside,
         sign * (face + _HALF_SIZE_M[1]),
-        meeting[2] + _HAND_ABOVE_TCP_M + above,
+        meeting[2] + hand.above + above,
     )
     return Box("object", center, _HALF_SIZE_M, stiffness)

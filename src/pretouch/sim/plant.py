@@ -39,6 +39,7 @@ class Plant:
 
     def __init__(self, model: RobotModel, scene: SceneSpec, params: PlantParams, q: FloatArray, seed: int) -> None:
         """Build an arm at rest at q (n,) [rad]; the seed decides its errors and its noise."""
+        params.check_joints(model.n)
         self.model, self.scene, self.params, self._n = model, scene, params, model.n
         rng = np.random.default_rng([seed, 1])
         self._rng = np.random.default_rng([seed, 2])

@@ -1,9 +1,13 @@
 """How far the simulated arm is from its model, and how its sensors err: figures of real Pandas."""
 
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
+from pretouch.errors import ParameterError
+from pretouch.robot.description import RobotDescription, panda
 
 Joints = tuple[float, ...]
 
@@ -52,3 +56,35 @@ class PlantParams(Checked):
     """Smallest singular value of the Jacobian at which the robot still gives a wrench."""
     set_point_hz: Annotated[float, Check(low=0.0, open_low=True)] = 100.0
     """Low-pass on the velocity set-points, the vendor's default cut-off [Hz]."""
+
+    def check_joints(self, n: int) -> None:
+        """Raise ParameterError unless there is one value for each of n joints."""
+        for name in (*_SCALED, *_KEPT):
+            count = len(getattr(self, name))
+            if count != n:
+                raise ParameterError(
+                    f"PlantParams.{name} has {count} values, the arm {n} joints: take plant_params_of(description)."
+                )
+
+
+_SCALED = ("friction_f1_nm", "torque_noise_nm", "torque_offset_nm", "ripple_nm")
+"""Torques: they grow with the size of a drive."""
+_KEPT = ("stiffness_nm_rad", "friction_f2_s_rad", "friction_f3_rad_s", "ripple_cycles")
+
+
+def plant_params_of(arm: RobotDescription) -> PlantParams:
+    """Return figures for an arm of any number of joints, from the Panda's: assumptions, measured on no such arm.
+
+    Each joint takes the figures of the Panda's joint at the same place between base and hand. Torques of friction,
+    noise, offset and ripple are scaled by the ratio of the two joints' torque limits; all else is kept. An arm with as
+    many joints as the Panda and its torque limits, such as the FR3, so has the Panda's own.
+    """
+    known, n = panda(), len(arm.q_ready)
+    place = np.rint(np.linspace(0, len(known.q_ready) - 1, n)).astype(np.int64)
+    size = arm.tau_max / known.tau_max[place]
+    own = PlantParams()
+    figures: dict[str, Any] = {
+        name: tuple((np.array(getattr(own, name))[place] * (size if name in _SCALED else 1.0)).tolist())
+        for name in (*_SCALED, *_KEPT)
+    }
+    return replace(own, **figures)

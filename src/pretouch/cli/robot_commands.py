@@ -1,0 +1,57 @@
+"""What can be said after `pretouch robot`: one dataclass a command, its docstrings are the help."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Import:
+    """Read your own arm from a URDF or MJCF file: fit capsules to its links, and write a description of it.
+
+    Look at what is printed: all that the file does not say is assumed, with a sentence for each.
+    """
+
+    file: tyro.conf.Positional[str]
+    """URDF file (of xacro, not the template) or MJCF file."""
+    out: str = ""
+    """Folder to write robot.toml, arm.xml and skin.toml to; by default the arm's name."""
+    ee: str = ""
+    """Link whose origin is the end-effector; by default the likeliest one."""
+    name: str = ""
+    """Name of the arm; by default the file's."""
+    package_path: str = ""
+    """Folders that hold the ROS packages of package:// paths, separated by commas; those above the file are searched
+    anyhow."""
+    qd_max: str = ""
+    """Joint velocity limits [rad/s], one or one a joint, separated by commas; by default the file's."""
+    qdd_max: str = ""
+    """Joint acceleration limits [rad/s^2]; no file has them."""
+    tau_max: str = ""
+    """Joint torque limits [Nm]; by default the file's."""
+    ready: str = ""
+    """Usual posture to start from [rad], one position a joint, separated by commas; by default one is searched for."""
+    capsules: int = 3
+    """Capsules for one link at most."""
+    force: bool = False
+    """Write to a folder that is there: what is in it is kept under another name."""
+    json: str = ""
+    """File for the numbers of the fit."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Read an arm's folder as everything else does, after a change by hand, and say what is wrong with it."""
+
+    folder: tyro.conf.Positional[str]
+    """Folder of the arm, or its robot.toml."""
+    skin: str = ""
+    """Skin file; by default the folder's own."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Arms of your own: import one from its URDF or MJCF file, or check one that was changed by hand."""
+
+    what: Annotated[Import, tyro.conf.subcommand("import")] | Annotated[Check, tyro.conf.subcommand("check")]

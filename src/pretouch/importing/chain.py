@@ -1,0 +1,163 @@
+"""Which of a robot's joints make the arm: one chain of hinges from the first link to the end-effector."""
+
+from dataclasses import dataclass
+
+from pretouch.errors import RobotModelError
+from pretouch.importing.source import Source, SourceJoint, SourceLink, locked
+
+_ARM_JOINTS = 4
+"""A branch with as many hinges that nothing leads is an arm; one with fewer is a finger."""
+_NAMES = ("tcp", "tool", "grasp", "ee", "eef", "tip")
+"""What an end-effector's frame is called, the surest first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """One arm of a robot: all other joints are fixed."""
+
+    source: Source
+    """With the joints of the chain only."""
+    ee: int
+    """Index of the end-effector's link."""
+    joints: tuple[SourceJoint, ...]
+    """The n joints from base to end-effector."""
+    mount: int
+    """Index of the link that the last joint moves: the end-effector is fixed to it."""
+    remarks: tuple[str, ...]
+    """What was chosen or fixed, a sentence each."""
+
+
+def arm_of(source: Source, ee: str = "") -> Arm:
+    """Choose the chain to an end-effector, or the likeliest one; fix all joints off it.
+
+    Raises RobotModelError where there is no such chain, or where several arms leave the choice open.
+    """
+    remarks = list(source.remarks)
+    if ee:
+        end = source.index(ee)
+    else:
+        end, others = _likeliest_end(source, _trunk(source))
+        if others:
+            remarks.append(f"The end-effector is taken to be {source.links[end].name}; --ee chooses another one:"
+                           f" {', '.join(source.links[i].name for i in others)}.")  # fmt: skip
+    way = source.ancestors(end)
+    joints = tuple(joint for i in way for joint in source.links[i].joints)
+    _check_chain(source, end, joints)
+    links, fixed = _with_locked(source, joints)
+    if fixed:
+        remarks.append(
+            f"{_counted(fixed)} off the arm {'is' if len(fixed) == 1 else 'are'} fixed at 0, or at the nearest limit:"
+            f" {', '.join(fixed)}. Give fingers that are to be closed otherwise their place in the file."
+        )
+    mount = max(i for i in way if source.links[i].joints)
+    return Arm(Source(source.name, links), end, joints, mount, tuple(remarks))
+
+
+def _counted(names: list[str]) -> str:
+    return f"{len(names)} joint{'s' if len(names) > 1 else ''}"
+
+
+def _children(source: Source) -> list[list[int]]:
+    found: list[list[int]] = [[] for _ in source.links]
+    for i, link in enumerate(source.links):
+        if link.parent >= 0:
+            found[link.parent].append(i)
+    return found
+
+
+def _independent(source: Source) -> list[int]:
+    """Number of joints that nothing leads, of each link and what hangs on it, along its longest branch."""
+    count = [sum(not joint.coupled for joint in link.joints) for link in source.links]
+    deepest = [0] * len(count)
+    for i in reversed(range(len(count))):
+        count[i] += deepest[i]
+        parent = source.links[i].parent
+        if parent >= 0:
+            deepest[parent] = max(deepest[parent], count[i])
+    return count
+
+
+def _trunk(source: Source) -> int:
+    """Return the last link before the arm ends or branches into fingers.
+
+    Several branches that are arms are a RobotModelError that names their ends.
+    """
+    children, count = _children(source), _independent(source)
+    coupled = [any(joint.coupled for joint in link.joints) for link in source.links]
+    at = 0
+    while True:
+        onward = [i for i in children[at] if count[i] or coupled[i]]
+        arms = [i for i in onward if count[i] >= _ARM_JOINTS]
+        if len(arms) > 1:
+            ends = [source.links[_last(source, children, count, i)].name for i in arms]
+            raise RobotModelError(f"The robot has {len(arms)} arms: choose one by --ee, such as {', '.join(ends)}.")
+        if len(onward) > 1 and not arms:
+            return at
+        if not onward or coupled[(arms or onward)[0]]:
+            return at
+        at = (arms or onward)[0]
+
+
+def _last(source: Source, children: list[list[int]], count: list[int], at: int) -> int:
+    """Return the last link of an arm: the end of its longest branch before it splits into fingers."""
+    while True:
+        onward = [i for i in children[at] if count[i]]
+        if len(onward) != 1:
+            return at if source.links[at].name else source.links[at].parent
+        at = onward[0]
+
+
+def _likeliest_end(source: Source, trunk: int) -> tuple[int, list[int]]:
+    """Return the end-effector among the links fixed to the trunk's last, and the other ones that could be meant."""
+    children = _children(source)
+    ends, waiting = [], [trunk]
+    while waiting:
+        at = waiting.pop(0)
+        fixed = [i for i in children[at] if not source.links[i].joints]
+        waiting += fixed
+        if not fixed:
+            ends.append(at)
+
+    def likelihood(link: int) -> int:
+        words = source.links[link].name.lower().replace("-", "_").split("_")
+        return next((k for k, name in enumerate(_NAMES) if any(word.startswith(name) for word in words)), len(_NAMES))
+
+    ends.sort(key=likelihood)
+    return ends[0], ends[1:]
+
+
+def _check_chain(source: Source, end: int, joints: tuple[SourceJoint, ...]) -> None:
+    """Refuse what is no chain of hinges each of which moves by itself and has limits."""
+    name = source.links[end].name
+    if not joints:
+        moved = [link.name for i, link in enumerate(source.links) if link.joints and i]
+        raise RobotModelError(
+            f"No joint moves {name}: choose another end-effector by --ee"
+            + (f", such as {', '.join(moved[-8:])}." if moved else "; the file has no joint that moves.")
+        )
+    for joint in joints:
+        before = next(link.parent for link in source.links if joint in link.joints)
+        way_out = f"choose an end-effector before it by --ee, such as {source.links[max(before, 0)].name}, or fix it"
+        if joint.kind == "slide":
+            raise RobotModelError(f"The joint {joint.name} slides, only hinges are supported: {way_out} in the file.")
+        if joint.kind == "other":
+            raise RobotModelError(f"The joint {joint.name} is no hinge, only these are supported: {way_out}.")
+        if joint.coupled:
+            raise RobotModelError(f"The joint {joint.name} follows another one, as fingers do: {way_out}.")
+        if joint.limits is not None and not joint.limits[0] < joint.limits[1]:
+            raise RobotModelError(
+                f"The joint {joint.name} has the range {joint.limits[0]:g} to {joint.limits[1]:g}: give it lower and"
+                " upper limits in the file."
+            )
+
+
+def _with_locked(source: Source, chain: tuple[SourceJoint, ...]) -> tuple[tuple[SourceLink, ...], list[str]]:
+    """Return the links with all joints fixed but those of the chain, and the names of the fixed ones."""
+    fixed, links = [], []
+    for link in source.links:
+        for joint in link.joints:
+            if joint not in chain:
+                link = locked(link, joint)
+                fixed.append(joint.name)
+        links.append(link)
+    return tuple(links), fixed

@@ -1,0 +1,100 @@
+"""Description of an arm in a file: robot.toml, beside the MJCF that it names."""
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from pretouch.errors import RobotModelError
+from pretouch.robot.description import RobotDescription
+from pretouch.types import FloatArray
+
+FILE = "robot.toml"
+
+_WORDS = ("name", "mjcf", "ee_body", "source")
+_LISTS = {"qd_max": "rad/s", "qdd_max": "rad/s^2", "tau_max": "Nm", "q_ready": "rad"}
+_LARGEST = 1e6
+"""Largest number in a file: any larger one is a mistake."""
+_MOST_JOINTS = 64
+
+
+def load_description(path: Path | str) -> RobotDescription:
+    """Read the description of an arm from robot.toml, or from the folder that holds it.
+
+    What is wrong with it is a RobotModelError that names the file, the key, the value and the way out.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / FILE
+    data = _read(path)
+    unknown = sorted(set(data) - {*_WORDS, *_LISTS})
+    if unknown:
+        raise RobotModelError(f"{path}: the key {unknown[0]!r} is unknown: use {', '.join([*_WORDS, *_LISTS])}.")
+    words = {key: _word(path, data, key) for key in _WORDS}
+    n = len(_numbers(path, data, "q_ready", None))
+    lists = {key: _numbers(path, data, key, n) for key in _LISTS}
+    try:
+        return RobotDescription(
+            name=words["name"],
+            mjcf=path.parent / words["mjcf"],
+            ee_body=words["ee_body"],
+            qd_max=lists["qd_max"],
+            qdd_max=lists["qdd_max"],
+            tau_max=lists["tau_max"],
+            q_ready=lists["q_ready"],
+            source=words["source"],
+        )
+    except (RobotModelError, OSError) as error:  # a file's name may be too long to look for
+        raise RobotModelError(f"{error} (in {path})") from error
+
+
+def description_text(arm: RobotDescription) -> str:
+    """Return the robot.toml that `load_description` reads back to the same arm, beside its MJCF file."""
+    given = {"name": arm.name, "mjcf": arm.mjcf.name, "ee_body": arm.ee_body, "source": arm.source}
+    lists = {key: [float(v) for v in getattr(arm, key)] for key in _LISTS}
+    return tomli_w.dumps(given | lists)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise RobotModelError(
+            f"The robot file {path} cannot be read: {reason}: give {FILE} or its folder, as `pretouch robot import`"
+            " writes it."
+        ) from error
+    except UnicodeDecodeError as error:
+        raise RobotModelError(f"The robot file {path} is not UTF-8 text: {error.reason} at {error.start}.") from error
+    except (ValueError, RecursionError) as error:  # not TOML, an integer too long, brackets too deep
+        raise RobotModelError(f"The robot file {path} is not valid TOML: {error}.") from error
+
+
+def _word(path: Path, data: dict[str, Any], key: str) -> str:
+    value = data.get(key)
+    if not isinstance(value, str) or not value.isprintable() or not value:
+        raise RobotModelError(f"{path}: {key} is {_shown(value)}: give printable text in quotes.")
+    return value
+
+
+def _numbers(path: Path, data: dict[str, Any], key: str, n: int | None) -> FloatArray:
+    value = data.get(key)
+    ok = isinstance(value, list) and 0 < len(value) <= _MOST_JOINTS and n in (None, len(value))
+    if not ok or not all(type(v) in (int, float) and abs(v) <= _LARGEST for v in value or []):
+        count = "" if n is None else f"{n} "
+        raise RobotModelError(
+            f"{path}: {key} is {_shown(value)}: give a list of {count}finite numbers, one a joint [{_LISTS[key]}]."
+        )
+    return np.array(value, dtype=np.float64)
+
+
+def _shown(value: Any) -> str:
+    """Show a value in a message, cut where it is long. An integer may have more digits than Python writes out."""
+    try:
+        text = repr(value)
+    except ValueError:
+        return "too long to show"
+    return text if len(text) <= 200 else f"{text[:200]} ..."

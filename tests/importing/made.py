@@ -1,0 +1,43 @@
+"""Small robots to import: texts of URDF files."""
+
+from pathlib import Path
+
+BOX = '<geometry><box size="0.08 0.08 0.2"/></geometry>'
+
+
+INERTIAL = '<inertial><mass value="2"/><inertia ixx=".02" ixy="0" ixz="0" iyy=".02" iyz="0" izz=".01"/></inertial>'
+
+
+def link(name, shape="", inertial=INERTIAL, what="collision"):
+    body = f'<{what}><origin xyz="0 0 0.1"/>{shape}</{what}>' if shape else ""
+    return f'<link name="{name}">{inertial}{body}</link>'
+
+
+def joint(name, parent, child, kind="revolute", axis="0 0 1", xyz="0 0 0.2", rpy="0 0 0",
+          limit='<limit lower="-2.8" upper="2.8" velocity="2" effort="40"/>', more=""):  # fmt: skip
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{limit}{more}</joint>'
+    )
+
+
+_AXES = ("0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
+_LENGTHS = (0.0, 0.2, 0.25, 0.35, 0.25, 0.25, 0.25)
+
+
+def six_axis(tail="", changed=None):
+    """An arm of six joints like the industrial ones, its links boxes, with a flange and a tool frame."""
+    parts = [link("base", BOX)]
+    for k in range(6):
+        more = (changed or {}).get(k + 1, {})
+        parts.append(link(f"link{k + 1}", BOX))
+        given = {"axis": _AXES[k], "xyz": f"{0.05 * (k == 1)} {0.03 * (k == 3)} {_LENGTHS[k + 1]}", "rpy": "0 0 0.1"}
+        parts.append(joint(f"joint{k + 1}", f"link{k}" if k else "base", f"link{k + 1}", **given | more))
+    parts += [link("tool0", inertial=""), joint("flange", "link6", "tool0", "fixed", xyz="0 0 0.12", limit="")]
+    return f'<robot name="sixer">{"".join(parts)}{tail}</robot>'
+
+
+def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
+    file = folder / name
+    file.write_text(text)
+    return file

@@ -1,0 +1,209 @@
+"""What is wrong with a robot's file is said in one sentence with the way out."""
+
+import re
+
+import numpy as np
+import pytest
+from tests.importing.made import BOX, joint, link, six_axis, written
+
+from pretouch.errors import RobotModelError
+from pretouch.importing.chain import arm_of
+from pretouch.importing.limits import limits_of
+from pretouch.importing.meshes import read_mesh
+from pretouch.importing.read import read_source
+from pretouch.importing.solids import surface_of
+
+BOMB = '<?xml version="1.0"?><!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><robot name="&b;"/>'
+FILE_ENTITY = '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><robot name="r"><link name="&x;"/></robot>'
+
+
+def arm(folder, text, ee=""):
+    return arm_of(read_source(written(folder, text)), ee)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "is not valid XML"),
+        ("<robot", "is not valid XML"),
+        ("<sdf/>", "is a <sdf>: give a URDF"),
+        (BOMB, "has a document type"),
+        (FILE_ENTITY, "has a document type"),
+        ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="x"/></robot>', "xacro template"),
+        ("<robot name='r'/>", "hang on 0 roots"),
+        (f"<robot name='r'>{link('a')}{link('b')}</robot>", r"hang on 2 roots \(a, b\)"),
+        (f"<robot name='r'>{link('a')}{link('a')}</robot>", "same name"),
+        (
+            f"<robot name='r'>{link('a')}{joint('j', 'a', 'nowhere')}</robot>",
+            "child 'nowhere': choose from the links a",
+        ),
+        (
+            f"<robot name='r'>{link('r')}{link('a')}{link('b')}{joint('j', 'a', 'b')}{joint('k', 'b', 'a')}</robot>",
+            "a, b hang on each other in a ring",
+        ),
+        (six_axis(changed={2: {"kind": "screw"}}), "joint2 is of the type 'screw': choose from revolute"),
+        (six_axis(changed={2: {"axis": "0 0 0"}}), "joint2 has an axis of no length"),
+        (six_axis(changed={2: {"axis": "0 1"}}), "joint2: xyz of <axis> is '0 1': give 3 numbers"),
+        (six_axis(changed={2: {"xyz": "0 nan 0"}}), "xyz of <origin> is 'nan': give a finite number"),
+        (six_axis(changed={2: {"limit": '<limit velocity="1"/>'}}), "joint2 has the range 0 to 0: give it lower"),
+        (six_axis(changed={4: {"kind": "prismatic"}}), "joint4 slides, only hinges .* --ee, such as link3"),
+        (six_axis(changed={4: {"kind": "floating"}}), "joint4 is no hinge"),
+        (six_axis(changed={4: {"more": '<mimic joint="joint3"/>'}}), "No joint|joint4 follows"),
+        (six_axis().replace('<box size="0.08 0.08 0.2"/>', '<box size="0 1 1"/>', 1), "has a box of no size"),
+        (six_axis().replace('<box size="0.08 0.08 0.2"/>', "<cone/>", 1), "a shape 'cone': use box, sphere"),
+    ],
+)
+def test_a_broken_urdf_is_refused_in_one_sentence(tmp_path, text, sentence):
+    with pytest.raises(RobotModelError, match=sentence) as caught:
+        arm(tmp_path, text, "" if "joint4 follows" not in sentence else "tool0")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(RobotModelError, match=r"nowhere.urdf cannot be read: No such file"):
+        read_source(tmp_path / "nowhere.urdf")
+
+
+def test_an_unknown_end_effector_lists_the_links(tmp_path):
+    with pytest.raises(RobotModelError, match=r"The link 'hand' is unknown: choose from base, link1, .*tool0"):
+        arm(tmp_path, six_axis(), "hand")
+
+
+def test_an_end_effector_that_nothing_moves_is_refused(tmp_path):
+    with pytest.raises(RobotModelError, match="No joint moves base: choose another end-effector by --ee, such as"):
+        arm(tmp_path, six_axis(), "base")
+
+
+def test_the_tool_frame_is_taken_for_the_end_effector(tmp_path):
+    found = arm(tmp_path, six_axis(link("camera", inertial="") + joint("c", "link6", "camera", "fixed")))
+    assert found.source.links[found.ee].name == "tool0"
+    assert [j.name for j in found.joints] == [f"joint{k}" for k in range(1, 7)]
+    assert "--ee chooses another one: camera" in found.remarks[0]
+
+
+def fingers():
+    slide = '<limit lower="0.01" upper="0.04" velocity="1" effort="1"/>'
+    return (
+        link("left", BOX) + link("right", BOX) + joint("f1", "link6", "left", "prismatic", "0 1 0", limit=slide)
+        + joint("f2", "link6", "right", "prismatic", "0 -1 0", limit=slide, more='<mimic joint="f1"/>')
+    )  # fmt: skip
+
+
+def test_fingers_are_fixed_and_named(tmp_path):
+    found = arm(tmp_path, six_axis(fingers()))
+    assert len(found.joints) == 6
+    assert any("2 joints off the arm are fixed at 0, or at the nearest limit: f1, f2" in r for r in found.remarks)
+    left = found.source.index("left")
+    # the nearest to 0 that the finger can be is 10 mm
+    assert found.source.links[left].T_parent_link[:3, 3] == pytest.approx([0.0, 0.01, 0.2])
+
+
+def two_arms():
+    parts = [link("torso")]
+    for side in "lr":
+        for k in range(5):
+            parts.append(link(f"{side}{k}"))
+            parts.append(joint(f"{side}j{k}", f"{side}{k - 1}" if k else "torso", f"{side}{k}", axis=f"0 {k % 2} 1"))
+    return f"<robot name='two'>{''.join(parts)}</robot>"
+
+
+def test_of_two_arms_one_has_to_be_chosen(tmp_path):
+    with pytest.raises(RobotModelError, match="has 2 arms: choose one by --ee, such as l4, r4"):
+        arm(tmp_path, two_arms())
+    chosen = arm(tmp_path, two_arms(), "r4")
+    assert [j.name for j in chosen.joints] == [f"rj{k}" for k in range(5)]
+    assert "lj0, lj1" in chosen.remarks[0]
+
+
+def test_limits_that_are_missing_are_assumed_with_a_sentence(tmp_path):
+    found = arm(tmp_path, six_axis(changed={1: {"kind": "continuous", "limit": ""}}))
+    limits = limits_of(found)
+    assert limits.q_max[0] == pytest.approx(2 * np.pi)
+    assert limits.qd_max.tolist() == [1.0, 2.0, 2.0, 2.0, 2.0, 2.0]
+    said = " ".join(limits.remarks)
+    for part in ("joint1: no position limits", "velocity limit of joint1: 1 rad/s", "acceleration limit of all joints",
+                 "give --qdd-max", "torque limit of joint1: 50 Nm"):  # fmt: skip
+        assert part in said
+
+
+@pytest.mark.parametrize("given", [(1.0, 2.0), (-1.0,), (np.nan,), (0.0,)])
+def test_limits_given_badly_are_refused(tmp_path, given):
+    with pytest.raises(RobotModelError, match=r"--qd-max is .*: give one positive number \[rad/s\], or 6"):
+        limits_of(arm(tmp_path, six_axis()), qd_max=given)
+
+
+def mesh_arm(uri):
+    return six_axis().replace('<box size="0.08 0.08 0.2"/>', f'<mesh filename="{uri}" scale="0.001 0.001 0.001"/>')
+
+
+ASCII_STL = (
+    "solid x\n"
+    + "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 100 0 0\nvertex 0 50 0\nendloop\nendfacet\n"
+    + "endsolid\n"
+)
+OBJ = "# a corner\nv 0 0 0\nv 100 0 0\nv 100 50 0\nv 0 50 0\nf 1/1 2/2 3/3 -1\n"
+
+
+@pytest.mark.parametrize(
+    ("uri", "place"),
+    [
+        ("package://my_arm/meshes/a.stl", "my_arm/meshes/a.stl"),
+        ("package://my_arm/meshes/a.obj", "my_arm/meshes/a.obj"),
+        ("meshes/a.stl", "my_arm/urdf/meshes/a.stl"),
+        ("../meshes/a.OBJ", "my_arm/meshes/a.OBJ"),
+    ],
+)
+def test_meshes_are_found_by_package_and_by_relative_path(tmp_path, uri, place):
+    urdf, mesh = tmp_path / "my_arm" / "urdf", tmp_path / place
+    for folder in (urdf, mesh.parent):
+        folder.mkdir(parents=True, exist_ok=True)
+    mesh.write_text(OBJ if uri.lower().endswith("obj") else ASCII_STL)
+    found = read_source(written(urdf, mesh_arm(uri)))
+    surface = surface_of(found.links[1].collision)
+    assert surface.vertices.max(axis=0) == pytest.approx([0.1, 0.05, 0.1])
+
+
+def test_a_package_is_found_in_the_path_given(tmp_path):
+    (tmp_path / "elsewhere" / "my_arm").mkdir(parents=True)
+    (tmp_path / "elsewhere" / "my_arm" / "a.stl").write_text(ASCII_STL)
+    (tmp_path / "here").mkdir()
+    file = written(tmp_path / "here", mesh_arm("package://my_arm/a.stl"))
+    with pytest.raises(RobotModelError, match="give --package-path the folder that holds the package my_arm"):
+        surface_of(read_source(file).links[1].collision)
+    for folder in (tmp_path / "elsewhere", tmp_path / "elsewhere" / "my_arm"):
+        assert len(surface_of(read_source(file, (folder,)).links[1].collision).faces) == 1
+    with pytest.raises(RobotModelError, match=r"The package path .* is no folder"):
+        read_source(file, (tmp_path / "none",))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("a.stl", b"", "is damaged"),
+        ("a.stl", b"\0" * 100, "is damaged|holds no triangle"),
+        ("a.stl", b"\0" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "is damaged: its length"),
+        ("a.stl", b"solid x\nvertex 0 0 zero\n", "is damaged"),
+        ("a.stl", ASCII_STL.replace("100", "nan").encode(), "a coordinate is no finite number"),
+        ("a.obj", b"v 0 0 0\nf 1 2 3\n", "a corner that is not there"),
+        ("a.obj", b"v 0 0\nf 1 1 1\n", "is damaged"),
+        ("a.obj", b"", "holds no triangle"),
+        ("a.dae", b"<COLLADA", "is damaged|pip install"),
+        ("a.passwd", b"root:x", "none that can be read: use .stl, .obj, .dae"),
+    ],
+)
+def test_a_broken_mesh_is_refused_in_one_sentence(tmp_path, name, content, sentence):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(RobotModelError, match=sentence) as caught:
+        read_mesh(tmp_path / name)
+    assert re.search(re.escape(name), str(caught.value))
+    assert "root:x" not in str(caught.value)
+
+
+def test_a_binary_stl_is_read(tmp_path):
+    record = np.zeros(2, np.dtype([("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")]))
+    record["c"][0] = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    record["c"][1] = [[1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    file = tmp_path / "a.stl"
+    file.write_bytes(b"solid but binary".ljust(80) + (2).to_bytes(4, "little") + record.tobytes())
+    surface = read_mesh(file)
+    assert (len(surface.vertices), len(surface.faces)) == (4, 2)

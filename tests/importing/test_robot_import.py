@@ -1,0 +1,222 @@
+"""A robot's file becomes a folder that everything else takes, and nothing is lost on the way."""
+
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+import pytest
+from tests.importing.made import BOX, joint, link, six_axis, written
+
+from pretouch.control.path import line
+from pretouch.controller import Controller
+from pretouch.errors import RobotModelError
+from pretouch.importing.folder import write_folder
+from pretouch.importing.robot_import import ImportOptions, import_robot
+from pretouch.params import profile
+from pretouch.robot.description_file import load_description
+from pretouch.robot.model import RobotModel
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.sensing.skin import load_skin
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import plant_params_of
+from pretouch.sim.scene import SceneSpec, fixtures
+
+READY = (0.0, 0.3, 1.2, 0.0, 1.6, 0.0)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("source"), six_axis())
+
+
+@pytest.fixture(scope="module")
+def imported(source):
+    return import_robot(source, ImportOptions())
+
+
+@pytest.fixture(scope="module")
+def folder(imported, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out") / "sixer"
+    assert write_folder(imported, out) is None
+    return out
+
+
+@pytest.fixture(scope="module")
+def model(folder):
+    return RobotModel(load_description(folder))
+
+
+def test_the_folder_holds_an_arm_with_what_the_file_says(model):
+    description = model.description
+    assert (description.name, description.ee_body, model.n) == ("sixer", "tool0", 6)
+    assert description.qd_max.tolist() == [2.0] * 6
+    assert description.tau_max.tolist() == [40.0] * 6
+    assert model.q_min == pytest.approx(np.full(6, -2.8))
+    assert description.source == "imported from arm.urdf"
+
+
+def stripped(file):
+    """The URDF as MuJoCo's own reader takes it: no shapes, and no bodies joined."""
+    root = ET.parse(file).getroot()  # noqa: S314  our own
+    for element in root.findall("link"):
+        for what in ("collision", "visual"):
+            for shape in element.findall(what):
+                element.remove(shape)
+    ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", fusestatic="false", discardvisual="false")
+    return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+
+
+def assert_same_mechanics(model, oracle, shift=()):
+    """Poses and dynamics as MuJoCo has them from the source itself."""
+    data, rng = mujoco.MjData(oracle), np.random.default_rng(1)
+    for q in rng.uniform(model.q_min, model.q_max, (20, model.n)):
+        data.qpos[: model.n] = q
+        mujoco.mj_forward(oracle, data)
+        kin = model.kinematics(q)
+        for b in range(1, oracle.nbody):
+            at = model.link_index(oracle.body(b).name)
+            assert kin.position[at] == pytest.approx(data.xpos[b], abs=1e-9)
+            assert kin.rotation[at] == pytest.approx(data.xmat[b].reshape(3, 3), abs=1e-9)
+        mass = np.zeros((oracle.nv, oracle.nv))
+        mujoco.mj_fullM(oracle, data, mass)
+        found = model.dynamics(q, np.zeros(model.n))
+        assert found.mass_matrix == pytest.approx(mass[: model.n, : model.n], rel=1e-6, abs=1e-9)
+        assert found.gravity == pytest.approx(data.qfrc_bias[: model.n], rel=1e-6, abs=1e-7)
+
+
+def test_poses_and_dynamics_are_those_of_the_source(model, source):
+    assert_same_mechanics(model, stripped(source))
+
+
+def test_the_description_has_capsules_and_no_meshes(folder):
+    root = ET.parse(folder / "arm.xml").getroot()  # noqa: S314  our own
+    assert {geom.get("type") for geom in root.iter("geom")} == {"capsule"}
+    assert not list(root.iter("mesh"))
+
+
+def test_the_ready_posture_is_a_good_one(model, imported):
+    q = model.description.q_ready
+    kin = model.kinematics(q)
+    assert (np.minimum(q - model.q_min, model.q_max - q) > 0.2).all()
+    assert np.linalg.svd(model.ee_jacobian(kin), compute_uv=False)[-1] > 0.05
+    assert kin.position[model.ee, 0] > 0.2
+    assert kin.rotation[model.ee][:, 2] == pytest.approx([0, 0, -1], abs=1e-3)
+    assert self_distances(model, capsule_ends(model, kinematics_of(model, q[None]))).min() > 0.019
+    assert imported.ready.manipulability == pytest.approx(
+        np.sqrt(np.linalg.det(model.ee_jacobian(kin) @ model.ee_jacobian(kin).T))
+    )
+
+
+def test_the_units_sit_on_the_surface_and_look_away(model, folder):
+    skin = load_skin(folder / "skin.toml", model)
+    assert len(skin) >= 6
+    for link_index, T in zip(skin.link, skin.T_link_sensor, strict=True):
+        own = model.capsules.of_links(np.array([link_index]))
+        axis = np.clip(((T[:3, 3] - own.a) * (own.b - own.a)).sum(axis=1) / ((own.b - own.a) ** 2).sum(axis=1), 0, 1)
+        away = T[:3, 3] - own.a - axis[:, None] * (own.b - own.a)
+        height = np.linalg.norm(away, axis=1) - own.radius
+        assert height.min() == pytest.approx(0.008, abs=1e-4)
+        assert away[height.argmin()] @ T[:3, 2] > 0
+
+
+def test_the_controller_and_the_simulated_arm_take_it(model, folder):
+    description = model.description
+    plant = Plant(model, SceneSpec(), plant_params_of(description), description.q_ready, 0)
+    at = model.kinematics(description.q_ready).position[model.ee]
+    path = line(tuple(at), (at[0], at[1] + 0.1, at[2]))
+    skin = load_skin(folder / "skin.toml", model)
+    controller = Controller(model, skin, fixtures(SceneSpec()), path, profile("blind"))
+    plant.advance(0.1)
+    assert controller.init(plant.read()) is not None
+
+
+def test_a_folder_that_is_there_is_kept(imported, tmp_path):
+    out = tmp_path / "arm"
+    out.mkdir()
+    (out / "mine.txt").write_text("precious")
+    with pytest.raises(RobotModelError, match="arm is there: give another --out, or --force"):
+        write_folder(imported, out)
+    for k in (1, 2):
+        kept = write_folder(imported, out, force=True)
+        assert kept == tmp_path / f"arm.old-{k}"
+    assert (tmp_path / "arm.old-1" / "mine.txt").read_text() == "precious"
+    assert sorted(p.name for p in out.iterdir()) == ["arm.xml", "robot.toml", "skin.toml"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["arm", "arm.old-1", "arm.old-2"]
+
+
+def test_a_ready_posture_outside_the_limits_is_refused(source):
+    with pytest.raises(RobotModelError, match=r"--ready is .*: give 6 joint positions"):
+        import_robot(source, ImportOptions(ready=(0.0, 9.0, 0.0, 0.0, 0.0, 0.0)))
+
+
+def test_links_without_inertial_are_estimated_from_their_capsules(tmp_path):
+    shape = '<geometry><sphere radius="0.1"/></geometry>'
+    text = six_axis().replace(link("link3", BOX), link("link3", shape, inertial=""))
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY))
+    at = found.model.link_index("link3")
+    assert any("estimated at 1000 kg/m^3: link3 (4.2 kg)" in r for r in found.remarks)
+    assert found.model._model.body_mass[at] == pytest.approx(1000 * 4 / 3 * np.pi * 0.1**3, rel=0.01)
+
+
+def test_an_impossible_inertia_is_mended_with_a_sentence(tmp_path):
+    text = six_axis().replace('izz=".01"', 'izz="9"', 1)
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY))
+    assert any("an inertia no body can have" in r and "base" in r for r in found.remarks)
+
+
+def test_visual_shapes_stand_in_for_collision_shapes(tmp_path):
+    text = six_axis().replace(link("link2", BOX), link("link2", BOX, what="visual"))
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY))
+    assert any("fitted to what is drawn: link2" in r for r in found.remarks)
+    assert found.model.link_index("link2") in found.model.capsules.link
+
+
+def test_a_first_link_called_world_is_the_world(tmp_path):
+    text = six_axis().replace(
+        "</robot>", link("world", inertial="") + joint("w", "world", "base", "fixed") + "</robot>"
+    )
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY))
+    assert found.model.links[:2] == ("world", "base")
+
+
+MJCF = """<mujoco model="mj"><compiler angle="degree"/><worldbody><geom type="plane" size="1 1 1"/><body name="base">
+<geom type="box" size=".05 .05 .05"/>{body}</body></worldbody>
+<actuator><motor joint="j1" gear="10" ctrlrange="-1 1" forcerange="-3 3" forcelimited="true"/></actuator></mujoco>"""
+
+
+def mjcf():
+    body = ""
+    for k, axis in enumerate(("0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1"), 1):
+        place = "0.02 0.01 0.25" if k > 1 else "0 0 0.1"
+        body += (
+            f'<body name="b{k}" pos="{place}" euler="0 0 10"><joint name="j{k}" axis="{axis}" pos="0.01 0 -0.02"'
+            f' range="-160 160" ref="{5 * (k == 2)}"/><geom type="cylinder" size=".03 .08" pos="0 0 .08" mass="1"/>'
+        )
+    return MJCF.format(body=body + '<body name="tip" pos="0 0 .2"/>' + "</body>" * 6)
+
+
+def test_an_mjcf_file_keeps_its_mechanics(tmp_path):
+    file = written(tmp_path, mjcf(), "arm.xml")
+    found = import_robot(file, ImportOptions(ready=READY))
+    assert found.description.ee_body == "tip"
+    assert found.limits.tau_max[:2].tolist() == [30.0, 50.0]
+    assert_same_mechanics(found.model, mujoco.MjModel.from_xml_path(str(file)))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("<mujoco><worldbody><body><freejoint/></body></worldbody></mujoco>", "arm.xml cannot be read"),
+        ("<mujoco><worldbody><geom type='mesh' mesh='none'/></worldbody></mujoco>", "arm.xml cannot be read"),
+        ("<mujoco/>", "No joint moves world: .* the file has no joint"),
+        (mjcf().replace('name="j3"', 'name="j3" type="slide"'), "j3 slides"),
+        (
+            mjcf().replace('name="j3"', 'name="j3" type="ball"').replace('axis="0 1 0"', "", 2),
+            "cannot be read|no hinge",
+        ),
+    ],
+)
+def test_a_broken_mjcf_is_refused_in_one_sentence(tmp_path, text, sentence):
+    with pytest.raises(RobotModelError, match=sentence) as caught:
+        import_robot(written(tmp_path, text, "arm.xml"), ImportOptions())
+    assert "\n" not in str(caught.value)

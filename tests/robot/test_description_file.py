@@ -1,0 +1,65 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from pretouch.errors import RobotModelError
+from pretouch.robot.description import panda
+from pretouch.robot.description_file import description_text, load_description
+
+
+@pytest.fixture
+def folder(tmp_path):
+    arm = panda()
+    (tmp_path / arm.mjcf.name).write_bytes(arm.mjcf.read_bytes())
+    (tmp_path / "robot.toml").write_text(description_text(arm))
+    return tmp_path
+
+
+def test_a_description_is_read_back_as_it_was(folder):
+    for path in (folder, folder / "robot.toml", str(folder)):
+        found = load_description(path)
+        for field in dataclasses.fields(panda()):
+            if field.name != "mjcf":
+                assert np.array_equal(getattr(found, field.name), getattr(panda(), field.name))
+        assert found.mjcf == folder / "panda.xml"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sentence"),
+    [
+        ("name = ", "naem = ", "the key 'naem' is unknown: use name, mjcf"),
+        ('"panda"', "7", "name is 7: give printable text"),
+        ('"panda.xml"', '"none.xml"', r"there is no MJCF file at .*none.xml\. \(in "),
+        ('"panda.xml"', '"' + "x" * 5000 + '"', "in .*robot.toml"),
+        ("2.175,", '"fast",', r"qd_max is .*: give a list of 7 finite numbers, one a joint \[rad/s\]"),
+        ("2.175,", "nan,", "qd_max is"),
+        ("2.175,", "0.0,", "qd_max is .* positive"),
+        ("2.175,", "", "qd_max is .*give a list of 7"),
+        ("qdd_max", "#", "not valid TOML"),
+        ("= ", "=", None),
+    ],
+)
+def test_what_is_wrong_is_said_with_file_key_and_value(folder, before, after, sentence):
+    file = folder / "robot.toml"
+    file.write_text(file.read_text().replace(before, after, 1))
+    if sentence is None:
+        assert load_description(file).name == "panda"
+        return
+    with pytest.raises(RobotModelError, match=sentence) as caught:
+        load_description(file)
+    assert str(file) in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"a = [" * 3000, b"name = 0x" + b"f" * 9000])
+def test_a_file_that_is_none_is_refused(tmp_path, content):
+    (tmp_path / "robot.toml").write_bytes(content)
+    with pytest.raises(RobotModelError, match=r"robot.toml"):
+        load_description(tmp_path)
+
+
+def test_a_file_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(
+        RobotModelError, match=r"robot.toml cannot be read: No such file .* give robot.toml or its folder"
+    ):
+        load_description(tmp_path)
