@@ -8,16 +8,20 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pretouch.cli import main
+from pretouch.cli.serve_fci import TypedPushes
 from pretouch.cli.skin_keys import with_new
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.robot.description import fr3
+from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
+from pretouch.serving.fci.arm import ArmSetup, ServedArm
 from pretouch.serving.fci.wire import CONNECT, HEADER, PANDA
+from pretouch.sim.scene import SceneSpec
 
 
 def _served(*arguments: str) -> subprocess.Popen[str]:
@@ -82,3 +86,46 @@ def test_what_cannot_be_served_is_said_in_a_sentence(
 ) -> None:
     assert main(["serve-fci", *arguments]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_a_person_types_pushes() -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.openpty()
+    with os.fdopen(theirs) as terminal:
+        typed = TypedPushes(arm.pushes, terminal)
+        assert typed.possible
+        assert not typed.take()
+        os.write(ours, b"-y\n0,0,4:0.5\n0,1")
+        for _ in range(2):  # a terminal gives a line at a time
+            assert not typed.take()
+        arm.step(None)
+        np.testing.assert_array_equal(arm.true_force, [0.0, -15.0, 4.0])
+        os.write(ours, b",0:0.5\n")
+        typed.take()
+        arm.step(None)
+        np.testing.assert_array_equal(arm.true_force, [0.0, -14.0, 4.0])
+    os.close(ours)
+
+
+def test_what_is_typed_and_is_no_push_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.openpty()
+    with os.fdopen(theirs) as terminal:
+        typed = TypedPushes(arm.pushes, terminal)
+        os.write(ours, b"harder\n")
+        typed.take()
+        assert "'harder'" in capsys.readouterr().out
+        arm.step(None)
+        assert not arm.true_force.any()
+    os.close(ours)
+
+
+def test_nobody_types_where_there_is_no_terminal(tmp_path: Path) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    (tmp_path / "typed").write_text("+y\n")
+    with (tmp_path / "typed").open() as file:
+        typed = TypedPushes(arm.pushes, file)
+        assert not typed.possible
+        typed.take()
+    arm.step(None)
+    assert not arm.true_force.any()

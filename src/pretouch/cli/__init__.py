@@ -22,6 +22,9 @@ from pretouch.cli.commands import (
     WarmUp,
 )  # fmt: skip
 from pretouch.cli.ending import Terminated, ends_raise, exit_code
+from pretouch.cli.robot_commands import Check, Import, Robot
+from pretouch.cli.run.options import Run
+from pretouch.cli.serve_fci_command import ServeFci
 from pretouch.cli.skin_commands import Skin
 from pretouch.cli.words import words
 from pretouch.errors import ParameterError, PretouchError
@@ -65,6 +68,12 @@ def main(args: list[str] | None = None) -> int:
                     return _skin(command)
                 case WarmUp():
                     _warm_up()
+                case Robot():
+                    _robot(command)
+                case ServeFci():
+                    _serve_fci(command)
+                case Run():
+                    return _run(command)
     except PretouchError as error:
         errors.print(str(error), markup=False)
         return _USAGE
@@ -103,7 +112,11 @@ def _reproduce(command: Reproduce) -> None:
         stiffness=tuple(map(_number, words(command.stiffness))),
         skin=command.skin or None,
         record=command.record,
+        arm=command.arm or None,
     )
+    if request.arm and not everything:
+        context = request.context()
+        print(context.placement.sentence(context.model.description.name))
     out = Path(command.out or f"runs/reproduce-{command.experiment}")
     runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
     run_all(runs, out, Path(command.json) if command.json else out / "results.json")
@@ -174,6 +187,30 @@ def _skin(command: Skin) -> int:
     from pretouch.cli.skin import skin
 
     return skin(command.what)
+
+
+def _run(command: Run) -> int:
+    from pretouch.cli.run.command import run
+
+    return run(command)
+
+
+def _robot(command: Robot) -> None:
+    match command.what:
+        case Import():
+            from pretouch.cli.robot_import import import_arm
+
+            import_arm(command.what)
+        case Check():
+            from pretouch.cli.robot_check import check_arm
+
+            check_arm(command.what)
+
+
+def _serve_fci(command: ServeFci) -> None:
+    from pretouch.cli.serve_fci import serve_fci
+
+    serve_fci(command)
 
 
 def _warm_up() -> None:

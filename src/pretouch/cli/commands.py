@@ -5,6 +5,9 @@ from typing import Annotated, Literal
 
 import tyro
 
+from pretouch.cli.robot_commands import Robot
+from pretouch.cli.run.options import Run
+from pretouch.cli.serve_fci_command import ServeFci
 from pretouch.cli.skin_commands import Skin
 from pretouch.hardware.address import HOST, PORT
 
@@ -39,6 +42,9 @@ class Reproduce:
     """Contact stiffness of the static object [N/m], or several, separated by commas."""
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
+    arm: str = ""
+    """Folder of an arm that `pretouch robot import` wrote, for the static experiment; by default the Panda. The paper's
+    paths are scaled and moved into its reach, and the skin is the folder's own."""
     record: str = "first"
     """first: record the trials of the first seed of which figures are drawn; all: record every trial."""
     out: str = ""
@@ -216,4 +222,7 @@ Command = (
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Skin, tyro.conf.subcommand("skin")]
     | Annotated[WarmUp, tyro.conf.subcommand("warm-up")]
+    | Annotated[Robot, tyro.conf.subcommand("robot")]
+    | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[ServeFci, tyro.conf.subcommand("serve-fci")]
 )

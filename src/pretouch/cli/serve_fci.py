@@ -1,10 +1,14 @@
 """What `pretouch serve-fci` does: builds scene, arm and units, and serves them until it is told to end."""
 
 import csv
+import os
+import select
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -19,7 +23,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin
 from pretouch.serving.fci.arm import ArmSetup, ServedArm
 from pretouch.serving.fci.options import ServeOptions, drop_of
-from pretouch.serving.fci.pushes import push_of
+from pretouch.serving.fci.pushes import Pushes, push_of, typed_push
 from pretouch.serving.fci.server import FciServer
 from pretouch.serving.fci.units import UnitsSetup
 from pretouch.serving.simulate import Visitor
@@ -43,7 +47,39 @@ def serve_fci(command: ServeFci) -> None:
         host, port = server.address
         pace = "lockstep" if c.lockstep else "real time"
         _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}).")
-        server.serve(ended)
+        typed = TypedPushes(arm.pushes, sys.stdin)
+        if typed.possible:
+            _say("Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force as 0,15,0 [N].")
+        server.serve(lambda: ended() or typed.take())
+
+
+class TypedPushes:
+    """Pushes that a person at the terminal types, one a line."""
+
+    def __init__(self, pushes: Pushes, source: TextIO) -> None:
+        """Take where they go, and what is typed at; only a terminal is listened to."""
+        self._pushes, self._text = pushes, b""
+        self._descriptor = source.fileno() if source.isatty() else -1
+
+    @property
+    def possible(self) -> bool:
+        """Whether there is a terminal."""
+        return self._descriptor >= 0
+
+    def take(self) -> bool:
+        """Have what was typed come; always False, so that a server goes on."""
+        if not self.possible or not select.select([self._descriptor], [], [], 0)[0]:
+            return False
+        read = os.read(self._descriptor, 4096)
+        if not read:
+            self._descriptor = -1
+        *lines, self._text = (self._text + read).split(b"\n")
+        for line in filter(bytes.strip, lines):
+            try:
+                self._pushes.add(typed_push(line.decode(errors="replace"), self._pushes.now))
+            except ParameterError as error:
+                _say(str(error))
+        return False
 
 
 def _setup(c: ServeFci) -> ArmSetup:

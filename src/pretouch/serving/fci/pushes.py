@@ -11,6 +11,8 @@ from pretouch.types import FloatArray
 
 _LASTING_S = 0.5
 """How long a push lasts unless it says so [s]."""
+_TYPED_N, _TYPED_S = 15.0, 1.5
+"""Force [N] and duration [s] of a push of which only the axis is typed: what a guided push asks for."""
 _NONE = np.zeros(3)
 
 
@@ -24,6 +26,12 @@ class TcpPush:
     """On the arm, base frame [N]."""
     duration: float = _LASTING_S
     """[s]"""
+
+
+_AXES = {
+    "+x": (_TYPED_N, 0.0, 0.0), "-x": (-_TYPED_N, 0.0, 0.0), "+y": (0.0, _TYPED_N, 0.0),
+    "-y": (0.0, -_TYPED_N, 0.0), "+z": (0.0, 0.0, _TYPED_N), "-z": (0.0, 0.0, -_TYPED_N),
+}  # fmt: skip
 
 
 def push_of(text: str) -> TcpPush:
@@ -41,6 +49,17 @@ def push_of(text: str) -> TcpPush:
     return TcpPush(start, (x, y, z), duration)
 
 
+def typed_push(text: str, now: float) -> TcpPush:
+    """Read a push that begins now [s] from an axis, as +y or -x, or from FX,FY,FZ or FX,FY,FZ:DURATION [N, s]."""
+    plain = text.strip().lower()
+    if plain in _AXES:
+        return TcpPush(now, _AXES[plain], _TYPED_S)
+    try:
+        return push_of(f"{now}:{plain}")
+    except ParameterError:
+        raise ParameterError(f"{plain!r} is no push: type an axis, as +y, or a force, as 0,15,0 [N].") from None
+
+
 class Pushes:
     """Pushes an arm at the end-effector, at the times of a clock that begins with the plant's at `begin`."""
 
@@ -48,10 +67,20 @@ class Pushes:
         self._plant, self._pushes, self._begin, self._link = plant, pushes, begin, plant.model.ee
         self.force: FloatArray = _NONE
         """(3,) the force now [N]."""
-        if pushes:
-            plant.before_each_step(self._push)
+        plant.before_each_step(self._push)
+
+    @property
+    def now(self) -> float:
+        """The time of the pushes [s]."""
+        return self._plant.time - self._begin
+
+    def add(self, push: TcpPush) -> None:
+        """Have another one come; those that are over are forgotten."""
+        self._pushes = (*(p for p in self._pushes if p.start + p.duration > self.now), push)
 
     def _push(self, time: float) -> None:
+        if not self._pushes:
+            return
         now, data, link = time - self._begin, self._plant.mj_data, self._link
         self.force = sum(
             (np.array(p.force) for p in self._pushes if p.start <= now < p.start + p.duration), start=_NONE

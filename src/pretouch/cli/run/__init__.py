@@ -1,0 +1,1 @@
+"""What `pretouch run` does."""

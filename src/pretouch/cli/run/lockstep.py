@@ -1,0 +1,88 @@
+"""What `pretouch run --lockstep` does: a simulated Franka arm on this machine, which waits for each command."""
+
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from ipaddress import ip_address
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.cli.run.options import Run
+from pretouch.cli.run.parts import Parts
+from pretouch.cli.skin_keys import keys_file
+from pretouch.errors import RobotError
+from pretouch.hardware.franka.client import connect
+from pretouch.hardware.franka.collision import collision_behavior
+from pretouch.hardware.keys import load_keys
+from pretouch.session.finding import refusals
+from pretouch.session.keeping import keeping
+from pretouch.session.lockstep import RobotTimeUnits, follow_in_lockstep
+from pretouch.session.start import check_start
+from pretouch.session.watching import Watcher
+from pretouch.types import ControlStep
+
+
+def run_lockstep(command: Run, parts: Parts) -> int:
+    """Let a controller move a simulated arm that waits for it; return 0. Nobody is asked anything: nothing is real."""
+    address, seconds = command.robot.ip, command.task.seconds
+    _demand_here(address)
+    if not seconds:
+        raise RobotError("A run in lockstep needs --seconds: robot time passes as fast as this machine can.")
+    if command.task.approach or command.robot.confirm_push:
+        raise RobotError("--approach and --confirm-push do not go with --lockstep: leave them out.")
+    with connect(address, command.robot.arm) as client, _units(command, parts) as units:
+        client.set_collision_behavior(collision_behavior(parts.profile, parts.model))
+        q = client.read().q
+        controller = parts.controller(q)
+        refused = refusals(check_start(controller, q))
+        if refused:
+            raise RobotError(refused[0])
+        print("In lockstep nothing is checked, and no push is asked for: the arm is a simulated one.", flush=True)
+        place, folder = Path(command.record) if command.record else None, Path(command.holds)
+        with keeping(controller, f"{command.robot.arm} at {address}, in lockstep", place, folder) as kept:
+            watcher = Watcher(kept.recorder, print, "", controller.limits.period)
+            try:
+                follow_in_lockstep(client, controller, units, watcher, _Until(seconds))
+            finally:
+                said = (*watcher.course.sentences(controller.limits.period), *kept.close())
+                print("\n".join(("The arm is at rest.", *said)), flush=True)
+    return 0
+
+
+def _demand_here(address: str) -> None:
+    """Raise RobotError for an arm that may be a real one: it would wait for nobody."""
+    try:
+        here = ip_address(socket.gethostbyname(address)).is_loopback
+    except (OSError, UnicodeError):
+        here = False
+    if not here:
+        raise RobotError(
+            f"--lockstep is for a simulated arm on this machine, as 127.0.0.1, and the arm is at {address}: leave it"
+            " out."
+        )
+
+
+@contextmanager
+def _units(command: Run, parts: Parts) -> Iterator[RobotTimeUnits | None]:
+    """Hear the units in the robot's time, if there are any."""
+    c = command.units
+    with ExitStack() as stack:
+        yield (
+            stack.enter_context(
+                RobotTimeUnits(parts.skin.ids, load_keys(keys_file(c.keys)), c.units_host, c.units_port, command.seed)
+            )
+            if len(parts.skin)
+            else None
+        )
+
+
+class _Until:
+    """Whether so many seconds of robot time have passed since the first step."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._begin = seconds, np.nan
+
+    def __call__(self, step: ControlStep) -> bool:
+        self._begin = step.stamp if np.isnan(self._begin) else self._begin
+        return step.stamp - self._begin >= self._seconds

@@ -1,0 +1,142 @@
+"""What can be said after `pretouch run`, and which of it goes together."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+import tyro
+
+from pretouch.errors import HardwareError, ParameterError, RobotError
+from pretouch.hardware.address import HOST, PORT
+
+
+@dataclass(frozen=True)
+class RobotOptions:
+    """The arm."""
+
+    robot: Literal["simulated", "franka", "ros2"] = "simulated"
+    """simulated: a rehearsal of it all, without hardware. franka: by the Franka Control Interface. ros2: by topics."""
+    arm: Literal["panda", "fr3"] = "panda"
+    """Which arm it is."""
+    ip: str = ""
+    """Address of the Franka robot."""
+    lockstep: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """The robot is a `pretouch serve-fci --lockstep` on this machine: it waits for each command."""
+    confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Ask for the guided pushes although the force sign of this robot is confirmed."""
+    ros_sign: Literal["", "on-robot", "by-robot"] = ""
+    """With ros2, required: whose force the wrench topic gives, on the robot by its environment or by the robot."""
+    ros_frame: Literal["", "base", "ee"] = ""
+    """With ros2, required: the frame of the wrench."""
+    ros_command: Literal["trajectory", "velocities"] = "trajectory"
+    """With ros2: short trajectories that end at rest, or velocities for a controller with a time-out."""
+    ros_controller: str = ""
+    """With ros2 and velocities: name of the ros2_control controller that takes them."""
+    ros_timeout: float = 0.0
+    """With ros2 and velocities: its command time-out [s]."""
+    ros_distribution: Literal["foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical"] = "jazzy"
+    """With ros2: the distribution, which decides the layout of ranges."""
+    ros_domain: int = -1
+    """With ros2: the domain; by default that of ROS_DOMAIN_ID."""
+    ros_interface: str = "127.0.0.1"
+    """With ros2: the network interface's address."""
+
+
+@dataclass(frozen=True)
+class SkinOptions:
+    """The sensor units."""
+
+    skin: str = ""
+    """Skin file; by default the seven units that come with the package."""
+    no_skin: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """The arm carries no units. The profile must be one that uses none, as blind."""
+    keys: str = ""
+    """File of the units' keys; a simulated arm needs none."""
+    units_host: str = HOST
+    """Address at which units are heard; real ones need 0.0.0.0, which is every address of this machine."""
+    units_port: int = PORT
+    """UDP port at which units are heard."""
+
+
+@dataclass(frozen=True)
+class TaskOptions:
+    """What the arm does."""
+
+    path: Literal["circle", "line", "hold"] = "circle"
+    """circle and line: the paper's, begun where they are nearest. hold: stay where it is, and yield when touched."""
+    center: tuple[float, float, float] = (0.5, 0.0, 0.25)
+    """Center of the circle [m], base frame."""
+    radius: float = 0.25
+    """Radius of the circle [m]."""
+    profile: str = "paper"
+    """Parameters of the controller, or PROFILE:GROUP.FIELD=VALUE."""
+    seconds: float = 0.0
+    """How long [s]; 0: until it is stopped."""
+    approach: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """First go slowly to where the path begins."""
+    floor: float | None = None
+    """Height of what is below the arm, base frame [m]; by default 0, where its base stands, and -0.2 in simulation."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Move an arm: checks, a guided push that confirms the force sign, the controller in real time, and rest.
+
+    The exit code is 1 if the run ended early, 2 if it was refused.
+    """
+
+    robot: RobotOptions = field(default_factory=RobotOptions)
+    units: SkinOptions = field(default_factory=SkinOptions)
+    task: TaskOptions = field(default_factory=TaskOptions)
+    record: str = ""
+    """Recording to write."""
+    holds: str = "runs/holds"
+    """Folder for the last seconds before a HOLD that lasts until a person resumes."""
+    priority: int | None = None
+    """Real-time priority of the control loop, 1 to 99; by default the process keeps its own."""
+    cpu: int | None = None
+    """Number of the processor it stays on; by default the system decides."""
+    seed: int = 0
+    """Decides all that is random in a simulation."""
+    yes: bool = False
+    """Do not ask before the arm moves."""
+
+
+def check_options(command: Run) -> None:
+    """Raise an error for options that do not go together."""
+    robot, units, kind = command.robot, command.units, command.robot.robot
+    if kind == "franka" and not robot.ip:
+        raise RobotError("No address of the robot is given: name it with --ip.")
+    odd = [_flag(name) for other, names in _ONLY.items() if other != kind for name in names if _given(robot, name)]
+    if odd:
+        raise RobotError(f"{', '.join(odd)} {'does' if len(odd) == 1 else 'do'} not go with --robot {kind}.")
+    if kind == "ros2" and not (robot.ros_sign and robot.ros_frame):
+        raise RobotError(
+            "With --robot ros2 both --ros-sign and --ros-frame must be given: ROS 2 says of no wrench whose force it"
+            " is; see the documentation of your robot's driver."
+        )
+    if units.no_skin and (units.skin or units.keys):
+        raise HardwareError("--no-skin does not go with --skin and --keys: leave one or the other out.")
+    if not units.units_host:
+        raise HardwareError("--units-host is empty: give 127.0.0.1, or 0.0.0.0 for every address of this machine.")
+    if not 0.0 <= command.task.seconds < float("inf"):
+        raise ParameterError(f"--seconds is {command.task.seconds:g}: give 0 or more.")
+    if command.seed < 0:
+        raise ParameterError(f"The seed is {command.seed}: it must be at least 0.")
+
+
+_ONLY = {
+    "franka": ("ip", "lockstep"),
+    "ros2": (
+        "ros_sign", "ros_frame", "ros_command", "ros_controller", "ros_timeout", "ros_distribution", "ros_domain",
+        "ros_interface",
+    ),
+}  # fmt: skip
+"""Options that only one kind of robot has."""
+
+
+def _given(robot: RobotOptions, name: str) -> bool:
+    return bool(getattr(robot, name) != getattr(RobotOptions(), name))
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"

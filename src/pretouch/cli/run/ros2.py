@@ -1,0 +1,51 @@
+"""An arm on ROS 2 for `pretouch run`."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import cast
+
+from pretouch.cli.run.options import RobotOptions, Run
+from pretouch.cli.run.parts import Parts
+from pretouch.cli.run.robots import Opened
+from pretouch.errors import HardwareError
+from pretouch.hardware.ros2.extra import check_extra
+from pretouch.hardware.ros2.params import ArmParams, Frame, NodeParams, OutputParams, Sign, SkinParams
+
+_PATIENCE_S = 10.0
+
+
+@contextmanager
+def ros2(command: Run, parts: Parts) -> Iterator[Opened]:
+    """Join the others on ROS 2, hear arm and units, and publish each control step."""
+    check_extra()
+    from pretouch.hardware.ros2.node import Ros2Node
+    from pretouch.hardware.ros2.output import Ros2Output
+    from pretouch.hardware.ros2.robot import Ros2Robot
+    from pretouch.hardware.ros2.skin import Ros2Skin
+    from pretouch.session.ros2 import Ros2SessionArm, identity
+    from pretouch.session.session import NoUnits
+
+    if command.units.keys:
+        raise HardwareError("--keys does not go with --robot ros2, whose units are topics: leave it out.")
+    joined, arm = _params(command.robot)
+    period = parts.profile.task.control_period_s
+    with ExitStack() as stack:
+        node = stack.enter_context(Ros2Node(joined))
+        robot = stack.enter_context(Ros2Robot(arm, parts.model, node, period))
+        robot.wait(_PATIENCE_S)
+        units = stack.enter_context(Ros2Skin(SkinParams(), parts.skin, node)) if len(parts.skin) else None
+        if units:
+            units.wait(_PATIENCE_S)
+        yield Opened(
+            Ros2SessionArm(robot, parts.model.n), units or NoUnits(), identity(joined, arm),
+            notes=lambda: (*robot.notes, *(units.notes if units else ())),
+            output=lambda controller: Ros2Output(OutputParams(), controller, node),
+        )  # fmt: skip
+
+
+def _params(robot: RobotOptions) -> tuple[NodeParams, ArmParams]:
+    sign, frame = cast(Sign, robot.ros_sign), cast(Frame, robot.ros_frame)  # the options were checked for ''
+    node = NodeParams(robot.ros_distribution, robot.ros_domain, robot.ros_interface)
+    return node, ArmParams(
+        sign, frame, command=robot.ros_command, controller=robot.ros_controller, timeout_s=robot.ros_timeout
+    )

@@ -1,0 +1,59 @@
+"""A Franka arm as a session's, and by what its confirmed force sign is remembered."""
+
+from importlib.metadata import PackageNotFoundError, version
+
+from pretouch.errors import RobotError
+from pretouch.hardware.franka.arm import FrankaArm
+from pretouch.hardware.franka.client import Kind
+from pretouch.hardware.franka.sentences import check_ready
+from pretouch.session.remembered import Identity
+from pretouch.types import FloatArray, RobotState
+
+_NAMES: dict[Kind, str] = {"panda": "Panda", "fr3": "FR3"}
+_LIBRARIES: dict[Kind, str] = {"panda": "panda-python", "fr3": "pylibfranka"}
+
+
+def identity(kind: Kind, address: str) -> Identity:
+    """Return what a robot at an address is known by: another library asks for the guided pushes again."""
+    library = _LIBRARIES[kind]
+    try:
+        return Identity(kind, address, f"{library} {version(library)}")
+    except PackageNotFoundError:
+        raise RobotError("Franka arms need the extra 'franka': pip install 'pretouch[franka]'") from None
+
+
+class FrankaSessionArm:
+    """The port `Arm` over the process that speaks with a Franka arm."""
+
+    def __init__(self, arm: FrankaArm, kind: Kind, address: str) -> None:
+        """Take an arm that is connected."""
+        self._arm, self._address = arm, address
+        self.name = f"{_NAMES[kind]} at {address}"
+
+    def read(self) -> RobotState:
+        """Return the newest state."""
+        return self._arm.read()
+
+    def command(self, qd: FloatArray) -> None:
+        """Take joint velocities (7,) [rad/s] as the set-point."""
+        self._arm.command(qd)
+
+    def unfit(self) -> tuple[str, ...]:
+        """Say why the arm is in no mode to be moved."""
+        try:
+            check_ready(self._arm.state(), self._address)
+        except RobotError as error:
+            return (str(error),)
+        return ()
+
+    def begin(self) -> None:
+        """Begin a motion at rest."""
+        self._arm.begin()
+
+    def end(self) -> None:
+        """Come to rest and end the motion."""
+        self._arm.end()
+
+    def report(self) -> str:
+        """Say how well the line to the arm did."""
+        return str(self._arm.report)

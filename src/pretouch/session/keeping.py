@@ -1,0 +1,72 @@
+"""What is kept of a run: a recording, if one is asked for, and the last seconds before each HOLD that latches."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.controller import Controller
+from pretouch.loop import Cycle, Recorder
+from pretouch.recording.codec import encode_inputs
+from pretouch.recording.last_seconds import LastSeconds
+from pretouch.recording.writer import Recording
+from pretouch.types import Inputs, RangeReadings, RobotState
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Where a run goes."""
+
+    recorder: Recorder
+    """To be given each cycle."""
+    recording: Recording | None
+    last_seconds: LastSeconds
+
+    def close(self) -> tuple[str, ...]:
+        """Finish the files; return a sentence on each."""
+        self.last_seconds.close()
+        said = [f"The last seconds before a HOLD: {place}" for place in self.last_seconds.written]
+        said += [self.last_seconds.trouble] if self.last_seconds.trouble else []
+        return (*said, self.recording.close().sentence) if self.recording else tuple(said)
+
+
+@contextmanager
+def keeping(
+    controller: Controller, robot: str, place: Path | None, folder: Path, further: Recorder | None = None
+) -> Iterator[Kept]:
+    """Open what a run is kept in.
+
+    Args:
+        controller: that moves the arm.
+        robot: what the arm is called.
+        place: recording to write, if any.
+        folder: for the last seconds before each HOLD that latches.
+        further: what else is given each cycle.
+    """
+    _warm_up(controller)
+    with ExitStack() as stack:
+        recording = stack.enter_context(Recording(place, controller, {"robot": robot})) if place else None
+        last = stack.enter_context(LastSeconds(controller, folder, recording, about={"robot": robot}))
+        yield Kept(_Both(last, further) if further else last, recording, last)
+
+
+def _warm_up(controller: Controller) -> None:
+    """Encode once what is encoded in the loop: the first time takes a tenth of a second."""
+    n, units = controller.model.n, len(controller.skin)
+    zero = np.zeros(n)
+    readings = RangeReadings(np.zeros(units), np.zeros(units), np.zeros(units, np.int64))
+    encode_inputs(0, Inputs(0.0, RobotState(0.0, zero, zero, zero, zero, zero, np.zeros(6)), readings))
+
+
+class _Both:
+    """Two recorders as one."""
+
+    def __init__(self, first: Recorder, second: Recorder) -> None:
+        self._first, self._second = first, second
+
+    def record(self, cycle: Cycle) -> None:
+        """Keep one turn of the loop."""
+        self._first.record(cycle)
+        self._second.record(cycle)

@@ -1,0 +1,126 @@
+"""The arm moves: slowly to where its path begins, then under the controller. However it ends, it is to end at rest."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch import realtime
+from pretouch.calibration.motion.perform import PerformParams, perform
+from pretouch.calibration.motion.plan import Plan
+from pretouch.controller import Controller
+from pretouch.errors import PretouchError
+from pretouch.loop import MonotonicClock, Recorder
+from pretouch.ports import Skin
+from pretouch.session.arm import Arm
+from pretouch.session.signals import signals_noted
+from pretouch.types import ControlStep
+
+
+@dataclass
+class Ending:
+    """How a motion ended: written as it does, to be read whatever is raised then."""
+
+    stopped: str = ""
+    """Why it ended early, as a sentence; '' if it did not."""
+    unrest: str = ""
+    """Why the arm may not be at rest, as a sentence; '' if it is."""
+
+
+_STAND_S, _FRESH_S, _LOOK_S = 1.0, 0.1, 0.01
+"""How long an arm is looked at, how old its state may be meanwhile, and between two looks [s]."""
+_STILL_RAD_S = 0.05
+"""Six standard deviations of the joint velocity that a Panda measures at rest [rad/s]."""
+
+
+class _Interrupted(Exception):
+    """A signal came while the arm moved."""
+
+
+def go(arm: Arm, controller: Controller, way: Plan, ending: Ending) -> None:
+    """Let an arm go a planned way. A signal stops it, and is raised after it has come to rest."""
+    period = controller.profile.task.control_period_s
+
+    def move(came: list[int]) -> str:
+        def look(_tick: float) -> None:
+            if came:
+                raise _Interrupted("a signal came")
+
+        params = PerformParams(period_s=period)
+        done = perform(arm, MonotonicClock(period), controller.model, way, params, look)
+        return done.stopped or ""
+
+    _moved(arm, move, ending)
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the loop asks of the machine."""
+
+    priority: int | None = None
+    """See `realtime.real_time`."""
+    cpu: int | None = None
+    """See `realtime.real_time`."""
+
+
+def follow(
+    arm: Arm,
+    skin: Skin,
+    controller: Controller,
+    clock: MonotonicClock,
+    recorder: Recorder,
+    done: Callable[[ControlStep], bool],
+    resume: Callable[[], bool],
+    wishes: Wishes,
+    tell: Callable[[str], None],
+    ending: Ending,
+) -> None:
+    """Turn the controller until `done` says so, a signal comes, or something fails. The arguments are `realtime.run`'s.
+
+    Everything is compiled before the arm takes commands. A signal is raised after the arm has come to rest.
+    """
+    realtime.warm_up(controller, arm.read())
+
+    def move(came: list[int]) -> str:
+        realtime.run(
+            controller, arm, skin, clock, recorder, lambda step: bool(came) or done(step), resume,
+            priority=wishes.priority, cpu=wishes.cpu, tell=tell,
+        )  # fmt: skip
+        return ""
+
+    _moved(arm, move, ending)
+
+
+def _moved(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> None:
+    """Let an arm take commands while `move` gives them; it is handed the signals that came, and says why it stopped."""
+    with signals_noted() as came:
+        try:
+            arm.begin()
+            ending.stopped = move(came)
+        except Exception as error:
+            ending.stopped = _named(error)
+        finally:
+            try:
+                arm.end()
+            except Exception as error:
+                ending.stopped = ending.stopped or _named(error)
+                ending.unrest = "" if _stands(arm) else _named(error)
+
+
+def _stands(arm: Arm) -> bool:
+    """Whether an arm whose motion could not be ended is seen to stand, as after a stop of its own."""
+    until = time.monotonic() + _STAND_S
+    while time.monotonic() < until:
+        with suppress(Exception):  # whatever it is, the arm is not seen to stand
+            state = arm.read()
+            if time.monotonic() - state.stamp < _FRESH_S and np.abs(state.qd).max() < _STILL_RAD_S:
+                return True
+        time.sleep(_LOOK_S)
+    return False
+
+
+def _named(error: Exception) -> str:
+    """Say what an error says, and of one that is not ours, what it is."""
+    return str(error) if isinstance(error, PretouchError) else f"{type(error).__name__}: {error}"

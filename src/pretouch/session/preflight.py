@@ -1,0 +1,124 @@
+"""What must be so before an arm is moved: each check is a few lines, and says what to do if it fails."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.checks import Checked, Fraction, NonNegative, Positive
+from pretouch.controller import Controller
+from pretouch.session.finding import Finding
+from pretouch.session.standing import Standing
+from pretouch.types import FloatArray
+
+
+@dataclass(frozen=True)
+class PreflightParams(Checked):
+    """What an arm must be like to be moved. Figures without a source are ours."""
+
+    watch_s: Positive = 3.0
+    """Time for which it is watched while it stands [s]."""
+    drift_rad: Positive = 0.005
+    """How far a joint may move meanwhile [rad]."""
+    near_limit_rad: NonNegative = 0.1
+    """Distance to a joint's limit below which it is mentioned [rad]. Where it is refused is the profile's."""
+    bias_share: Fraction = 0.5
+    """Largest mean force at rest, as a share of the base threshold F_b: 5 N of Table I's 10. Real Pandas have 0.4 to
+    1.7 N an axis with nothing attached (franka_ros, issue 404)."""
+    disturbance_share: Fraction = 0.5
+    """Largest deviation from that mean, averaged over 0.1 s, as a share of F_b: more, and somebody touches the arm."""
+    unfelt: Fraction = 0.1
+    """Largest share of states without a force estimate."""
+    floor_clearance_m: NonNegative = 0.05
+    """Distance that the path keeps from what is below the arm [m]."""
+
+
+_PLACES = 200
+"""Places of the path whose height is looked at."""
+
+
+def check(controller: Controller, seen: Standing, floor: float, params: PreflightParams) -> tuple[Finding, ...]:
+    """Return what there is to know of an arm that was watched, for a controller that is to move it.
+
+    Args:
+        controller: its model, path and profile count.
+        seen: the arm, standing.
+        floor: height of what is below it, base frame [m].
+        params: limits.
+    """
+    return (
+        *_limits(controller, seen.newest.q, params),
+        *_rest(controller, seen, params),
+        *_force(controller, seen, params),
+        *_floor(controller, floor, params),
+    )
+
+
+def _limits(controller: Controller, q: FloatArray, params: PreflightParams) -> Iterator[Finding]:
+    model, margin = controller.model, controller.profile.task.position_margin_rad
+    room = np.minimum(q - model.q_min, model.q_max - q)
+    for joint in np.flatnonzero(room < max(margin, params.near_limit_rad)).tolist():
+        where = f"{model.joints[joint]} is at {q[joint]:.3f} rad, {room[joint]:.3f} rad from its limit"
+        if room[joint] < margin:
+            yield Finding("limits", f"{where}, and the profile keeps {margin:g} rad: guide the arm away from it.")
+        else:
+            yield Finding("limits", f"{where}: it can hardly move that way.", refused=False)
+
+
+def _rest(controller: Controller, seen: Standing, params: PreflightParams) -> Iterator[Finding]:
+    moved = np.ptp(seen.q, axis=0)
+    joint = int(np.argmax(moved))
+    if moved[joint] > params.drift_rad:
+        yield Finding(
+            "rest",
+            f"The arm does not stand still: {controller.model.joints[joint]} moved by {moved[joint]:.3f} rad (limit"
+            f" {params.drift_rad:g} rad): let it come to rest, and nobody guide it.",
+        )
+
+
+def _force(controller: Controller, seen: Standing, params: PreflightParams) -> Iterator[Finding]:
+    threshold = controller.profile.threshold
+    if seen.unfelt > params.unfelt:
+        yield Finding(
+            "no force",
+            f"The robot gives no force estimate in {100 * seen.unfelt:.0f}% of its states: it is near a singularity;"
+            " guide it to another posture.",
+        )
+    if seen.unfelt == 1.0:
+        return
+    force, most = seen.rest_wrench[:3], params.bias_share * threshold.f_base_n
+    if np.abs(force).max() > most:
+        yield Finding(
+            "bias",
+            f"At rest the robot believes to feel {_vector(force)} N, more than {most:g} N on an axis: tell it the mass"
+            " of its hand and of what that holds, and see that nothing touches the arm.",
+        )
+    if seen.noise.max() > threshold.sigma_max_n:
+        yield Finding(
+            "noise",
+            f"The force at rest has a standard deviation of {seen.noise.max():.1f} N (limit"
+            f" {threshold.sigma_max_n:g} N): see that nothing shakes the arm, and that its mounting is firm.",
+        )
+    most = params.disturbance_share * threshold.f_base_n
+    if seen.disturbance > most:
+        yield Finding(
+            "touched",
+            f"While it stood, the force changed by {seen.disturbance:.1f} N (limit {most:g} N): let nobody touch the"
+            " arm yet.",
+        )
+
+
+def _floor(controller: Controller, floor: float, params: PreflightParams) -> Iterator[Finding]:
+    path = controller.path
+    lowest = min(float(path.point(phase)[2]) for phase in np.linspace(0.0, path.length, _PLACES))
+    if lowest < floor + params.floor_clearance_m:
+        yield Finding(
+            "floor",
+            f"The path comes down to z = {lowest:.2f} m, and the floor is at {floor:.2f} m (to be kept:"
+            f" {params.floor_clearance_m:g} m): say with --floor how high what is below the arm really is, or choose"
+            " another path.",
+        )
+
+
+def _vector(values: FloatArray) -> str:
+    return f"({', '.join(f'{value:.1f}' for value in values)})"

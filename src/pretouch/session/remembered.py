@@ -1,0 +1,79 @@
+"""Which robots' force sign a guided push has confirmed: a small file, replaced whole or not at all."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pretouch.errors import RobotError
+
+_FILE = "force-sign.json"
+
+
+@dataclass(frozen=True)
+class Identity:
+    """A robot, and through what it is spoken to: with any of it changed, the push is asked for again."""
+
+    kind: str
+    """As `panda`, `fr3`, `ros2`."""
+    address: str
+    """Where it is."""
+    through: str
+    """Library, driver settings and versions that lie between."""
+
+    @property
+    def key(self) -> str:
+        """Name of its entry."""
+        return f"{self.kind} at {self.address}"
+
+
+def state_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """Return the folder for what is remembered, by the XDG base directory specification."""
+    given = environment.get("XDG_STATE_HOME", "")
+    base = Path(given) if os.path.isabs(given) else Path.home() / ".local" / "state"
+    return base / "pretouch"
+
+
+class Remembered:
+    """The file of confirmed robots in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.place = folder / _FILE
+
+    def knows(self, robot: Identity) -> bool:
+        """Whether this robot has been confirmed; a file that cannot be read is a RobotError."""
+        return self._read().get(robot.key) == robot.through
+
+    def keep(self, robot: Identity) -> None:
+        """Note that a robot is confirmed; RobotError where that cannot be written."""
+        entries = self._read() | {robot.key: robot.through}
+        unfinished = self.place.with_name(f".{_FILE}.{os.getpid()}.tmp")
+        try:
+            self.place.parent.mkdir(parents=True, exist_ok=True)
+            with unfinished.open("w", encoding="utf-8") as file:
+                json.dump(entries, file, indent=1)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(unfinished, self.place)
+        except OSError as error:
+            raise RobotError(
+                f"The confirmed push cannot be noted in {self.place} ({error.strerror}): make that folder writable, or"
+                " set XDG_STATE_HOME to another."
+            ) from error
+
+    def _read(self) -> dict[str, str]:
+        try:
+            found: Any = json.loads(self.place.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return {}
+        except OSError as error:
+            raise RobotError(f"The file {self.place} cannot be read: {error.strerror}.") from error
+        except (ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
+            raise RobotError(
+                f"The file {self.place} is damaged: delete it; the guided pushes are then asked for once more."
+            )
+        return found

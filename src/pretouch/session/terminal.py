@@ -1,0 +1,77 @@
+"""A person at the terminal while the arm moves: told of things without the loop waiting, and heard pressing Enter."""
+
+import os
+import select
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from queue import SimpleQueue
+from types import TracebackType
+from typing import Self
+
+_CLOSE_S = 1.0
+"""How long a terminal that takes nothing is waited for at the end [s]."""
+
+
+class Narrator:
+    """Says sentences from a thread of its own: a terminal that is stopped must not stop an arm's loop."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        """Take what says one sentence, and may block."""
+        self._say = say
+        self._sentences: SimpleQueue[str | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._tell, daemon=True)
+
+    def __call__(self, sentence: str) -> None:
+        """Have it said, soon."""
+        self._sentences.put(sentence)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Wait a moment until all is said; a second time does nothing."""
+        self._sentences.put(None)
+        self._thread.join(_CLOSE_S)
+
+    def _tell(self) -> None:
+        while (sentence := self._sentences.get()) is not None:
+            with suppress(OSError, ValueError):  # the terminal is gone, or closed
+                self._say(sentence)
+
+
+class EnterKey:
+    """Whether Enter was pressed since the last time it was asked; never, without a terminal."""
+
+    def __init__(self, descriptor: int | None = None) -> None:
+        """Take the file descriptor to listen at; by default that of the standard input."""
+        self._descriptor = _standard_input() if descriptor is None else descriptor
+        self.possible = self._descriptor is not None and os.isatty(self._descriptor)
+        """Whether there is a terminal."""
+
+    def __call__(self) -> bool:
+        """Return it without waiting."""
+        if not self.possible or self._descriptor is None:
+            return False
+        try:
+            if not select.select([self._descriptor], [], [], 0)[0]:
+                return False
+            typed = os.read(self._descriptor, 4096)
+        except OSError:  # the terminal is gone, or another program has it
+            return False
+        self.possible = bool(typed)
+        return b"\n" in typed
+
+
+def _standard_input() -> int | None:
+    try:
+        return sys.stdin.fileno()
+    except (AttributeError, OSError, ValueError):  # none, or one of a test's
+        return None

@@ -1,0 +1,115 @@
+"""Sensor units before a run: each is heard, its clock is known, and what it shows agrees with the model."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import monotonic
+from typing import Protocol
+
+import numpy as np
+
+from pretouch.errors import HardwareError
+from pretouch.hardware.findings import findings
+from pretouch.hardware.health import UnitWindow
+from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
+from pretouch.hardware.receiver_process import Traffic
+from pretouch.hardware.traffic import Received, UnitTraffic
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.ports import Clock, Robot
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.session.finding import Finding
+from pretouch.types import RangeReadings
+
+_TAKE_S = 0.1
+"""Time between two looks at the units [s]."""
+
+
+class Units(Protocol):
+    """What hears the units, as `NetworkSkin`."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether it still listens."""
+        ...
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Where it listens."""
+        ...
+
+    def read(self) -> RangeReadings:
+        """Return the newest reading of each unit."""
+        ...
+
+    def take_samples(self) -> list[Received]:
+        """Return the samples since the last call."""
+        ...
+
+    def traffic(self) -> Traffic:
+        """Return what was counted."""
+        ...
+
+
+class UnitCheck:
+    """Watches units for as long as their arm stands."""
+
+    def __init__(self, units: Units, model: RobotModel, skin: Skin, fixtures: Fixtures, robot: Robot) -> None:
+        """Take the units of a skin on an arm, and what stands around it."""
+        self._units, self._skin, self._robot = units, skin, robot
+        self._health = HealthParams()
+        self._windows = [UnitWindow(name, self._health.window_s) for name in skin.ids]
+        self._model = ModelCheck(model, skin, fixtures, ModelCheckParams())
+        self._taken = 0.0
+        self._arrivals = [-np.inf] * len(skin)
+
+    def wait(self, clock: Clock, patience: float, steady: float) -> None:
+        """Wait until all units have been heard for a while without a break; those that are not are a HardwareError.
+
+        Args:
+            clock: gives the ticks.
+            patience: how long to wait for one of them [s].
+            steady: for how long all must be heard [s]: their clocks are known by then.
+        """
+        begin = since = clock.tick()
+        while (now := clock.tick()) - since < steady:
+            self.take(now)
+            missing = [unit.id for unit in self._traffic() if unit.state != "live"]
+            since = now if missing else since
+            if missing and now - begin > patience:
+                raise HardwareError(_missing(missing, self._units.address))
+
+    def take(self, now: float) -> None:
+        """Take in what came until a tick [s]."""
+        if not self._units.alive:
+            raise HardwareError("The receiver of the units has ended: what it printed tells why.")
+        if now - self._taken < _TAKE_S:
+            return
+        self._taken = now
+        heard = self._units.take_samples()
+        for one in heard:
+            self._arrivals[one.unit] = one.arrival
+        traffic = self._traffic()
+        for k, window in enumerate(self._windows):
+            window.take(monotonic(), [one for one in heard if one.unit == k], traffic[k])
+        self._model.take(self._robot.read().q, self._units.read())
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what is wrong with them by now."""
+        now = monotonic()
+        health = [window.health(now, unit) for window, unit in zip(self._windows, self._traffic(), strict=True)]
+        found = (*findings(health, self._health), *self._model.findings())
+        return tuple(Finding(f.what, f.sentence, refused=f.level == "fault") for f in found)
+
+    def _traffic(self) -> Sequence[UnitTraffic]:
+        """Return what was counted, older than the samples by up to 0.6 s but for the newest arrivals."""
+        told = zip(self._units.traffic().units, self._arrivals, strict=True)
+        return [replace(unit, last_arrival=max(arrival, unit.last_arrival)) for unit, arrival in told]
+
+
+def _missing(names: Sequence[str], address: tuple[str, int]) -> str:
+    host, port = address
+    return (
+        f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not heard at {host}:{port}: see what"
+        " `pretouch skin monitor` says of them; --skin names the units of the arm."
+    )

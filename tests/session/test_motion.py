@@ -1,0 +1,139 @@
+"""However a motion ends, the arm is brought to rest, and it is said what happened."""
+
+import os
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.calibration.motion.plan import Plan
+from pretouch.cli.ending import Terminated, ends_raise
+from pretouch.control.path import line
+from pretouch.controller import Controller
+from pretouch.loop import MonotonicClock
+from pretouch.params import PROFILES
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.sensing.skin import Skin
+from pretouch.session.motion import Ending, Wishes, follow, go
+from pretouch.session.session import NoUnits
+from pretouch.types import Mode
+from tests.session.arms import FollowingArm
+
+
+@pytest.fixture(scope="module")
+def controller(panda_model):
+    x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
+    blind = PROFILES["blind"]
+    profile = replace(blind, threshold=replace(blind.threshold, window_samples=10))  # moves after a tenth of a second
+    path = line((x, y, z), (x, y + 0.4, z))
+    return Controller(panda_model, Skin((), panda_model), no_fixtures(), path, profile)
+
+
+class Keeper:
+    """Keeps steps, and does something at one of them."""
+
+    def __init__(self, at=10**9, then=lambda: None):
+        self.steps, self.at, self.then = [], at, then
+
+    def record(self, cycle):
+        self.steps.append(cycle.step)
+        if len(self.steps) == self.at:
+            self.then()
+
+
+def followed(controller, arm, keeper, cycles=80):
+    ending = Ending()
+    clock = MonotonicClock(0.01)
+    follow(
+        arm, NoUnits(), controller, clock, keeper, lambda _: len(keeper.steps) >= cycles, lambda: False, Wishes(),
+        lambda _: None, ending,
+    )  # fmt: skip
+    return ending
+
+
+def fast(arm):
+    return np.abs(np.array(arm.commands)).max()
+
+
+def test_a_run_begins_and_ends_at_rest(controller, panda_model):
+    arm, keeper = FollowingArm(panda_model.description.q_ready), Keeper()
+    assert followed(controller, arm, keeper) == Ending()
+    assert keeper.steps[-1].mode is Mode.TRACK
+    assert fast(arm) > 0.05
+    assert not arm.commands[-1].any()
+    assert (arm.begun, arm.ended) == (1, 1)
+    steps = np.diff(np.array(arm.commands), axis=0) / 0.01
+    assert np.all(np.abs(steps) <= 1.001 * panda_model.description.qdd_max)
+
+
+def test_an_exception_in_the_recorder_brings_the_arm_to_rest_and_is_said(controller, panda_model):
+    def fail():
+        raise ZeroDivisionError("by a recorder")
+
+    arm = FollowingArm(panda_model.description.q_ready)
+    ending = followed(controller, arm, Keeper(60, fail))
+    assert ending == Ending(stopped="ZeroDivisionError: by a recorder")
+    assert fast(arm) > 0.05
+    assert not arm.commands[-1].any()
+    assert arm.ended == 1
+
+
+@pytest.mark.parametrize(
+    ("number", "raised"),
+    [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, Terminated), (signal.SIGHUP, Terminated)],
+)
+def test_a_signal_is_raised_after_the_arm_has_come_to_rest(controller, panda_model, number, raised):
+    arm = FollowingArm(panda_model.description.q_ready)
+    before = signal.getsignal(signal.SIGTSTP)
+    with ends_raise(), pytest.raises(raised):
+        followed(controller, arm, Keeper(60, lambda: os.kill(os.getpid(), number)))
+    assert fast(arm) > 0.05
+    assert not arm.commands[-1].any()
+    assert arm.ended == 1
+    assert signal.getsignal(signal.SIGTSTP) is before
+
+
+def test_ctrl_z_does_not_stop_a_program_whose_arm_moves(controller, panda_model):
+    arm = FollowingArm(panda_model.description.q_ready)
+    assert followed(controller, arm, Keeper(20, lambda: os.kill(os.getpid(), signal.SIGTSTP)), 40) == Ending()
+
+
+def test_an_arm_that_takes_no_more_commands_is_said_and_its_motion_ended(controller, panda_model):
+    arm = FollowingArm(panda_model.description.q_ready)
+    arm.dies_after = 60
+    ending = followed(controller, arm, Keeper())
+    assert ending.stopped == "The process that speaks with the arm has ended."
+    assert arm.ended == 1
+
+
+@pytest.mark.parametrize(("stands", "unrest"), [(True, ""), (False, "The arm does not answer.")])
+def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, panda_model, stands, unrest):
+    arm = FollowingArm(panda_model.description.q_ready)
+    arm.end_fails, arm.gone = True, not stands
+    assert followed(controller, arm, Keeper(), 20) == Ending(stopped="The arm does not answer.", unrest=unrest)
+
+
+def test_an_arm_goes_along_a_plan_and_a_signal_stops_it(controller, panda_model):
+    q = panda_model.description.q_ready
+    plan = Plan(np.array([0.0, 1.5]), np.array([q, q + 0.1]))
+    arm, ending = FollowingArm(q), Ending()
+    go(arm, controller, plan, ending)
+    assert ending == Ending()
+    assert np.allclose(arm.q, q + 0.1, atol=0.01)
+    assert not arm.commands[-1].any()
+
+    arm, ending = FollowingArm(q), Ending()
+    command = arm.command
+
+    def commanded(qd):
+        command(qd)
+        if len(arm.commands) == 50:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    arm.command = commanded
+    with ends_raise(), pytest.raises(Terminated):
+        go(arm, controller, plan, ending)
+    assert "a signal came" in ending.stopped
+    assert 0.005 < np.abs(arm.q - q).max() < 0.09
+    assert not arm.commands[-1].any()

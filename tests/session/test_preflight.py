@@ -1,0 +1,107 @@
+"""What forbids a run: each check with an arm that fails it alone."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.control.path import Circle, line
+from pretouch.controller import Controller
+from pretouch.errors import RobotError
+from pretouch.params import PROFILES
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.sensing.skin import Skin
+from pretouch.session.preflight import PreflightParams, check
+from pretouch.session.standing import watch
+from pretouch.session.start import check_start, way_to_start
+from tests.session.arms import PushedArm
+
+
+@pytest.fixture(scope="module")
+def controller(panda_model):
+    return Controller(panda_model, Skin((), panda_model), no_fixtures(), Circle(), PROFILES["blind"])
+
+
+def seen(model, **about_arm):
+    arm = PushedArm(model, **about_arm)
+    return watch(arm, arm, model.description.qd_max, 2.0)
+
+
+def found(controller, seen, floor=-0.2):
+    return check(controller, seen, floor, PreflightParams())
+
+
+def test_a_sound_arm_is_found_fit(controller, panda_model):
+    assert found(controller, seen(panda_model, force=lambda _: np.array([1.0, -1.5, 2.0]), noise=1.8)) == ()
+
+
+@pytest.mark.parametrize(
+    ("about", "what", "said"),
+    [
+        ({"force": lambda _: np.array([0.0, 0.0, 6.0])}, "bias", r"\(0\.0, 0\.0, 6\.0\) N, more than 5 N"),
+        ({"noise": 4.0}, "noise", "standard deviation of"),
+        (
+            {"force": lambda t: np.array([0.0, 9.0 if 101.0 < t < 101.3 else 0.0, 0.0])},
+            "touched", "let nobody touch the arm",
+        ),
+    ],
+)  # fmt: skip
+def test_a_force_at_rest_that_would_hide_contacts_is_refused(controller, panda_model, about, what, said):
+    findings = {finding.what: finding for finding in found(controller, seen(panda_model, **about))}
+    assert findings[what].refused
+    assert re.search(said, findings[what].sentence)
+
+
+def test_no_force_estimate_is_refused(controller, panda_model):
+    standing = seen(panda_model)
+    findings = found(controller, replace(standing, wrench=np.full_like(standing.wrench, np.nan)))
+    assert [finding.what for finding in findings] == ["no force"]
+
+
+def test_an_arm_that_moves_is_refused(controller, panda_model):
+    standing = seen(panda_model)
+    q = standing.q + np.linspace(0.0, 0.02, len(standing.q))[:, None] * np.eye(7)[3]
+    (finding,) = found(controller, replace(standing, q=q))
+    assert "joint4 moved by 0.020 rad" in finding.sentence
+
+
+@pytest.mark.parametrize(("room", "refused"), [(0.005, True), (0.05, False)])
+def test_a_joint_near_its_limit_is_named(controller, panda_model, room, refused):
+    standing = seen(panda_model)
+    q = standing.newest.q.copy()
+    q[5] = panda_model.q_max[5] - room
+    (finding,) = found(controller, replace(standing, newest=replace(standing.newest, q=q)))
+    assert finding.refused == refused
+    assert f"joint6 is at {q[5]:.3f} rad, {room:.3f} rad from its limit" in finding.sentence
+
+
+def test_a_path_that_comes_down_to_the_floor_is_refused(controller, panda_model):
+    (finding,) = found(controller, seen(panda_model), floor=0.0)
+    assert "z = 0.00 m" in finding.sentence
+    assert "--floor" in finding.sentence
+
+
+def test_an_arm_away_from_its_path_is_refused_with_the_way_out(controller, panda_model):
+    (finding,) = check_start(controller, panda_model.description.q_ready)
+    assert "--approach" in finding.sentence
+
+
+def test_the_way_to_the_start_ends_there_and_is_slow(controller, panda_model):
+    q = panda_model.description.q_ready
+    way = way_to_start(panda_model, q, controller.path, -0.2)
+    assert np.allclose(way.at(0.0)[0], q)
+    assert not check_start(controller, way.at(way.duration)[0])
+    times = np.linspace(0.0, way.duration, 200)
+    x = np.array([panda_model.kinematics(way.at(t)[0]).position[panda_model.ee] for t in times])
+    assert np.linalg.norm(np.diff(x, axis=0), axis=1).max() / (times[1] - times[0]) < 0.16
+
+
+def test_no_way_is_planned_where_the_arm_is_at_the_start(controller, panda_model):
+    goal = way_to_start(panda_model, panda_model.description.q_ready, controller.path, -0.2)
+    assert way_to_start(panda_model, goal.at(goal.duration)[0], controller.path, -0.2) is None
+
+
+def test_a_way_through_the_floor_is_an_error(panda_model):
+    with pytest.raises(RobotError, match="no way to the start"):
+        way_to_start(panda_model, panda_model.description.q_ready, line((0.5, 0.0, -0.1), (0.5, 0.1, -0.1)), 0.0)

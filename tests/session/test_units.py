@@ -1,0 +1,59 @@
+"""Units before a run, over real sockets."""
+
+import time
+
+import pytest
+
+from pretouch.errors import HardwareError
+from pretouch.hardware.network_skin import NetworkSkin
+from pretouch.loop import MonotonicClock
+from pretouch.robot.model import RobotModel
+from pretouch.serving.simulated_arm import SimulateOptions
+from pretouch.serving.wire_skin import made_keys
+from pretouch.session.session import NoUnits
+from pretouch.session.simulated import SimulatedSessionArm
+from pretouch.session.units import UnitCheck
+from pretouch.sim.scene import SceneSpec, fixtures
+
+
+@pytest.fixture
+def checked(panda_model, paper_skin):
+    """A simulated arm with units, and the check of them."""
+    keys = made_keys(paper_skin.ids, 0)
+    model, scene = RobotModel(panda_model.description), SceneSpec()
+    with NetworkSkin(paper_skin.ids, keys) as units:
+        options = SimulateOptions(model, paper_skin, keys, *units.address, hand=False)
+        with SimulatedSessionArm(options, panda_model.description.q_ready, scene) as arm:
+            yield arm, units, UnitCheck(units, panda_model, paper_skin, fixtures(scene), arm)
+
+
+def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(checked):
+    arm, _, check = checked
+    clock = MonotonicClock(0.01)
+    check.wait(clock, 20.0, 1.0)
+    assert not [finding.sentence for finding in check.findings() if finding.refused]
+
+    arm._arm.fleet.units[2].silent = True
+    end = time.monotonic() + 1.0
+    while (now := clock.tick()) < end:
+        check.take(now)
+    (finding,) = [finding for finding in check.findings() if finding.refused]
+    assert finding.sentence.startswith("hand_front has sent nothing for")
+
+
+def test_units_that_are_not_heard_are_named(checked):
+    arm, units, check = checked
+    arm._arm.fleet.units[0].silent = True
+    with pytest.raises(HardwareError, match=f"hand_left is not heard at 127.0.0.1:{units.address[1]}"):
+        check.wait(MonotonicClock(0.01), 1.5, 1.0)
+
+
+def test_a_receiver_that_has_ended_is_said(checked):
+    _, units, check = checked
+    units.close()
+    with pytest.raises(HardwareError, match="receiver of the units has ended"):
+        check.wait(MonotonicClock(0.01), 1.5, 1.0)
+
+
+def test_an_arm_without_units_has_none():
+    assert len(NoUnits().read().stamp) == 0

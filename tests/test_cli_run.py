@@ -1,0 +1,157 @@
+"""`pretouch run`: what is refused, and a rehearsal from the checks to the report."""
+
+import io
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+from pretouch import cli
+from pretouch.recording.reader import open_recording
+from pretouch.session import simulated
+from pretouch.session.preflight import PreflightParams
+from pretouch.session.push import PushParams
+from pretouch.types import Mode
+
+BLIND = ("run", "--no-skin", "--profile", "blind", "--path", "hold")
+
+
+@pytest.fixture(autouse=True)
+def _state_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr("pretouch.cli.run.command.PREFLIGHT", PreflightParams(watch_s=1.0))
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--robot", "franka"), "name it with --ip"),
+        (("--ip", "127.0.0.1"), "--ip does not go with --robot simulated"),
+        (("--robot", "ros2"), "both --ros-sign and --ros-frame must be given"),
+        (("--robot", "ros2", "--ros-sign", "on-robot", "--ip", "1.2.3.4"), "--ip does not go with --robot ros2"),
+        (("--no-skin",), "choose --profile blind"),
+        (("--no-skin", "--skin", "a.toml"), "--no-skin does not go with --skin"),
+        (("--skin", "missing.toml"), "missing.toml cannot be read"),
+        (("--profile", "paperr"), "'paperr' is unknown"),
+        (("--seconds", "-1"), "--seconds is -1"),
+        (("--seconds", "inf"), "--seconds is inf"),
+        (("--floor", "nan"), "--floor is nan"),
+        (("--seed", "-1"), "The seed is -1"),
+        (("--priority", "100"), "real-time priority is 100"),
+        (("--units-host", ""), "--units-host is empty"),
+        (("--path", "circle", "--radius", "3"), "cannot reach"),
+        (("--robot", "franka", "--ip", "192.0.2.1", "--lockstep", "--seconds", "1"), "is for a simulated arm"),
+        (("--robot", "franka", "--ip", "127.0.0.1", "--lockstep"), "needs --seconds"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys):
+    assert cli.main(["run", *words]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_recording_that_is_there_is_not_written_over(tmp_path, capsys):
+    (tmp_path / "a.mcap").write_text("precious")
+    assert cli.main([*BLIND, "--record", "a.mcap"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert (tmp_path / "a.mcap").read_text() == "precious"
+
+
+def test_a_rehearsal_checks_confirms_announces_moves_and_reports(tmp_path, capsys):
+    assert cli.main([*BLIND, "--seconds", "0.3", "--yes", "--record", "a.mcap"]) == 0
+    said = capsys.readouterr().out
+    order = [
+        "All checks passed", "Push the hand gently", "towards +y", "towards +x", "The force sign is confirmed",
+        "keeps its end-effector at", "To stop it", "HOLD", "The arm is at rest.", "a.mcap holds",
+    ]  # fmt: skip
+    places = [said.find(part) for part in order]
+    assert -1 not in places
+    assert places == sorted(places)
+    assert len(open_recording(tmp_path / "a.mcap")) >= 30
+    assert not (tmp_path / "state").exists()
+
+
+def test_without_a_terminal_nobody_lets_the_arm_move(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
+    assert cli.main([*BLIND, "--seconds", "1"]) == 2
+    shown = capsys.readouterr()
+    assert "no terminal to ask at" in shown.err
+    assert "HOLD" not in shown.out
+
+
+def test_a_wrong_sign_is_refused_before_anything_moves(capsys, monkeypatch):
+    read, began = simulated.SimulatedSessionArm.read, []
+
+    def opposite(arm):
+        state = read(arm)
+        return type(state)(
+            state.stamp, state.q, state.qd, state.q_commanded, state.qd_commanded, -state.tau_ext, -state.wrench
+        )
+
+    monkeypatch.setattr(simulated.SimulatedSessionArm, "read", opposite)
+    monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", began.append)
+    assert cli.main([*BLIND, "--seconds", "1", "--yes"]) == 2
+    assert "force by the robot, not on it" in capsys.readouterr().err
+    assert not began
+
+
+def test_without_a_push_nothing_moves(capsys, monkeypatch):
+    monkeypatch.setattr(simulated.SimulatedSessionArm, "push", lambda *_: None)
+    monkeypatch.setattr("pretouch.cli.run.command.PUSH", PushParams(timeout_s=0.5))
+    assert cli.main([*BLIND, "--seconds", "1", "--yes"]) == 2
+    assert "No clear push towards +y" in capsys.readouterr().err
+
+
+def at_begin(monkeypatch, seconds, then):
+    """Have something done a while after the arm was let move."""
+    begin = simulated.SimulatedSessionArm.begin
+
+    def begun(arm):
+        begin(arm)
+        threading.Timer(seconds, then, (arm,)).start()
+
+    monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", begun)
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_a_signal_in_the_middle_brings_the_arm_to_rest_and_files_are_whole(tmp_path, capsys, monkeypatch, number, code):
+    at_begin(monkeypatch, 2.5, lambda _: os.kill(os.getpid(), number))
+    assert cli.main(["run", "--no-skin", "--profile", "blind", "--yes", "--record", "a.mcap"]) == code
+    said = capsys.readouterr().out
+    assert "The arm is at rest." in said
+    assert "a.mcap holds" in said
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert recorded.complete
+    assert recorded[len(recorded) - 1].step.mode is Mode.TRACK
+    assert np.linalg.norm(recorded[len(recorded) - 1].step.ee_velocity) > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_units_that_fall_silent_in_the_middle_are_named_and_the_arm_holds(tmp_path, capsys, monkeypatch):
+    def silence(arm):
+        for unit in arm._arm.fleet.units:
+            unit.silent = True
+
+    at_begin(monkeypatch, 2.5, silence)
+    assert cli.main(["run", "--yes", "--seconds", "4", "--units-port", "0", "--record", "a.mcap"]) == 0
+    assert "No usable reading from hand_left" in capsys.readouterr().out
+    steps = [kept.step for kept in open_recording(tmp_path / "a.mcap")]
+    assert any(step.mode is Mode.TRACK for step in steps)
+    assert steps[-1].mode is Mode.HOLD
+    assert not steps[-1].command.any()
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_an_approach_leads_to_where_the_path_begins(tmp_path, capsys):
+    words = "--no-skin", "--profile", "blind", "--path", "line", "--approach", "--seconds", "0.5", "--yes"
+    assert cli.main(["run", *words, "--record", "a.mcap"]) == 0
+    said = capsys.readouterr().out
+    assert "First the arm goes slowly" in said
+    step = open_recording(tmp_path / "a.mcap")[0].step
+    assert np.linalg.norm(step.ee_position - step.path_position) < 0.02
