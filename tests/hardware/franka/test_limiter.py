@@ -5,7 +5,7 @@ import pytest
 
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.limiter import SetPointLimiter, refusal
-from pretouch.hardware.franka.limits import LimiterParams, MotionLimits, motion_limits
+from pretouch.hardware.franka.limits import LimiterParams, MotionLimits, motion_limits, planned
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.robot.model import RobotModel
 from tests.hardware.franka.made import CheckingArm, middle
@@ -93,3 +93,10 @@ def test_a_set_point_that_is_none_is_named(limits: MotionLimits, joint: int, val
     wanted[joint] = value
     assert words in refusal(wanted, limits)
     assert refusal(limits.qd_max.tolist(), limits) == ""
+
+
+def test_a_controller_is_told_the_acceleration_that_is_used(panda_model: RobotModel) -> None:
+    told = RobotModel(planned(panda_model.description, LimiterParams(acceleration_share=0.25)))
+    np.testing.assert_array_equal(told.description.qdd_max, panda_model.description.qdd_max / 4)
+    # what the arm takes is what it was
+    np.testing.assert_array_equal(motion_limits(told, "panda").qdd_max, panda_model.description.qdd_max)

@@ -1,8 +1,8 @@
 """What `pretouch run --lockstep` does: a simulated Franka arm on this machine, which waits for each command."""
 
 import socket
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from ipaddress import ip_address
 from pathlib import Path
 
@@ -14,13 +14,15 @@ from pretouch.cli.skin_keys import keys_file
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.client import connect
 from pretouch.hardware.franka.collision import collision_behavior
+from pretouch.hardware.franka.lockstep import run_in_lockstep
+from pretouch.hardware.franka.lockstep_skin import LockstepSkin
 from pretouch.hardware.keys import load_keys
 from pretouch.session.finding import refusals
 from pretouch.session.keeping import keeping
-from pretouch.session.lockstep import RobotTimeUnits, follow_in_lockstep
+from pretouch.session.session import NoUnits
 from pretouch.session.start import check_start
 from pretouch.session.watching import Watcher
-from pretouch.types import ControlStep
+from pretouch.types import ControlStep, RangeReadings
 
 
 def run_lockstep(command: Run, parts: Parts) -> int:
@@ -31,7 +33,7 @@ def run_lockstep(command: Run, parts: Parts) -> int:
         raise RobotError("A run in lockstep needs --seconds: robot time passes as fast as this machine can.")
     if command.task.approach or command.robot.confirm_push:
         raise RobotError("--approach and --confirm-push do not go with --lockstep: leave them out.")
-    with connect(address, command.robot.arm) as client, _units(command, parts) as units:
+    with connect(address, command.robot.arm) as client, _units(command, parts) as readings_at:
         client.set_collision_behavior(collision_behavior(parts.profile, parts.model))
         q = client.read().q
         controller = parts.controller(q)
@@ -43,7 +45,7 @@ def run_lockstep(command: Run, parts: Parts) -> int:
         with keeping(controller, f"{command.robot.arm} at {address}, in lockstep", place, folder) as kept:
             watcher = Watcher(kept.recorder, print, "", controller.limits.period)
             try:
-                follow_in_lockstep(client, controller, units, watcher, _Until(seconds))
+                run_in_lockstep(client, controller, readings_at, watcher, _Until(seconds))
             finally:
                 said = (*watcher.course.sentences(controller.limits.period), *kept.close())
                 print("\n".join(("The arm is at rest.", *said)), flush=True)
@@ -64,17 +66,15 @@ def _demand_here(address: str) -> None:
 
 
 @contextmanager
-def _units(command: Run, parts: Parts) -> Iterator[RobotTimeUnits | None]:
+def _units(command: Run, parts: Parts) -> Iterator[Callable[[float], RangeReadings]]:
     """Hear the units in the robot's time, if there are any."""
+    if not len(parts.skin):
+        nothing = NoUnits().read()
+        yield lambda _: nothing
+        return
     c = command.units
-    with ExitStack() as stack:
-        yield (
-            stack.enter_context(
-                RobotTimeUnits(parts.skin.ids, load_keys(keys_file(c.keys)), c.units_host, c.units_port, command.seed)
-            )
-            if len(parts.skin)
-            else None
-        )
+    with LockstepSkin(parts.skin, load_keys(keys_file(c.keys)), c.units_host, c.units_port, command.seed) as skin:
+        yield skin
 
 
 class _Until:

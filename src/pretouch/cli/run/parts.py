@@ -10,6 +10,7 @@ from pretouch.cli.run.options import Run, TaskOptions
 from pretouch.control.path import Circle, Path, line
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
+from pretouch.hardware.franka.limits import LimiterParams, planned
 from pretouch.params import Profile
 from pretouch.params import profile as find_profile
 from pretouch.perception.scene_filter import Fixtures
@@ -67,6 +68,8 @@ def parts(command: Run) -> Parts:
     """Read files and parameters; what does not fit together is an error."""
     units, task, profile = command.units, command.task, find_profile(command.task.profile)
     model = arm_model(command.robot.arm)
+    if command.robot.robot == "franka":
+        model = RobotModel(planned(model.description, LimiterParams()))
     if units.no_skin:
         if profile.perception.enabled:
             raise ParameterError(

@@ -1,12 +1,12 @@
 """Within what a Franka arm takes velocity commands, one a millisecond, and the share of it that is used."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.robot.description import SpeedEnvelope
+from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
@@ -15,6 +15,8 @@ JERK = {
     "fr3": np.full(7, 5000.0),
 }
 """Largest jerk of each joint [rad/s^3]: `kMaxJointJerk` in `rate_limiting.h` of libfranka 0.9, and 0.21 for the FR3."""
+
+_ARMS = {"panda": panda, "fr3": fr3}
 
 Share = Annotated[float, Check(low=0.01, high=0.9)]
 
@@ -56,6 +58,14 @@ class MotionLimits:
 
 
 def motion_limits(model: RobotModel, kind: str) -> MotionLimits:
-    """Return the limits of an arm; `kind` is "panda" or "fr3"."""
+    """Return the limits of an arm; `kind` is "panda" or "fr3".
+
+    Accelerations are the vendor's: those of the model may be what a controller is told (`planned`).
+    """
     arm = model.description
-    return MotionLimits(arm.qd_max, arm.qdd_max, JERK[kind], model.q_min, model.q_max, arm.envelope)
+    return MotionLimits(arm.qd_max, _ARMS[kind]().qdd_max, JERK[kind], model.q_min, model.q_max, arm.envelope)
+
+
+def planned(description: RobotDescription, params: LimiterParams) -> RobotDescription:
+    """Return what a controller is to know of an arm: of its accelerations, the share that is used on the way."""
+    return replace(description, qdd_max=params.acceleration_share * description.qdd_max)

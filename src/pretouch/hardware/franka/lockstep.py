@@ -33,9 +33,8 @@ def run_in_lockstep(
     resume: Callable[[], bool] = lambda: False,
     *,
     params: LimiterParams | None = None,
-    every: int = 10,
 ) -> None:
-    """Turn the controller at every so many states of a motion until `done` says so of a step.
+    """Turn the controller once a period of the robot's time, until `done` says so of a step.
 
     All stamps are of the robot's time, from the first state of the motion on: the simulated arm's time jumps before it.
     The controller is compiled before the motion begins, for the arm waits less than a second for its first command. The
@@ -44,18 +43,18 @@ def run_in_lockstep(
 
     Args:
         client: connected to the arm.
-        controller: its period must be `every` milliseconds.
+        controller: its period must be a whole number of milliseconds.
         skin_at: returns the readings there are at a robot time [s]; asked at every state, used at each step.
         recorder: keeps the steps.
         done: whether a step was the last.
         resume: whether a person now asks to leave a latched HOLD.
         params: of the way from one set-point to the next.
-        every: states to a step.
     """
-    if abs(every * PERIOD_S - controller.limits.period) > 1e-9:
+    every = round(controller.limits.period / PERIOD_S)
+    if every < 1 or abs(every * PERIOD_S - controller.limits.period) > 1e-9:
         raise ParameterError(
-            f"The controller has a period of {controller.limits.period!r} s, but is to be stepped every {every} ms:"
-            " make them the same (params.at_rate makes a profile for another rate)."
+            f"The controller has a period of {controller.limits.period!r} s, which is no whole number of milliseconds:"
+            " params.at_rate makes a profile for another rate."
         )
     warm_up(controller, robot_state(client.read(), 0.0))
     limiter = SetPointLimiter(motion_limits(controller.model, client.kind), params or LimiterParams())
