@@ -78,6 +78,8 @@ def test_its_units_are_heard_in_real_time(tmp_path: Path) -> None:
         (["--units", "127.0.0.1:7337"], "needs --keys"),
         (["--hand", "--scene", "static"], "--hand goes with --scene empty"),
         (["--seed", "-1"], "give 0 or more"),
+        (["--scene", "static", "--stiffness", "0"], "--stiffness is 0 N/m: give more than 0"),
+        (["--scene", "static", "--stiffness", "nan"], "--stiffness is nan N/m"),
         (["--truth", "/nowhere/truth.csv"], "The truth cannot be written"),
     ],
 )

@@ -32,6 +32,8 @@ from pretouch.sim.posture import brought_to
 from pretouch.sim.scene import HandSpec, SceneSpec
 
 _say = partial(print, flush=True)
+_STIFFEST = 1e6
+"""Largest stiffness of the board [N/m]."""
 
 
 def serve_fci(command: ServeFci) -> None:
@@ -86,6 +88,8 @@ def _setup(c: ServeFci) -> ArmSetup:
     model = arm_model(c.robot)
     if c.hand and c.scene != "empty":
         raise ParameterError(f"--hand goes with --scene empty: in {c.scene} there is what the experiment has.")
+    if not 0 < c.stiffness <= _STIFFEST:
+        raise ParameterError(f"--stiffness is {c.stiffness:g} N/m: give more than 0, and at most {_STIFFEST:g}.")
     if c.seed < 0:
         raise ParameterError(f"--seed is {c.seed}: give 0 or more.")
     scene, hand, path = _scene(c, model)

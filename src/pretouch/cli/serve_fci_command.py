@@ -28,14 +28,14 @@ class ServeFci:
     side: Literal["+y", "-y"] = "+y"
     """Side of the board."""
     stiffness: float = 25_000.0
-    """Contact stiffness of the board [N/m]."""
+    """Contact stiffness of the board [N/m], greater than 0."""
     start: Literal["ready", "path"] = "ready"
     """Where the arm stands at first: its usual posture, or the start of the path."""
     seed: int = 0
     """Simulated arm to take: each has other errors and noise, and the scene other places."""
     push: tuple[str, ...] = ()
-    """Forces on the arm at its TCP, each T:FX,FY,FZ or T:FX,FY,FZ:DURATION [s, N, s], base frame. T counts from the
-    start of the server; in lockstep, from the first motion on, while the arm moves."""
+    """Forces on the arm at its TCP, each T:FX,FY,FZ or T:FX,FY,FZ:DURATION [s, N, s], base frame, up to
+    1000 N. T counts from the start of the server; in lockstep, from the first motion on, while the arm moves."""
     hand: bool = False
     """Let a person's hand come and go before the arm, in the empty scene."""
     units: str = ""

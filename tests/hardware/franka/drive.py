@@ -1,9 +1,12 @@
 """Run as a process: drives an arm in lockstep through the vendor's library; prints what came of it as JSON."""
 
+import gc
 import json
 import sys
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 
@@ -15,8 +18,10 @@ from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.limiter import SetPointLimiter
 from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.lockstep import run_in_lockstep
+from pretouch.hardware.franka.lockstep_skin import LockstepSkin
 from pretouch.hardware.franka.sentences import MotionAborted
 from pretouch.hardware.franka.state import FrankaState, packed
+from pretouch.hardware.keys import load_keys
 from pretouch.loop import Cycle
 from pretouch.params import profile
 from pretouch.perception.scene_filter import Fixtures
@@ -42,6 +47,7 @@ class Result:
     last_errors: list[str] = field(default_factory=list)
     forces: list[list[float]] = field(default_factory=list)
     speed: float = 0.0
+    heard: int = 0
 
 
 class Staircase:
@@ -86,36 +92,72 @@ def contact(client: Client, model: RobotModel, result: Result) -> None:
     client.control(Staircase(model, client.kind, 0.2, Result()).answer)
 
 
+def raises(client: Client, model: RobotModel, result: Result) -> None:
+    """Fail in the middle of a motion, and keep the exception, as a caller may; then move again."""
+    answer = Staircase(model, client.kind, LASTS_S, result).answer
+
+    def failing(state: FrankaState, since: float) -> tuple[FloatArray, bool]:
+        if result.states == 300:
+            raise RuntimeError("the disk is full")
+        return answer(state, since)
+
+    kept: list[Exception] = []
+    gc.disable()
+    try:
+        client.control(failing)
+    except RuntimeError as error:
+        kept.append(error)
+    result.trouble, result.mode = str(kept[0]), client.read().mode
+    client.control(Staircase(model, client.kind, 0.2, Result()).answer)
+
+
+def units(client: Client, model: RobotModel, result: Result, host: str, port: str, keys: str) -> None:
+    """Follow the paper's circle for a second, with what the units in the robot's time tell."""
+    skin = paper_skin(model)
+    with LockstepSkin(skin, load_keys(Path(keys)), host, int(port), seed=3) as readings_at:
+        follow(client, Controller(model, skin, fixtures(SceneSpec()), Circle(), profile("paper")), result, readings_at)
+
+
 def control(client: Client, model: RobotModel, result: Result, fails: bool = False) -> None:
-    """Follow the paper's circle for a second and a half after the force window is full."""
+    """Follow the paper's circle without units; fail if asked to."""
+    known: Fixtures = fixtures(SceneSpec())
+    controller = Controller(model, paper_skin(model), known, Circle(), profile("blind"))
+    follow(client, controller, result, lambda _: NEVER, fails)
+
+
+def follow(
+    client: Client, controller: Controller, result: Result, readings_at: Callable[[float], RangeReadings],
+    fails: bool = False,
+) -> None:  # fmt: skip
+    """Turn a controller for a second and a half after the force window is full."""
     hashed, steps = sha256(), []
 
     class Recorder:
         def record(self, cycle: Cycle) -> None:
             steps.append(cycle.step)
+            readings = cycle.inputs.readings
             hashed.update(cycle.step.command.tobytes() + cycle.step.force.tobytes())
+            hashed.update(readings.stamp.tobytes() + readings.distance.tobytes() + readings.status.tobytes())
+            result.heard = int(np.sum(np.isfinite(readings.stamp)))
             if fails and len(steps) == 200:
                 raise OSError("the disk is full")
 
-    skin = paper_skin(model)
-    known: Fixtures = fixtures(SceneSpec())
-    controller = Controller(model, skin, known, Circle(), profile("blind"))
     try:
-        run_in_lockstep(client, controller, lambda _: NEVER, Recorder(), lambda _: len(steps) >= 250)
+        run_in_lockstep(client, controller, readings_at, Recorder(), lambda _: len(steps) >= 250)
     except OSError as error:
         result.trouble = str(error)
     result.states, result.digest = len(steps), hashed.hexdigest()
     result.speed = float(np.linalg.norm(steps[-1].ee_velocity))
 
 
-def main(kind: str, address: str, task: str) -> None:
+def main(kind: str, address: str, task: str, *more: str) -> None:
     model, result = RobotModel(panda() if kind == "panda" else fr3()), Result()
     with connect(address, kind) as client:  # type: ignore[arg-type]
-        tasks = {"staircase": staircase, "contact": contact, "control": control}
+        tasks = {"staircase": staircase, "contact": contact, "control": control, "raises": raises, "units": units}
         if task == "fail":
             control(client, model, result, fails=True)
         else:
-            tasks[task](client, model, result)
+            tasks[task](client, model, result, *more)
         if not result.mode:
             result.mode = client.read().mode
     print(json.dumps(asdict(result)))

@@ -20,7 +20,7 @@ _numbers = itertools.count(1)
 def loopback() -> str:
     """An address that no other test run on this machine uses at once: the vendor's libraries know one port alone."""
     pid = os.getpid()
-    return f"127.{64 + pid // 250 % 128}.{1 + pid % 250}.{next(_numbers)}"
+    return f"127.{64 + pid // 250 % 128}.{1 + pid % 250}.{1 + next(_numbers) % 250}"
 
 
 def wait_for(happened: Callable[[], bool], what: str, most: float = 20.0) -> None:

@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -10,7 +11,7 @@ import time
 import pytest
 
 from pretouch.errors import RobotError
-from pretouch.hardware.franka import client, sentences
+from pretouch.hardware.franka import arm, client, sentences
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.client import connect, reachable
 from pretouch.hardware.franka.only_one import OnlyOne
@@ -24,7 +25,6 @@ from tests.hardware.franka.served import loopback
     ("address", "what"),
     [
         ("127.0.99.99", "nobody listens on port 1337 there"),
-        ("no-such-arm.invalid", "there is no machine of that name"),
         ("a..b", "there is no machine of that name"),
     ],
 )
@@ -33,6 +33,15 @@ def test_a_wrong_address_is_said_at_once(address: str, what: str) -> None:
     with pytest.raises(RobotError, match=re.escape(f"No Franka arm at {address}: {what}; check the address")):
         reachable(address)
     assert time.monotonic() - began < 10.0
+
+
+def test_a_name_that_nobody_has_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(*_: object) -> None:
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(client.socket, "create_connection", unknown)
+    with pytest.raises(RobotError, match="No Franka arm at no-such-arm: there is no machine of that name; check"):
+        reachable("no-such-arm")
 
 
 def test_an_arm_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,7 +91,24 @@ def test_a_process_that_holds_an_arm_is_named_and_lets_go_when_it_is_killed() ->
         assert process.stdout.readline() == "1\n"
         with pytest.raises(RobotError, match=f"The arm at {address} is in use by process {process.pid} on"):
             OnlyOne(address)
+        for _ in range(300):  # more than wait at a door that nobody opens
+            with pytest.raises(RobotError, match=f"The arm at {address} is in use by "):
+                OnlyOne(address)
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
     OnlyOne(address).release()
+    OnlyOne(address).release()
+
+
+def test_a_machine_that_takes_the_connection_and_is_silent_is_given_up(
+    panda_model: RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(arm, "_START_S", 3.0)
+    address, began = loopback(), time.monotonic()
+    with (
+        socket.create_server((address, client.PORT)),
+        pytest.raises(RobotError, match=f"What is at {address} takes connections, and does not answer as an arm"),
+    ):
+        FrankaArm(address, "panda", panda_model)
+    assert time.monotonic() - began < 10.0
     OnlyOne(address).release()

@@ -21,7 +21,7 @@ class Bench:
         limits = motion_limits(model, "panda")
         self.boxes, self.communication, self.over = Boxes(), Communication(), False
         self.arm = CheckingArm(limits, middle(limits))
-        self.motion = Motion(limits, FrankaParams(), self.boxes, self.communication, lambda: self.over)
+        self.motion = Motion(1, limits, FrankaParams(), self.boxes, self.communication, lambda: self.over)
         self.finished = False
 
     def order(self, qd: float, age: float = -1000.0, wish: Wish = Wish.MOVE) -> None:
@@ -62,6 +62,24 @@ def test_stale_set_points_bring_it_to_rest_in_the_motion_and_fresh_ones_move_it_
     assert bench.motion.trouble == ""
 
 
+def test_without_set_points_for_long_the_motion_ends_and_fresh_ones_do_not_count(bench: Bench) -> None:
+    bench.order(0.2, age=FrankaParams().end_after_s + 0.01)
+    bench.run(1)
+    bench.order(0.2)
+    bench.run(1000)
+    assert bench.finished
+    assert "its motion ended: no set-point came for 1 s" in bench.motion.trouble
+
+
+def test_orders_of_another_request_end_it(bench: Bench) -> None:
+    bench.boxes.order(Order(2, Wish.MOVE, time.monotonic() + 1000.0, [0.2] * 7))
+    bench.run(1000)
+    assert bench.finished
+    told = bench.boxes.told()
+    assert told is not None
+    assert told.answered == 1
+
+
 def test_a_set_point_that_is_old_but_not_stale_still_counts(bench: Bench) -> None:
     bench.order(0.1, age=FrankaParams().stale_after_s - 0.03)
     bench.run(1)
@@ -83,7 +101,7 @@ def test_a_set_point_that_is_none_ends_the_motion_at_rest_and_later_ones_do_not_
     assert told.trouble == bench.motion.trouble
 
 
-@pytest.mark.parametrize("wish", [Wish.END, Wish.QUIT])
+@pytest.mark.parametrize("wish", [Wish.WAIT, Wish.END, Wish.QUIT])
 def test_it_ends_at_rest_when_asked_to(bench: Bench, wish: Wish) -> None:
     bench.order(0.0, wish=wish)
     bench.run(1000)

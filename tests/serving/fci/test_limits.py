@@ -18,7 +18,7 @@ from pretouch.serving.fci.options import drop_of
 from pretouch.serving.fci.pushes import TcpPush, push_of
 from pretouch.serving.fci.state import StateDatagram, by_robot_at
 from pretouch.serving.fci.urdf import urdf_of
-from pretouch.serving.fci.wire import PANDA, Impedance
+from pretouch.serving.fci.wire import PANDA, Impedance, RobotMode
 from pretouch.sim.scene import SceneSpec
 
 _MODELS = {"panda": RobotModel(panda()), "fr3": RobotModel(fr3())}
@@ -70,6 +70,22 @@ def test_braking_keeps_the_acceleration_limit_and_ends_at_rest(speeds: list[floa
     assert not qd.any()
 
 
+def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit() -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", _READY.copy(), SceneSpec()))
+    arm.begin(Impedance.JOINT)
+    for k in range(1, 501):
+        assert arm.step(Setpoint(2e-3 * k * np.eye(7)[6])) is None
+    assert arm.step(Setpoint(np.full(7, np.nan))) is not None
+    speeds = [arm.qd[6]]
+    while not arm.at_rest:
+        arm.step(None)
+        speeds.append(arm.qd[6])
+    # 1 rad/s at 20 rad/s^2
+    np.testing.assert_allclose(np.diff([1.0, *speeds])[:-1], -0.02, atol=1e-9)
+    assert len(speeds) == 50
+    assert arm.mode is RobotMode.REFLEX
+
+
 def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration() -> None:
     motion = Motion(_limits("panda"), Impedance.JOINT)
     for k in range(1, 4):
@@ -119,10 +135,23 @@ def test_pushes_and_drops_are_read() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "1", "1:2", "1:2,3", "a:1,2,3", "1:1,2,3:0", "-1:1,2,3", "1:nan,0,0", "1:1,2,3:1:1"]
+    "text",
+    [
+        "1:0,1e9,0",
+        "1:0,0,-1001",
+        "",
+        "1",
+        "1:2",
+        "1:2,3",
+        "a:1,2,3",
+        "1:1,2,3:0",
+        "-1:1,2,3",
+        "1:nan,0,0",
+        "1:1,2,3:1:1",
+    ],
 )
 def test_what_is_no_push_is_refused(text: str) -> None:
-    with pytest.raises(ParameterError, match=r"as 2\.0:0,15,0:0\.5"):
+    with pytest.raises(ParameterError, match=r"as 2\.0:0,15,0:0\.5|give at most 1000 N along each axis"):
         push_of(text)
 
 

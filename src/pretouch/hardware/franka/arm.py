@@ -5,7 +5,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection
 from typing import Self
 
@@ -15,7 +15,7 @@ from pretouch.hardware.franka.collision import CollisionBehavior
 from pretouch.hardware.franka.limits import motion_limits
 from pretouch.hardware.franka.orders import Boxes, Order, Told, Wish
 from pretouch.hardware.franka.params import FrankaParams
-from pretouch.hardware.franka.process import Task, serve
+from pretouch.hardware.franka.process import LEFT_TO_THE_PROGRAM, Task, serve
 from pretouch.hardware.franka.report import CommunicationReport
 from pretouch.hardware.franka.state import JOINTS, FrankaState, robot_state
 from pretouch.realtime import check_wishes
@@ -26,6 +26,8 @@ _START_S = 30.0
 """Longest time for the process to start, and for the arm to answer it [s]."""
 _ANSWER_S = 10.0
 """Longest time for a request [s]: a recovery takes seconds."""
+_STATE_MOST_S = 0.5
+"""Age at which a state says nothing about the arm any more [s]."""
 _LOOK_S = 0.001
 
 
@@ -53,21 +55,21 @@ class FrankaArm:
         check_wishes(priority, None)
         self._address, self._owner = address, os.getpid()
         self._boxes, self._request = Boxes(), 0
-        self._set_point, self._moves = [0.0] * JOINTS, False
         limits = motion_limits(model, kind)
         task = Task(address, kind, limits, behavior, params or FrankaParams(), priority, self._owner)
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
         self._process = context.Process(target=serve, args=(task, self._boxes, theirs), daemon=True)
-        with _without_interrupts():
+        with _terminal_kept_out():
             self._process.start()
         theirs.close()
         try:
             with ours:
-                self.missing = _greeted(ours)
+                self.missing = _greeted(ours, address)
                 """Sentences on what the process could not have, or ''."""
         except BaseException:
-            self.close()
+            self._process.kill()  # no motion runs yet, and it may hang in the vendor's library
+            self._process.join()
             raise
 
     @property
@@ -76,16 +78,16 @@ class FrankaArm:
         return self._process.pid or 0
 
     def state(self) -> FrankaState:
-        """Return the newest state, in the vendor's terms and signs."""
-        return self._told().state
+        """Return the newest state, in the vendor's terms and signs; a RobotError if none has come for a while."""
+        return self._fresh().state
 
     def read(self) -> RobotState:
-        """Return the newest state, stamped with `time.monotonic` as it came."""
-        told = self._told()
+        """Return the newest state, stamped with `time.monotonic` as it came; a RobotError as of `state`."""
+        told = self._fresh()
         return robot_state(told.state, told.stamp)
 
     def begin(self) -> None:
-        """Begin a motion at rest."""
+        """Begin a motion at rest. Commands must follow within `FrankaParams.end_after_s`."""
         self._ask(Wish.MOVE)
 
     def command(self, qd: FloatArray) -> None:
@@ -93,7 +95,7 @@ class FrankaArm:
         told = self._told()
         if told.trouble:
             raise RobotError(told.trouble)
-        self._demand_process()
+        self._demand_fresh(told)
         if not told.moving:
             raise RobotError(f"The arm at {self._address} is in no motion: begin one first.")
         self._order(Wish.MOVE, [float(v) for v in qd])
@@ -102,7 +104,7 @@ class FrankaArm:
         """Bring the arm to rest and end the motion; a RobotError says what had ended it before."""
         if self._told().moving:
             self._order(Wish.END, [0.0] * JOINTS)
-            self._wait(lambda told: not told.moving, "come to rest")
+            self._wait(self._rested, "come to rest")
         trouble = self._told().trouble
         if trouble:
             raise RobotError(trouble)
@@ -117,12 +119,17 @@ class FrankaArm:
         return self._boxes.report()
 
     def close(self) -> None:
-        """Bring the arm to rest and end the process. In a process forked from the one that began it, do nothing."""
+        """Bring the arm to rest and end the process; at once where no state comes: it hangs, or the line is dead.
+
+        In a process forked from the one that began it, do nothing.
+        """
         if os.getpid() != self._owner:
             return
         self._request += 1
         self._order(Wish.QUIT, [0.0] * JOINTS)
-        self._process.join(_ANSWER_S)
+        until = time.monotonic() + _ANSWER_S
+        while self._process.is_alive() and time.monotonic() < min(until, self._told().stamp + _STATE_MOST_S):
+            self._process.join(_LOOK_S)
         self._process.kill()
         self._process.join()
 
@@ -134,9 +141,15 @@ class FrankaArm:
 
     def _ask(self, wish: Wish) -> None:
         """Make a request and wait until it is answered; raise a RobotError with what went wrong."""
+        if self._fresh().moving:
+            raise RobotError(f"The arm at {self._address} is in a motion: end it first.")
         self._request += 1
         self._order(wish, [0.0] * JOINTS)
-        self._wait(lambda told: told.answered >= self._request, f"{wish.name.lower()}")
+        try:
+            self._wait(lambda told: told.answered >= self._request, wish.name.lower())
+        except BaseException:
+            self._order(Wish.WAIT, [0.0] * JOINTS)  # it is not to happen later
+            raise
         trouble = self._told().trouble
         if trouble:
             raise RobotError(trouble)
@@ -152,6 +165,26 @@ class FrankaArm:
                 raise RobotError(f"The arm at {self._address} did not {what} within {_ANSWER_S:g} s: stop it by hand.")
             time.sleep(_LOOK_S)
 
+    def _rested(self, told: Told) -> bool:
+        """Whether a motion has ended; a RobotError where no state tells."""
+        if told.moving:
+            self._demand_fresh(told)
+        return not told.moving
+
+    def _fresh(self) -> Told:
+        told = self._told()
+        self._demand_fresh(told)
+        return told
+
+    def _demand_fresh(self, told: Told) -> None:
+        self._demand_process()
+        age = time.monotonic() - told.stamp
+        if age > _STATE_MOST_S:
+            raise RobotError(
+                f"No state has come from the arm at {self._address} for {age:.1f} s: it stops by itself where it gets"
+                " no commands; look at it, at its network cable, and at what else keeps this machine busy."
+            )
+
     def _told(self) -> Told:
         told = self._boxes.told()
         if told is None:
@@ -161,24 +194,30 @@ class FrankaArm:
     def _demand_process(self) -> None:
         if not self._process.is_alive():
             raise RobotError(
-                f"The process that moves the arm at {self._address} has ended: the arm has come to rest; connect anew."
+                self._told().trouble
+                or f"The process that moves the arm at {self._address} has ended: the arm stops by itself; look whether"
+                " it stands, then connect anew."
             )
 
 
 @contextmanager
-def _without_interrupts() -> Iterator[None]:
-    """Start a process in here, and Ctrl-C does not reach it from its first instruction on."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+def _terminal_kept_out() -> Iterator[None]:
+    """Start a process in here, and no Ctrl-C or Ctrl-Z reaches it from its first instruction on."""
+    resource_tracker.ensure_running()  # begun with the first process, it would unblock Ctrl-C
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, LEFT_TO_THE_PROGRAM)
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _greeted(started: Connection) -> str:
+def _greeted(started: Connection, address: str) -> str:
     """Wait for the process to be connected; return what it could not have."""
     if not started.poll(_START_S):
-        raise RobotError(f"The arm did not answer within {_START_S:g} s: look at its network cable.")
+        raise RobotError(
+            f"What is at {address} takes connections, and does not answer as an arm within {_START_S:g} s: check the"
+            " address."
+        )
     try:
         connected, said = started.recv()
     except EOFError:

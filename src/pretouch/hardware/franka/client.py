@@ -78,6 +78,9 @@ class Client(Protocol):
 def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
     """Connect to an arm; what stands in the way is a RobotError.
 
+    A machine that takes the connection and then says nothing is waited for without end: the vendor's libraries know no
+    bound. `arm.FrankaArm`, which connects in a process of its own, gives up after half a minute.
+
     Args:
         address: name or IP address of the arm.
         kind: which arm it is.

@@ -21,10 +21,14 @@ class Fr3Client(VendorClient):
     def _move(self, answer: Any) -> None:
         motion = self._robot.start_joint_velocity_control(pylibfranka.ControllerMode.JointImpedance)
         finished = False
-        while not finished:
-            command = answer(*motion.readOnce())
-            finished = command.motion_finished
-            motion.writeOnce(command)
+        try:
+            while not finished:
+                command = answer(*motion.readOnce())
+                finished = command.motion_finished
+                motion.writeOnce(command)
+        finally:
+            # the library stops the arm when it forgets a motion that has not ended; an exception would remember it
+            del motion
 
 
 open_client = Fr3Client

@@ -10,6 +10,8 @@ from pretouch.hardware.franka.limits import LimiterParams, MotionLimits
 from pretouch.hardware.franka.state import JOINTS, FrankaState
 
 PERIOD_S = 0.001
+_UNHEARD_S = 0.02
+"""Before a position limit, so long may the arm go on as it does because commands are lost [s]."""
 _REST_RAD_S = 1e-9
 _ROUNDING = 1.0 + 1e-9
 _BRAKING = 0.7
@@ -62,12 +64,17 @@ class SetPointLimiter:
 
     def step(self, state: FrankaState, wanted: list[float]) -> list[float]:
         """Return the velocities (7,) [rad/s] to command in answer to a state, on the way to those wanted."""
-        at, now = state.q_d.tolist(), state.dq_d.tolist()
+        at, now, changing = state.q_d.tolist(), state.dq_d.tolist(), state.ddq_d.tolist()
+        if not all(map(math.isfinite, (*at, *now, *changing))):
+            raise RobotError(
+                f"The arm says that it is to be at {at} rad, {now} rad/s and {changing} rad/s^2, which are not all"
+                " numbers: look at what it reports."
+            )
         self.lost = self._sent is not None and self._differs(now, self._sent)
         if self._sent is None or self.lost:
             self._input.current_velocity = now
             self._input.current_acceleration = [
-                max(-most, min(most, a)) for a, most in zip(state.ddq_d.tolist(), self._acceleration, strict=True)
+                max(-most, min(most, a)) for a, most in zip(changing, self._acceleration, strict=True)
             ]
         self._input.target_velocity = [
             high.at_most(min(v, most), high.zero - q) if v > 0.0 else -low.at_most(min(-v, most), q - low.zero)
@@ -97,7 +104,7 @@ def _ends(limits: MotionLimits, margin: float, acceleration: list[float], jerk: 
     ends = []
     for i, (a, j) in enumerate(zip(acceleration, jerk, strict=True)):
         low, high = float(limits.q_min[i]), float(limits.q_max[i])
-        slope, offset = 2.0 * _BRAKING * a, a * (1.5 * a / j + 2.0 * PERIOD_S)
+        slope, offset = 2.0 * _BRAKING * a, a * (1.5 * a / j + _UNHEARD_S)
         if (e := limits.envelope) is not None:
             short = float(e.offset[i] ** 2 / e.slope[i])
             low, high = max(low, float(e.q_lower[i]) + short), min(high, float(e.q_upper[i]) - short)

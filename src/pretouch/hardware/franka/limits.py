@@ -30,8 +30,8 @@ class LimiterParams(Checked):
     millisecond: with this share, a command that comes late, when the arm has moved on without it, breaks none."""
     jerk_share: Share = 0.15
     """Share of the arm's jerk limits that is used."""
-    speed_share: Fraction = 0.98
-    """Share of the arm's speed limits that is used."""
+    speed_share: Fraction = 0.94
+    """Share of the arm's speed limits that is used: while commands are lost, the arm goes on speeding up."""
     position_margin_rad: NonNegative = 0.003
     """Distance kept from the position limits [rad], less than the controller's."""
     reseed_rad_s: Positive = 1e-5

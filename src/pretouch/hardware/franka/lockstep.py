@@ -38,8 +38,8 @@ def run_in_lockstep(
 
     All stamps are of the robot's time, from the first state of the motion on: the simulated arm's time jumps before it.
     The controller is compiled before the motion begins, for the arm waits less than a second for its first command. The
-    arm comes to rest within its limits before the motion ends, also on Ctrl-C,
-    SIGTERM and whatever goes wrong in a step, which is raised afterwards.
+    arm comes to rest within its limits before the motion ends, also on Ctrl-C, SIGTERM, SIGHUP and whatever goes wrong
+    in a step, which is raised afterwards.
 
     Args:
         client: connected to the arm.
@@ -119,7 +119,7 @@ class _Turning:
 
 @contextmanager
 def _asked_to_end() -> Iterator[list[int]]:
-    """Give a list in which Ctrl-C and SIGTERM are noted while the arm moves; they take effect afterwards."""
+    """Give a list in which signals that end a program are noted while the arm moves; they take effect afterwards."""
     came: list[int] = []
 
     def note(number: int, _frame: FrameType | None) -> None:
@@ -128,7 +128,9 @@ def _asked_to_end() -> Iterator[list[int]]:
     if threading.current_thread() is not threading.main_thread():
         yield came  # signals reach the main thread alone
         return
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    # nohup has SIGHUP ignored, and wants it so
+    ending = [s for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(s) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, note) for number in ending}
     try:
         yield came
     finally:

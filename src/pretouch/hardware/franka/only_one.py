@@ -6,6 +6,8 @@ import struct
 from pretouch.errors import RobotError
 
 _CREDENTIALS = struct.Struct("3i")
+_ASK_S = 1.0
+"""Longest wait for the holder's number [s]: it answers nobody, and so many may ask."""
 
 
 class OnlyOne:
@@ -24,7 +26,7 @@ class OnlyOne:
         except OSError:
             self._socket.close()
             raise RobotError(
-                f"The arm at {address} is in use by process {_holder(name)} on this machine: end that one first."
+                f"The arm at {address} is in use by {_holder(name)} on this machine: end that one first."
             ) from None
 
     def release(self) -> None:
@@ -33,11 +35,12 @@ class OnlyOne:
 
 
 def _holder(name: str) -> str:
-    """Return the number of the process that listens at an abstract address."""
+    """Name the process that listens at an abstract address."""
     try:
         with socket.socket(socket.AF_UNIX) as asking:
+            asking.settimeout(_ASK_S)
             asking.connect(name)
             pid, _, _ = _CREDENTIALS.unpack(asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size))
     except OSError:
-        return "unknown"
-    return str(pid)
+        return "another process"
+    return f"process {pid}"

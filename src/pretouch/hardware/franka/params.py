@@ -15,5 +15,8 @@ class FrankaParams(Checked):
     stale_after_s: Positive = 0.05
     """Age at which a set-point no longer counts, and the arm is brought to rest [s]: five periods of a controller at
     100 Hz, from which on the controller itself brakes (`FailureParams.overrun_s`)."""
+    end_after_s: Positive = 1.0
+    """Age of the newest set-point at which the motion is ended, and has to be begun anew [s]: a program that was
+    stopped for that long does not know where the arm is, nor who stands there by now."""
     demand_real_time: bool = False
     """Whether to refuse a kernel without real-time capabilities."""

@@ -2,10 +2,12 @@
 
 It does nothing else, so that nothing keeps it from answering in time. Set-points come through shared memory, and the
 arm comes to rest, within its limits, when they are older than `FrankaParams.stale_after_s`, when one is no number or
-beyond the limits, when the program that sent them has died, and on SIGTERM. Ctrl-C is left to the program.
+beyond the limits, when the program that sent them has died, and on SIGTERM. What a terminal sends, as Ctrl-C, is left
+to the program.
 
 After stale set-points a fresh one is followed again: a controller goes on from where the arm says it is, at rest. After
-a set-point that was refused the motion ends, and nothing is followed until another one is begun.
+`FrankaParams.end_after_s` without one, and after one that was refused, the motion ends, and nothing is followed until
+another one is begun.
 """
 
 import os
@@ -26,6 +28,8 @@ from pretouch.hardware.franka.params import FrankaParams
 from pretouch.hardware.franka.report import Communication
 from pretouch.realtime import real_time
 
+LEFT_TO_THE_PROGRAM = frozenset({signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU})
+"""Signals that a terminal sends to all processes in it. Whoever starts `serve` blocks them meanwhile."""
 _TOLD_TO_END = "The process that moves the arm was told to end, so the arm was brought to rest: connect anew."
 
 
@@ -45,8 +49,9 @@ class Task:
 
 def serve(task: Task, boxes: Boxes, started: Connection) -> None:
     """Serve orders until told to quit or the program is gone; tell it '', or as a sentence what is wrong."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    for number in LEFT_TO_THE_PROGRAM:
+        signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, LEFT_TO_THE_PROGRAM)
     with ExitStack() as opened:
         try:
             client = opened.enter_context(connect(task.address, task.kind, task.params.demand_real_time))
@@ -70,7 +75,7 @@ class ArmServer:
         self._communication = Communication()
         self._answered, self._trouble = 0, ""
         self._leaving = False
-        self._state = client.read()
+        self._state, self._stamp = client.read(), time.monotonic()
         self._tell()
         signal.signal(signal.SIGTERM, self._leave)
         signal.siginterrupt(signal.SIGTERM, False)
@@ -85,7 +90,7 @@ class ArmServer:
                 self._do(order)
                 self._boxes.put_report(self._communication.report())
             try:
-                self._state = self._client.read()
+                self._state, self._stamp = self._client.read(), time.monotonic()
             except RobotError as error:
                 self._trouble = self._trouble or str(error)
                 break
@@ -96,20 +101,26 @@ class ArmServer:
 
     def _tell(self) -> None:
         """Pass on the state there is while no motion runs."""
-        self._boxes.tell(Told(time.monotonic(), self._answered, False, self._trouble, self._state))
+        self._boxes.tell(Told(self._stamp, self._answered, False, self._trouble, self._state))
 
     def _do(self, order: Order) -> None:
         self._trouble = ""
         try:
             if order.wish is Wish.MOVE:
-                motion = Motion(self._task.limits, self._task.params, self._boxes, self._communication, self._is_over)
+                task = self._task
+                motion = Motion(
+                    order.request, task.limits, task.params, self._boxes, self._communication, self._is_over
+                )
                 self._client.control(motion.answer)
                 self._trouble = motion.trouble
             elif order.wish is Wish.RECOVER:
                 self._client.recover()
         except RobotError as error:
             self._trouble = str(error)
-        self._answered = order.request
+        if (told := self._boxes.told()) is not None:  # the motion's last state: there may be no other
+            self._state, self._stamp = told.state, told.stamp
+        # what was asked during a motion ended it, and is not to be done at some later time
+        self._answered = self._boxes.ordered().request if order.wish is Wish.MOVE else order.request
 
     def _is_over(self) -> bool:
         """Whether there is nobody left to serve."""

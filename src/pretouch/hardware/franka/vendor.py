@@ -58,6 +58,8 @@ class VendorClient:
             if raised:
                 raise raised[0] from None
             sentences.aborted(self._address, error)
+        finally:
+            raised.clear()  # the exception holds this frame, and with it the motion
 
     def _move(self, answer: Any) -> None:
         """Run the library's loop; `answer` takes its state and duration and returns its command."""

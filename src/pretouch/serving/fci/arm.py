@@ -69,7 +69,7 @@ class ServedArm:
         """What ended the last motion."""
         self.motion: Motion | None = None
         self.success_rate = 0.0
-        """Fraction of the last commands of the motion, or of the one before, that came in time."""
+        """Fraction of the last commands of the motion that came in time; 0 while none runs."""
         self.qd, self.qdd = np.zeros(JOINTS), np.zeros(JOINTS)
         """Commanded velocities [rad/s] and accelerations [rad/s^2], (7,)."""
         self._since_motion = _COMES_TO_REST
@@ -101,11 +101,10 @@ class ServedArm:
     def begin(self, impedance: Impedance) -> None:
         """Begin a motion, at rest and without errors: whoever calls it has looked."""
         self.motion, self.mode, self.reflex_reason = Motion(self.limits, impedance), RobotMode.MOVE, ()
-        self.success_rate = 0.0
 
     def stop(self) -> None:
         """End the motion: the arm brakes."""
-        self.motion, self._since_motion = None, 0
+        self.motion, self._since_motion, self.success_rate = None, 0, 0.0
         if self.mode is RobotMode.MOVE:
             self.mode = RobotMode.IDLE
 

@@ -13,6 +13,8 @@ _LASTING_S = 0.5
 """How long a push lasts unless it says so [s]."""
 _TYPED_N, _TYPED_S = 15.0, 1.5
 """Force [N] and duration [s] of a push of which only the axis is typed: what a guided push asks for."""
+_MOST_N = 1000.0
+"""Largest push along an axis [N]."""
 _NONE = np.zeros(3)
 
 
@@ -46,6 +48,8 @@ def push_of(text: str) -> TcpPush:
         raise ParameterError(
             f"The push is {text!r}: give start, force and, if you like, duration, as 2.0:0,15,0:0.5 [s, N, s]."
         )
+    if max(map(abs, (x, y, z))) > _MOST_N:
+        raise ParameterError(f"The push is {text!r}: give at most {_MOST_N:g} N along each axis.")
     return TcpPush(start, (x, y, z), duration)
 
 
@@ -57,7 +61,9 @@ def typed_push(text: str, now: float) -> TcpPush:
     try:
         return push_of(f"{now}:{plain}")
     except ParameterError:
-        raise ParameterError(f"{plain!r} is no push: type an axis, as +y, or a force, as 0,15,0 [N].") from None
+        raise ParameterError(
+            f"{plain!r} is no push: type an axis, as +y, or a force, as 0,15,0 [N], of at most {_MOST_N:g} N."
+        ) from None
 
 
 class Pushes:

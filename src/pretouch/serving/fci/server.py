@@ -85,6 +85,7 @@ class FciServer:
         """Serve until `done` says so, or, if asked to serve once, until the client has gone."""
         self._start = self._next = time.monotonic()
         while not done() and not (self._options.once and self._served and self._client is None):
+            self._settle()
             self._send_state()
             self._wait()
             self._pass_time(self._setpoint())
@@ -111,7 +112,7 @@ class FciServer:
             if self._command is None and arm.motion is not None and arm.motion.begun:
                 self._look(self._next + self._options.grace_s, for_command=True)
         elif arm.motion is None:
-            self._look(now + (PERIOD_S if arm.settled else 0.0))
+            self._look(now + PERIOD_S)
         elif arm.motion.begun:
             self._look(now + self._options.patience_s, for_command=True)
         else:
@@ -250,7 +251,7 @@ class FciServer:
             self._tick = start - 1
 
     def _settle(self) -> None:
-        """In lockstep, let the arm come to rest whatever the clock says."""
+        """In lockstep, let the arm come to rest between two states: what a client sees then differs in time alone."""
         while self._options.lockstep and not self._arm.moving and not self._arm.settled:
             self._pass_time(None)
 
