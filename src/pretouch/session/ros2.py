@@ -3,6 +3,7 @@
 import numpy as np
 
 from pretouch.errors import RobotError
+from pretouch.hardware.ros2.network import domain_of
 from pretouch.hardware.ros2.params import ArmParams, NodeParams
 from pretouch.hardware.ros2.robot import Ros2Robot
 from pretouch.session.remembered import Identity
@@ -11,12 +12,12 @@ from pretouch.types import FloatArray, RobotState
 
 def identity(node: NodeParams, arm: ArmParams) -> Identity:
     """Return what a robot is known by: its topics, and the settings that say what they mean."""
-    domain = "the environment's domain" if node.domain < 0 else f"domain {node.domain}"
-    return Identity("ros2", f"{node.interface}, {domain}, {arm.wrench}", f"sign {arm.sign}, frame {arm.frame}")
+    where = f"{node.interface}, domain {domain_of(node)}, {arm.wrench}"
+    return Identity("ros2", where, f"sign {arm.sign}, frame {arm.frame}, zeros {arm.zeros}")
 
 
 class Ros2SessionArm:
-    """The port `Arm` over topics. Whoever takes the commands must stop the arm when none come."""
+    """The port `Arm` over topics."""
 
     def __init__(self, robot: Ros2Robot, n: int) -> None:
         """Take a robot of n joints that is heard."""
@@ -38,14 +39,19 @@ class Ros2SessionArm:
         return ()
 
     def begin(self) -> None:
-        """Take commands from here on."""
+        """Take commands from here on, once the arm has settled where it is."""
+        self._robot.begin()
         self._begun = True
 
     def end(self) -> None:
-        """Command rest, and take no more commands."""
-        if self._begun:
-            self._begun = False
+        """Command rest, wait until the last trajectory has ended, and take no more commands."""
+        if not self._begun:
+            return
+        self._begun = False
+        try:
             self._robot.command(self._rest)
+        finally:
+            self._robot.end()
 
     def report(self) -> str:
         """Topics have nothing to say."""

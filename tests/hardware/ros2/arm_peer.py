@@ -1,9 +1,9 @@
 """A simulated arm behind ROS 2 topics, in a process of its own: a joint_trajectory_controller as ros2_control has it.
 
-It takes trajectories from where it is commanded to be (`interpolate_from_desired_state`), by cubic splines through
-positions and velocities, at 1 kHz, and publishes joint states, a wrench in the vendor's sign, and ranges that show
-nothing near. Lines on its input: `push FX FY FZ` [N, on the arm], `freeze` (the same states again and again), `mute`,
-`clear`, `stop`. At the end it writes what was commanded at each millisecond to a file.
+It takes trajectories as `spline.py` has it for a release, at 1 kHz, and publishes joint states, a wrench in the
+vendor's sign, and ranges that show nothing near. Lines on its input: `push FX FY FZ` [N, on the arm], `freeze` (the
+same states again and again), `mute`, `deaf` (no command arrives), `clear`, `stop`. At the end it writes to a file the
+positions that were commanded at each millisecond.
 """
 
 import argparse
@@ -23,54 +23,23 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec
+from tests.hardware.ros2.spline import Release, Spline
 
 DT = 0.001
 
 
-class Spline:
-    """What a joint_trajectory_controller asks for: cubic Hermite splines through the points of the last trajectory."""
-
-    def __init__(self, names: list[str], q: np.ndarray) -> None:
-        self.names, self.q, self.qd = names, q.copy(), np.zeros_like(q)
-        self.time, self.points = np.zeros(1), np.stack([[self.q, self.qd]])
-        self.last = 0.0
-
-    def replace(self, message: object, now: float) -> None:
-        order = [message.joint_names.index(name) for name in self.names]
-        start = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
-        start = now if start == 0 else now + start - time_ns() / 1e9
-        after = [p.time_from_start.sec + p.time_from_start.nanosec / 1e9 for p in message.points]
-        assert all(b > a for a, b in zip([0.0, *after], after, strict=False)), after
-        assert not np.any(message.points[-1].velocities)
-        # from what was commanded last, at the instant of the last command
-        self.time = np.array([self.last, *(start + t for t in after)])
-        given = [[p.positions[order], p.velocities[order]] for p in message.points]
-        self.points = np.concatenate([[[self.q, self.qd]], given])
-
-    def advance(self, now: float) -> None:
-        self.last = now
-        i = int(np.searchsorted(self.time, now, side="right")) - 1
-        if i >= len(self.time) - 1:
-            self.q, self.qd = self.points[-1]
-            return
-        T, s = self.time[i + 1] - self.time[i], now - self.time[i]
-        (q0, v0), (q1, v1) = self.points[i], self.points[i + 1]
-        c, d = 3 * (q1 - q0) / T**2 - (2 * v0 + v1) / T, -2 * (q1 - q0) / T**3 + (v0 + v1) / T**2
-        self.q, self.qd = q0 + v0 * s + c * s**2 + d * s**3, v0 + 2 * c * s + 3 * d * s**2
-
-
-def main(domain: int, log: str, rate: float, ideal: bool, extra: bool) -> None:
+def main(domain: int, log: str, rate: float, ideal: bool, extra: bool, release: Release) -> None:
     model = RobotModel(panda())
     skin, q = paper_skin(model), model.description.q_ready
     plant = Plant(model, SceneSpec(), PlantParams(), q, 0)
     force = plant.mj_data.xfrc_applied[model.ee, :3]
     plant.advance(0.2)
-    spline, told, orders = Spline(list(model.joints), q), SimpleQueue(), SimpleQueue()
+    spline, told, orders = Spline(release, DT, list(model.joints), q), SimpleQueue(), SimpleQueue()
     Thread(target=lambda: [orders.put(line.split()) for line in sys.stdin], daemon=True).start()
     # another order than the model's, and joints that are none of its
     shuffled = [6, 0, 3, 1, 5, 2, 4]
     names = [model.joints[j] for j in shuffled] + (["finger_1", "finger_2"] if extra else [])
-    rows, muted, frozen = [], False, None
+    rows, muted, deaf, frozen = [], False, False, None
     with Ros2Node(NodeParams(domain=domain)) as node:
         make, header = node.messages.make, node.messages.header
         node.subscribe("/joint_trajectory_controller/joint_trajectory", TRAJECTORY,
@@ -85,13 +54,15 @@ def main(domain: int, log: str, rate: float, ideal: bool, extra: bool) -> None:
             steps = int((now - begin) / DT) - tick
             if not steps:
                 continue
-            tick, before = tick + steps, spline.q
+            tick, before = tick + steps, spline.commanded[0]
             while not told.empty():
-                spline.replace(told.get(), now)
-            spline.advance(now)
-            rows.append([now, *spline.q, *spline.qd])
+                message = told.get()
+                if not deaf:
+                    spline.take(message, time_ns() / 1e9 - monotonic())
+            commanded = spline.update(now)
+            rows.append([now, *commanded])
             if not ideal:
-                plant.command((spline.q - before) / (steps * DT))
+                plant.command((commanded - before) / (steps * DT))
                 plant.advance(steps * DT)
             while not orders.empty():
                 match orders.get():
@@ -101,8 +72,10 @@ def main(domain: int, log: str, rate: float, ideal: bool, extra: bool) -> None:
                         frozen = time_ns()
                     case ["mute"]:
                         muted = True
+                    case ["deaf"]:
+                        deaf = True
                     case ["clear"]:
-                        frozen, muted = None, False
+                        frozen, muted, deaf = None, False, False
                     case ["stop"]:
                         np.save(log, np.array(rows))
                         return
@@ -112,7 +85,7 @@ def main(domain: int, log: str, rate: float, ideal: bool, extra: bool) -> None:
             today = frozen or time_ns()
             stamp = (today // 10**9, today % 10**9)
             robot = plant.read()
-            positions, velocities = (spline.q, spline.qd) if ideal else (robot.q, robot.qd)
+            positions, velocities = spline.commanded if ideal else (robot.q, robot.qd)
             more = np.full(2 if extra else 0, 0.02)
             states.publish(make(JOINT_STATE, header(stamp, ""), names, np.append(positions[shuffled], more),
                                 np.append(velocities[shuffled], more), np.zeros(0)))  # fmt: skip
@@ -131,4 +104,5 @@ if __name__ == "__main__":
     parser.add_argument("--rate", type=float, default=250.0)
     parser.add_argument("--ideal", action="store_true")
     parser.add_argument("--extra", action="store_true")
+    parser.add_argument("--release", default="4.21")
     main(**vars(parser.parse_args()))

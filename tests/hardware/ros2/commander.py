@@ -19,13 +19,14 @@ def main(domain: int) -> None:
     model = RobotModel(panda())
     limits = joint_limits(model, 0.01, PERIOD)
     with Ros2Node(NodeParams(domain=domain)) as node, Ros2Robot(ArmParams("by-robot", "base"), model, node) as robot:
-        robot.wait()
+        robot.wait(10)
+        robot.begin()
         clock, sent, start = MonotonicClock(PERIOD), np.zeros(7), None
         while True:
             now = clock.tick()
             start = start or now
             state = robot.read()
-            speed = 0.8 * min(max(now - start - 0.6, 0.0), 1.0)
+            speed = 0.8 * min(now - start, 1.0)
             wanted = speed * np.sin(2.0 * (now - start) + np.arange(7))
             lower, upper = joint_box(state.q_commanded, state.qd_commanded, limits)
             sent = np.clip(wanted, lower, upper)

@@ -94,12 +94,44 @@ def test_what_comes_again_or_late_is_not_new() -> None:
     assert stamps.repeated == 2
 
 
-def test_another_publisher_and_a_clock_set_back_begin_anew() -> None:
+def test_another_publisher_begins_anew_and_so_does_a_clock_set_back_once_it_goes_on() -> None:
     stamps = Stamps()
     assert stamps.instant(at(10.0), 1.0, 7) == 1.0
     assert stamps.instant(at(9.9), 1.1, 8) == 1.1
-    assert stamps.instant(at(5.0), 1.2, 8) == 1.2
-    assert stamps.instant(at(5.0), 1.3, 8) is None
+    assert [stamps.instant(at(5 + k / 100), 1.2 + k / 100, 8) for k in range(4)] == [None, None, 1.22, 1.23]
+    assert stamps.instant(at(5.03), 1.3, 8) is None
+
+
+def test_two_frozen_writers_and_alternating_stamps_are_not_new() -> None:
+    stamps = Stamps()
+    assert [stamps.instant(at(10), t, w) for t, w in ((1.0, 1), (1.01, 2), (1.02, 1), (1.03, 2))] == [
+        1.0, 1.01, None, None,
+    ]  # fmt: skip
+    stamps = Stamps()
+    assert [stamps.instant(at(10 - 2 * (k % 2)), 1.0 + k, 1) for k in range(9)] == [1.0, *[None] * 8]
+
+
+def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_is_not() -> None:
+    stamps = Stamps()
+    for k in range(3):
+        stamps.instant(at(10 + k), 1.0 + k, 1)
+    assert not stamps.together()
+    stamps.instant(at(13), 4.0, 2)
+    assert not stamps.together()
+    stamps.instant(at(13.1), 4.1, 1)
+    assert stamps.together()
+
+
+def test_what_strangers_publish_takes_bounded_memory() -> None:
+    joints, stamps = Joints(("a",), Stamps()), Stamps()
+    for k in range(1000):
+        joints.take(SimpleNamespace(name=[f"x{k}"], position=[0.0], velocity=[], header=at(0)), 0.0, 1)
+        stamps.instant(at(10), float(k), k)
+    assert len(joints._places) <= 64
+    assert len(joints.others) <= 65
+    assert len(stamps._writers) <= 8
+    joints.take(joint_state(1, "a", [1.0]), 5.0, 1)
+    assert joints.newest is not None
 
 
 def test_messages_without_a_stamp_are_all_new() -> None:
@@ -110,6 +142,15 @@ def test_messages_without_a_stamp_are_all_new() -> None:
 @pytest.mark.parametrize(("clock", "expected"), [(100.2, 4.8), (100.0, 5.0), (99.0, 5.0)])
 def test_with_one_clock_the_headers_age_counts(clock: float, expected: float) -> None:
     assert Stamps(True, lambda: clock).instant(at(100.0), 5.0, 7) == pytest.approx(expected)
+
+
+def test_how_far_a_clock_is_behind_is_what_the_promptest_message_shows() -> None:
+    stamps = Stamps(now=lambda: 100.0)
+    stamps.instant(at(0), 5.0, 7)
+    assert stamps.behind is None
+    for stamp in (99.5, 99.99, 99.995 - 0.1, 99.996):
+        stamps.instant(at(stamp), 5.0, 7)
+    assert stamps.behind == pytest.approx(0.004)
 
 
 @pytest.mark.parametrize(("sign", "factor"), [("on-robot", 1), ("by-robot", -1)])

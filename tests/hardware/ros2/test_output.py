@@ -162,6 +162,8 @@ def test_steps_are_published_at_the_rate_that_was_asked_for(
     assert course.output.dropped == 0
 
 
+@pytest.mark.slow
+@pytest.mark.alone
 def test_recording_a_step_takes_the_loop_little_time(course: Course) -> None:
     took = []
     for _ in range(100):
@@ -182,3 +184,20 @@ def test_the_last_steps_are_published_before_the_end(
     course.turn()
     course.output.close()
     assert listener.last("/pretouch/mode").data.startswith("HOLD")
+
+
+def test_a_failure_of_the_publishing_thread_is_told_and_keeps_nothing_waiting(
+    course: Course, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("no cloud")
+
+    monkeypatch.setattr(course.output._shown, "cloud", fail)
+    assert course.output.notes == ()
+    course.turn()
+    course.output._thread.join(5)
+    assert course.output.notes == ("Control steps are not published any more: ValueError: no cloud",)
+    for _ in range(40):
+        course.turn()
+    assert course.output._queue.qsize() == 0
+    assert course.output.dropped == 0

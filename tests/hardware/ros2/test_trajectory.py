@@ -48,11 +48,11 @@ def test_each_joint_brakes_as_hard_as_it_may_once_the_velocity_was_held(qd: np.n
 @given(qd=velocities, wanted=velocities)
 def test_way_points_are_in_order_and_begin_where_the_velocity_was_held(qd: np.ndarray, wanted: np.ndarray) -> None:
     points = list(motion(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD).way_points())
-    times = [t for t, _, _ in points]
+    times = [point.time for point in points]
     assert times[0] >= HOLD
     assert all(b - a > 0.9e-6 for a, b in pairwise(times))
-    assert points[0][2] == pytest.approx(wanted)
-    assert not points[-1][2].any()
+    assert points[0].qd == pytest.approx(wanted)
+    assert not points[-1].qd.any()
 
 
 def test_a_command_is_a_step_held_for_a_period_as_the_controller_takes_it() -> None:
@@ -110,6 +110,24 @@ def test_what_is_asked_for_at_an_instant_before_the_last_command_is_of_the_one_b
     assert reference.at(1.009)[1] == pytest.approx(one)
     assert reference.at(1.011)[1] == pytest.approx(2 * one)
     assert reference.at(0.5)[1] == pytest.approx(STILL)
+
+
+def test_what_has_passed_is_told_by_the_points_between_which_velocities_are_linear() -> None:
+    reference, rng = Reference(A, PERIOD, HOLD), np.random.default_rng(3)
+    reference.begin(PANDA.q_ready, 0.0, 0.5)
+    qd = STILL
+    for k in range(50):
+        now = 1.0 + k * PERIOD + rng.uniform(0, 2e-3)
+        passed = reference.passed(now, 0.025)
+        assert passed[0].time == pytest.approx(-0.025)
+        assert all(b.time - a.time > 0.9e-4 for a, b in pairwise(passed))
+        assert passed[-1].time < 0
+        for a, b in pairwise(passed):
+            # the middle of a cubic spline between them is where it was asked for
+            q = (a.q + b.q) / 2 + (a.qd - b.qd) * (b.time - a.time) / 8
+            assert q == pytest.approx(reference.motion_at(now + (a.time + b.time) / 2)[0], abs=1e-6)
+        qd = np.clip(qd + rng.uniform(-1, 1, 7) * A * PERIOD, -0.5 * V, 0.5 * V)
+        reference.command(qd, now)
 
 
 def test_the_loops_way_to_rest_is_followed_within_the_limits() -> None:

@@ -33,7 +33,8 @@ def ros2(command: Run, parts: Parts) -> Iterator[Opened]:
         node = stack.enter_context(Ros2Node(joined))
         robot = stack.enter_context(Ros2Robot(arm, parts.model, node, period))
         robot.wait(_PATIENCE_S)
-        units = stack.enter_context(Ros2Skin(SkinParams(), parts.skin, node)) if len(parts.skin) else None
+        ranges = SkinParams(command.robot.ros_ranges)
+        units = stack.enter_context(Ros2Skin(ranges, parts.skin, node)) if len(parts.skin) else None
         if units:
             units.wait(_PATIENCE_S)
         yield Opened(
@@ -47,5 +48,7 @@ def _params(robot: RobotOptions) -> tuple[NodeParams, ArmParams]:
     sign, frame = cast(Sign, robot.ros_sign), cast(Frame, robot.ros_frame)  # the options were checked for ''
     node = NodeParams(robot.ros_distribution, robot.ros_domain, robot.ros_interface)
     return node, ArmParams(
-        sign, frame, command=robot.ros_command, controller=robot.ros_controller, timeout_s=robot.ros_timeout
-    )
+        sign, frame, joint_states=robot.ros_joint_states, joint_names=robot.ros_joints, wrench=robot.ros_wrench,
+        shared_clock=not robot.ros_own_clock, command=robot.ros_command, command_topic=robot.ros_commands,
+        controller=robot.ros_controller, timeout_s=robot.ros_timeout,
+    )  # fmt: skip

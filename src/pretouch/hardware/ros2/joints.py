@@ -9,6 +9,9 @@ from pretouch.hardware.ros2.stamps import Stamps
 from pretouch.types import FloatArray
 from pretouch.values import value
 
+_REMEMBERED = 64
+"""Orders of names, and joints of others, that are kept: whoever publishes ever other names must not fill the memory."""
+
 
 @value
 class Measured:
@@ -30,7 +33,7 @@ class Joints:
         self.newest: Measured | None = None
         """What was measured last."""
         self.others: set[str] = set()
-        """Joints named in messages that do not have all of ours."""
+        """Joints named in messages that do not have all of ours; some of them, where there are many."""
         self.differentiated = False
         """Whether the messages have no velocities, so that they are taken from the positions."""
         self._places: dict[tuple[str, ...], list[int] | None] = {}
@@ -57,12 +60,15 @@ class Joints:
 
     def _where(self, names: tuple[str, ...], positions: int) -> list[int] | None:
         if names not in self._places:
+            if len(self._places) >= _REMEMBERED:
+                self._places.clear()
             known = {name: i for i, name in enumerate(names)}
             complete = all(name in known for name in self.names)
             self._places[names] = [known[name] for name in self.names] if complete else None
         places = self._places[names]
         if places is None:
-            self.others.update(names)
+            ours = set(self.names).intersection(names)
+            self.others |= ours | set(names[: max(_REMEMBERED - len(self.others), 0)])
         return places if places is not None and positions == len(names) else None
 
     def _difference(self, stamp: float, q: FloatArray) -> FloatArray:

@@ -10,7 +10,6 @@ import numpy as np
 from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl import types as idl
 from rosbags.interfaces import Nodetype
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RobotError
@@ -89,7 +88,7 @@ class Messages:
         """Return the message that bytes hold; those of another type or distribution are a RobotError."""
         try:
             return self._store.deserialize_cdr(data, kind)
-        except SerdeError as error:
+        except Exception as error:  # any bytes may come from a network
             raise RobotError(
                 f"A message of {len(data)} bytes is no {kind} of {self.distribution}: choose the distribution that"
                 " the sender has."

@@ -5,6 +5,7 @@ from contextlib import suppress
 from threading import Lock, Thread
 from time import monotonic, sleep
 from typing import Any, Self
+from uuid import UUID
 
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
 from cyclonedds.core import (
@@ -35,6 +36,7 @@ _DEPTH = 10
 _BLOCKED_MS = 10
 """Longest time a reliable publisher may wait for a slow subscriber [ms]; keeping the last ten, it does not."""
 _ANY = ViewState.Any | InstanceState.Any | SampleState.Any
+_UNREAD = ViewState.Any | InstanceState.Any | SampleState.NotRead
 _POLL_S = 0.02
 
 
@@ -66,6 +68,11 @@ class Publisher:
         del self._writer
 
     @property
+    def key(self) -> UUID:
+        """By which others know it."""
+        return self._writer.guid
+
+    @property
     def subscribers(self) -> int:
         """How many take what is published."""
         return _count(self._writer.get_matched_subscriptions)
@@ -93,7 +100,7 @@ class Subscription:
             except RobotError as error:
                 self._unreadable = f"{self.topic}: {error}"
                 continue
-            self._count += 1
+            self._count, self._unreadable = self._count + 1, ""
             self._on_message(message, received, sample.sample_info.publication_handle)
 
     def close(self) -> None:
@@ -102,7 +109,7 @@ class Subscription:
 
     @property
     def unreadable(self) -> str:
-        """What keeps messages from being read, as a sentence, or ''."""
+        """What kept the newest message from being read, as a sentence, or ''."""
         if self._unreadable or self._count or not self.publishers:
             return self._unreadable
         # cyclonedds drops what is too short for its type by itself, and only prints a line
@@ -133,6 +140,12 @@ class Ros2Node:
         self._waits = WaitSet(self._participant)
         self._waits.attach(self._ends)
         self._ended = False
+        self.failure = ""
+        """Why nothing is received any more, as a sentence, or ''."""
+        self._publications: dict[UUID, str] = {}
+        self._discovered = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
+        self._found = ReadCondition(self._discovered, _UNREAD)
+        self._waits.attach(self._found)
         self._thread = Thread(target=self._receive, name="ros2", daemon=True)
         self._thread.start()
 
@@ -164,6 +177,11 @@ class Ros2Node:
         names = {e.topic_name for e in there if getattr(e, "type_name", "") == wanted and e.participant_key != ours}
         return tuple(sorted(name.removeprefix("rt") for name in names if name.startswith("rt/")))
 
+    def others(self, publisher: Publisher) -> int:
+        """Count who else publishes on a publisher's topic: one that was killed is only missed after 10 s."""
+        there = self._publications  # replaced as a whole by the node's thread
+        return sum(topic == f"rt{publisher.topic}" and key != publisher.key for key, topic in there.items())
+
     def wait_for(self, there: Callable[[], bool], timeout: float) -> bool:
         """Wait until something is there, for so long at most [s]; say whether it is."""
         end = monotonic() + timeout
@@ -181,7 +199,7 @@ class Ros2Node:
         self._ends.set(True)
         self._thread.join()
         # cyclonedds ends what is no longer referred to: readers and writers before what they stand on
-        del self._waits, self._ends
+        del self._waits, self._ends, self._found, self._discovered
         for publisher in self._publishers:
             publisher.close()
         for subscription in self._subscriptions:
@@ -215,9 +233,21 @@ class Ros2Node:
         return Qos(*policies)
 
     def _receive(self) -> None:
-        while not self._ended:
-            self._waits.wait(duration(seconds=1))
-            with self._lock:
-                subscriptions = tuple(self._subscriptions)
-            for subscription in subscriptions:
-                subscription.take()
+        try:
+            while not self._ended:
+                self._waits.wait(duration(seconds=1))
+                if self._found.triggered:
+                    self._discover()
+                with self._lock:
+                    subscriptions = tuple(self._subscriptions)
+                for subscription in subscriptions:
+                    subscription.take()
+        except Exception as error:  # whoever reads next is told, and stops the arm
+            self.failure = f"Nothing is received from ROS 2 any more: restart ({type(error).__name__}: {error})."
+
+    def _discover(self) -> None:
+        self._publications = {
+            found.key: found.topic_name
+            for found in self._discovered.read(1000)
+            if found.sample_info.instance_state == InstanceState.Alive
+        }

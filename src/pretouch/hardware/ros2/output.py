@@ -11,7 +11,7 @@ from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import OutputParams
 from pretouch.hardware.ros2.shown import Shown, Stamp
 from pretouch.loop import Cycle
-from pretouch.types import Mode
+from pretouch.types import ControlStep, Mode
 
 _WAITING_MOST = 16
 """Steps that may wait to be published; more are left out."""
@@ -30,8 +30,11 @@ class Ros2Output:
         self._period, self._diagnostics_period = 1 / params.rate_hz, 1 / params.diagnostics_hz
         self._next = self._next_diagnostics = 0.0
         self._mode: Mode | None = None
+        self._published: Mode | None = None
         self.dropped = 0
         """Steps left out because the thread was busy."""
+        self.failure = ""
+        """Why nothing is published any more, as a sentence, or ''."""
         self._queue: SimpleQueue[tuple[Cycle, Stamp] | None] = SimpleQueue()
         begin = params.namespace.rstrip("/")
         self._cloud = node.publisher(f"{begin}/obstacles", CLOUD)
@@ -51,6 +54,8 @@ class Ros2Output:
     def record(self, cycle: Cycle) -> None:
         """Have a turn of the loop published, if it is time."""
         now, step = monotonic(), cycle.step
+        if self.failure:
+            return
         if now < self._next and step.contact is None and step.mode is self._mode:
             return
         if now >= self._next:
@@ -60,6 +65,12 @@ class Ros2Output:
             self.dropped += 1
             return
         self._queue.put((cycle, _now()))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know of what was published, a sentence each."""
+        dropped = f"{self.dropped} control steps were not published: the machine was busy." if self.dropped else ""
+        return tuple(filter(None, (self.failure, dropped)))
 
     def close(self) -> None:
         """Publish what waits, and end."""
@@ -73,19 +84,23 @@ class Ros2Output:
         self.close()
 
     def _work(self) -> None:
-        mode: Mode | None = None
         while (item := self._queue.get()) is not None:
-            cycle, at = item
-            self._publish(cycle, at)
-            changed = cycle.step.mode is not mode
-            mode = cycle.step.mode
-            now = monotonic()
-            if changed or now >= self._next_diagnostics:
-                self._next_diagnostics = now + self._diagnostics_period
-                self._diagnostics.publish(self._shown.diagnostics(cycle, at))
+            try:
+                self._publish(*item)
+            except Exception as error:  # the arm goes on: a person is told at the end
+                self.failure = f"Control steps are not published any more: {type(error).__name__}: {error}"
+                return
 
     def _publish(self, cycle: Cycle, at: Stamp) -> None:
-        step, shown = cycle.step, self._shown
+        self._publish_step(cycle.step, at)
+        now, changed = monotonic(), cycle.step.mode is not self._published
+        self._published = cycle.step.mode
+        if changed or now >= self._next_diagnostics:
+            self._next_diagnostics = now + self._diagnostics_period
+            self._diagnostics.publish(self._shown.diagnostics(cycle, at))
+
+    def _publish_step(self, step: ControlStep, at: Stamp) -> None:
+        shown = self._shown
         if step.contact is not None:
             self._contact.publish(shown.wrench(step.contact.force, at))
         self._force.publish(shown.wrench(step.force, at))

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pretouch.checks import Check, Checked, NonNegative, Positive
+from pretouch.checks import Check, Checked, NonNegative
 from pretouch.errors import ParameterError
 
 Distribution = Literal["foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical"]
@@ -59,11 +59,12 @@ class ArmParams(Checked):
     """The arm's joints as the messages and the arm's controller call them, in the model's order; () is the model's."""
     wrench: str = "/wrench"
     """Topic of geometry_msgs/WrenchStamped."""
-    wrench_timeout_s: Positive = 0.05
+    wrench_timeout_s: Annotated[float, Check(low=0.0, high=0.5, open_low=True)] = 0.05
     """Age of a wrench from which it is no estimate any more [s]."""
-    shared_clock: bool = False
-    """Whether the time of ROS is this machine's time of day, to a millisecond: then stamps of headers count, and
-    trajectories say when they begin. Otherwise what counts is when a message comes."""
+    shared_clock: bool = True
+    """Whether the time of ROS is this machine's time of day, to some milliseconds: then stamps of headers count, and
+    trajectories say when they begin. Otherwise what counts is when a message comes, and the arm moves smoothly by
+    joint_trajectory_controller 4.17 to 4.20 alone."""
     command: Command = "trajectory"
     """trajectory: trajectory_msgs/JointTrajectory that ends at rest. velocities: std_msgs/Float64MultiArray, for a
     controller that stops by itself when none comes any more."""
@@ -74,13 +75,18 @@ class ArmParams(Checked):
     timeout_s: NonNegative = 0.0
     """That time-out [s], at most 0.5."""
     hold_s: Annotated[float, Check(low=0.0, high=0.5, open_low=True)] = 0.05
-    """How long a trajectory goes on at the commanded velocity before it brakes, should no other one come [s]. What
-    reaches the arm's controller late or early by t disturbs its acceleration by 6 v t / hold_s^2."""
-    settle_s: Positive = 0.5
+    """How long a trajectory goes on at the commanded velocity before it brakes, should no other one come [s]."""
+    ahead_s: Annotated[float, Check(low=0.0, high=0.05)] = 0.01
+    """With one clock: how long after a turn of the loop its trajectory begins [s]. A message that takes no longer, less
+    a period of the arm's controller, leaves no trace in the motion."""
+    settle_s: Annotated[float, Check(low=0.2, high=5.0)] = 0.5
     """Time in which the first trajectory brings the arm to where it was measured [s]: what its controller commanded by
-    then is not known."""
-    follow_most_rad: Positive = 0.15
+    then is not known. Until then only rest is commanded."""
+    follow_most_rad: Annotated[float, Check(low=0.005, high=0.3)] = 0.05
     """Distance between a joint's commanded and measured position from which the arm does not follow [rad]."""
+    stray_rad: Annotated[float, Check(low=0.001, high=0.1)] = 0.005
+    """Distance between a joint and where it usually is by its commands, its lag and offset known, from which its
+    controller is taken to be elsewhere: it is left to come to rest, and begins anew where it then is [rad]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

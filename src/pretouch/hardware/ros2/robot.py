@@ -1,31 +1,32 @@
 """The port `Robot` over ROS 2 topics: joint states and wrench in, commands out."""
 
 import math
-from time import monotonic, sleep, time
+from time import monotonic, sleep
 from typing import Self
 
 import numpy as np
 
 from pretouch.errors import RobotError
+from pretouch.hardware.ros2.commands import Commands, Velocities
+from pretouch.hardware.ros2.joint_trajectories import Trajectories
 from pretouch.hardware.ros2.joints import Joints, Measured
 from pretouch.hardware.ros2.messages import JOINT_STATE, TRAJECTORY, VELOCITIES, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
-from pretouch.hardware.ros2.params import ArmParams, parts
+from pretouch.hardware.ros2.params import ArmParams
 from pretouch.hardware.ros2.stamps import Stamps
-from pretouch.hardware.ros2.trajectory import Motion, Reference
 from pretouch.hardware.ros2.wrench import Wrench
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
 
 _PERIOD_S = 0.01
-_FRESH_S = 0.1
-"""Age of a joint state up to which it tells whether the arm follows [s]."""
+_SHARED_S = 0.05
+"""How far the stamps of a clock that is shared may be from the time of day [s]."""
 
 
 class Ros2Robot:
     """An arm behind topics. `wait` for it before it is used; for one thread, as the control loop's.
 
-    A state is stamped with when it was received, by this machine's monotonic clock. The arm reports no commanded
+    A state is stamped with when it was measured, by this machine's monotonic clock. The arm reports no commanded
     positions and velocities: with trajectories they are reckoned from what it was sent, with velocities they are the
     measured positions and the last command.
     """
@@ -41,108 +42,101 @@ class Ros2Robot:
             raise RobotError(f"hold_s is {params.hold_s:g} s: give at least the control period, {period:g} s.")
         self.params, self._node = params, node
         self._model = RobotModel(model.description)  # memory of its own
-        self._names = params.joint_names or model.joints
-        self._joints = Joints(self._names, Stamps(params.shared_clock))
+        self._joints = Joints(params.joint_names or model.joints, Stamps(params.shared_clock))
         self._wrench = Wrench(params, Stamps(params.shared_clock))
         self._states = node.subscribe(params.joint_states, JOINT_STATE, self._joints.take)
         self._wrenches = node.subscribe(params.wrench, WRENCH, self._wrench.take)
-        kind = TRAJECTORY if params.command == "trajectory" else VELOCITIES
-        self._commands = node.publisher(params.commands_on, kind)
-        self._reference = Reference(model.description.qdd_max, period, params.hold_s)
-        self._sent = np.zeros(model.n)
-        self._settled = -math.inf
+        self._commands: Commands = (
+            Trajectories(params, model, self._joints.names, node, period)
+            if params.command == "trajectory"
+            else Velocities(params, model, node)
+        )
         self._turn = self._turn_before = -math.inf
+        self._lost = ""
 
     def wait(self, timeout: float = 5.0) -> None:
-        """Wait until states and a wrench come and somebody takes commands, for so long at most [s].
+        """Wait until states and a wrench come and nobody else commands the controller, for so long at most [s].
 
-        What has not come by then is a RobotError that says what there is instead.
+        What is not so by then is a RobotError that says what there is instead.
         """
-
-        def ready() -> bool:
-            return self._joints.newest is not None and self._wrench.heard and self._commands.subscribers > 0
-
-        if not self._node.wait_for(ready, timeout):
-            raise RobotError(self._absent())
+        if not self._node.wait_for(lambda: not (self._absent() or self._contested()), timeout):
+            raise RobotError(self._contested() or self._absent())
+        self._check_clock()
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
-        found = [self._wrench.doubt, self._states.unreadable, self._wrenches.unreadable]
+        p, found = self.params, [self._wrench.doubt, self._states.unreadable, self._wrenches.unreadable]
         if self._joints.differentiated:
-            found.append(f"{self.params.joint_states} has no velocities: they are taken from the positions.")
-        if self._states.publishers > 1:
-            found.append(f"{self.params.joint_states} has {self._states.publishers} publishers.")
-        if self._commands.subscribers > 1:
-            found.append(f"{self.params.commands_on} has {self._commands.subscribers} subscribers.")
+            found.append(f"{p.joint_states} has no velocities: they are taken from the positions.")
+        if p.shared_clock and self._joints.newest is not None and self._joints.stamps.behind is None:
+            found.append(f"{p.joint_states} has no stamps: whether its clock is this machine's cannot be seen.")
+        if self._commands.publisher.subscribers > 1:
+            found.append(f"{p.commands_on} has {self._commands.publisher.subscribers} subscribers.")
+        if p.command == "velocities":
+            found.append(
+                f"That {p.controller} stops by itself {p.timeout_s:g} s after the last command is taken from the"
+                " settings, and cannot be seen: should it not, the arm goes on when this program dies."
+            )
+        elif not p.shared_clock:
+            found.append("Without a shared clock only joint_trajectory_controller 4.17 to 4.20 moves smoothly.")
         return tuple(filter(None, found))
 
+    def begin(self) -> None:
+        """Begin at rest where the arm is, and wait until it has settled there; RobotError where that is not known."""
+        self._check_sound()
+        if not self._commands.begun:
+            sleep(self._commands.begin(self._newest(), monotonic()))
+
     def read(self) -> RobotState:
-        """Return the newest state; an arm that does not follow its commands is a RobotError."""
+        """Return the newest state; an arm that does not follow its commands is a RobotError, once."""
         now = monotonic()
         self._turn_before, self._turn = self._turn, now
-        joints = self._joints.newest
-        if joints is None:
-            raise RobotError(self._absent())
-        q_commanded, qd_commanded = self._commanded(joints, now)
+        joints = self._newest()
+        if not self._lost:
+            try:
+                self._check_sound()
+                self._commands.check(joints, now)
+            except RobotError as error:
+                self._lost = str(error)
+                raise
+        # a state of this turn, measured before the last command, is not moved on by the controller
+        q, qd = self._commands.at(joints, now if joints.stamp > self._turn_before else joints.stamp)
         wrench = self._wrench.read(now, self._orientation(joints.q))
         no_torques = np.full(self._model.n, np.nan)
-        return RobotState(joints.stamp, joints.q, joints.qd, q_commanded, qd_commanded, no_torques, wrench)
+        return RobotState(joints.stamp, joints.q, joints.qd, q, qd, no_torques, wrench)
 
     def command(self, qd: FloatArray) -> None:
-        """Take joint velocities (n,) [rad/s] as the set-point, kept for `hold_s` unless there is another one."""
+        """Take joint velocities (n,) [rad/s] as the set-point, kept for `hold_s` unless there is another one.
+
+        Before the arm has settled it stays at rest. Once it was found not to follow, commands are RobotErrors: it is at
+        rest when the last trajectory has ended.
+        """
+        if self._lost:
+            raise RobotError(self._lost)
         if not np.isfinite(qd).all():
             raise RobotError(f"The command holds {qd}: give finite joint velocities.")
-        if self.params.command == "velocities":
-            layout = self._node.messages.make("std_msgs/msg/MultiArrayLayout", [], 0)
-            self._commands.publish(self._node.messages.make(VELOCITIES, layout, np.array(qd, dtype=np.float64)))
-        else:
-            self._continue(qd)
-        self._sent, self._turn = np.array(qd, dtype=np.float64), -math.inf
+        now = self._turn if self._turn > -math.inf else monotonic()
+        if not self._commands.begun:
+            self._commands.begin(self._newest(), now)
+        self._commands.send(qd, now)
+        self._turn = -math.inf
+
+    def end(self) -> None:
+        """Bring the arm to rest: zeros to a controller of velocities, and the last trajectory is waited for."""
+        self._commands.rest()
+        sleep(max(self._commands.ends - monotonic(), 0.0))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave the arm once the last trajectory has ended, at rest; behind velocities a time-out does that."""
-        sleep(max(self._reference.ends - monotonic(), 0.0))
+        self.end()
 
-    def _continue(self, qd: FloatArray) -> None:
-        """Send the next trajectory; it begins with this turn of the loop, or at once if nothing was read for it."""
-        now = self._turn if self._turn > -math.inf else monotonic()
-        if not self._reference.begun:
-            if self._joints.newest is None:
-                raise RobotError(self._absent())
-            self._settled = now + self.params.settle_s
-            self._publish(self._reference.begin(self._joints.newest.q, now, self.params.settle_s), now)
-        if now < self._settled and not np.any(qd):
-            return
-        self._settled = -math.inf
-        self._publish(self._reference.command(qd, now), now)
-
-    def _publish(self, course: Motion, began: float) -> None:
-        make = self._node.messages.make
-        nothing = np.zeros(0)
-        points = [
-            make("trajectory_msgs/msg/JointTrajectoryPoint", q, v, nothing, nothing,
-                 make("builtin_interfaces/msg/Duration", *parts(float(t))))
-            for t, q, v in course.way_points()
-        ]  # fmt: skip
-        # a stamp of zero means at once
-        begin = parts(time() - (monotonic() - began)) if self.params.shared_clock else (0, 0)
-        self._commands.publish(make(TRAJECTORY, self._node.messages.header(begin, ""), list(self._names), points))
-
-    def _commanded(self, joints: Measured, now: float) -> tuple[FloatArray, FloatArray]:
-        """Commanded positions and velocities (n,) at the state's instant.
-
-        A state that came in this turn of the loop, but before the last command, is not moved on by the controller: it
-        is given what is commanded by now.
-        """
-        if self.params.command == "velocities" or not self._reference.begun:
-            return joints.q, self._sent
-        if now - joints.stamp < _FRESH_S:
-            self._check_following(joints)
-        return self._reference.at(now if joints.stamp > self._turn_before else joints.stamp)
+    def _newest(self) -> Measured:
+        if self._joints.newest is None:
+            raise RobotError(self._absent())
+        return self._joints.newest
 
     def _orientation(self, q: FloatArray) -> FloatArray:
         """Orientation of the end-effector (3, 3), if the wrench needs it."""
@@ -150,18 +144,35 @@ class Ros2Robot:
             return np.eye(3)
         return self._model.kinematics(q).rotation[self._model.ee]
 
-    def _check_following(self, joints: Measured) -> None:
-        wanted, _ = self._reference.motion_at(joints.stamp)
-        apart = np.abs(wanted - joints.q)
-        worst = int(np.argmax(apart))
-        if apart[worst] > self.params.follow_most_rad:
+    def _check_sound(self) -> None:
+        wrong = self._node.failure or self._contested()
+        if wrong:
+            raise RobotError(wrong)
+
+    def _contested(self) -> str:
+        """Say whom this program shares the arm with, or ''."""
+        p = self.params
+        if self._node.others(self._commands.publisher):
+            return (
+                f"Another program publishes on {p.commands_on}: end it, or wait 10 s if it was killed: one alone may"
+                " command the arm."
+            )
+        for stamps, topic in ((self._joints.stamps, p.joint_states), (self._wrench.stamps, p.wrench)):
+            if stamps.together():
+                return f"Several publishers tell of the arm on {topic}: let one alone, or give each a topic of its own."
+        return ""
+
+    def _check_clock(self) -> None:
+        """Refuse a clock that is not shared: trajectories would begin at another time than meant."""
+        p, behind = self.params, self._joints.stamps.behind
+        if p.shared_clock and behind is not None and abs(behind) > _SHARED_S:
             raise RobotError(
-                f"The arm does not follow: {self._names[worst]} is at {joints.q[worst]:.3f} rad and was sent to"
-                f" {wanted[worst]:.3f} rad: see that its controller runs, then start again from where it stands."
+                f"The stamps of {p.joint_states} are {behind:.3g} s behind this machine's time of day: set the clocks"
+                " by NTP, or say that they are not the same with shared_clock = false."
             )
 
     def _absent(self) -> str:
-        """Say what has not come, and what there is."""
+        """Say what has not come, and what there is; '' if nothing is missing."""
         p, joints = self.params, self._joints
         if joints.newest is None:
             if not joints.others:
@@ -172,6 +183,8 @@ class Ros2Robot:
             )
         if not self._wrench.heard:
             return _nobody(p.wrench, WRENCH, "wrench", self._node.topics(WRENCH))
+        if self._commands.publisher.subscribers:
+            return ""
         kind = TRAJECTORY if p.command == "trajectory" else VELOCITIES
         there = self._node.topics(kind, subscribed=True)
         return (

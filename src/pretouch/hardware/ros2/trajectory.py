@@ -1,9 +1,12 @@
 """Joint velocity commands as short trajectories that end at rest, so that an arm that gets no other one stops.
 
 A trajectory goes from where the one before had brought the arm to the commanded velocity within a period, keeps it for
-a while, and brakes each joint as hard as it may, all with velocities that are linear in between. Its first way-point
-lies at the end of that while: who follows it gets there by a cubic spline from where he is, and a message that came a
-little early or late only bends that.
+a while, and brakes each joint as hard as it may, all with velocities that are linear in between. Cubic splines through
+these points are exactly that.
+
+It can be sent in two ways. With its past (`Reference.passed`), whoever follows it by a clock that is the same goes on
+as if there were no messages, as long as each comes before it begins. By its way-points alone, the first of which lies
+at the end of that while, he gets there by a spline from where he is, and a message that came early or late bends that.
 
 A controller that holds each command for a period and brakes in such steps ends exactly where these ramps do, if it
 takes positions for ahead of the ramp by half a period: `Reference.at` gives those, and joint limits rest on them.
@@ -12,6 +15,7 @@ takes positions for ahead of the ramp by half a period: `Reference.at` gives tho
 import math
 from collections import deque
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 
@@ -22,6 +26,8 @@ _REMEMBERED = 32
 """Trajectories kept: a state that is late is of one before the last."""
 _FINEST_S = 1e-6
 """Shortest time between two points [s]: they must differ."""
+_NEAREST_S = 1e-4
+"""Shortest time between two points that are passed [s]: so little bends nothing."""
 
 
 @value
@@ -37,9 +43,14 @@ class Motion:
     first: int = 1
     """Which of the instants is the first way-point."""
 
-    def way_points(self) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-        """Yield times [s], positions and velocities (n,) from where the velocity was kept for a while on."""
-        yield from zip(self.time[self.first :].tolist(), self.q[self.first :], self.qd[self.first :], strict=True)
+    def points(self) -> Iterator["Point"]:
+        """Yield all points, the first at its begin."""
+        for time, q, qd in zip(self.time.tolist(), self.q, self.qd, strict=True):
+            yield Point(time, q, qd)
+
+    def way_points(self) -> Iterator["Point"]:
+        """Yield the points from where the velocity was kept for a while on."""
+        yield from islice(self.points(), self.first, None)
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities (n,) at a time since the begin [s]."""
@@ -77,12 +88,34 @@ def motion(
     return Motion(time, np.vstack([q, q + np.cumsum(steps, axis=0)]), qd, 2 if kept else 1)
 
 
+@value
+class Point:
+    """Where to be, relative to the begin of a trajectory."""
+
+    time: float
+    """[s]; negative: passed already."""
+    q: FloatArray
+    """(n,) [rad]."""
+    qd: FloatArray
+    """(n,) [rad/s]."""
+
+
+@value
+class _Sent:
+    """A trajectory and what it was made of."""
+
+    began: float
+    course: Motion
+    wanted: FloatArray
+
+
 class Reference:
     """What the arm's motion generator is at, reckoned from the trajectories it was sent."""
 
     def __init__(self, qdd_max: FloatArray, period: float, hold: float) -> None:
+        """Take the limits (n,) [rad/s^2], the control period and how long a velocity is held [s]."""
         self._qdd_max, self._period, self._hold = qdd_max, period, hold
-        self._sent: deque[tuple[float, Motion, FloatArray]] = deque(maxlen=_REMEMBERED)
+        self._sent: deque[_Sent] = deque(maxlen=_REMEMBERED)
 
     @property
     def begun(self) -> bool:
@@ -92,37 +125,49 @@ class Reference:
     @property
     def ends(self) -> float:
         """When the last trajectory ends [s]; in the past if there is none."""
-        if not self._sent:
-            return -math.inf
-        began, course, _ = self._sent[-1]
-        return began + float(course.time[-1])
+        return self._sent[-1].began + float(self._sent[-1].course.time[-1]) if self._sent else -math.inf
 
     def begin(self, q: FloatArray, now: float, settle: float) -> Motion:
-        """Begin at rest at q (n,) [rad], to be reached within a time [s]."""
+        """Begin, or begin anew, at rest at q (n,) [rad], to be reached within a time [s]."""
         still = np.zeros_like(q)
-        self._sent.append((now, Motion(np.array([0.0, settle]), np.stack([q, q]), np.stack([still, still])), still))
-        return self._sent[-1][1]
+        course = Motion(np.array([0.0, settle]), np.stack([q, q]), np.stack([still, still]))
+        self._sent.clear()
+        self._sent.append(_Sent(now, course, still))
+        return course
 
     def command(self, wanted: FloatArray, now: float) -> Motion:
         """Go on to wanted velocities (n,) [rad/s] from an instant on [s]."""
         q, qd = self.motion_at(now)
-        self._sent.append((now, motion(q, qd, wanted, self._qdd_max, self._period, self._hold), wanted.copy()))
-        return self._sent[-1][1]
+        self._sent.append(_Sent(now, motion(q, qd, wanted, self._qdd_max, self._period, self._hold), wanted.copy()))
+        return self._sent[-1].course
+
+    def passed(self, now: float, past: float) -> tuple[Point, ...]:
+        """Return what was asked for in a time [s] before an instant [s]: its begin, and each change since."""
+        begins = [sent.began for sent in self._sent]
+        places = [now - past]
+        for sent, until in zip(self._sent, [*begins[1:], math.inf], strict=True):
+            knots = sent.began + sent.course.time
+            places += knots[knots < min(until, now) - _NEAREST_S].tolist()
+        found: list[Point] = []
+        for place in sorted(p for p in places if now - past <= p < now - _NEAREST_S):
+            if not found or place - now > found[-1].time + _NEAREST_S:
+                found.append(Point(place - now, *self.motion_at(place)))
+        return tuple(found)
 
     def motion_at(self, instant: float) -> tuple[FloatArray, FloatArray]:
         """Return positions [rad] and velocities [rad/s] (n,) that were asked for at an instant [s]."""
-        began, course, _ = self._active(instant)
-        return course.at(instant - began)
+        sent = self._active(instant)
+        return sent.course.at(instant - sent.began)
 
     def at(self, instant: float) -> tuple[FloatArray, FloatArray]:
         """Return the commanded positions and velocities (n,) at an instant [s], as of a set-point that is held."""
-        began, course, wanted = self._active(instant)
-        q, qd = course.at(instant - began)
-        kept = instant - began <= max(self._hold, float(course.time[1]))
-        return q + qd * self._period / 2, wanted if kept else qd
+        sent = self._active(instant)
+        q, qd = sent.course.at(instant - sent.began)
+        kept = instant - sent.began <= max(self._hold, float(sent.course.time[1]))
+        return q + qd * self._period / 2, sent.wanted if kept else qd
 
-    def _active(self, instant: float) -> tuple[float, Motion, FloatArray]:
+    def _active(self, instant: float) -> _Sent:
         for sent in reversed(self._sent):
-            if sent[0] <= instant:
+            if sent.began <= instant:
                 return sent
         return self._sent[0]
