@@ -5,21 +5,54 @@ import pytest
 from pretouch.cli import main
 from tests.importing.made import six_axis, written
 
+READY = "0,0.3,1.2,0,1.6,0"
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    """An imported arm's folder; tests change copies of it."""
+    folder = tmp_path_factory.mktemp("arm")
+    told = ["robot", "import", str(written(folder, six_axis())), "--capsules", "1", "--ready", READY]
+    assert main([*told, "--out", str(folder / "out")]) == 0
+    return folder / "out"
+
+
+def changed(arm, folder, name, old, new):
+    """Copy the folder of an arm with one of its files changed."""
+    for file in arm.iterdir():
+        text = file.read_text()
+        assert file.name != name or old in text
+        (folder / file.name).write_text(text.replace(old, new, 1) if file.name == name else text)
+    return folder
+
 
 def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
     file = written(tmp_path, six_axis())
     out, numbers = tmp_path / "mine", tmp_path / "fit.json"
-    ready = "0,0.3,1.2,0,1.6,0"
-    told = ["robot", "import", str(file), "--out", str(out), "--ready", ready, "--json", str(numbers)]
+    told = ["robot", "import", str(file), "--out", str(out), "--ready", READY, "--json", str(numbers)]
+    told += ["--capsules", "1"]
     assert main(told) == 0
     printed = capsys.readouterr().out
     for part in ("sixer: 6 joints, end-effector tool0", "whole arm", "sticks out", "manipulability", "Written: "):
         assert part in printed
+    assert "of its capsules most, by" in printed
+    assert "raise restriction.d_repulse_m by as much, or import with --cover" in printed
     assert json.loads(numbers.read_text())["whole_arm"]["points"] > 500
     assert main(["robot", "check", str(out)]) == 0
     assert "In order" in capsys.readouterr().out
     assert main(told) == 2
     assert "is there: give another --out, or --force" in capsys.readouterr().err
+    assert main([*told, "--force"]) == 0
+    assert f"What was in {out} is in {out}.old-1." in capsys.readouterr().out
+
+
+def test_a_folder_of_the_arms_own_name_is_refused_before_anything_is_fitted(tmp_path, capsys, monkeypatch):
+    file = written(tmp_path, six_axis())
+    (tmp_path / "sixer").mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("pretouch.cli.robot_import.import_robot", lambda *_: pytest.fail("imported"))
+    assert main(["robot", "import", str(file)]) == 2
+    assert "The folder sixer is there" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -29,6 +62,7 @@ def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
         (["--qd-max", "fast"], "--qd-max is 'fast': give numbers"),
         (["--capsules", "0"], "--capsules is 0: give 1 to 10"),
         (["--package-path", "/nowhere"], "The package path /nowhere is no folder"),
+        (["--ready", "1,2"], "--ready is [1.0, 2.0]: give 6 joint positions"),
     ],
 )
 def test_misuse_is_one_sentence(tmp_path, capsys, more, sentence):
@@ -36,6 +70,32 @@ def test_misuse_is_one_sentence(tmp_path, capsys, more, sentence):
     error = capsys.readouterr().err
     assert sentence in error
     assert len(error.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "sentence"),
+    [
+        ("arm.xml", 'name="base_0" type="capsule" size="', 'name="base_0" type="capsule" size="0.7 0.1" user="',
+         "in each other"),
+        ("robot.toml", '"tool0"', '"hand"', "ee_body: The link 'hand' is unknown: choose from base"),
+        ("robot.toml", "1.2", "9.2", "q_ready is [0.0, 0.3, 9.2, 0.0, 1.6, 0.0]: give 6 joint positions"),
+    ],
+)  # fmt: skip
+def test_an_arm_that_is_not_in_order_is_refused_with_the_file_and_the_key(
+    arm, tmp_path, capsys, name, old, new, sentence
+):
+    assert main(["robot", "check", str(changed(arm, tmp_path, name, old, new))]) == 2
+    captured = capsys.readouterr()
+    assert sentence in captured.err
+    assert "robot.toml" in captured.err
+    assert "In order" not in captured.out
+
+
+def test_a_ready_posture_that_is_not_clear_is_said_and_the_import_is_kept(tmp_path, capsys):
+    told = ["robot", "import", str(written(tmp_path, six_axis())), "--capsules", "1", "--out", str(tmp_path / "o")]
+    assert main([*told, "--ready", "0,0,2.7,0,2.7,0"]) == 0
+    assert "mm in each other: choose another posture" in capsys.readouterr().out
+    assert main(["robot", "check", str(tmp_path / "o")]) == 2
 
 
 def test_a_folder_that_is_no_arm_is_said(tmp_path, capsys):

@@ -37,6 +37,15 @@ def six_axis(tail="", changed=None):
     return f'<robot name="sixer">{"".join(parts)}{tail}</robot>'
 
 
+def small(what="collision"):
+    """An arm of six joints whose links are 0.2 m long: all of its singular values are small."""
+    can = '<geometry><cylinder radius="0.04" length="0.2"/></geometry>'
+    parts = [link("base", can, what=what)]
+    for k, axis in enumerate(("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "0 0 1"), 1):
+        parts += [link(f"l{k}", can, what=what), joint(f"j{k}", f"l{k - 1}" if k > 1 else "base", f"l{k}", axis=axis)]
+    return f'<robot name="small">{"".join(parts)}</robot>'
+
+
 def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
     file = folder / name
     file.write_text(text)

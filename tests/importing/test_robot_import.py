@@ -1,16 +1,20 @@
 """A robot's file becomes a folder that everything else takes, and nothing is lost on the way."""
 
+import os
+import re
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 import pytest
-from tests.importing.made import BOX, joint, link, six_axis, written
+from tests.importing.made import BOX, joint, link, six_axis, small, written
 
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.errors import RobotModelError
+from pretouch.importing.body import fit_error
 from pretouch.importing.folder import write_folder
+from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import ImportOptions, import_robot
 from pretouch.params import profile
 from pretouch.robot.description_file import load_description
@@ -107,16 +111,22 @@ def test_the_ready_posture_is_a_good_one(model, imported):
     )
 
 
-def test_the_units_sit_on_the_surface_and_look_away(model, folder):
+def test_the_units_sit_on_the_surface_and_look_away(model, folder, imported):
     skin = load_skin(folder / "skin.toml", model)
     assert len(skin) >= 6
+    arm_links, above = imported.arm.source.links, []
     for link_index, T in zip(skin.link, skin.T_link_sensor, strict=True):
         own = model.capsules.of_links(np.array([link_index]))
         axis = np.clip(((T[:3, 3] - own.a) * (own.b - own.a)).sum(axis=1) / ((own.b - own.a) ** 2).sum(axis=1), 0, 1)
         away = T[:3, 3] - own.a - axis[:, None] * (own.b - own.a)
         height = np.linalg.norm(away, axis=1) - own.radius
-        assert height.min() == pytest.approx(0.008, abs=1e-4)
+        assert height.min() > 0.008 - 1e-4
+        surface = next(body.surface for body in imported.bodies if arm_links[body.link].name == model.links[link_index])
+        assert surface.outside(T[None, :3, 3]).all()
+        above.append((height.min(), float(surface(T[None, :3, 3])[0])))
         assert away[height.argmin()] @ T[:3, 2] > 0
+    # as high as a board in its case, over whichever of the two is higher there
+    assert np.min(above, axis=1) == pytest.approx(np.full(len(skin), 0.008), abs=1e-3)
 
 
 def test_the_controller_and_the_simulated_arm_take_it(model, folder):
@@ -144,38 +154,125 @@ def test_a_folder_that_is_there_is_kept(imported, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["arm", "arm.old-1", "arm.old-2"]
 
 
+@pytest.mark.parametrize("at", ["_fill", "os.rename"])
+def test_an_import_that_is_cut_short_leaves_what_was_there(imported, tmp_path, monkeypatch, at):
+    out = tmp_path / "arm"
+    out.mkdir()
+    (out / "mine.txt").write_text("precious")
+    real = os.rename
+
+    def cut(*args):
+        if at == "_fill" or ".robot-" in str(args[0]):
+            raise KeyboardInterrupt
+        real(*args)
+
+    monkeypatch.setattr(f"pretouch.importing.folder.{at}", cut)
+    with pytest.raises(KeyboardInterrupt):
+        write_folder(imported, out, force=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["arm"]
+    assert (out / "mine.txt").read_text() == "precious"
+
+
+def assert_pointing_down(model, ready):
+    kin = model.kinematics(ready.q)
+    assert kin.rotation[model.ee][:, 2] == pytest.approx([0, 0, -1], abs=1e-3)
+    assert kin.position[model.ee, 0] > 0.2
+    assert ready.clear > 0.019
+
+
+@pytest.mark.slow
+def test_a_small_arm_with_a_hand_that_turns_about_itself_gets_a_ready_posture(tmp_path):
+    found = import_robot(written(tmp_path, small()), ImportOptions(capsules=1))
+    assert_pointing_down(found.model, found.ready)
+    assert not any("No posture was found" in r for r in found.remarks)
+
+
+def test_where_no_hand_points_down_the_import_says_so_and_is_written(tmp_path):
+    kept = '<limit lower="-0.05" upper="0.05" velocity="2" effort="40"/>'
+    file = written(tmp_path, six_axis(changed={k: {"limit": kept} for k in range(1, 7)}).replace(BOX, "<geometry/>", 5))
+    found = import_robot(file, ImportOptions(capsules=1))
+    assert any("No posture was found with the hand in front" in r and "--ready" in r for r in found.remarks)
+    write_folder(found, tmp_path / "out")
+    assert RobotModel(load_description(tmp_path / "out")).n == 6
+
+
 def test_a_ready_posture_outside_the_limits_is_refused(source):
-    with pytest.raises(RobotModelError, match=r"--ready is .*: give 6 joint positions"):
-        import_robot(source, ImportOptions(ready=(0.0, 9.0, 0.0, 0.0, 0.0, 0.0)))
+    for ready in ((0.0, 9.0, 0.0, 0.0, 0.0, 0.0), (0.0,) * 5, (np.nan,) * 6):
+        with pytest.raises(RobotModelError, match=r"--ready is .*: give 6 joint positions"):
+            import_robot(source, ImportOptions(ready=ready))
+
+
+def test_a_ready_posture_in_which_the_arm_is_in_itself_is_named(source):
+    ready = import_robot(source, ImportOptions(ready=(0.0, 0.0, 2.7, 0.0, 2.7, 0.0), capsules=1)).ready
+    assert ready.clear < 0
+    assert re.search(r"the capsules of (base|link\d) and link\d are \d+ mm in each other", ready.conflict)
+
+
+def test_meshes_in_millimetres_are_named(tmp_path):
+    file = written(tmp_path, six_axis().replace('<box size="0.08 0.08 0.2"/>', '<box size="80 80 200"/>', 1))
+    with pytest.raises(RobotModelError, match=r'The link base is 200 m long: .* the scale "0.001 0.001 0.001"'):
+        import_robot(file, ImportOptions(ready=READY, capsules=1))
+
+
+def test_an_arm_without_any_geometry_is_refused(tmp_path):
+    file = written(tmp_path, six_axis().replace(BOX, "<geometry/>"))
+    with pytest.raises(RobotModelError, match=r"No moving link of sixer has any geometry: give"):
+        import_robot(file, ImportOptions(ready=READY, capsules=1))
+
+
+def test_a_broken_mesh_is_said_before_the_first_link_is_fitted(tmp_path, monkeypatch):
+    monkeypatch.setattr("pretouch.importing.body.fitted", lambda *_: pytest.fail("fitted"))
+    text = six_axis()
+    at = text.rindex(BOX)
+    with pytest.raises(RobotModelError, match=r"The mesh none.stl is not there"):
+        import_robot(
+            written(tmp_path, text[:at] + '<geometry><mesh filename="none.stl"/></geometry>' + text[at + len(BOX) :]),
+            ImportOptions(ready=READY),
+        )
+
+
+def test_capsules_that_cover_have_nothing_stick_out_and_stay_clear(source):
+    found = import_robot(source, ImportOptions(ready=READY, capsules=1, cover=True))
+    assert max(body.sticks_out for body in found.bodies) < 2e-4
+    assert found.error.p95 < 1e-3
+
+
+def test_masses_that_no_link_has_are_named(tmp_path):
+    text = six_axis().replace('<mass value="2"/>', '<mass value="500000"/>', 1).replace(BOX, "<geometry/>", 5)
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY, capsules=1))
+    assert any("Implausible masses" in r and "base (500000 kg)" in r for r in found.remarks)
+
+
+def test_distances_that_nothing_is_compared_with_are_no_numbers():
+    assert (fit_error(np.array([])).points, np.isnan(fit_error(np.array([])).rms)) == (0, True)
 
 
 def test_links_without_inertial_are_estimated_from_their_capsules(tmp_path):
     shape = '<geometry><sphere radius="0.1"/></geometry>'
-    text = six_axis().replace(link("link3", BOX), link("link3", shape, inertial=""))
-    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY))
+    text = six_axis().replace(link("link3", BOX), link("link3", shape, inertial="")).replace(BOX, "<geometry/>", 4)
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY, capsules=1))
     at = found.model.link_index("link3")
     assert any("estimated at 1000 kg/m^3: link3 (4.2 kg)" in r for r in found.remarks)
     assert found.model._model.body_mass[at] == pytest.approx(1000 * 4 / 3 * np.pi * 0.1**3, rel=0.01)
 
 
 def test_an_impossible_inertia_is_mended_with_a_sentence(tmp_path):
-    text = six_axis().replace('izz=".01"', 'izz="9"', 1)
-    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY))
+    text = six_axis().replace('izz=".01"', 'izz="9"', 1).replace(BOX, "<geometry/>", 5)
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY, capsules=1))
     assert any("an inertia no body can have" in r and "base" in r for r in found.remarks)
 
 
 def test_visual_shapes_stand_in_for_collision_shapes(tmp_path):
     text = six_axis().replace(link("link2", BOX), link("link2", BOX, what="visual"))
-    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY))
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY, capsules=1))
     assert any("fitted to what is drawn: link2" in r for r in found.remarks)
     assert found.model.link_index("link2") in found.model.capsules.link
 
 
 def test_a_first_link_called_world_is_the_world(tmp_path):
-    text = six_axis().replace(
-        "</robot>", link("world", inertial="") + joint("w", "world", "base", "fixed") + "</robot>"
-    )
-    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY))
+    text = six_axis().replace(BOX, "<geometry/>", 5)
+    text = text.replace("</robot>", link("world", inertial="") + joint("w", "world", "base", "fixed") + "</robot>")
+    found = import_robot(written(tmp_path, text), ImportOptions(ready=READY, capsules=1))
     assert found.model.links[:2] == ("world", "base")
 
 
@@ -197,10 +294,16 @@ def mjcf():
 
 def test_an_mjcf_file_keeps_its_mechanics(tmp_path):
     file = written(tmp_path, mjcf(), "arm.xml")
-    found = import_robot(file, ImportOptions(ready=READY))
+    found = import_robot(file, ImportOptions(ready=READY, capsules=1))
     assert found.description.ee_body == "tip"
     assert found.limits.tau_max[:2].tolist() == [30.0, 50.0]
+    assert not any("Armature" in r for r in found.remarks)
     assert_same_mechanics(found.model, mujoco.MjModel.from_xml_path(str(file)))
+
+
+def test_what_an_mjcf_says_of_friction_is_left_out_with_a_sentence(tmp_path):
+    file = written(tmp_path, mjcf().replace('name="j3"', 'name="j3" armature="0.1"'), "arm.xml")
+    assert any(r.startswith("Armature, damping, friction and springs") for r in read_source(file).remarks)
 
 
 @pytest.mark.parametrize(

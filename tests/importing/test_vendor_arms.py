@@ -37,6 +37,7 @@ def of(capsules: Capsules, link: int) -> Rods:
     return Rods(own.a, own.b, own.radius)
 
 
+@pytest.mark.slow
 def test_the_pandas_capsules_are_no_worse_than_ours(panda_import, panda_model):
     arm = panda_import.arm
     both = [body for body in panda_import.bodies if arm.source.links[body.link].name in panda_model.links]
@@ -52,6 +53,7 @@ def test_the_pandas_capsules_are_no_worse_than_ours(panda_import, panda_model):
     assert abs(fitted.largest) < 0.03
 
 
+@pytest.mark.slow
 def test_the_pandas_poses_are_those_of_our_model(panda_import, panda_model):
     found = panda_import.model
     for q in np.random.default_rng(0).uniform(panda_model.q_min, panda_model.q_max, (10, 7)):

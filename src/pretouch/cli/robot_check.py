@@ -6,10 +6,11 @@ from rich.console import Console
 
 from pretouch.cli.robot_commands import Check
 from pretouch.cli.tables import show
+from pretouch.errors import RobotModelError
 from pretouch.experiments.tables import TextTable
 from pretouch.importing.folder import SKIN
-from pretouch.importing.ready import rated
-from pretouch.robot.description_file import load_description
+from pretouch.importing.ready import Ready, check_posture, never_apart, rated
+from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
 
@@ -18,32 +19,46 @@ def check_arm(command: Check) -> None:
     """Load an arm and its skin, and print what is known of them; what is wrong is an error of this package."""
     folder = Path(command.folder)
     description = load_description(folder)
-    model = RobotModel(description)
+    file = folder / FILE if folder.is_dir() else folder
+    try:
+        model = RobotModel(description)
+    except RobotModelError as error:
+        raise RobotModelError(f"{error} (in {file}, or its {description.mjcf.name})") from error
+    check_posture(description.q_ready, model.q_min, model.q_max, f"{file}: q_ready")
     ready = rated(model, description.q_ready)
-    own = (folder if folder.is_dir() else folder.parent) / SKIN
+    own = file.parent / SKIN
     skin = load_skin(command.skin or own, model) if command.skin or own.exists() else None
+    together = ", ".join(f"{a} and {b}" for a, b in never_apart(model)) or "none"
+    note = (
+        f"{len(model.capsules)} capsules, {len(model.body)} of them on moving links. {ready_said(ready)} Units:"
+        f" {', '.join(skin.ids) if skin else 'no skin file'}. Links that never come apart, so that they are not looked"
+        f" at: {together}."
+    )
+    console = Console(highlight=False)
+    show(console, [joint_table(model, ready, note)])
+    if ready.conflict:
+        raise RobotModelError(f"{ready.conflict} ({file}: q_ready)")
+    console.print(f"In order: {folder}.", markup=False, soft_wrap=True)
+
+
+def joint_table(model: RobotModel, ready: Ready, note: str) -> TextTable:
+    """Show the limits of an arm's joints and their places in the ready posture."""
+    arm = model.description
     rows = [
         (
-            name, f"{model.q_min[j]:.3f}", f"{model.q_max[j]:.3f}", f"{description.qd_max[j]:.3g}",
-            f"{description.qdd_max[j]:.3g}", f"{description.tau_max[j]:.3g}", f"{ready.q[j]:.3f}",
+            name, f"{model.q_min[j]:.3f}", f"{model.q_max[j]:.3f}", f"{arm.qd_max[j]:.3g}",
+            f"{arm.qdd_max[j]:.3g}", f"{arm.tau_max[j]:.3g}", f"{ready.q[j]:.3f}",
         )
         for j, name in enumerate(model.joints)
     ]  # fmt: skip
-    header = (
-        "joint",
-        "lower\n[rad]",
-        "upper\n[rad]",
-        "speed\n[rad/s]",
-        "accel.\n[rad/s^2]",
-        "torque\n[Nm]",
-        "ready\n[rad]",
+    units = {"lower": "rad", "upper": "rad", "speed": "rad/s", "accel.": "rad/s^2", "torque": "Nm", "ready": "rad"}
+    header = ("joint", *(f"{what}\n[{unit}]" for what, unit in units.items()))
+    return TextTable(f"{arm.name}: {model.n} joints, end-effector {arm.ee_body}", header, tuple(rows), note, 1)
+
+
+def ready_said(ready: Ready) -> str:
+    """Say what a posture is good for."""
+    return (
+        f"Ready posture: manipulability {ready.manipulability:.3g}, smallest singular value {ready.singular_value:.3g},"
+        f" {1000 * ready.clear:.0f} mm clear of itself."
     )
-    note = (
-        f"{len(model.capsules)} capsules, {len(model.body)} of them on moving links. Ready posture: manipulability"
-        f" {ready.manipulability:.3g}, smallest singular value {ready.singular_value:.3g}, {1000 * ready.clear:.0f} mm"
-        f" clear of itself. Units: {', '.join(skin.ids) if skin else 'no skin file'}."
-    )
-    title = f"{description.name}: {model.n} joints, end-effector {description.ee_body}"
-    console = Console(highlight=False)
-    show(console, [TextTable(title, header, tuple(rows), note, 1)])
-    console.print(f"In order: {folder}.", markup=False, soft_wrap=True)

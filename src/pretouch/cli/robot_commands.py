@@ -34,6 +34,8 @@ class Import:
     """Usual posture to start from [rad], one position a joint, separated by commas; by default one is searched for."""
     capsules: int = 3
     """Capsules for one link at most."""
+    cover: bool = False
+    """Enlarge the capsules until no surface sticks out of them: the arm then keeps farther off than its shape asks."""
     force: bool = False
     """Write to a folder that is there: what is in it is kept under another name."""
     json: str = ""

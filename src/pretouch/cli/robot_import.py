@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
+from pretouch.cli.robot_check import joint_table, ready_said
 from pretouch.cli.robot_commands import Import
 from pretouch.cli.tables import show
 from pretouch.cli.words import words
@@ -16,7 +17,11 @@ from pretouch.experiments.campaign import write_json
 from pretouch.experiments.tables import TextTable
 from pretouch.importing.body import FARTHEST, FitError
 from pretouch.importing.folder import check_free, write_folder
+from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
+
+_NEGLIGIBLE = 0.001
+"""What sticks out less is not spoken of [m]."""
 
 
 def import_arm(command: Import) -> None:
@@ -30,16 +35,18 @@ def import_arm(command: Import) -> None:
         tau_max=_numbers("--tau-max", command.tau_max),
         ready=_numbers("--ready", command.ready),
         capsules=command.capsules,
+        cover=command.cover,
     )
-    if command.out:
-        check_free(Path(command.out), command.force)
+    file = Path(command.file)
+    folder = Path(command.out or _file_name(command.name or read_source(file, options.packages).name))
+    check_free(folder, command.force)
     if command.json:
         check_writable("file", Path(command.json))
-    found = import_robot(Path(command.file), options)
-    folder = Path(command.out or _file_name(found.description.name))
+    found = import_robot(file, options)
     kept = write_folder(found, folder, command.force)
     console = Console(highlight=False)
-    show(console, [_joints(found), _capsules(found)])
+    links = f"Links: {', '.join(found.model.links[1:])}."
+    show(console, [joint_table(found.model, found.ready, links), _capsules(found)])
     for sentence in [*found.remarks, *_said(found)]:
         console.print(f"- {sentence}", markup=False, soft_wrap=True)
     if kept:
@@ -64,28 +71,6 @@ def _file_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.")[:60] or "arm"
 
 
-def _joints(found: Imported) -> TextTable:
-    limits = found.limits
-    rows = [
-        (
-            joint.name, f"{limits.q_min[j]:.3f}", f"{limits.q_max[j]:.3f}", f"{limits.qd_max[j]:.3g}",
-            f"{limits.qdd_max[j]:.3g}", f"{limits.tau_max[j]:.3g}", f"{found.ready.q[j]:.3f}",
-        )
-        for j, joint in enumerate(found.arm.joints)
-    ]  # fmt: skip
-    header = (
-        "joint",
-        "lower\n[rad]",
-        "upper\n[rad]",
-        "speed\n[rad/s]",
-        "accel.\n[rad/s^2]",
-        "torque\n[Nm]",
-        "ready\n[rad]",
-    )
-    title = f"{found.description.name}: {len(rows)} joints, end-effector {found.description.ee_body}"
-    return TextTable(title, header, tuple(rows), "Links: " + ", ".join(found.model.links[1:]) + ".", 1)
-
-
 def _capsules(found: Imported) -> TextTable:
     rows = []
     for body in found.bodies:
@@ -104,25 +89,44 @@ def _capsules(found: Imported) -> TextTable:
 
 
 def _row(error: FitError) -> tuple[str, ...]:
-    return tuple(f"{1000 * value:.1f}" for value in (error.p5, error.p95, error.largest, error.rms))
+    values = (error.p5, error.p95, error.largest, error.rms)
+    return tuple(f"{1000 * value:.1f}" if error.points else "-" for value in values)
 
 
 def _said(found: Imported) -> list[str]:
-    ready = found.ready
     units = ", ".join(f"{unit.id} ({unit.link})" for unit in found.skin.units) or "none"
     return [
-        f"Ready posture: manipulability {ready.manipulability:.3g}, smallest singular value {ready.singular_value:.3g},"
-        f" {1000 * ready.clear:.0f} mm clear of itself; --ready gives another one.",
+        *_sticking_out(found),
+        f"{ready_said(found.ready)} --ready gives another one.",
+        *([found.ready.conflict] if found.ready.conflict else []),
         f"Proposed units: {units}. skin.toml holds where each would sit; give yours, or calibrate them.",
+    ]
+
+
+def _sticking_out(found: Imported) -> list[str]:
+    """Name the moving link that sticks out most, and say what to do about it."""
+    links, model = found.arm.source.links, found.model
+    moving = [body for body in found.bodies if model.moved_by[model.link_index(links[body.link].name)].any()]
+    worst = max(moving, key=lambda body: body.sticks_out)
+    if worst.sticks_out < _NEGLIGIBLE:
+        return []
+    return [
+        f"Of the moving links {links[worst.link].name} sticks out of its capsules most, by"
+        f" {1000 * worst.sticks_out:.1f} mm: raise restriction.d_repulse_m by as much, or import with --cover."
     ]
 
 
 def _numbers_of(found: Imported) -> dict[str, Any]:
     links = {
         found.arm.source.links[body.link].name: {
-            "capsules": len(body.rods), "fitted": body.fitted, "sticks_out": body.sticks_out, **asdict(body.error)
+            "capsules": len(body.rods), "fitted": body.fitted, "sticks_out": body.sticks_out, **_fit_numbers(body.error)
         }
         for body in found.bodies
     }  # fmt: skip
-    return {"name": found.description.name, "whole_arm": asdict(found.error), "links": links,
+    return {"name": found.description.name, "whole_arm": _fit_numbers(found.error), "links": links,
             "q_ready": found.ready.q.tolist(), "remarks": list(found.remarks)}  # fmt: skip
+
+
+def _fit_numbers(error: FitError) -> dict[str, float | None]:
+    """Numbers of a fit; null where no point was compared."""
+    return {key: value if error.points or key == "points" else None for key, value in asdict(error).items()}

@@ -8,9 +8,10 @@ import numpy as np
 from pretouch.control.path import Circle, Path, line
 from pretouch.control.task import rotation_error
 from pretouch.errors import ExperimentError
+from pretouch.importing.reaching import Pace, reached
 from pretouch.importing.ready import ever_apart, reach_of
 from pretouch.robot.description import fr3, panda
-from pretouch.robot.model import RobotModel
+from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.sim.board import PANDA_SIDE, HandSide, Side, sign_of
 from pretouch.types import FloatArray
@@ -21,6 +22,7 @@ _SHRINK = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 _SHIFT_M = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15, 0.2, -0.2)
 """What is tried, the nearest to the paper first: parts of the scale by reach, shifts along x and z."""
 _PLACES = 48
+_TO_START, _ONWARD = Pace(300, 0.1, 1e-6, 0.05), Pace(30, 0.1, 1e-6, 0.05)
 _SINGULAR, _LIMIT_RAD, _CLEAR_M = 0.05, 0.05, 0.01
 """What the arm has to keep all along: smallest singular value, distance from joint limits, and from itself."""
 
@@ -108,7 +110,7 @@ def _followed(model: RobotModel, path: Path) -> bool:
     q = model.description.q_ready
     postures: list[FloatArray] = []
     for phase in np.linspace(0.0, path.length, _PLACES):
-        found = _at(model, q, path.point(phase), upright, 300 if not postures else 30)
+        found = _at(model, q, path.point(phase), upright, _ONWARD if postures else _TO_START)
         if found is None:
             return False
         q = found
@@ -117,18 +119,15 @@ def _followed(model: RobotModel, path: Path) -> bool:
     return float(self_distances(model, ends)[:, ever_apart(model)].min(initial=np.inf)) > _CLEAR_M
 
 
-def _at(model: RobotModel, q: FloatArray, point: FloatArray, upright: FloatArray, steps: int) -> FloatArray | None:
+def _at(model: RobotModel, q: FloatArray, point: FloatArray, upright: FloatArray, pace: Pace) -> FloatArray | None:
     """Move the hand to a point (3,), not turned; None where it does not get there or only just."""
-    ready, n = model.description.q_ready, model.n
-    for _ in range(steps):
-        kin = model.kinematics(q)
-        error = np.concatenate([point - kin.position[model.ee], rotation_error(kin.rotation[model.ee], upright)])
-        J = model.ee_jacobian(kin)
-        if np.abs(error).max() < 1e-4:
-            room = np.minimum(q - model.q_min, model.q_max - q).min()
-            singular = np.linalg.svd(J, compute_uv=False)[-1]
-            return q if room > _LIMIT_RAD and singular > _SINGULAR else None
-        pseudo = J.T @ np.linalg.inv(J @ J.T + 1e-6 * np.eye(6))
-        step = pseudo @ error + 0.05 * (np.eye(n) - pseudo @ J) @ (ready - q)
-        q = np.clip(q + step * min(1.0, 0.1 / max(np.abs(step).max(), 1e-12)), model.q_min, model.q_max)
-    return None
+
+    def error(kin: Kinematics) -> FloatArray:
+        return np.concatenate([point - kin.position[model.ee], rotation_error(kin.rotation[model.ee], upright)])
+
+    found = reached(model, q, error, model.description.q_ready, pace)
+    if found is None:
+        return None
+    room = np.minimum(found - model.q_min, model.q_max - found).min()
+    singular = np.linalg.svd(model.ee_jacobian(model.kinematics(found)), compute_uv=False)[-1]
+    return found if room > _LIMIT_RAD and singular > _SINGULAR else None

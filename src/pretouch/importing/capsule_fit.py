@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pretouch.importing.sampling import directions, spread
-from pretouch.importing.surface_distance import SurfaceDistance
+from pretouch.importing.surface_distance import SurfaceDistance, halved
 from pretouch.types import FloatArray, IntArray
 
 MOST = 3
@@ -21,6 +21,8 @@ _GOOD = 0.003
 _WORTH = 0.9
 """One more capsule has to bring the error down to this part."""
 _STEPS = 60
+_EXACT = 1e-4
+"""Within this `farthest_out` is exact [m]."""
 _SHORTEST = 1e-4
 """Half the length of a capsule's axis, at least [m]: the file format has no balls."""
 
@@ -86,6 +88,33 @@ def fitted(surface: SurfaceDistance, most: int = MOST) -> Rods:
             break
     assert best is not None  # noqa: S101  the loop runs at least once
     return best
+
+
+def farthest_out(rods: Rods, corners: FloatArray) -> float:
+    """How far triangles (F, 3, 3) stick out of capsules at most [m], at most 0.1 mm more than they do; 0 if nowhere.
+
+    The distance to one capsule is largest at a corner, so that only triangles between capsules need be divided.
+    """
+    most = max(0.0, float(rods(corners.reshape(-1, 3)).max()))
+    waiting = corners
+    while len(waiting := waiting[_ceiling(rods, waiting).min(axis=1) > most + _EXACT]):
+        waiting = halved(waiting)
+        most = max(most, float(rods(waiting.reshape(-1, 3)).max()))
+    return most + _EXACT if most > 0 else 0.0
+
+
+def covering(rods: Rods, corners: FloatArray) -> Rods:
+    """Raise the radii until each of some triangles (F, 3, 3) is inside one of the capsules."""
+    ceiling = _ceiling(rods, corners)
+    nearest = ceiling.argmin(axis=1)
+    more = np.zeros(len(rods))
+    np.maximum.at(more, nearest, ceiling[np.arange(len(corners)), nearest])
+    return Rods(rods.a, rods.b, rods.radius + more)
+
+
+def _ceiling(rods: Rods, corners: FloatArray) -> FloatArray:
+    """Largest distances (F, K) of triangles (F, 3, 3) from each capsule [m]: convex, so those of a corner."""
+    return rods.each(corners.reshape(-1, 3)).reshape(len(corners), 3, -1).max(axis=1)
 
 
 def _weights(error: FloatArray) -> FloatArray:

@@ -7,7 +7,9 @@ from pretouch.importing.source import Source, SourceJoint, SourceLink, locked
 
 _ARM_JOINTS = 4
 """A branch with as many hinges that nothing leads is an arm; one with fewer is a finger."""
-_NAMES = ("tcp", "tool", "grasp", "ee", "eef", "tip")
+_GRIPPER, _FINGER = ("gripper", "finger", "jaw"), ("finger", "jaw")
+"""What a single finger's joint, or its link, is called; a link called gripper may be the arm's last."""
+_NAMES = ("tcp", "tool", "grasp", "ee", "eef", "effector", "tip")
 """What an end-effector's frame is called, the surest first."""
 
 
@@ -36,7 +38,13 @@ def arm_of(source: Source, ee: str = "") -> Arm:
     if ee:
         end = source.index(ee)
     else:
-        end, others = _likeliest_end(source, _trunk(source))
+        trunk, grips = _trunk(source)
+        end, others = _likeliest_end(source, trunk)
+        if grips:
+            remarks.append(
+                f"{grips} is taken for a gripper's joint, no joint of the arm; --ee"
+                f" {_moved_by(source, grips)} makes it one."
+            )
         if others:
             remarks.append(f"The end-effector is taken to be {source.links[end].name}; --ee chooses another one:"
                            f" {', '.join(source.links[i].name for i in others)}.")  # fmt: skip
@@ -77,8 +85,20 @@ def _independent(source: Source) -> list[int]:
     return count
 
 
-def _trunk(source: Source) -> int:
-    """Return the last link before the arm ends or branches into fingers.
+def _moved_by(source: Source, joint: str) -> str:
+    return next(link.name for link in source.links if joint in [one.name for one in link.joints])
+
+
+def _grips(link: SourceLink) -> str | None:
+    """Name of the joint of a link, if it or the link is called as those of grippers are."""
+    for joint in link.joints:
+        if any(word in joint.name.lower() for word in _GRIPPER) or any(word in link.name.lower() for word in _FINGER):
+            return joint.name
+    return None
+
+
+def _trunk(source: Source) -> tuple[int, str | None]:
+    """Return the last link before the arm ends or branches into fingers, and the joint of a single finger on it.
 
     Several branches that are arms are a RobotModelError that names their ends.
     """
@@ -91,11 +111,14 @@ def _trunk(source: Source) -> int:
         if len(arms) > 1:
             ends = [source.links[_last(source, children, count, i)].name for i in arms]
             raise RobotModelError(f"The robot has {len(arms)} arms: choose one by --ee, such as {', '.join(ends)}.")
-        if len(onward) > 1 and not arms:
-            return at
-        if not onward or coupled[(arms or onward)[0]]:
-            return at
-        at = (arms or onward)[0]
+        if not onward or (len(onward) > 1 and not arms):
+            return at, None
+        ahead = (arms or onward)[0]
+        if coupled[ahead] and not count[ahead]:
+            return at, None
+        if count[ahead] == 1 and (joint := _grips(source.links[ahead])):
+            return at, joint
+        at = ahead
 
 
 def _last(source: Source, children: list[list[int]], count: list[int], at: int) -> int:

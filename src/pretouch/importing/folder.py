@@ -26,7 +26,12 @@ def write_folder(found: Imported, folder: Path, force: bool = False) -> Path | N
         try:
             _fill(found, unfinished)
             aside = _put_aside(folder)
-            os.rename(unfinished, folder)
+            try:
+                os.rename(unfinished, folder)
+            except BaseException:
+                if aside is not None:
+                    os.rename(aside, folder)
+                raise
         except BaseException:
             shutil.rmtree(unfinished, ignore_errors=True)
             raise

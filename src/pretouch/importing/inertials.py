@@ -14,6 +14,8 @@ DENSITY = 1000.0
 """Of a link whose mass is unknown, over its capsules [kg/m^3]."""
 _LEAST_MASS, _LEAST_INERTIA = 1e-3, 1e-6
 """Of a moved link of which nothing is known [kg, kg m^2]."""
+_LARGEST_MASS = 500.0
+"""What no link of an arm has [kg]."""
 
 
 def inertials_of(arm: Arm, bodies: tuple[LinkBody, ...]) -> tuple[tuple[Inertial | None, ...], tuple[str, ...]]:
@@ -34,6 +36,12 @@ def inertials_of(arm: Arm, bodies: tuple[LinkBody, ...]) -> tuple[tuple[Inertial
         else:
             found.append(None)
     remarks = []
+    heavy = [
+        f"{link.name} ({own.mass:g} kg)"
+        for link, own in zip(links, found, strict=True) if own is not None and own.mass > _LARGEST_MASS
+    ]  # fmt: skip
+    if heavy:
+        remarks.append(f"Implausible masses, correct them in the file: {', '.join(heavy)}.")
     if estimated:
         remarks.append(
             f"Without mass or inertia, so estimated at {DENSITY:g} kg/m^3: {', '.join(estimated)}. Forces in simulation"

@@ -11,6 +11,8 @@ from pretouch.types import FloatArray
 _ENDLESS = 2 * np.pi
 _SPEED, _ACCELERATION, _TORQUE = 1.0, 5.0, 50.0
 """Where nothing is known: slow, gentle and middling [rad/s, rad/s^2, Nm]."""
+_LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 100.0, 50.0, 5000.0
+"""What no joint of an arm has [rad, rad/s, Nm]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +48,18 @@ def limits_of(
     speed = [joint.velocity for joint in arm.joints]
     torque = [joint.effort for joint in arm.joints]
     nothing: list[float | None] = [None] * len(arm.joints)
-    return Limits(
-        ranges[:, 0], ranges[:, 1],
-        _settled(arm, "velocity", "--qd-max", "rad/s", speed, qd_max, _SPEED, remarks),
-        _settled(arm, "acceleration", "--qdd-max", "rad/s^2", nothing, qdd_max, _ACCELERATION, remarks),
-        _settled(arm, "torque", "--tau-max", "Nm", torque, tau_max, _TORQUE, remarks),
-        tuple(remarks),
-    )  # fmt: skip
+    speeds = _settled(arm, "velocity", "--qd-max", "rad/s", speed, qd_max, _SPEED, remarks)
+    accelerations = _settled(arm, "acceleration", "--qdd-max", "rad/s^2", nothing, qdd_max, _ACCELERATION, remarks)
+    torques = _settled(arm, "torque", "--tau-max", "Nm", torque, tau_max, _TORQUE, remarks)
+    for what, unit, values, largest in (
+        ("position", "rad", np.abs(ranges).max(axis=1), _LARGEST_POSITION),
+        ("velocity", "rad/s", speeds, _LARGEST_SPEED),
+        ("torque", "Nm", torques, _LARGEST_TORQUE),
+    ):
+        beyond = [f"{joint.name} ({v:g} {unit})" for joint, v in zip(arm.joints, values, strict=True) if v > largest]
+        if beyond:
+            remarks.append(f"Implausible {what} limits, correct them in the file or robot.toml: {', '.join(beyond)}.")
+    return Limits(ranges[:, 0], ranges[:, 1], speeds, accelerations, torques, tuple(remarks))
 
 
 def _settled(

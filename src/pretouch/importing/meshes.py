@@ -1,4 +1,4 @@
-"""Triangles from mesh files: STL and OBJ by themselves, COLLADA by trimesh."""
+"""Mesh files: where those are that a URDF names, and their triangles. STL and OBJ by ourselves, COLLADA by trimesh."""
 
 import warnings
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ import numpy as np
 from pretouch.errors import RobotModelError
 from pretouch.types import FloatArray, IntArray
 
+_SCHEMES = ("package://", "model://")
 SUFFIXES = (".stl", ".obj", ".dae")
 _LARGEST_FILE = 200_000_000
 """[bytes]"""
@@ -32,6 +33,52 @@ class Surface:
     def corners(self) -> FloatArray:
         """Corners (F, 3, 3) of the triangles [m]."""
         return self.vertices[self.faces]
+
+
+class MeshFinder:
+    """Finds mesh files: relative to the URDF, by absolute path, or in a ROS package.
+
+    The package `p` of package://p/rest is looked for as the folder `p` in the folders given, in the folder of the
+    file, and in each folder above it.
+    """
+
+    def __init__(self, file: Path, folders: tuple[Path, ...]) -> None:
+        """Take the URDF, and folders that hold packages, or are packages themselves."""
+        for folder in folders:
+            if not folder.is_dir():
+                raise RobotModelError(f"The package path {folder} is no folder: give one that holds ROS packages.")
+        self._near = file.resolve().parent
+        self._folders = [*folders, self._near, *self._near.parents]
+
+    def find(self, uri: str) -> Path:
+        """Return the file that a URI names; RobotModelError if there is none."""
+        if "\0" in uri or len(uri) > 4000:
+            raise RobotModelError(f"The mesh name {uri[:100]!r} is no file name: correct it.")
+        scheme = next((s for s in _SCHEMES if uri.startswith(s)), None)
+        try:
+            found = self._in_package(uri.removeprefix(scheme)) if scheme else self._plain(uri)
+        except OSError:  # a name too long, for one
+            found = None
+        if found is None:
+            way_out = (
+                f"give --package-path the folder that holds the package {uri.removeprefix(scheme).split('/')[0]}"
+                if scheme
+                else "put it where the URDF says"
+            )
+            raise RobotModelError(f"The mesh {uri} is not there: {way_out}.")
+        return found
+
+    def _plain(self, uri: str) -> Path | None:
+        path = self._near / uri.removeprefix("file://")
+        return path if path.is_file() else None
+
+    def _in_package(self, name: str) -> Path | None:
+        package, _, rest = name.partition("/")
+        for folder in self._folders:
+            for path in (folder / package / rest, folder / rest if folder.name == package else None):
+                if path is not None and path.is_file():
+                    return path
+        return None
 
 
 def read_mesh(path: Path) -> Surface:
@@ -61,9 +108,10 @@ def _check(read: Surface, path: Path) -> None:
         raise RobotModelError(
             f"The mesh {path} has {len(read.faces)} triangles: make it coarser, {_MOST_TRIANGLES} at most."
         )
-    used = read.vertices[read.faces]
-    if not np.all(np.isfinite(used)):
+    if not np.all(np.isfinite(used := read.corners)):
         raise RobotModelError(f"The mesh {path} is damaged: a coordinate is no finite number.")
+    if not np.any(np.cross(used[:, 1] - used[:, 0], used[:, 2] - used[:, 0])):
+        raise RobotModelError(f"The mesh {path} has no area, its triangles are lines or points: give one that has.")
 
 
 def _stl(data: bytes) -> Surface:
@@ -74,8 +122,20 @@ def _stl(data: bytes) -> Surface:
             return _joined(corners)
     if not data.lstrip()[:5].lower() == b"solid":
         raise ValueError("its length is not what its number of triangles asks for")
-    words = [line.split()[1:4] for line in data.decode("ascii", "replace").splitlines() if "vertex" in line]
-    return _joined(np.array(words, dtype=np.float64).reshape(-1, 3, 3))
+    lines = data.decode("ascii", "replace").splitlines()
+    places = [_three(line.split()[1:], k) for k, line in enumerate(lines, 1) if "vertex" in line]
+    if len(places) % 3:
+        raise ValueError(f"{len(places)} corners make no triangles")
+    return _joined(np.array(places, dtype=np.float64).reshape(-1, 3, 3))
+
+
+def _three(words: list[str], line: int) -> list[float]:
+    """Return the coordinates of a corner."""
+    try:
+        x, y, z = (float(word) for word in words[:3])
+    except ValueError:
+        raise ValueError(f"line {line} holds no three numbers") from None
+    return [x, y, z]
 
 
 def _joined(corners: FloatArray) -> Surface:
@@ -87,12 +147,15 @@ def _joined(corners: FloatArray) -> Surface:
 def _obj(data: bytes) -> Surface:
     vertices: list[list[float]] = []
     faces: list[tuple[int, int, int]] = []
-    for line in data.decode("utf-8", "replace").splitlines():
+    for k, line in enumerate(data.decode("utf-8", "replace").splitlines(), 1):
         word, *rest = line.split() or [""]
         if word == "v":
-            vertices.append([float(x) for x in rest[:3]])
+            vertices.append(_three(rest, k))
         elif word == "f":
-            corners = [int(x.split("/")[0]) for x in rest]
+            try:
+                corners = [int(x.split("/")[0]) for x in rest]
+            except ValueError:
+                raise ValueError(f"line {k} names no corners by number") from None
             corners = [c - 1 if c > 0 else len(vertices) + c for c in corners]
             faces += [(corners[0], *pair) for pair in pairwise(corners[1:])]
     index = np.array(faces, dtype=np.int64).reshape(-1, 3)

@@ -44,6 +44,8 @@ def _root(file: Path) -> ET.Element:
         raise RobotModelError(f"The file {file} cannot be read: {error.strerror}: give a URDF or MJCF file.") from error
     try:
         root = ET.fromstring(data, ET.XMLParser(target=_NoEntities()))  # noqa: S314  its entities are refused
+    except RobotModelError as error:
+        raise RobotModelError(f"{error} (in {file})") from error
     except (ET.ParseError, ValueError, LookupError) as error:
         raise RobotModelError(f"The file {file} is not valid XML: {error}.") from error
     if "xacro" in str(root.tag) or any("xacro" in str(child.tag) for child in root):

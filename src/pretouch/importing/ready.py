@@ -1,17 +1,23 @@
 """A posture to start from: hand in front and pointing down, away from limits, singularities and the arm itself."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from pretouch.errors import RobotModelError
+from pretouch.importing.reaching import Pace, reached
 from pretouch.importing.sampling import spread
-from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, pairs_apart, self_distances
 from pretouch.types import BoolArray, FloatArray
 
-_STARTS, _STEPS, _STEP_MAX = 96, 80, 0.2
+_STARTS = 96
+_DRAWN, _FREE = Pace(80, 0.2, 1e-3, 0.02), Pace(80, 0.2, 1e-6, 0.0)
+"""First drawn to the middle of the joints' ranges; arms with small singular values get there only undrawn."""
 _TRIED = 100
+_ANYWHERE = 1000
+"""Postures that are looked at where no hand in front of the base points down."""
 _IN_FRONT, _HEIGHT = 0.55, 0.4
 """Where the hand is to be, in front of the base and above it, as parts of the arm's reach."""
 _CLEAR = 0.02
@@ -31,7 +37,20 @@ class Ready:
     singular_value: float
     """Smallest singular value of the Jacobian [m or 1 per rad]; 0 is singular."""
     clear: float
-    """Distance of the arm from itself [m]."""
+    """Distance of the arm from itself [m]; negative where its capsules are in each other."""
+    nearest: tuple[str, str] | None
+    """The two links with that distance; None if no two come apart."""
+
+    @property
+    def conflict(self) -> str | None:
+        """Say what is wrong with the posture, if the arm touches itself there."""
+        if self.clear > 0 or self.nearest is None:
+            return None
+        first, second = self.nearest
+        return (
+            f"In the ready posture the capsules of {first} and {second} are {-1000 * self.clear:.0f} mm in each other:"
+            " choose another posture, or smaller capsules in arm.xml."
+        )
 
 
 def reach_of(model: RobotModel) -> float:
@@ -42,42 +61,70 @@ def reach_of(model: RobotModel) -> float:
     return float(np.linalg.norm(places[:, :2], axis=1).max())
 
 
-def rated(model: RobotModel, q: FloatArray, apart: BoolArray | None = None) -> Ready:
-    """Say what a posture is good for; one outside the limits, or of another size, is a RobotModelError."""
-    if q.shape != (model.n,) or not np.all((q >= model.q_min) & (q <= model.q_max)):
-        limits = ", ".join(f"{a:.3g} to {b:.3g}" for a, b in zip(model.q_min, model.q_max, strict=True))
+def check_posture(q: FloatArray, q_min: FloatArray, q_max: FloatArray, what: str) -> None:
+    """Refuse a posture outside the limits (n,) [rad], or of another size, with a RobotModelError that begins `what`."""
+    if q.shape != q_min.shape or not np.all((q >= q_min) & (q <= q_max)):
+        limits = ", ".join(f"{a:.3g} to {b:.3g}" for a, b in zip(q_min, q_max, strict=True))
         raise RobotModelError(
-            f"--ready is {np.round(q, 4).tolist()}: give {model.n} joint positions [rad] within {limits}."
+            f"{what} is {np.round(q, 4).tolist()}: give {len(q_min)} joint positions [rad] within {limits}."
         )
+
+
+def rated(model: RobotModel, q: FloatArray, apart: BoolArray | None = None) -> Ready:
+    """Say what a posture (n,) within the limits is good for."""
     values = np.linalg.svd(model.ee_jacobian(model.kinematics(q)), compute_uv=False)
-    return Ready(q, float(np.prod(values)) if model.n >= 6 else 0.0, float(values[-1]), _clearance(model, q, apart))
+    apart = ever_apart(model) if apart is None else apart
+    clear, nearest = np.inf, None
+    if apart.any():
+        between = self_distances(model, capsule_ends(model, kinematics_of(model, q[None])))[0, apart]
+        at = int(between.argmin())
+        first, second = (model.links[model.capsules.link[c]] for c in pairs_apart(model)[apart][at])
+        clear, nearest = float(between[at]), (first, second)
+    return Ready(q, float(np.prod(values)) if model.n >= 6 else 0.0, float(values[-1]), clear, nearest)
 
 
-def proposed(model: RobotModel) -> Ready:
-    """Search for a good posture; a RobotModelError asks for one where none is found."""
+def proposed(model: RobotModel) -> tuple[Ready, tuple[str, ...]]:
+    """Search for a good posture. Where none has its hand in front and pointing down, a sentence says so."""
     reach = reach_of(model)
     hand = np.array([_IN_FRONT * reach, 0.0, _HEIGHT * reach])
-    low, high = _near_middle(model, 0.8)
     apart = ever_apart(model)
-    best, best_score = None, -np.inf
-    for u in spread(_STARTS, model.n):
-        q = _reaching(model, low + u * (high - low), hand)
-        if q is None:
-            continue
-        found = rated(model, q, apart)
-        kin = model.kinematics(q)
-        lowest = (kin.position[model.body.link, 2]).min()
-        if found.clear < _CLEAR or lowest < _CLEAR:
-            continue
-        score = found.singular_value + 0.2 * _room(model, q)
-        if score > best_score:
-            best, best_score = found, score
-    if best is None:
-        raise RobotModelError(
-            f"{model.description.name}: no posture was found with the hand in front of the base and pointing down:"
-            " give one by --ready, one position a joint [rad], by commas."
-        )
-    return best
+    for pace in (_DRAWN if model.n > 5 else _FREE, _FREE):
+        found = [rated(model, q, apart) for q in _hand_at(model, hand, pace)]
+        best = max((one for one in found if _is_clear(model, one)), key=partial(_worth, model), default=None)
+        if best is not None:
+            return best, ()
+    low, high = _near_middle(model, 0.8)
+    found = [rated(model, low + u * (high - low), apart) for u in spread(_ANYWHERE, model.n)]
+    best = max(found, key=lambda one: (_is_clear(model, one), min(one.clear, _CLEAR), _worth(model, one)))
+    return best, (
+        "No posture was found with the hand in front of the base and pointing down, so another one was taken: give"
+        " yours by --ready, or as q_ready in robot.toml.",
+    )
+
+
+def _hand_at(model: RobotModel, hand: FloatArray, pace: Pace) -> list[FloatArray]:
+    """Return postures with the end-effector at a place (3,), pointing down, away from joint limits."""
+    low, high = _near_middle(model, 0.8)
+    starts = low + spread(_STARTS, model.n) * (high - low)
+    found = [reached(model, q, partial(_to_hand, model, hand), model.q_mid, pace) for q in starts]
+    return [q for q in found if q is not None and _room(model, q) > _MARGIN]
+
+
+def _to_hand(model: RobotModel, hand: FloatArray, kin: Kinematics) -> FloatArray:
+    """Motion (6,) that brings the end-effector to a place (3,), pointing down."""
+    direction = pointing(model, kin)
+    turn = np.cross(direction, [0.0, 0.0, -1.0]) if direction[2] <= 0.999 else np.array([1.0, 0.0, 0.0])
+    return np.concatenate([hand - kin.position[model.ee], turn])
+
+
+def _is_clear(model: RobotModel, found: Ready) -> bool:
+    """Tell whether a posture is clear of itself and of the base's plane."""
+    lowest = model.kinematics(found.q).position[model.body.link, 2].min()
+    return bool(found.clear >= _CLEAR and lowest >= _CLEAR)
+
+
+def _worth(model: RobotModel, found: Ready) -> float:
+    return found.singular_value + 0.2 * _room(model, found.q)
 
 
 def _near_middle(model: RobotModel, part: float) -> tuple[FloatArray, FloatArray]:
@@ -92,9 +139,8 @@ def _room(model: RobotModel, q: FloatArray) -> float:
     return float((np.minimum(q - model.q_min, model.q_max - q) / half).min())
 
 
-def pointing(model: RobotModel, q: FloatArray) -> FloatArray:
+def pointing(model: RobotModel, kin: Kinematics) -> FloatArray:
     """Return the direction (3,) the hand points in: along the last joint, or away from it if the hand is beside it."""
-    kin = model.kinematics(q)
     axis, out = kin.axis[-1], kin.position[model.ee] - kin.anchor[-1]
     away = float(np.linalg.norm(out))
     if away > 0.01 and abs(axis @ out) < away / 2:
@@ -102,34 +148,16 @@ def pointing(model: RobotModel, q: FloatArray) -> FloatArray:
     return axis if axis @ out >= 0 else -axis
 
 
-def _reaching(model: RobotModel, q: FloatArray, hand: FloatArray) -> FloatArray | None:
-    """Bring the end-effector to a place (3,) pointing down, from a posture; None where that does not come about."""
-    n = model.n
-    for _ in range(_STEPS):
-        kin = model.kinematics(q)
-        turn = np.cross(pointing(model, q), [0.0, 0.0, -1.0])
-        if pointing(model, q)[2] > 0.999:
-            turn = np.array([1.0, 0.0, 0.0])
-        error = np.concatenate([hand - kin.position[model.ee], turn])
-        if np.abs(error).max() < 1e-4:
-            return q if _room(model, q) > _MARGIN else None
-        J = model.ee_jacobian(kin)
-        pull = 0.02 * (model.q_mid - q) if n > 5 else np.zeros(n)
-        pseudo = J.T @ np.linalg.inv(J @ J.T + 1e-3 * np.eye(6))
-        step = pseudo @ error + (np.eye(n) - pseudo @ J) @ pull
-        q = np.clip(q + step * min(1.0, _STEP_MAX / max(np.abs(step).max(), 1e-12)), model.q_min, model.q_max)
-    return None
-
-
-def _clearance(model: RobotModel, q: FloatArray, apart: BoolArray | None = None) -> float:
-    """Least distance of the arm from itself [m], but for parts that never come apart."""
-    apart = ever_apart(model) if apart is None else apart
-    ends = capsule_ends(model, kinematics_of(model, q[None]))
-    return float(self_distances(model, ends)[0, apart].min(initial=np.inf))
-
-
 def ever_apart(model: RobotModel) -> BoolArray:
     """Whether the pairs (P,) of `pairs_apart` come apart in some of many postures: in a short wrist not all do."""
     q = model.q_min + spread(_TRIED, model.n) * (model.q_max - model.q_min)
     ends = capsule_ends(model, kinematics_of(model, q))
     return np.asarray(np.any(self_distances(model, ends) > 0, axis=0))
+
+
+def never_apart(model: RobotModel) -> tuple[tuple[str, str], ...]:
+    """Pairs of links that `ever_apart` leaves out altogether: no capsules of theirs come apart."""
+    pairs = model.capsules.link[pairs_apart(model)]
+    apart = {(int(a), int(b)) for a, b in pairs[ever_apart(model)]}
+    rest = sorted({(int(a), int(b)) for a, b in pairs} - apart)
+    return tuple((model.links[a], model.links[b]) for a, b in rest)

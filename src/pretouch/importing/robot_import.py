@@ -13,7 +13,7 @@ from pretouch.importing.chain import Arm, arm_of
 from pretouch.importing.inertials import inertials_of
 from pretouch.importing.limits import Limits, limits_of
 from pretouch.importing.read import read_source
-from pretouch.importing.ready import Ready, proposed, rated
+from pretouch.importing.ready import Ready, check_posture, proposed, rated
 from pretouch.importing.sampling import spread
 from pretouch.importing.units import proposed_skin
 from pretouch.importing.write_mjcf import mjcf_text
@@ -50,6 +50,8 @@ class ImportOptions:
     """Usual posture to start from [rad]; by default one is searched for."""
     capsules: int = MOST
     """Capsules for one link at most."""
+    cover: bool = False
+    """Whether capsules are enlarged until no surface sticks out of them."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.capsules <= 10:
@@ -79,7 +81,9 @@ def import_robot(file: Path, options: ImportOptions) -> Imported:
     """Read an arm, fit capsules, and propose what the file does not hold. Foreseeable misuse is a RobotModelError."""
     arm = arm_of(read_source(file, options.packages), options.ee)
     limits = limits_of(arm, options.qd_max, options.qdd_max, options.tau_max)
-    bodies, about_bodies = body_of(arm, options.capsules)
+    if options.ready:
+        check_posture(np.array(options.ready), limits.q_min, limits.q_max, "--ready")
+    bodies, about_bodies = body_of(arm, options.capsules, options.cover)
     inertials, about_inertials = inertials_of(arm, bodies)
     name = options.name or arm.source.name
     text = mjcf_text(name, arm, limits, inertials, bodies)
@@ -93,11 +97,12 @@ def import_robot(file: Path, options: ImportOptions) -> Imported:
         )  # fmt: skip
         model = RobotModel(described)
         check_same(arm, model)
-        ready = rated(model, np.array(options.ready)) if options.ready else proposed(model)
+        ready, about_ready = (rated(model, np.array(options.ready)), ()) if options.ready else proposed(model)
         described = replace(described, q_ready=ready.q)
         model = RobotModel(described)
-    skin, about_skin = proposed_skin(model)
-    remarks = (*arm.remarks, *limits.remarks, *about_bodies, *about_inertials, *about_skin)
+    surfaces = {arm.source.links[body.link].name: body.surface for body in bodies}
+    skin, about_skin = proposed_skin(model, surfaces)
+    remarks = (*arm.remarks, *limits.remarks, *about_bodies, *about_inertials, *about_ready, *about_skin)
     error = whole_arm_error(arm, bodies, *_checked_at(arm, model))
     return Imported(described, text, model, arm, limits, bodies, error, ready, skin, remarks)
 

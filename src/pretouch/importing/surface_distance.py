@@ -37,6 +37,11 @@ class SurfaceDistance:
         self._hull = _hull_planes(whole.reshape(-1, 3))
 
     @property
+    def parts(self) -> FloatArray:
+        """Corners (D, 3, 3) of the divided triangles [m]."""
+        return self._parts
+
+    @property
     def corners(self) -> FloatArray:
         """Corners (F, 3, 3) of the triangles that have an area [m]."""
         return self._whole
@@ -127,12 +132,17 @@ def _divided(corners: FloatArray, longest: float) -> FloatArray:
         total += len(waiting)
         if not len(waiting) or total > _MOST_TRIANGLES:
             break
-        turn = edges[long].argmax(axis=1)
-        rows = np.arange(len(waiting))
-        a, b, c = (waiting[rows, (turn + k) % 3] for k in range(3))
-        middle = (a + b) / 2
-        waiting = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        waiting = halved(waiting)
     return np.concatenate([*kept, waiting])
+
+
+def halved(corners: FloatArray) -> FloatArray:
+    """Divide triangles (F, 3, 3) across their longest edges, (2 F, 3, 3)."""
+    turn = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).argmax(axis=1)
+    rows = np.arange(len(corners))
+    a, b, c = (corners[rows, (turn + k) % 3] for k in range(3))
+    middle = (a + b) / 2
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
 
 
 def _hull_planes(points: FloatArray) -> FloatArray | None:

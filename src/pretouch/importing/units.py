@@ -6,6 +6,7 @@ import numpy as np
 
 from pretouch.errors import SkinError
 from pretouch.importing.sampling import spread
+from pretouch.importing.surface_distance import SurfaceDistance
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
@@ -13,7 +14,7 @@ from pretouch.sensing.unit import SensorUnit, cone_rays
 from pretouch.types import FloatArray
 
 HEIGHT = 0.008
-"""Of a unit above its link's capsules [m]: a board in its case."""
+"""Of a unit above its link's capsules and surface, at least [m]: a board in its case."""
 ROUND_HAND = 4
 """Units round the outermost link that has room, as round the hand in the paper; the other links have one each."""
 _SMALLEST = 0.02
@@ -24,21 +25,28 @@ _POSTURES, _SPREAD = 8, 0.6
 """Postures about the ready one in which the beams are to be free, and how far about [rad]."""
 _APART = 0.03
 """Least distance of two units on a link [m]."""
+_RAISES = 20
+"""Steps in which a unit is moved out of the surface."""
 _RANGE = 1.0
 """How far the beams are followed [m]."""
 _FREE = 0.8
 """Least part of the beams that has to be free."""
 
 
-def proposed_skin(model: RobotModel) -> tuple[Skin, tuple[str, ...]]:
-    """Return units on each moving link that has room, and a sentence for the links that have none."""
+def proposed_skin(model: RobotModel, surfaces: dict[str, SurfaceDistance]) -> tuple[Skin, tuple[str, ...]]:
+    """Return units on each moving link that has room, and a sentence for the links that have none.
+
+    Args:
+        model: the arm, in its ready posture.
+        surfaces: by the name of the link, in its frame.
+    """
     postures = _postures(model)
     units: list[SensorUnit] = []
     beams: list[FloatArray] = []
     bare = []
     wanted = ROUND_HAND
     for link in _outermost_first(model):
-        places = _free_places(model, link, postures)
+        places = _free_places(model, link, postures, surfaces[model.links[link]])
         own: list[FloatArray] = []
         while places and len(own) < wanted:
             T = max(places, key=lambda place: _worth(place, postures[0].rotation[link], own, beams)).T
@@ -80,10 +88,13 @@ class _Place:
     """Part of the beams, over all postures."""
 
 
-def _free_places(model: RobotModel, link: int, postures: list[Kinematics]) -> list[_Place]:
-    """Return the places on a link that are outside all its capsules and see past the rest of the arm."""
+def _free_places(model: RobotModel, link: int, postures: list[Kinematics], surface: SurfaceDistance) -> list[_Place]:
+    """Return the places on a link that are outside its capsules and surface and see past the rest of the arm."""
     found = []
-    for T in _places(model.capsules.of_links(np.array([link]))):
+    for on_capsule in _places(model.capsules.of_links(np.array([link]))):
+        T = _raised(on_capsule, surface)
+        if T is None:
+            continue
         try:
             Skin([SensorUnit("unit", model.links[link], T)], model)
         except SkinError:  # inside another capsule of the link
@@ -94,6 +105,18 @@ def _free_places(model: RobotModel, link: int, postures: list[Kinematics]) -> li
         if free >= _FREE:
             found.append(_Place(T, free))
     return found
+
+
+def _raised(T: FloatArray, surface: SurfaceDistance) -> FloatArray | None:
+    """Move a unit (4, 4) outwards until it is `HEIGHT` above a surface; None if that takes too many steps."""
+    raised = T.copy()
+    for _ in range(_RAISES):
+        at = raised[None, :3, 3]
+        height = float(surface(at)[0]) * (1 if surface.outside(at)[0] else -1)
+        if height >= HEIGHT - 1e-6:
+            return raised
+        raised[:3, 3] += (HEIGHT - height) * T[:3, 2]
+    return None
 
 
 def _worth(place: _Place, rotation: FloatArray, own: list[FloatArray], beams: list[FloatArray]) -> float:

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.packages import MeshFinder
+from pretouch.importing.meshes import MeshFinder
 from pretouch.importing.solids import Block, Cylinder, MeshFile, Rounded, Shape
 from pretouch.importing.source import Inertial, Source, SourceJoint, SourceLink
 from pretouch.importing.urdf_values import inertia_of, number, origin_of, required, vector
@@ -71,10 +71,12 @@ def _ordered(links: dict[str, Element], joints: dict[str, Element]) -> list[tupl
     for child, joint in joints.items():
         children[required(joint.find("parent"), "link")].append(child)
     roots = [name for name in links if name not in joints]
+    if links and not roots:
+        raise RobotModelError(f"The links {', '.join(links)} hang on each other in a ring: leave one joint out.")
+    if not links:
+        raise RobotModelError("The robot has no links: give it some.")
     if len(roots) != 1:
-        raise RobotModelError(
-            f"The links hang on {len(roots)} roots ({', '.join(roots) or 'none'}): join them to one tree."
-        )
+        raise RobotModelError(f"The links hang on {len(roots)} roots ({', '.join(roots)}): join them to one tree.")
     order: list[tuple[str, int]] = []
     waiting = [(roots[0], -1)]
     while waiting:

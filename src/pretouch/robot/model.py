@@ -65,7 +65,7 @@ class RobotModel:
         """Names of the links; a link's index is its place here, 0 is the world."""
         self.joints: tuple[str, ...] = tuple(self._model.joint(j).name for j in range(self.n))
         """Names of the joints, in the order of q."""
-        self.ee: int = self.link_index(description.ee_body)
+        self.ee: int = self._end_effector()
         """Index of the end-effector's link."""
         self.capsules: Capsules = capsules_of(self._model)
         """The body, base included."""
@@ -90,6 +90,12 @@ class RobotModel:
                 raise RobotModelError(f"{name}: joint {joint} is no hinge: only hinge joints are supported.")
             if not self._model.jnt_limited[j]:
                 raise RobotModelError(f"{name}: joint {joint} has no range: give it its position limits.")
+
+    def _end_effector(self) -> int:
+        try:
+            return self.link_index(self.description.ee_body)
+        except RobotModelError as error:
+            raise RobotModelError(f"{self.description.name}: ee_body: {error}") from error
 
     def _moved_by(self) -> BoolArray:
         moved = np.zeros((self._model.nbody, self.n), dtype=np.bool_)
