@@ -4,15 +4,19 @@ import io
 import os
 import signal
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pretouch import cli
+from pretouch.cli.run.robots import Opened
 from pretouch.recording.reader import open_recording
+from pretouch.recording.writer import Recording
 from pretouch.session import simulated
 from pretouch.session.preflight import PreflightParams
-from pretouch.session.push import PushParams
+from pretouch.session.push import GuidedPush, PushParams
+from pretouch.session.remembered import Identity
 from pretouch.types import Mode
 
 BLIND = ("run", "--no-skin", "--profile", "blind", "--path", "hold")
@@ -25,6 +29,17 @@ def _state_of_its_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
+def at_begin(monkeypatch, seconds, then):
+    """Have something done a while after the arm was let move."""
+    begin = simulated.SimulatedSessionArm.begin
+
+    def begun(arm):
+        begin(arm)
+        threading.Timer(seconds, then, (arm,)).start()
+
+    monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", begun)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -32,6 +47,10 @@ def _state_of_its_own(tmp_path, monkeypatch):
         (("--ip", "127.0.0.1"), "--ip does not go with --robot simulated"),
         (("--robot", "ros2"), "both --ros-sign and --ros-frame must be given"),
         (("--robot", "ros2", "--ros-sign", "on-robot", "--ip", "1.2.3.4"), "--ip does not go with --robot ros2"),
+        (
+            ("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--approach"),
+            "--approach does not go with --robot ros2",
+        ),
         (("--no-skin",), "choose --profile blind"),
         (("--no-skin", "--skin", "a.toml"), "--no-skin does not go with --skin"),
         (("--skin", "missing.toml"), "missing.toml cannot be read"),
@@ -45,6 +64,7 @@ def _state_of_its_own(tmp_path, monkeypatch):
         (("--path", "circle", "--radius", "3"), "cannot reach"),
         (("--robot", "franka", "--ip", "192.0.2.1", "--lockstep", "--seconds", "1"), "is for a simulated arm"),
         (("--robot", "franka", "--ip", "127.0.0.1", "--lockstep"), "needs --seconds"),
+        (("--recover",), "--recover does not go with --robot simulated"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys):
@@ -63,8 +83,9 @@ def test_a_rehearsal_checks_confirms_announces_moves_and_reports(tmp_path, capsy
     assert cli.main([*BLIND, "--seconds", "0.3", "--yes", "--record", "a.mcap"]) == 0
     said = capsys.readouterr().out
     order = [
-        "All checks passed", "Push the hand gently", "towards +y", "towards +x", "The force sign is confirmed",
-        "keeps its end-effector at", "To stop it", "HOLD", "The arm is at rest.", "a.mcap holds",
+        "All checks passed", "Push the hand gently", "towards +y", "towards +x", "towards +z",
+        "The force sign is confirmed", "keeps its end-effector at", "To stop it", "HOLD", "The arm is at rest.",
+        "a.mcap holds",
     ]  # fmt: skip
     places = [said.find(part) for part in order]
     assert -1 not in places
@@ -73,6 +94,91 @@ def test_a_rehearsal_checks_confirms_announces_moves_and_reports(tmp_path, capsy
     assert not (tmp_path / "state").exists()
 
 
+@pytest.fixture
+def _no_pushes(monkeypatch):
+    """The force sign counts as confirmed: pushes take seconds."""
+    monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
+
+
+@pytest.mark.usefixtures("_no_pushes")
+def test_a_folder_that_is_made_for_a_recording_is_said(tmp_path, capsys):
+    assert cli.main([*BLIND, "--seconds", "0.1", "--yes", "--record", "deep/er/a.mcap"]) == 0
+    assert "The folder deep/er was made for the recording." in capsys.readouterr().out
+    assert len(open_recording(tmp_path / "deep" / "er" / "a.mcap"))
+
+
+def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path, capsys, monkeypatch):
+    place = tmp_path / "state" / "pretouch" / "force-sign.json"
+    place.parent.mkdir(parents=True)
+    place.write_text("[")
+    known = Identity("test", "here", "nothing")
+    monkeypatch.setattr("pretouch.cli.run.robots.Opened", lambda arm, skin, _, *more: Opened(arm, skin, known, *more))
+    assert cli.main([*BLIND, "--seconds", "0.1", "--yes"]) == 2
+    shown = capsys.readouterr()
+    assert "is damaged: delete it" in shown.err
+    assert "checks" not in shown.out
+
+
+@pytest.mark.usefixtures("_no_pushes")
+def test_a_recording_that_fails_in_the_middle_is_told_at_once_and_by_the_exit_code(capsys, monkeypatch):
+    at_begin(monkeypatch, 0.2, lambda _: monkeypatch.setattr(Recording, "trouble", "The disk is full."))
+    assert cli.main([*BLIND, "--seconds", "1", "--yes", "--record", "a.mcap"]) == 1
+    said = capsys.readouterr().out
+    assert -1 < said.find("The disk is full.") < said.find("The arm is at rest.")
+    assert said.count("The disk is full.") == 2
+    assert "ended early" not in said
+
+
+@pytest.mark.usefixtures("_no_pushes")
+def test_an_approach_that_is_broken_off_is_reported_and_no_refusal(tmp_path, capsys, monkeypatch):
+    def fail(arm):
+        arm._failure = "its power failed"
+
+    at_begin(monkeypatch, 0.5, fail)
+    words = "--no-skin", "--profile", "blind", "--path", "line", "--approach", "--yes", "--record", "a.mcap"
+    assert cli.main(["run", *words]) == 1
+    said = capsys.readouterr().out
+    assert "The arm did not get to the start of its path." in said
+    assert "its power failed" in said
+    assert "a.mcap holds 0 control steps" in said
+    assert not list((tmp_path / "runs").glob("**/*"))
+
+
+@pytest.mark.usefixtures("_no_pushes")
+def test_an_arm_that_is_moved_while_a_person_is_asked_is_not_let_go(capsys, monkeypatch):
+    read, turned = simulated.SimulatedSessionArm.read, []
+
+    def asked(*_):
+        turned.append(0.1)
+
+    def moved(arm):
+        state = read(arm)
+        return replace(state, q=state.q + sum(turned))
+
+    monkeypatch.setattr("pretouch.cli.run.command.demand_yes", asked)
+    monkeypatch.setattr(simulated.SimulatedSessionArm, "read", moved)
+    monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", pytest.fail)
+    assert cli.main([*BLIND, "--seconds", "1"]) == 2
+    assert "The arm was moved since it was checked" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("_no_pushes")
+def test_ctrl_c_after_the_report_waits_until_all_is_closed(capsys, monkeypatch):
+    close, closed = simulated.SimulatedSessionArm.__exit__, []
+
+    def interrupted(arm, *error):
+        os.kill(os.getpid(), signal.SIGINT)
+        close(arm, *error)
+        closed.append(arm)
+
+    monkeypatch.setattr(simulated.SimulatedSessionArm, "__exit__", interrupted)
+    assert cli.main([*BLIND, "--seconds", "0.1", "--yes"]) == 130
+    assert closed
+    assert "The arm is at rest." in capsys.readouterr().out
+    assert cli.main([*BLIND, "--seconds", "-1"]) == 2
+
+
+@pytest.mark.usefixtures("_no_pushes")
 def test_without_a_terminal_nobody_lets_the_arm_move(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     assert cli.main([*BLIND, "--seconds", "1"]) == 2
@@ -104,17 +210,7 @@ def test_without_a_push_nothing_moves(capsys, monkeypatch):
     assert "No clear push towards +y" in capsys.readouterr().err
 
 
-def at_begin(monkeypatch, seconds, then):
-    """Have something done a while after the arm was let move."""
-    begin = simulated.SimulatedSessionArm.begin
-
-    def begun(arm):
-        begin(arm)
-        threading.Timer(seconds, then, (arm,)).start()
-
-    monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", begun)
-
-
+@pytest.mark.usefixtures("_no_pushes")
 @pytest.mark.slow
 @pytest.mark.alone
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
@@ -130,6 +226,7 @@ def test_a_signal_in_the_middle_brings_the_arm_to_rest_and_files_are_whole(tmp_p
     assert np.linalg.norm(recorded[len(recorded) - 1].step.ee_velocity) > 0.1
 
 
+@pytest.mark.usefixtures("_no_pushes")
 @pytest.mark.slow
 @pytest.mark.alone
 def test_units_that_fall_silent_in_the_middle_are_named_and_the_arm_holds(tmp_path, capsys, monkeypatch):
@@ -146,6 +243,7 @@ def test_units_that_fall_silent_in_the_middle_are_named_and_the_arm_holds(tmp_pa
     assert not steps[-1].command.any()
 
 
+@pytest.mark.usefixtures("_no_pushes")
 @pytest.mark.slow
 @pytest.mark.alone
 def test_an_approach_leads_to_where_the_path_begins(tmp_path, capsys):

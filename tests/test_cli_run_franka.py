@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
@@ -40,25 +41,45 @@ def address():
     return f"127.{10 + pid // 250 % 50}.{1 + pid % 250}.{next(_number)}"
 
 
+@dataclass(frozen=True)
+class Server:
+    """A simulated arm in a process of its own, with a keyboard."""
+
+    process: subprocess.Popen
+    log: Path
+    keyboard: int
+
+    def said(self):
+        return self.log.read_text()
+
+    def type(self, line):
+        os.write(self.keyboard, f"{line}\n".encode())
+
+
 @contextmanager
 def served(kind, where, folder, *words):
-    """Serve a simulated arm from a process of its own."""
+    """Serve a simulated arm."""
     log = folder / f"served-{where}.log"
+    keyboard, typed = os.openpty()
     with log.open("w") as file:
         process = subprocess.Popen(
             [sys.executable, "-m", "pretouch.cli", "serve-fci", "--robot", kind, "--host", where, *words],
-            stdout=file, stderr=subprocess.STDOUT, cwd=folder,
+            stdin=typed, stdout=file, stderr=subprocess.STDOUT, cwd=folder,
         )  # fmt: skip
+    server = Server(process, log, keyboard)
     try:
         end = time.monotonic() + 60.0
-        while "Listening at" not in log.read_text():
-            assert process.poll() is None, log.read_text()
-            assert time.monotonic() < end, log.read_text()
+        while "Listening at" not in server.said():
+            assert process.poll() is None, server.said()
+            assert time.monotonic() < end, server.said()
             time.sleep(0.05)
-        yield log
+        yield server
     finally:
         process.terminate()
+        process.send_signal(signal.SIGCONT)
         process.wait(10.0)
+        os.close(keyboard)
+        os.close(typed)
 
 
 def running(kind, where, folder, *words):
@@ -68,6 +89,12 @@ def running(kind, where, folder, *words):
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True, cwd=folder,
         env=os.environ | {"XDG_STATE_HOME": str(folder / "state")},
     )  # fmt: skip
+
+
+def children(run):
+    """The processes that a run has started, but for that of the library which counts what is shared."""
+    numbers = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+    return [int(n) for n in numbers if "resource_tracker" not in Path(f"/proc/{n}/cmdline").read_text()]
 
 
 def confirmed(kind, where, folder):
@@ -92,28 +119,30 @@ def in_lockstep(kind, folder, name, scene, *words):
         save_keys(made_keys(paper_skin(RobotModel(_ARMS[kind]())).ids, 0), keys)
     port = 20_000 + (os.getpid() * 7 + next(_number)) % 30_000
     units = "--units", f"127.0.0.1:{port}", "--keys", "keys.toml"
-    with served(kind, where, folder, "--lockstep", "--start", "path", *units, *scene) as log:
+    with served(kind, where, folder, "--lockstep", "--start", "path", *units, *scene) as server:
         heard = "--keys", "keys.toml", "--units-port", str(port)
         run = running(kind, where, folder, "--lockstep", "--record", name, *heard, *words)
         out, _ = run.communicate(timeout=300)
         assert run.returncode == 0, out
-        return open_recording(folder / name), log.read_text()
+        return open_recording(folder / name), server.said()
 
 
 def steps_as_written(recording):
     return [recording.step_data(i) for i in range(len(recording))]
 
 
-@pytest.mark.parametrize("kind", ["panda", "fr3"])
-@pytest.mark.parametrize(("side", "push"), [("+y", -1.0), ("-y", 1.0)])
+@pytest.mark.parametrize(
+    ("kind", "side", "push", "times"), [("panda", "+y", -1.0, 2), ("panda", "-y", 1.0, 1), ("fr3", "+y", -1.0, 2)]
+)
 def test_the_static_experiment_repeats_to_the_last_bit_and_the_arm_yields_away_from_the_board(
-    tmp_path, kind, side, push
+    tmp_path, kind, side, push, times
 ):
-    scene = "--scene", "static", "--side", side, "--stiffness", "10000"
+    scene = "--scene", "static", "--side", side
     words = "--profile", "paper:restriction.mode=off", "--seconds", "9"
     first, said = in_lockstep(kind, tmp_path, "a.mcap", scene, *words)
-    second, _ = in_lockstep(kind, tmp_path, "b.mcap", scene, *words)
-    assert steps_as_written(first) == steps_as_written(second)
+    if times > 1:
+        second, _ = in_lockstep(kind, tmp_path, "b.mcap", scene, *words)
+        assert steps_as_written(first) == steps_as_written(second)
     assert "reflex" not in said
     contacts = [kept.step for kept in first if kept.step.contact is not None]
     assert contacts
@@ -137,15 +166,17 @@ def test_the_dynamic_experiment_repeats_to_the_last_bit_and_the_arm_yields_to_th
 
 def test_pushes_confirm_the_sign_once_and_the_run_begins_and_ends_at_rest(tmp_path):
     where = address()
-    pushes = [f"{12 + 6 * k}:{force}:1.5" for k, force in enumerate(["0,14,0", "14,0,0"] * 6)]
-    with served("panda", where, tmp_path, "--start", "path", "--push", *pushes) as log:
+    with served("panda", where, tmp_path, "--start", "path") as server:
         run = running("panda", where, tmp_path, *_FOLLOWING[:-1], "2", "--record", "a.mcap")
-        out, _ = run.communicate(timeout=150)
+        for axis in ("+y", "+x", "+z"):
+            said_until(run, f"towards {axis}")
+            server.type(axis)
+        out, _ = run.communicate(timeout=60)
         assert run.returncode == 0, out
     assert "The force sign is confirmed" in out
     assert "The arm is at rest." in out
     assert re.search(r"\d{4} states answered", out)
-    assert "Motion ended: " not in log.read_text() or "reflex" not in log.read_text()
+    assert "reflex" not in server.said()
     steps = [kept.step for kept in open_recording(tmp_path / "a.mcap")]
     assert np.abs(steps[0].command).max() < 0.02
     assert np.linalg.norm(steps[-1].ee_velocity) > 0.1
@@ -154,13 +185,15 @@ def test_pushes_confirm_the_sign_once_and_the_run_begins_and_ends_at_rest(tmp_pa
 
 def test_pushes_felt_the_other_way_round_refuse_before_anything_moves(tmp_path):
     where = address()
-    pushes = [f"{12 + 6 * k}:{force}:1.5" for k, force in enumerate(["0,-14,0", "-14,0,0"] * 6)]
-    with served("panda", where, tmp_path, "--start", "path", "--push", *pushes) as log:
+    with served("panda", where, tmp_path, "--start", "path") as server:
         run = running("panda", where, tmp_path, *_FOLLOWING[:-1], "2")
-        out, _ = run.communicate(timeout=150)
+        for axis in "yxz":
+            said_until(run, f"towards +{axis}")
+            server.type(f"-{axis}")
+        out, _ = run.communicate(timeout=60)
         assert run.returncode == 2, out
         assert "opposite to the pushes" in out
-        assert "Motion" not in log.read_text()
+        assert "Motion" not in server.said()
     assert not Remembered(tmp_path / "state" / "pretouch").knows(identity("panda", where))
 
 
@@ -168,7 +201,7 @@ def test_pushes_felt_the_other_way_round_refuse_before_anything_moves(tmp_path):
 def test_sigterm_in_the_middle_brings_the_arm_to_rest_without_a_reflex(tmp_path, kind):
     where = address()
     confirmed(kind, where, tmp_path)
-    with served(kind, where, tmp_path, "--start", "path") as log:
+    with served(kind, where, tmp_path, "--start", "path") as server:
         run = running(kind, where, tmp_path, *_FOLLOWING, "--record", "a.mcap")
         said_until(run, "TRACK")
         time.sleep(1.0)
@@ -176,7 +209,7 @@ def test_sigterm_in_the_middle_brings_the_arm_to_rest_without_a_reflex(tmp_path,
         out, _ = run.communicate(timeout=60)
         assert run.returncode == 143, out
         assert "The arm is at rest." in out
-        assert "reflex" not in log.read_text()
+        assert "reflex" not in server.said()
     assert open_recording(tmp_path / "a.mcap").complete
 
 
@@ -186,14 +219,76 @@ def test_the_process_that_speaks_with_the_arm_dying_is_said(tmp_path):
     with served("panda", where, tmp_path, "--start", "path"):
         run = running("panda", where, tmp_path, *_FOLLOWING)
         said_until(run, "TRACK")
-        children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
-        for child in children:
-            if "resource_tracker" not in Path(f"/proc/{child}/cmdline").read_text():
-                os.kill(int(child), signal.SIGKILL)
+        for child in children(run):
+            os.kill(child, signal.SIGKILL)
         out, _ = run.communicate(timeout=60)
         assert run.returncode == 1, out
         assert "The run ended early: The process that moves the arm" in out
         assert "Whether the arm is at rest is not known" in out
+
+
+def test_an_arm_whose_computer_dies_in_motion_is_not_said_to_stand(tmp_path):
+    where = address()
+    confirmed("panda", where, tmp_path)
+    with served("panda", where, tmp_path, "--start", "path") as server:
+        run = running("panda", where, tmp_path, *_FOLLOWING)
+        said_until(run, "TRACK")
+        os.kill(server.process.pid, signal.SIGKILL)
+        out, _ = run.communicate(timeout=60)
+        assert run.returncode == 1, out
+        assert "Whether the arm is at rest is not known" in out
+        assert "The arm is at rest." not in out
+
+
+@pytest.mark.parametrize("frozen", ["server", "process"])
+def test_an_arm_of_which_no_state_comes_ends_the_run(tmp_path, frozen):
+    """A pulled cable leaves the connection open; so does a process that stands still."""
+    where = address()
+    confirmed("panda", where, tmp_path)
+    with served("panda", where, tmp_path, "--start", "path") as server:
+        run = running("panda", where, tmp_path, *_FOLLOWING)
+        said_until(run, "TRACK")
+        for process in [server.process.pid] if frozen == "server" else children(run):
+            os.kill(process, signal.SIGSTOP)
+        begun = time.monotonic()
+        out, _ = run.communicate(timeout=60)
+        took = time.monotonic() - begun
+    assert run.returncode == 1, out
+    assert "Whether the arm is at rest is not known" in out
+    assert took < 8.0
+
+
+def test_a_server_that_dies_in_lockstep_ends_the_run(tmp_path):
+    where = address()
+    with served("panda", where, tmp_path, "--lockstep", "--start", "path") as server:
+        words = "--lockstep", "--no-skin", "--profile", "blind", "--path", "circle", "--seconds", "300"
+        run = running("panda", where, tmp_path, *words)
+        said_until(run, "TRACK")
+        os.kill(server.process.pid, signal.SIGKILL)
+        out, _ = run.communicate(timeout=60)
+    assert run.returncode == 1, out
+    assert "Whether the arm is at rest is not known" in out
+
+
+def test_an_arm_in_reflex_is_refused_with_the_way_out_and_recovers(tmp_path):
+    where = address()
+    confirmed("panda", where, tmp_path)
+    with served("panda", where, tmp_path, "--start", "path") as server:
+        run = running("panda", where, tmp_path, *_FOLLOWING)
+        said_until(run, "TRACK")
+        server.type("0,80,0")
+        out, _ = run.communicate(timeout=60)
+        assert run.returncode == 1, out
+        assert "stopped by itself" in out
+        assert "reflex" in server.said()
+        refused = running("panda", where, tmp_path, *_FOLLOWING)
+        out, _ = refused.communicate(timeout=60)
+        assert refused.returncode == 2, out
+        assert "then let it recover. With --recover it does." in out
+        again = running("panda", where, tmp_path, "--recover", "--path", "hold", *_FOLLOWING[:-1], "1")
+        out, _ = again.communicate(timeout=60)
+        assert again.returncode == 0, out
+        assert "has recovered" in out
 
 
 def test_a_second_program_on_the_same_arm_is_refused(tmp_path):

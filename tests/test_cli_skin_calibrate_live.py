@@ -15,12 +15,13 @@ from scipy.spatial.transform import Rotation
 
 from pretouch import cli
 from pretouch.cli.calibrate import live
-from pretouch.cli.calibrate.session import Session, signals_noted
+from pretouch.cli.calibrate.session import Session
 from pretouch.cli.ending import Terminated, ends_raise, exit_code
 from pretouch.errors import HardwareError, RecordingError
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.sensing.skin import load_skin
+from pretouch.session.signals import signals_noted
 from pretouch.types import RobotState
 from tests.calibrated_arm import swinging
 

@@ -9,6 +9,7 @@ import pytest
 from pretouch.control.path import Circle, line
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
+from pretouch.hardware.franka.limits import LimiterParams
 from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.sensing.skin import Skin
@@ -66,7 +67,7 @@ def test_an_arm_that_moves_is_refused(controller, panda_model):
     assert "joint4 moved by 0.020 rad" in finding.sentence
 
 
-@pytest.mark.parametrize(("room", "refused"), [(0.005, True), (0.05, False)])
+@pytest.mark.parametrize(("room", "refused"), [(0.003, True), (0.008, False), (0.05, False)])
 def test_a_joint_near_its_limit_is_named(controller, panda_model, room, refused):
     standing = seen(panda_model)
     q = standing.newest.q.copy()
@@ -74,6 +75,11 @@ def test_a_joint_near_its_limit_is_named(controller, panda_model, room, refused)
     (finding,) = found(controller, replace(standing, newest=replace(standing.newest, q=q)))
     assert finding.refused == refused
     assert f"joint6 is at {q[5]:.3f} rad, {room:.3f} rad from its limit" in finding.sentence
+
+
+def test_an_arm_that_its_own_limiter_has_brought_to_a_limit_is_not_refused(panda_model):
+    assert LimiterParams().position_margin_rad < PreflightParams().least_room_rad
+    assert PreflightParams().least_room_rad < PROFILES["paper"].task.position_margin_rad - 0.002
 
 
 def test_a_path_that_comes_down_to_the_floor_is_refused(controller, panda_model):

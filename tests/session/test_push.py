@@ -40,7 +40,7 @@ def confirmed(model, push=lambda axis: 14.0 * axis, **about_arm):
 @pytest.mark.parametrize("noise", [0.0, 1.8])
 def test_a_force_on_the_robot_in_the_base_frame_is_confirmed(panda_model, noise):
     said = confirmed(panda_model, noise=noise)
-    assert sum("Let go" in sentence for sentence in said) == 2
+    assert sum("Let go" in sentence for sentence in said) == 3
 
 
 def test_a_push_somewhat_askew_still_tells(panda_model):
@@ -55,6 +55,12 @@ def test_the_force_by_the_robot_is_refused(panda_model):
 def test_a_force_in_the_frame_of_a_hand_that_points_down_is_refused(panda_model):
     with pytest.raises(RobotError, match="not given in the base frame"):
         confirmed(panda_model, R=np.diag([1.0, -1.0, -1.0]))
+
+
+@pytest.mark.parametrize("tau_sign", [1.0, -1.0])
+def test_the_force_by_the_robot_in_a_frame_turned_about_z_is_refused_by_the_push_upwards(panda_model, tau_sign):
+    with pytest.raises(RobotError, match="not given in the base frame"):
+        confirmed(panda_model, R=np.diag([-1.0, -1.0, 1.0]), wrench_sign=-1.0, tau_sign=tau_sign)
 
 
 def test_a_force_against_the_joint_torques_is_refused(panda_model):
@@ -77,6 +83,12 @@ def test_what_is_no_clear_push_decides_nothing(panda_model, push, said):
     with pytest.raises(RobotError, match=r"No clear push .* within 8 s"):
         GuidedPush(arm, arm, panda_model, person.ask(arm), heard.append, PARAMS).confirm(rest)
     assert (said in heard[0]) if said else not heard
+
+
+def test_an_arm_that_tells_no_joint_torques_is_confirmed_by_its_force_alone(panda_model):
+    confirmed(panda_model, tau_sign=np.nan)
+    with pytest.raises(RobotError, match="opposite to the pushes"):
+        confirmed(panda_model, wrench_sign=-1.0, tau_sign=np.nan)
 
 
 def test_torques_that_do_not_fit_the_force_are_said_and_decide_nothing(panda_model):

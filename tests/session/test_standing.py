@@ -25,6 +25,18 @@ def test_a_touch_of_a_moment_shows(panda_model):
     assert watch(arm, arm, panda_model.description.qd_max, 3.0).disturbance > 6.0
 
 
+def test_one_noisy_state_in_a_span_without_others_is_no_touch(panda_model):
+    arm = PushedArm(panda_model)
+    seen = watch(arm, arm, panda_model.description.qd_max, 3.0)
+    lone = np.searchsorted(seen.stamp, seen.stamp[0] + 1.02)
+    kept = np.ones(len(seen.stamp), dtype=bool)
+    kept[lone - 2 : lone + 8] = False
+    kept[lone] = True
+    seen.wrench[lone, 0] = 6.0
+    thinned = replace(seen, stamp=seen.stamp[kept], wrench=seen.wrench[kept])
+    assert thinned.disturbance < 1.0
+
+
 def test_states_without_an_estimate_are_counted(panda_model):
     arm = PushedArm(panda_model)
     read, count = arm.read, iter(range(1000))

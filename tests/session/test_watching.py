@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.loop import Cycle
-from pretouch.session.watching import Watcher
+from pretouch.session.watching import Course, Watcher
 from pretouch.types import Inputs
 from tests.following_arm import Arm
 
@@ -58,6 +58,11 @@ def test_silent_units_are_named_although_the_arm_held_before(watched):
     turn(10)
     turn(120, silent=dict.fromkeys(range(7), 1.0))
     assert any("No usable reading" in sentence for sentence in told)
+
+
+def test_a_hold_of_a_moment_is_not_counted():
+    course = Course(steps=200, holds={"The window fills.": 1.0, "A unit was late.": 0.01})
+    assert course.sentences(0.01) == ("200 control steps, 2.0 s; 0 contacts.", "Held for 1.0 s: The window fills.")
 
 
 def test_contacts_are_counted_and_a_line_comes_every_five_seconds(watched):

@@ -73,7 +73,7 @@ def main(args: list[str] | None = None) -> int:
                 case ServeFci():
                     _serve_fci(command)
                 case Run():
-                    return _run(command)
+                    return _run(command) or exit_code()
     except PretouchError as error:
         errors.print(str(error), markup=False)
         return _USAGE

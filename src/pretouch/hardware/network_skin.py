@@ -8,7 +8,7 @@ memory between them has no name that could be left over.
 import os
 import signal
 from collections.abc import Callable, Sequence
-from multiprocessing import current_process, get_context
+from multiprocessing import current_process, get_context, resource_tracker
 from multiprocessing.connection import Connection
 from typing import Self
 
@@ -142,6 +142,7 @@ class NetworkSkin:
 
 def _start_without_interrupts(start: Callable[[], None]) -> None:
     """Start a process that Ctrl-C does not reach, from its first instruction on: its parent ends it."""
+    resource_tracker.ensure_running()  # begun with the first process, it would unblock Ctrl-C
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         start()

@@ -10,6 +10,7 @@ from pretouch.session.remembered import Identity
 from pretouch.types import FloatArray, RobotState
 
 _NAMES: dict[Kind, str] = {"panda": "Panda", "fr3": "FR3"}
+_REFLEX = "reflex"
 _LIBRARIES: dict[Kind, str] = {"panda": "panda-python", "fr3": "pylibfranka"}
 
 
@@ -40,11 +41,21 @@ class FrankaSessionArm:
 
     def unfit(self) -> tuple[str, ...]:
         """Say why the arm is in no mode to be moved."""
+        state = self._arm.state()
         try:
-            check_ready(self._arm.state(), self._address)
+            check_ready(state, self._address)
         except RobotError as error:
-            return (str(error),)
+            return (str(error), "With --recover it does.") if state.mode == _REFLEX else (str(error),)
         return ()
+
+    @property
+    def reflex(self) -> bool:
+        """Whether the arm has stopped by itself and must recover."""
+        return self._arm.state().mode == _REFLEX
+
+    def recover(self) -> None:
+        """Let the arm recover; what forbids it is a RobotError."""
+        self._arm.recover()
 
     def begin(self) -> None:
         """Begin a motion at rest."""
@@ -55,5 +66,6 @@ class FrankaSessionArm:
         self._arm.end()
 
     def report(self) -> str:
-        """Say how well the line to the arm did."""
-        return str(self._arm.report)
+        """Say how well the line to the arm did; '' if no motion has ended."""
+        report = self._arm.report
+        return str(report) if report.cycles else ""

@@ -1,6 +1,6 @@
 """What is kept of a run: a recording, if one is asked for, and the last seconds before each HOLD that latches."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +24,11 @@ class Kept:
     recording: Recording | None
     last_seconds: LastSeconds
 
+    @property
+    def trouble(self) -> str:
+        """Why the recording that was asked for is not whole, as a sentence, or ''."""
+        return self.recording.trouble if self.recording else ""
+
     def close(self) -> tuple[str, ...]:
         """Finish the files; return a sentence on each."""
         self.last_seconds.close()
@@ -34,7 +39,12 @@ class Kept:
 
 @contextmanager
 def keeping(
-    controller: Controller, robot: str, place: Path | None, folder: Path, further: Recorder | None = None
+    controller: Controller,
+    robot: str,
+    place: Path | None,
+    folder: Path,
+    tell: Callable[[str], None],
+    further: Recorder | None = None,
 ) -> Iterator[Kept]:
     """Open what a run is kept in.
 
@@ -43,13 +53,15 @@ def keeping(
         robot: what the arm is called.
         place: recording to write, if any.
         folder: for the last seconds before each HOLD that latches.
+        tell: is told at once, without waiting, that the recording fails.
         further: what else is given each cycle.
     """
     _warm_up(controller)
     with ExitStack() as stack:
         recording = stack.enter_context(Recording(place, controller, {"robot": robot})) if place else None
         last = stack.enter_context(LastSeconds(controller, folder, recording, about={"robot": robot}))
-        yield Kept(_Both(last, further) if further else last, recording, last)
+        recorder: Recorder = _Both(last, further) if further else last
+        yield Kept(_Both(recorder, _Minder(recording, tell)) if recording else recorder, recording, last)
 
 
 def _warm_up(controller: Controller) -> None:
@@ -70,3 +82,16 @@ class _Both:
         """Keep one turn of the loop."""
         self._first.record(cycle)
         self._second.record(cycle)
+
+
+class _Minder:
+    """A recorder that tells once that another one fails."""
+
+    def __init__(self, recording: Recording, tell: Callable[[str], None]) -> None:
+        self._recording, self._tell, self._told = recording, tell, False
+
+    def record(self, cycle: Cycle) -> None:
+        """Look at the other one."""
+        if not self._told and self._recording.trouble:
+            self._told = True
+            self._tell(self._recording.trouble)

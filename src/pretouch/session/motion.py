@@ -28,9 +28,21 @@ class Ending:
     unrest: str = ""
     """Why the arm may not be at rest, as a sentence; '' if it is."""
 
+    @property
+    def early(self) -> bool:
+        """Whether it did not end as asked."""
+        return bool(self.stopped or self.unrest)
 
-_STAND_S, _FRESH_S, _LOOK_S = 1.0, 0.1, 0.01
-"""How long an arm is looked at, how old its state may be meanwhile, and between two looks [s]."""
+    def sentences(self) -> tuple[str, ...]:
+        """Say it."""
+        rest = "The arm is at rest."
+        if self.unrest:
+            rest = f"Whether the arm is at rest is not known: {self.unrest} Look at it, and press the user stop."
+        return (rest, f"The run ended early: {self.stopped}") if self.stopped else (rest,)
+
+
+_STAND_S, _LOOK_S = 1.0, 0.01
+"""How long an arm is looked at, and between two looks [s]."""
 _STILL_RAD_S = 0.05
 """Six standard deviations of the joint velocity that a Panda measures at rest [rad/s]."""
 
@@ -100,27 +112,27 @@ def _moved(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> None:
             arm.begin()
             ending.stopped = move(came)
         except Exception as error:
-            ending.stopped = _named(error)
+            ending.stopped = named(error)
         finally:
             try:
                 arm.end()
             except Exception as error:
-                ending.stopped = ending.stopped or _named(error)
-                ending.unrest = "" if _stands(arm) else _named(error)
+                ending.stopped = ending.stopped or named(error)
+                ending.unrest = "" if _stands(arm) else named(error)
 
 
 def _stands(arm: Arm) -> bool:
     """Whether an arm whose motion could not be ended is seen to stand, as after a stop of its own."""
-    until = time.monotonic() + _STAND_S
-    while time.monotonic() < until:
+    begin = time.monotonic()
+    while time.monotonic() < begin + _STAND_S:
         with suppress(Exception):  # whatever it is, the arm is not seen to stand
             state = arm.read()
-            if time.monotonic() - state.stamp < _FRESH_S and np.abs(state.qd).max() < _STILL_RAD_S:
+            if state.stamp > begin and np.abs(state.qd).max() < _STILL_RAD_S:
                 return True
         time.sleep(_LOOK_S)
     return False
 
 
-def _named(error: Exception) -> str:
+def named(error: Exception) -> str:
     """Say what an error says, and of one that is not ours, what it is."""
     return str(error) if isinstance(error, PretouchError) else f"{type(error).__name__}: {error}"

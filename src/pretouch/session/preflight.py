@@ -21,7 +21,11 @@ class PreflightParams(Checked):
     drift_rad: Positive = 0.005
     """How far a joint may move meanwhile [rad]."""
     near_limit_rad: NonNegative = 0.1
-    """Distance to a joint's limit below which it is mentioned [rad]. Where it is refused is the profile's."""
+    """Distance to a joint's limit below which it is mentioned [rad]."""
+    least_room_rad: NonNegative = 0.004
+    """Distance to a joint's limit below which the arm is refused [rad]: a Franka arm's set-points are followed up to
+    0.003 rad before it (`LimiterParams.position_margin_rad`), and the rest is rounding. An arm between here and the
+    profile's margin, where a run may end, is moved away from the limit alone."""
     bias_share: Fraction = 0.5
     """Largest mean force at rest, as a share of the base threshold F_b: 5 N of Table I's 10. Real Pandas have 0.4 to
     1.7 N an axis with nothing attached (franka_ros, issue 404)."""
@@ -55,12 +59,12 @@ def check(controller: Controller, seen: Standing, floor: float, params: Prefligh
 
 
 def _limits(controller: Controller, q: FloatArray, params: PreflightParams) -> Iterator[Finding]:
-    model, margin = controller.model, controller.profile.task.position_margin_rad
+    model, least = controller.model, params.least_room_rad
     room = np.minimum(q - model.q_min, model.q_max - q)
-    for joint in np.flatnonzero(room < max(margin, params.near_limit_rad)).tolist():
+    for joint in np.flatnonzero(room < max(least, params.near_limit_rad)).tolist():
         where = f"{model.joints[joint]} is at {q[joint]:.3f} rad, {room[joint]:.3f} rad from its limit"
-        if room[joint] < margin:
-            yield Finding("limits", f"{where}, and the profile keeps {margin:g} rad: guide the arm away from it.")
+        if room[joint] < least:
+            yield Finding("limits", f"{where} (at least {least:g} rad): guide the arm away from it.")
         else:
             yield Finding("limits", f"{where}: it can hardly move that way.", refused=False)
 

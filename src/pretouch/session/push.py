@@ -1,8 +1,9 @@
 """The guided push: a person pushes the standing arm, and what the robot believes to feel must be that push.
 
 Some stacks report the force on the robot, others the force by it, and the difference does not show until the arm moves
-towards whoever pushes it. So it is shown before: two pushes along two axes of the base tell the sign, and that the
-force is given in the base frame.
+towards whoever pushes it. So it is shown before: pushes along the three axes of the base tell the sign, and that the
+force is given in the base frame. Two would not do: a force by the arm in a frame half a turn about z away is felt as
+asked along x and y, and up is down.
 """
 
 from collections import deque
@@ -53,6 +54,7 @@ class Direction:
 DIRECTIONS = (
     Direction((0.0, 1.0, 0.0), "+y, to the left as seen from the base looking out over the arm"),
     Direction((1.0, 0.0, 0.0), "+x, straight away from the base"),
+    Direction((0.0, 0.0, 1.0), "+z, straight up from below"),
 )
 
 
@@ -106,12 +108,13 @@ class Judge:
         return self._judged(state.q, np.mean(wrenches, axis=0), np.mean(torques, axis=0))
 
     def _judged(self, q: FloatArray, wrench: FloatArray, torque: FloatArray) -> Verdict:
-        made = self._model.ee_jacobian(self._model.kinematics(q)).T @ wrench
-        agreement = _cosine(made, torque)
-        if agreement < -self._params.agreement:
-            return Verdict.CONTRADICTORY
-        if agreement < self._params.agreement:
-            return Verdict.DOUBTFUL
+        if np.all(np.isfinite(torque)):  # an arm on ROS 2 tells none
+            made = self._model.ee_jacobian(self._model.kinematics(q)).T @ wrench
+            agreement = _cosine(made, torque)
+            if agreement < -self._params.agreement:
+                return Verdict.CONTRADICTORY
+            if agreement < self._params.agreement:
+                return Verdict.DOUBTFUL
         along = _cosine(wrench[:3], self._axis)
         if abs(along) < np.cos(self._params.cone_rad):
             return Verdict.SIDEWAYS
@@ -139,8 +142,8 @@ _WRONG = {
     ),
 }
 _TURNED = (
-    "Of two pushes one was felt as it was and the other was not: the force is not given in the base frame, or a push"
-    " was not where it was asked for: check the frame setting, and push again."
+    "Of the pushes some were felt as they were and others were not: the force is not given in the base frame, or a push"
+    " was not where it was asked for: check the settings of frame and sign, and push again."
 )
 
 

@@ -9,12 +9,12 @@ from pretouch.errors import RobotError
 from pretouch.loop import MonotonicClock
 from pretouch.ports import Skin
 from pretouch.session.arm import Arm
-from pretouch.session.finding import Finding
+from pretouch.session.finding import Finding, refusals
 from pretouch.session.preflight import PreflightParams, check
 from pretouch.session.standing import Standing, watch
 from pretouch.session.start import check_start
 from pretouch.session.units import UnitCheck, Units
-from pretouch.types import RangeReadings
+from pretouch.types import FloatArray, RangeReadings
 
 _PATIENCE_S = 20.0
 """How long units that are not heard are waited for [s]."""
@@ -64,6 +64,28 @@ class Session:
         if not approach:
             found += check_start(c, seen.newest.q)
         return seen, (*found, *(units.findings() if units else ()))
+
+    def recheck(self, checked: Standing, params: PreflightParams, approach: bool) -> FloatArray:
+        """Return where the arm is by now (n,) [rad]; RobotError if that is not where it was checked, or may not move.
+
+        Args:
+            checked: what `preflight` saw of it.
+            params: those of `preflight`.
+            approach: whether the arm is going to the start of its path first.
+        """
+        self.check_arm()
+        q = np.array(self.arm.read().q)
+        moved = np.abs(q - checked.newest.q)
+        joint = int(np.argmax(moved))
+        if not moved[joint] <= params.drift_rad:
+            raise RobotError(
+                f"The arm was moved since it was checked, {self.controller.model.joints[joint]} by {moved[joint]:.3f}"
+                f" rad (limit {params.drift_rad:g} rad): start again."
+            )
+        refused = () if approach else refusals(check_start(self.controller, q))
+        if refused:
+            raise RobotError(refused[0])
+        return q
 
     def check_arm(self) -> None:
         """Raise RobotError with all that the arm itself has against being moved."""

@@ -12,6 +12,8 @@ from pretouch.types import FloatArray, RobotState
 
 MEAN_S = 0.1
 """Time over which a force is averaged before it is judged [s]: one sample of a Panda's is off by up to 6 N."""
+_ENOUGH = 0.5
+"""Share of the usual number of states that a mean needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +55,16 @@ class Standing:
 
     @property
     def disturbance(self) -> float:
-        """Largest deviation of the force from its mean, averaged over `MEAN_S` [N]."""
+        """Largest deviation of the force from its mean, averaged over `MEAN_S` [N].
+
+        A span with fewer than half as many states as is usual is left out: its mean is that of the noise.
+        """
         felt = np.isfinite(self.wrench).all(axis=1)
         away = self.wrench[felt, :3] - self.rest_wrench[:3]
-        group = np.floor((self.stamp[felt] - self.stamp[0]) / MEAN_S)
-        means = [away[group == one].mean(axis=0) for one in np.unique(group)]
+        span = np.floor((self.stamp[felt] - self.stamp[0]) / MEAN_S)
+        spans, counts = np.unique(span, return_counts=True)
+        enough = spans[counts >= _ENOUGH * np.median(counts)] if len(spans) else spans
+        means = [away[span == one].mean(axis=0) for one in enough]
         return max((float(np.linalg.norm(mean)) for mean in means), default=0.0)
 
 

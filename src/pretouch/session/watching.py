@@ -14,6 +14,8 @@ _LINE_S = 5.0
 """Time between two lines on how it goes [s]."""
 _AGAIN_S = 1.0
 """Least time between two sentences on why the arm holds [s]."""
+_BRIEF_S = 0.05
+"""A HOLD shorter than this is not counted at the end [s]."""
 
 
 @dataclass
@@ -31,8 +33,8 @@ class Course:
             f"{self.steps} control steps, {self.steps * period:.1f} s; {self.contacts}"
             f" {'contact' if self.contacts == 1 else 'contacts'}."
         ]
-        for reason, seconds in sorted(self.holds.items(), key=lambda item: -item[1]):
-            found.append(f"Held for {seconds:.1f} s: {reason}")
+        lasting = [(seconds, reason) for reason, seconds in self.holds.items() if seconds >= _BRIEF_S]
+        found += [f"Held for {seconds:.1f} s: {reason}" for seconds, reason in sorted(lasting, reverse=True)]
         return tuple(found)
 
 

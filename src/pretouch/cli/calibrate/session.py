@@ -1,9 +1,6 @@
 """An arm that makes a motion while its units are heard: all that is measured is recorded."""
 
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +13,7 @@ from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.ports import Clock, Robot
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
+from pretouch.session.signals import signals_noted
 from pretouch.types import FloatArray
 
 _STEADY_S, _PATIENCE_S = 3.0, 20.0
@@ -110,26 +108,3 @@ class Session:
             self._recording.joints(np.array([stamp]), q, qd, self._model.joints)
         if self._recording.trouble:
             raise RecordingError(self._recording.trouble)
-
-
-@contextmanager
-def signals_noted() -> Iterator[list[int]]:
-    """Only note signals that end the command, until the context ends: the first one comes then, before any other."""
-    came: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        came.append(number)
-
-    ours = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    # nohup has SIGHUP ignored, and wants it so
-    before = {int(one): signal.signal(one, note) for one in ours if signal.getsignal(one) is not signal.SIG_IGN}
-    try:
-        yield came
-    finally:
-        try:
-            for number in came[:1]:
-                signal.signal(number, before[number])
-                signal.raise_signal(number)
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)

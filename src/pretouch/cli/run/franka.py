@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from pretouch.cli.run.asking import demand_yes, say
 from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
 from pretouch.cli.run.robots import Opened, network_units
@@ -12,6 +13,8 @@ from pretouch.session.franka import FrankaSessionArm, identity
 from pretouch.session.session import NoUnits
 from pretouch.session.signals import children_undisturbed
 
+_REFUSED = "The arm was not let recover"
+
 
 @contextmanager
 def franka(command: Run, parts: Parts) -> Iterator[Opened]:
@@ -19,14 +22,27 @@ def franka(command: Run, parts: Parts) -> Iterator[Opened]:
     kind, address = command.robot.arm, command.robot.ip
     known = identity(kind, address)
     behavior = collision_behavior(parts.profile, parts.model)
-    print(
+    say(
         f"The arm stops by itself from {behavior.upper_force[0]:.0f} N on; the profile reacts from"
-        f" {parts.profile.threshold.f_base_n:g} N above the mean.",
-        flush=True,
+        f" {parts.profile.threshold.f_base_n:g} N above the mean."
     )
     priority = command.priority and min(command.priority + 1, 99)
     with children_undisturbed():
         connected = FrankaArm(address, kind, parts.model, behavior=behavior, priority=priority)
     with connected as arm, network_units(command, parts) as units:
         notes = (arm.missing,) if arm.missing else ()
-        yield Opened(FrankaSessionArm(arm, kind, address), units or NoUnits(), known, units, notes=lambda: notes)
+        ours = FrankaSessionArm(arm, kind, address)
+        if command.robot.recover:
+            _recover(ours, command.yes)
+        yield Opened(ours, units or NoUnits(), known, units, notes=lambda: notes)
+
+
+def _recover(arm: FrankaSessionArm, yes: bool) -> None:
+    """Let an arm that has stopped by itself recover; a person is asked first, for it may move a little."""
+    if not arm.reflex:
+        say(f"{arm.name} need not recover.")
+        return
+    if not yes:
+        demand_yes(f"{arm.name} has stopped by itself. Is it clear of what it touched, and may it recover?", _REFUSED)
+    arm.recover()
+    say(f"{arm.name} has recovered.")

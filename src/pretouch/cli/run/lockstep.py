@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pretouch.cli.run.asking import say
 from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
 from pretouch.cli.skin_keys import keys_file
@@ -16,9 +17,11 @@ from pretouch.hardware.franka.client import connect
 from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.lockstep import run_in_lockstep
 from pretouch.hardware.franka.lockstep_skin import LockstepSkin
+from pretouch.hardware.franka.sentences import MotionAborted
 from pretouch.hardware.keys import load_keys
 from pretouch.session.finding import refusals
 from pretouch.session.keeping import keeping
+from pretouch.session.motion import Ending, named
 from pretouch.session.session import NoUnits
 from pretouch.session.start import check_start
 from pretouch.session.watching import Watcher
@@ -26,13 +29,16 @@ from pretouch.types import ControlStep, RangeReadings
 
 
 def run_lockstep(command: Run, parts: Parts) -> int:
-    """Let a controller move a simulated arm that waits for it; return 0. Nobody is asked anything: nothing is real."""
+    """Let a controller move a simulated arm that waits for it; return 1 if that ended early, or else 0.
+
+    Nobody is asked anything: nothing is real.
+    """
     address, seconds = command.robot.ip, command.task.seconds
     _demand_here(address)
     if not seconds:
         raise RobotError("A run in lockstep needs --seconds: robot time passes as fast as this machine can.")
-    if command.task.approach or command.robot.confirm_push:
-        raise RobotError("--approach and --confirm-push do not go with --lockstep: leave them out.")
+    if command.task.approach or command.robot.confirm_push or command.robot.recover:
+        raise RobotError("--approach, --confirm-push and --recover do not go with --lockstep: leave them out.")
     with connect(address, command.robot.arm) as client, _units(command, parts) as readings_at:
         client.set_collision_behavior(collision_behavior(parts.profile, parts.model))
         q = client.read().q
@@ -40,16 +46,27 @@ def run_lockstep(command: Run, parts: Parts) -> int:
         refused = refusals(check_start(controller, q))
         if refused:
             raise RobotError(refused[0])
-        print("In lockstep nothing is checked, and no push is asked for: the arm is a simulated one.", flush=True)
+        say("In lockstep nothing is checked, and no push is asked for: the arm is a simulated one.")
         place, folder = Path(command.record) if command.record else None, Path(command.holds)
-        with keeping(controller, f"{command.robot.arm} at {address}, in lockstep", place, folder) as kept:
-            watcher = Watcher(kept.recorder, print, "", controller.limits.period)
+        name, ending = f"{command.robot.arm} at {address}, in lockstep", Ending()
+        with keeping(controller, name, place, folder, say) as kept:
+            watcher = Watcher(kept.recorder, say, "", controller.limits.period)
             try:
                 run_in_lockstep(client, controller, readings_at, watcher, _Until(seconds))
+            except Exception as error:
+                ending = _ended(error)
+                if not watcher.course.steps:
+                    raise
             finally:
                 said = (*watcher.course.sentences(controller.limits.period), *kept.close())
-                print("\n".join(("The arm is at rest.", *said)), flush=True)
-    return 0
+                say("\n".join((*ending.sentences(), *said)))
+    return int(ending.early or bool(kept.trouble))
+
+
+def _ended(error: Exception) -> Ending:
+    """Return how a motion ended by an error: a connection that was lost tells nothing of the arm."""
+    lost = isinstance(error, MotionAborted) and not error.errors
+    return Ending(named(error), named(error) if lost else "")
 
 
 def _demand_here(address: str) -> None:

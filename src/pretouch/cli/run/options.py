@@ -23,6 +23,8 @@ class RobotOptions:
     """The robot is a `pretouch serve-fci --lockstep` on this machine: it waits for each command."""
     confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Ask for the guided pushes although the force sign of this robot is confirmed."""
+    recover: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """With franka: let an arm that has stopped by itself recover first, once what it touched is cleared."""
     ros_sign: Literal["", "on-robot", "by-robot"] = ""
     """With ros2, required: whose force the wrench topic gives, on the robot by its environment or by the robot."""
     ros_frame: Literal["", "base", "ee"] = ""
@@ -33,6 +35,18 @@ class RobotOptions:
     """With ros2 and velocities: name of the ros2_control controller that takes them."""
     ros_timeout: float = 0.0
     """With ros2 and velocities: its command time-out [s]."""
+    ros_own_clock: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """With ros2: the time of ROS is not this machine's time of day, as in a simulation or on another machine."""
+    ros_joint_states: str = "/joint_states"
+    """With ros2: topic of the joint states."""
+    ros_joints: tuple[str, ...] = ()
+    """With ros2: names of the joints in the messages; by default the arm's own."""
+    ros_wrench: str = "/wrench"
+    """With ros2: topic of the wrench."""
+    ros_commands: str = ""
+    """With ros2: topic of the commands; by default that of a joint_trajectory_controller, or of --ros-controller."""
+    ros_ranges: str = "/skin/{unit}/range"
+    """With ros2: topic of the units' ranges; {unit} stands for the id of each."""
     ros_distribution: Literal["foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical"] = "jazzy"
     """With ros2: the distribution, which decides the layout of ranges."""
     ros_domain: int = -1
@@ -81,7 +95,7 @@ class TaskOptions:
 class Run:
     """Move an arm: checks, a guided push that confirms the force sign, the controller in real time, and rest.
 
-    The exit code is 1 if the run ended early, 2 if it was refused.
+    The exit code is 1 if the run ended early or its recording failed, 2 if it was refused before anything moved.
     """
 
     robot: RobotOptions = field(default_factory=RobotOptions)
@@ -114,6 +128,11 @@ def check_options(command: Run) -> None:
             "With --robot ros2 both --ros-sign and --ros-frame must be given: ROS 2 says of no wrench whose force it"
             " is; see the documentation of your robot's driver."
         )
+    if kind == "ros2" and command.task.approach:
+        raise RobotError(
+            "--approach does not go with --robot ros2, which tells no joint torques that could stop the arm on the way:"
+            " guide it to the start of its path."
+        )
     if units.no_skin and (units.skin or units.keys):
         raise HardwareError("--no-skin does not go with --skin and --keys: leave one or the other out.")
     if not units.units_host:
@@ -125,10 +144,10 @@ def check_options(command: Run) -> None:
 
 
 _ONLY = {
-    "franka": ("ip", "lockstep"),
+    "franka": ("ip", "lockstep", "recover"),
     "ros2": (
-        "ros_sign", "ros_frame", "ros_command", "ros_controller", "ros_timeout", "ros_distribution", "ros_domain",
-        "ros_interface",
+        "ros_sign", "ros_frame", "ros_command", "ros_controller", "ros_timeout", "ros_own_clock", "ros_joint_states",
+        "ros_joints", "ros_wrench", "ros_commands", "ros_ranges", "ros_distribution", "ros_domain", "ros_interface",
     ),
 }  # fmt: skip
 """Options that only one kind of robot has."""

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from typing import Protocol
 
 from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
@@ -22,7 +23,16 @@ from pretouch.session.signals import children_undisturbed
 from pretouch.session.units import Units
 
 
-def _no_output(_controller: Controller) -> AbstractContextManager[Recorder | None]:
+class Output(Recorder, Protocol):
+    """What else is told of each control step."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know of that, a sentence each."""
+        ...
+
+
+def _no_output(_controller: Controller) -> AbstractContextManager[Output | None]:
     return nullcontext()
 
 
@@ -40,7 +50,7 @@ class Opened:
     """Called as a person is asked to push: a simulated one does."""
     notes: Callable[[], tuple[str, ...]] = lambda: ()
     """What is to be known of the connection by now, a sentence each."""
-    output: Callable[[Controller], AbstractContextManager[Recorder | None]] = _no_output
+    output: Callable[[Controller], AbstractContextManager[Output | None]] = _no_output
     """Opens what else is told of each control step."""
 
 

@@ -1,0 +1,120 @@
+"""The part of `pretouch run` in which the arm moves: to the start of its path, along it, to rest, and the report."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pretouch.calibration.motion.plan import Plan
+from pretouch.cli.run.asking import say
+from pretouch.cli.run.options import Run
+from pretouch.cli.run.robots import Opened
+from pretouch.errors import HardwareError, PretouchError
+from pretouch.loop import MonotonicClock
+from pretouch.session.finding import refusals
+from pretouch.session.keeping import Kept, keeping
+from pretouch.session.motion import Ending, Wishes, follow, go, named
+from pretouch.session.session import Session
+from pretouch.session.signals import signals_noted
+from pretouch.session.start import check_start
+from pretouch.session.terminal import EnterKey, Narrator
+from pretouch.session.units import Units
+from pretouch.session.watching import Watcher
+from pretouch.types import ControlStep
+
+_ALIVE_EVERY = 50
+"""Control steps between two looks at whether the receiver of the units lives."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """Where the arm is let go."""
+
+    approach: Plan | None
+    """To the start of its path, if it goes there first."""
+    seconds: float
+    """How long it follows the path [s]; infinite until it is stopped."""
+
+
+def moved(command: Run, session: Session, found: Opened, way: Way, last: ExitStack) -> int:
+    """Let the arm move and report, whatever ends it; return 1 if it did not end as asked, or else 0.
+
+    All that the run is kept in is opened first. From the report to the end of `last`, signals are only noted.
+    """
+    controller, enter = session.controller, EnterKey()
+    latched = " Press Enter to resume." if enter.possible else " There is no terminal to resume at: end the run."
+    place = Path(command.record) if command.record else None
+    ending, clock = Ending(), MonotonicClock(controller.limits.period)
+    with ExitStack() as stack:
+        tell = stack.enter_context(Narrator(say))
+        further = stack.enter_context(found.output(controller))
+        kept = stack.enter_context(keeping(controller, session.arm.name, place, Path(command.holds), tell, further))
+        watcher = Watcher(kept.recorder, tell, latched, controller.limits.period)
+        try:
+            if _arrived(session, way.approach, tell, ending):
+                _follow(command, session, way, watcher, enter, clock, tell, ending)
+        finally:
+            last.enter_context(signals_noted())
+            tell.close()
+            _report(session, watcher, clock, kept, ending, further.notes if further else ())
+    return int(ending.early or bool(kept.trouble))
+
+
+def _arrived(session: Session, approach: Plan | None, tell: Callable[[str], None], ending: Ending) -> bool:
+    """Let the arm go to where its path begins, if it is to; return whether it is there."""
+    if approach is None:
+        return True
+    go(session.arm, session.controller, approach, ending)
+    if not ending.early:
+        try:
+            ending.stopped = " ".join(refusals(check_start(session.controller, np.array(session.arm.read().q))))
+        except PretouchError as error:
+            ending.stopped = named(error)
+    if ending.early:
+        ending.stopped = f"The arm did not get to the start of its path. {ending.stopped}"
+        return False
+    tell("The arm is at the start of its path, and at rest.")
+    return True
+
+
+def _follow(
+    command: Run, session: Session, way: Way, watcher: Watcher, enter: EnterKey, clock: MonotonicClock,
+    tell: Callable[[str], None], ending: Ending,
+) -> None:  # fmt: skip
+    """Let the controller move the arm."""
+    until, wishes = _Until(way.seconds, session.units), Wishes(command.priority, command.cpu)
+    try:
+        follow(session.arm, session.skin, session.controller, clock, watcher, until, enter, wishes, tell, ending)
+    except PretouchError as error:  # before the arm took the controller's commands
+        if way.approach is None:
+            raise
+        ending.stopped = named(error)
+
+
+def _report(
+    session: Session, watcher: Watcher, clock: MonotonicClock, kept: Kept, ending: Ending, notes: tuple[str, ...]
+) -> None:
+    """Close what the run is kept in, and say how it was."""
+    lines = list(ending.sentences())
+    if watcher.course.steps:
+        lines += [*watcher.course.sentences(clock.period), str(clock.timing())]
+    lines += [said for said in (session.arm.report(), *notes, *kept.close()) if said]
+    say("\n".join(lines))
+
+
+class _Until:
+    """When a run is over."""
+
+    def __init__(self, seconds: float, units: Units | None) -> None:
+        self._seconds, self._units = seconds, units
+        self._begin, self._steps = 0.0, 0
+
+    def __call__(self, step: ControlStep) -> bool:
+        """Whether this step was the last; a receiver that has ended is a HardwareError."""
+        self._begin = self._begin if self._steps else step.stamp
+        self._steps += 1
+        if self._units and self._steps % _ALIVE_EVERY == 0 and not self._units.alive:
+            raise HardwareError("The receiver of the units has ended: what it printed tells why.")
+        return step.stamp - self._begin >= self._seconds
