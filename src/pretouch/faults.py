@@ -16,6 +16,9 @@ _LARGEST = 1e3
 _FASTEST = 2.0
 """Times the arm's limit: a commanded joint velocity from here on is none that any arm was ever given."""
 
+_STRONGEST = 1e4
+"""An external torque [Nm] from here on is none."""
+
 _LATEST = 1e12
 """A time stamp [s] from here on is none, whatever the clock began with."""
 
@@ -42,14 +45,19 @@ def watch_init(robot: RobotState) -> Watch:
 
 
 def examine(
-    watch: Watch, inputs: Inputs, command: FloatArray, period: float, qd_max: FloatArray, params: FailureParams
+    watch: Watch,
+    inputs: Inputs,
+    command: FloatArray,
+    period: float,
+    qd_max: FloatArray,
+    params: FailureParams,
+    torques: bool = False,
 ) -> tuple[RobotState, dict[Event, str], Watch]:
     """Return the robot state to go by, the faults found, and what to remember.
 
     In place of a state that cannot be believed stands the last one that could, moved on by the last command. One from
     before the last command, lost or late, is moved on by the commands it cannot know of: the next one may differ from
-    the last one sent by so much only. What is returned shares no memory with the inputs but
-    `tau_ext`, which no step reads.
+    the last one sent by so much only. What is returned shares no memory with the inputs.
 
     Args:
         watch: memory.
@@ -58,6 +66,7 @@ def examine(
         period: time that command was held [s].
         qd_max: (n,) joint velocity limits [rad/s].
         params: time limits.
+        torques: whether the torques of the external force are needed, rather than the force.
     """
     faults: dict[Event, str] = {}
     robot, wrong = sound_robot(inputs.robot, qd_max)
@@ -76,13 +85,17 @@ def examine(
         sent = ()
     if robot is None or faults:
         last = watch.robot
-        believed = replace(last, q_commanded=last.q_commanded + command * period, qd_commanded=command, wrench=None)
+        believed = replace(
+            last, q_commanded=last.q_commanded + command * period, qd_commanded=command,
+            tau_ext=np.full(len(last.q), np.nan), wrench=None,
+        )  # fmt: skip
         return believed, faults, Watch(now, believed, min(watch.force_stamp, now), sent)
     if robot.stamp <= watch.stamp < now:
         robot = replace(robot, q_commanded=_moved_on(robot, now, sent), qd_commanded=command)
     if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
         robot = replace(robot, wrench=None)
-    force_stamp = min(watch.force_stamp, now) if robot.wrench is None else now
+    missing = np.isnan(robot.tau_ext).any() if torques else robot.wrench is None
+    force_stamp = min(watch.force_stamp, now) if missing else now
     if now - watch.stamp > params.overrun_s:
         faults[Event.OVERRUN] = f"{now - watch.stamp:.3f} s"
     if now - force_stamp > params.force_timeout_s:
@@ -114,7 +127,7 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
     """Copy a robot's state as arrays of float64, or say what keeps it from being that of an arm with these limits."""
     try:
         stamp, given = _time(robot.stamp), (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
-        tau_ext = robot.tau_ext
+        tau_ext = _torques(robot.tau_ext, len(qd_max))
         wrench = None if robot.wrench is None else np.array(robot.wrench, dtype=np.float64)
     except AttributeError:
         return None, f"it is {robot!r}"
@@ -135,6 +148,16 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
         i, j = np.argwhere(~(np.abs(numbers) < bounds))[0]
         return None, f"{_PARTS[i]} hold {numbers[i, j]:g}"
     return RobotState(stamp, numbers[0], numbers[1], numbers[2], numbers[3], tau_ext, wrench), ""
+
+
+def _torques(given: object, joints: int) -> FloatArray:
+    """Copy external torques as (n,) of float64; what can be none is NaN."""
+    try:
+        torques = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        torques = np.zeros(0)
+    sound = torques.shape == (joints,) and below(torques, _STRONGEST)
+    return torques if sound else np.full(joints, np.nan)
 
 
 @compiled

@@ -18,11 +18,16 @@ class Event(Enum):
     OVERRUN = auto()
     LATCHED = auto()
     REACTING = auto()
+    CLAMPED = auto()
+    OPENING = auto()
+    YIELDING = auto()
     CONTACT = auto()
     SKIN_UNFIT = auto()
     SKIN_SILENT = auto()
     NO_FORCE = auto()
+    GIVEN_UP = auto()
     WINDOW_FILLING = auto()
+    PATH_BLOCKED = auto()
     CLEAR = auto()
 
 
@@ -36,6 +41,8 @@ class Transition:
     sentence: str
     latches: bool = False
     """Whether the HOLD lasts until a person resumes."""
+    soft: bool = False
+    """Whether the arm may yield to a push while it holds: not where state, time or answer cannot be trusted."""
 
 
 _ANY = frozenset(Mode)
@@ -70,25 +77,46 @@ TABLE: tuple[Transition, ...] = (
     Transition(Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT, "A contact of {}: moving with it."),
     Transition(Event.REACTING, frozenset({Mode.REACT}), Mode.REACT, "Moving with a contact: {} left."),
     Transition(
+        Event.CLAMPED, frozenset({Mode.REACT}), Mode.HOLD,
+        "The arm was caught between two things while it yielded ({}) and has opened the way it came: free it, then"
+        " resume.",
+        latches=True, soft=True,
+    ),
+    Transition(
+        Event.OPENING, frozenset({Mode.REACT}), Mode.REACT,
+        "Caught between two things while yielding ({}): opening the way it came.",
+    ),
+    Transition(
+        Event.YIELDING, frozenset({Mode.REACT}), Mode.REACT, "Yielding to a contact: the task goes on {}.",
+    ),
+    Transition(
         Event.SKIN_UNFIT, _ANY, Mode.HOLD,
         "The readings do not fit the skin ({}): give one of each unit, in the order of the skin.",
+        soft=True,
     ),
     Transition(
         Event.SKIN_SILENT, _ANY, Mode.HOLD,
         "No usable reading from {}: check the unit's power, radio and sensor; the arm goes on when it is heard again.",
+        soft=True,
     ),
     Transition(
         Event.NO_FORCE, _ANY, Mode.HOLD,
         "The robot has given no force estimate for {}, as near a singularity, and contacts could not be felt: guide"
         " the arm to another posture.",
+        soft=True,
     ),
     Transition(
         Event.OVERRUN, _ANY, Mode.HOLD,
         "The step before this one was {} ago: braking; give the controller a process of its own.",
     ),
+    Transition(Event.GIVEN_UP, _ANY, Mode.HOLD, "Given up after {}.", soft=True),
     Transition(
         Event.WINDOW_FILLING, _ANY, Mode.HOLD,
         "The force window is filling ({}): contacts cannot be told from noise yet.",
+    ),
+    Transition(
+        Event.PATH_BLOCKED, frozenset({Mode.TRACK}), Mode.TRACK,
+        "Something near has kept the hand from its path for {}: waiting for the way to clear.",
     ),
     Transition(Event.CLEAR, _ANY, Mode.TRACK, "Following the path."),
 )  # fmt: skip
@@ -102,6 +130,8 @@ class ModeState:
     mode: Mode
     reason: str
     latched: bool = False
+    soft: bool = False
+    """Whether the arm may yield to a push while it holds."""
 
 
 _CLEAR = ModeState(Mode.TRACK, TABLE[-1].sentence)
@@ -126,4 +156,5 @@ def next_mode(state: ModeState, events: Mapping[Event, str], resume: bool) -> Mo
     if state.latched and not resume:
         seen[Event.LATCHED] = state.reason
     row = next(row for row in TABLE if row.event in seen and state.mode in row.source)
-    return ModeState(row.target, row.sentence.format(seen[row.event]), row.latches)
+    soft = state.soft if row.event is Event.LATCHED else row.soft
+    return ModeState(row.target, row.sentence.format(seen[row.event]), row.latches, soft)

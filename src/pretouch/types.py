@@ -74,7 +74,7 @@ class RobotState:
     qd_commanded: FloatArray
     """(n,) joint velocities the robot's motion generator is at [rad/s] (the vendor's dq_d)."""
     tau_ext: FloatArray
-    """(n,) estimated torques by the environment on the joints [Nm]."""
+    """(n,) estimated torques by the environment on the joints [Nm]; within a step NaN where the robot gave none."""
     wrench: FloatArray | None
     """(6,) estimated force [N] and torque about the TCP [Nm] **on the robot by the environment**, base frame.
 
@@ -123,6 +123,9 @@ class Obstacles:
     """(K, 3) unit vectors from body to obstacle, defined in penetration too."""
     body_distance: FloatArray
     """(K,) signed distance from the body's surface, less the point's spread [m] (eqs. 5-7)."""
+    closing_speed: FloatArray
+    """(K,) estimated speed of the object itself towards the closest body point, the arm's own motion not in it [m/s];
+    0 where it is not known or not estimated."""
 
 
 @value
@@ -244,7 +247,11 @@ class ControlStep:
     restricted: IntArray
     """(K',) which of the obstacles restrict the arm."""
     approach_limit: FloatArray
-    """(K',) approach limit of eq. 7 for each of them [m/s]."""
+    """(K',) approach limit for each of them, of eq. 7 or in mode braking of the braking curve [m/s]."""
     qp: QpSolution
     command: FloatArray
     """(n,) joint velocity command [rad/s]."""
+    residual: FloatArray
+    """(n,) external joint torques less what the detector takes for free motion [Nm], NaN where there are none."""
+    evidence: float
+    """How far the detector is on the way to a contact: one from 1 on, while armed."""

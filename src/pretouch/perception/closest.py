@@ -39,13 +39,13 @@ def closest_points(
     direction, ee_distance = last_direction.astype(np.float64), np.empty(count)
     closest(body.link, a, b, body.radius, point, body_point, link, direction, distance)
     distances(point, ee_position, ee_distance)
-    return Obstacles(unit, point, ee_distance, body_point, link, direction, distance)
+    return Obstacles(unit, point, ee_distance, body_point, link, direction, distance, np.zeros(count))
 
 
 def no_obstacles() -> Obstacles:
     """Return the empty set."""
     none, vectors = np.zeros(0), np.zeros((0, 3))
-    return Obstacles(np.zeros(0, np.int64), vectors, none, vectors, np.zeros(0, np.int64), vectors, none)
+    return Obstacles(np.zeros(0, np.int64), vectors, none, vectors, np.zeros(0, np.int64), vectors, none, none)
 
 
 @compiled

@@ -3,6 +3,7 @@
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.perception.closing import motion_init
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MAX_DISTANCE, MIN_DISTANCE
@@ -20,6 +21,8 @@ class TrackState:
     """(K, 3) last direction from the body to the point."""
     times: FloatArray
     """(3, K) instants `seen`, `used` and `heard` [s]."""
+    motion: FloatArray
+    """(2, K, 3) smoothed place [m] and velocity [m/s] of each unit's point, where closing speeds are estimated."""
 
     @property
     def seen(self) -> FloatArray:
@@ -42,7 +45,9 @@ SEEN, USED, HEARD = range(3)
 
 def track_init(units: int) -> TrackState:
     """Return the state before any reading."""
-    return TrackState(np.full((units, 3), np.nan), np.full((units, 3), np.nan), np.full((3, units), -np.inf))
+    return TrackState(
+        np.full((units, 3), np.nan), np.full((units, 3), np.nan), np.full((3, units), -np.inf), motion_init(units)
+    )
 
 
 def sensor_poses(skin: Skin, kin: Kinematics) -> tuple[FloatArray, FloatArray]:
@@ -156,7 +161,7 @@ def track(
     """
     point, times = state.point.copy(), state.times.copy()
     take_in(point, times, readings.stamp, points, is_fresh(state, readings, now), shows, tells, now, persistence)
-    return TrackState(point, state.direction, times)
+    return TrackState(point, state.direction, times, state.motion)
 
 
 @compiled

@@ -5,6 +5,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.params import PerceptionParams
 from pretouch.perception.closest import closest, distances, no_obstacles
+from pretouch.perception.closing import closing_speeds, follow_points, reckon
 from pretouch.perception.obstacles import (
     HEARD,
     SEEN,
@@ -23,6 +24,7 @@ from pretouch.perception.spread import bring_nearer, widen
 from pretouch.perception.vectors import placed_ends, rotate
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import MIN_DISTANCE
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus
 from pretouch.values import value
 
@@ -58,16 +60,19 @@ def perceive(
     if not params.enabled or len(skin) == 0:
         return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0), state
     arm, body, others, count = model.capsules, model.body, fixtures.capsules, len(skin)
-    tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy())
+    motion = state.motion.copy() if params.closing_speed else state.motion
+    tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy(), motion)
     distance = np.empty(count)
-    indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.empty((2, count))
+    indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
     found, nearest, oldest = _perceive(
-        tracks.point, tracks.direction, tracks.times,
+        tracks.point, tracks.direction, tracks.times, tracks.motion,
         kin.position, kin.rotation, model.ee, skin.link, skin.T_link_sensor,
         readings.stamp, readings.distance, readings.status, now,
         arm.link, arm.a, arm.b, arm.radius, body.link, body.a, body.b, body.radius,
         others.link, others.a, others.b, others.radius, fixtures.planes, RAYS,
         params.persistence_s, params.self_margin_m, params.filter_views,
+        params.closing_memory_s if params.closing_speed else 0.0, params.reckon_below_minimum,
+        params.silent_after_s if params.keep_while_silent else 0.0,
         0.0 if skin.exact else params.spread_sigmas, skin.position_sigma, skin.orientation_sigma,
         distance, indices, vectors, scalars,
     )  # fmt: skip
@@ -75,20 +80,21 @@ def perceive(
         unit=indices[0, :found], link=indices[1, :found],
         point=vectors[0, :found], body_point=vectors[1, :found], direction=vectors[2, :found],
         ee_distance=scalars[0, :found], body_distance=scalars[1, :found],
+        closing_speed=scalars[2, :found],
     )  # fmt: skip
     return Perception(obstacles, distance, nearest, now - oldest), tracks
 
 
 @compiled
 def _perceive(
-    point: FloatArray, last_direction: FloatArray, times: FloatArray,
+    point: FloatArray, last_direction: FloatArray, times: FloatArray, motion: FloatArray,
     link_position: FloatArray, link_rotation: FloatArray, ee: int, unit_link: IntArray, T_link_sensor: FloatArray,
     stamp: FloatArray, reading: FloatArray, status: IntArray, now: float,
     arm_link: IntArray, arm_a: FloatArray, arm_b: FloatArray, arm_radius: FloatArray,
     body_link: IntArray, body_a: FloatArray, body_b: FloatArray, body_radius: FloatArray,
     other_link: IntArray, other_a: FloatArray, other_b: FloatArray, other_radius: FloatArray, planes: FloatArray,
-    rays: FloatArray, persistence: float, margin: float, filter_views: bool,
-    sigmas: float, position_sigma: FloatArray, orientation_sigma: FloatArray,
+    rays: FloatArray, persistence: float, margin: float, filter_views: bool, memory: float, reckoned: bool,
+    silence: float, sigmas: float, position_sigma: FloatArray, orientation_sigma: FloatArray,
     distance: FloatArray, indices: IntArray, vectors: FloatArray, scalars: FloatArray,
 ) -> tuple[int, float, float]:  # fmt: skip
     """Change the tracks (first line of arguments), write obstacles (last line).
@@ -119,6 +125,13 @@ def _perceive(
             )
             leave_out_planes(shows, fresh, ends, position, rotation, planes, rays)
         points = locate(position, rotation, distance)
+        if reckoned:
+            reckon(
+                points, distance, point, times[SEEN], stamp, motion, position, rotation, MIN_DISTANCE, 3 * persistence
+            )
+        if memory > 0:
+            taken = fresh & shows & (now - stamp <= persistence)
+            follow_points(motion, point, times[SEEN], points, stamp, taken, memory)
         take_in(point, times, stamp, points, fresh, shows, tells, now, persistence)
 
     # the points, as long as they last
@@ -126,7 +139,8 @@ def _perceive(
     ee_distance, body_distance = scalars[0], scalars[1]
     found = 0
     for k in range(len(unit)):
-        if now - times[SEEN, k] <= persistence:
+        unanswered = times[HEARD, k] <= times[SEEN, k]
+        if now - times[SEEN, k] <= (max(persistence, silence) if unanswered else persistence):
             unit[found] = k
             for i in range(3):
                 near[found, i], direction[found, i] = point[k, i], last_direction[k, i]
@@ -145,6 +159,8 @@ def _perceive(
             body_distance, ee_distance, near, unit, sigmas, position_sigma, orientation_sigma, unit_link, T_link_sensor,
             link_position, link_rotation,
         )  # fmt: skip
+    if memory > 0:
+        closing_speeds(motion, unit[:found], direction, scalars[2])
     nearest, oldest = np.inf, np.inf
     for m in range(found):
         nearest = min(nearest, ee_distance[m])

@@ -9,7 +9,7 @@ from pretouch.compiled import compiled
 from pretouch.errors import RobotModelError
 from pretouch.robot.body import Capsules, capsules_of
 from pretouch.robot.description import RobotDescription
-from pretouch.types import BoolArray, FloatArray
+from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value
 
 
@@ -75,6 +75,17 @@ class RobotModel:
         """The part of the body that any joint moves."""
         if not len(self.body):
             raise RobotModelError(f"{description.name}: no joint moves a capsule: give the links capsule geoms.")
+        self.mass: FloatArray = self._model.body_mass.copy()
+        """(L,) mass of each link [kg]."""
+        self.com: FloatArray = self._model.body_ipos.copy()
+        """(L, 3) centre of mass of each link, link frame [m]."""
+        self.inertia: FloatArray = self._inertia()
+        """(L, 3, 3) of each link about it, axes of the link frame [kg m^2]."""
+        self.parts: IntArray = np.unique(self.body.link)
+        """(P,) links of the body."""
+        centers = (self.body.a + self.body.b) / 2
+        self.middle: FloatArray = np.array([centers[self.body.link == part].mean(axis=0) for part in self.parts])
+        """(P, 3) the middle of each one's capsules, link frame [m]."""
         self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
         self.q_max: FloatArray = self._model.jnt_range[:, 1].copy()
         self.q_mid: FloatArray = (self.q_min + self.q_max) / 2
@@ -104,6 +115,14 @@ class RobotModel:
             start, count = self._model.body_jntadr[body], self._model.body_jntnum[body]
             moved[body, start : start + count] = True
         return moved
+
+    def _inertia(self) -> FloatArray:
+        principal, turned = np.empty((self._model.nbody, 3, 3)), np.empty(9)
+        for body in range(self._model.nbody):
+            mujoco.mju_quat2Mat(turned, self._model.body_iquat[body])
+            R = turned.reshape(3, 3)
+            principal[body] = R @ np.diag(self._model.body_inertia[body]) @ R.T
+        return principal
 
     def link_index(self, name: str) -> int:
         """Return the index of a link; an unknown name is a RobotModelError that lists those there are."""
@@ -136,6 +155,17 @@ class RobotModel:
         mass_matrix, _ = self.mass_matrix_and_bias(q, np.zeros(self.n), gravity)
         mass_matrix, bias = self.mass_matrix_and_bias(q, qd, np.zeros(self.n))
         return Dynamics(mass_matrix, bias - gravity, gravity)
+
+    def mass_matrix(self, q: FloatArray) -> FloatArray:
+        """Compute the mass matrix (n, n) [kg m^2] at q (n,) [rad]."""
+        model, data = self._model, self._data
+        self._qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_crb(model, data)
+        mass_matrix = np.zeros((self.n, self.n))
+        mujoco.mj_fullM(model, data, mass_matrix)
+        return mass_matrix
 
     def mass_matrix_and_bias(self, q: FloatArray, qd: FloatArray, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compute the mass matrix (n, n) and, into `bias` (n,), Coriolis plus gravity torques [Nm]."""

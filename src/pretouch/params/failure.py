@@ -1,0 +1,23 @@
+"""Parameters of failure: when to stop trusting the inputs."""
+
+from dataclasses import dataclass
+
+from pretouch.checks import Checked, Positive, PositiveCount
+
+
+@dataclass(frozen=True)
+class FailureParams(Checked):
+    """When to stop trusting the inputs."""
+
+    state_timeout_s: Positive = 0.05
+    """Age of the robot state at which the arm holds [s]."""
+    overrun_s: Positive = 0.05
+    """Time between two steps from which the later one brakes [s]: a command is meant to be held for one period."""
+    force_max_n: Positive = 1e5
+    """Wrench component from which an estimate is no estimate [N, Nm]: far more than any arm survives. Let in, it would
+    spoil the window's sums."""
+    force_timeout_s: Positive = 0.2
+    """Time without a force estimate after which the arm holds [s]."""
+    solver_iterations: PositiveCount = 500
+    """Iterations of the QP solver after which the arm brakes. A bound on its time that is the same in each replay; most
+    steps need less than 10."""

@@ -1,0 +1,90 @@
+"""How fast an object itself comes nearer: what a unit's points do in the base frame, where the arm's motion is not."""
+
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.types import BoolArray, FloatArray, IntArray
+
+FASTEST = 2.0
+"""Fastest motion of a person's hand that is believed [m/s]."""
+_ON_ITS_OWN = 0.1
+"""Speed above which something nearer than a sensor measures is taken to come nearer by itself [m/s]."""
+_JUMP = 0.06
+"""By how much two readings of one surface may differ beside that, noise and the width of the cone [m]."""
+
+
+def motion_init(units: int) -> FloatArray:
+    """Return what is known of each unit's point (2, K, 3) before any reading: no place and no velocity, NaN."""
+    return np.full((2, units, 3), np.nan)
+
+
+@compiled
+def follow_points(
+    motion: FloatArray, last: FloatArray, last_stamp: FloatArray, points: FloatArray, stamp: FloatArray,
+    taken: BoolArray, memory: float,
+) -> None:  # fmt: skip
+    """Take the points (K, 3) that are `taken` (K,) into the motion (2, K, 3): smoothed places [m], velocities [m/s].
+
+    A fading-memory filter, the least squares of a straight line with weights that fall by 1/e in `memory` [s]: with
+    theta = exp(-dt / memory) it corrects the place by 1 - theta^2 and the velocity by (1 - theta)^2 / dt of what was
+    not foreseen. A point farther from the unit's last than a hand moves is of another surface, and begins anew, with
+    velocity 0. `last` (K, 3), `last_stamp` (K,) [s] and `stamp` are those of the readings before and now.
+    """
+    for k in range(len(taken)):
+        if not taken[k]:
+            continue
+        dt, away2 = stamp[k] - last_stamp[k], 0.0
+        for i in range(3):
+            away2 += (points[k, i] - last[k, i]) ** 2
+        known = not np.isnan(motion[0, k, 0]) and 0.0 < dt <= 3.0 * memory
+        if not known or away2 > (FASTEST * dt + _JUMP) ** 2:
+            for i in range(3):
+                motion[0, k, i], motion[1, k, i] = points[k, i], 0.0
+            continue
+        theta = np.exp(-dt / memory)
+        for i in range(3):
+            foreseen = motion[0, k, i] + dt * motion[1, k, i]
+            missed = points[k, i] - foreseen
+            motion[0, k, i] = foreseen + (1.0 - theta * theta) * missed
+            motion[1, k, i] += (1.0 - theta) ** 2 / dt * missed
+
+
+@compiled
+def reckon(
+    points: FloatArray, distance: FloatArray, last: FloatArray, last_stamp: FloatArray, stamp: FloatArray,
+    motion: FloatArray, position: FloatArray, rotation: FloatArray, least: float, within: float,
+) -> None:  # fmt: skip
+    """Put points (K, 3) that are nearer than the sensor measures where they were last seen, as far as that may be.
+
+    A reading of `least` [m] says only that something is between 0 and that. Where the unit saw a point up to `within`
+    [s] before, it is on the beam at the height of that, moved on if it came nearer by itself faster than 0.1 m/s;
+    where it saw none, it is at the sensor. `position` (K, 3) and `rotation` (K, 3, 3) are the sensors' poses.
+    """
+    for k in range(len(distance)):
+        if not distance[k] <= least:
+            continue
+        dt, ahead, nearing = stamp[k] - last_stamp[k], 0.0, 0.0
+        if 0.0 <= dt <= within:
+            for i in range(3):
+                ahead += rotation[k, i, 2] * (last[k, i] - position[k, i])
+                if not np.isnan(motion[1, k, i]):
+                    nearing -= rotation[k, i, 2] * motion[1, k, i]
+            if nearing > _ON_ITS_OWN:
+                ahead -= dt * nearing
+        ahead = min(max(ahead, 0.0), least)
+        for i in range(3):
+            points[k, i] = position[k, i] + rotation[k, i, 2] * ahead
+
+
+@compiled
+def closing_speeds(motion: FloatArray, unit: IntArray, direction: FloatArray, out: FloatArray) -> None:
+    """Write the speed (M,) [m/s] at which each obstacle comes nearer: its velocity against the direction (M, 3) to it.
+
+    0 where nothing is known, never more than a person's hand reaches.
+    """
+    for m in range(len(unit)):
+        k, speed = unit[m], 0.0
+        if not np.isnan(motion[0, k, 0]):
+            for i in range(3):
+                speed -= motion[1, k, i] * direction[m, i]
+        out[m] = min(max(speed, -FASTEST), FASTEST)
