@@ -17,7 +17,7 @@ def points(*at: tuple[float, float, float]) -> Obstacles:
     p, k = np.array(at).reshape(-1, 3), len(at)
     zero = np.zeros((k, 3))
     return Obstacles(
-        np.arange(k), p, np.linalg.norm(p - EE, axis=1), zero, np.zeros(k, np.int64), zero, np.zeros(k)
+        np.arange(k), p, np.linalg.norm(p - EE, axis=1), zero, np.zeros(k, np.int64), zero, np.zeros(k), np.zeros(k)
     )  # fmt: skip
 
 

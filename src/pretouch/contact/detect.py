@@ -19,6 +19,12 @@ class Detection:
     contact: Contact | None
     armed: bool
     """Whether the window was full before this sample."""
+    residual: FloatArray
+    """(n,) external joint torques less what the detector takes for free motion [Nm]; NaN without torques."""
+    evidence: float
+    """How far the test is on the way to a contact: one from 1 on, while armed."""
+    learning: bool = False
+    """Whether the sample is to be learnt as free motion."""
 
 
 def detect(
@@ -31,7 +37,8 @@ def detect(
     """Add a force sample to the window (eq. 8), move the thresholds (eqs. 9-11) and hold the sample against them.
 
     Mean and deviation are those of the window with the newest value in it. Without an estimate (`force` None) the
-    window stays as it is and nothing is detected. Nothing is detected either before the window is full.
+    window stays as it is and nothing is detected. Nothing is detected either before the window is full. Residual and
+    evidence are for `feel` to fill in.
     """
     armed, p, parts = state.full, params, np.empty((6, 3))
     chunk, at, sums = place(state)
@@ -45,7 +52,7 @@ def detect(
     if force is not None and found and armed:
         compared = after.newest if p.compare == "filtered" else force
         contact = Contact(external_force(compared, limits.mean), crossed(compared, limits))
-    return Detection(limits, contact, armed), after
+    return Detection(limits, contact, armed, _NONE, 0.0), after
 
 
 _NONE = np.full(3, np.nan)

@@ -1,0 +1,300 @@
+"""What a robot's external torques are in free motion: a mean and a spread, learnt while nothing is near.
+
+The mean of each joint's torque is linear in what physics gives (see `features`): an offset, friction, and the gravity
+of each link's error of mass. Its coefficients follow by recursive least squares with a prior, so that before anything
+is learnt the mean is zero and uncertain.
+
+The spread is S = M A M^T + D: the noise of the measured joint velocities enters an observer's torques through the mass
+matrix M(q), so that it is correlated between the joints and turns with the posture; D is what each joint adds. The
+variances A and D, diagonal, follow by expectation and maximisation, one small step a block, with an outlier counting
+less (the weights of a Student distribution).
+
+What is learnt waits in a queue of blocks for `QUEUE` of them, and the queue is emptied when a contact is suspected: the
+beginning of a contact is never learnt.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.contact.gaussian import backward, factor, forward
+from pretouch.errors import ParameterError
+from pretouch.params import DetectionParams
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.types import BoolArray, FloatArray
+from pretouch.values import value
+
+BLOCK = 4
+"""Samples that are learnt as one: their sums."""
+QUEUE = 8
+"""Blocks that wait: 0.3 s at 100 Hz."""
+PLAIN = 4
+"""Features before those of gravity."""
+_SLOW, _FAST = 0.1, 0.3
+"""Joint speeds over which friction turns round [rad/s]: between Coulomb's step and the 0.2 rad/s of a real Panda's."""
+_GRAVITY = 9.81
+
+
+@value
+class ResidualModel:
+    """What was learnt, and the samples that wait to be. n joints, f features."""
+
+    weights: FloatArray
+    """(n, f) of the mean [Nm]."""
+    covariance: FloatArray
+    """(n, f, f) of the weights."""
+    spread: FloatArray
+    """(2, 2, n) standing and moving, each A [(rad/s^2)^2] and D [Nm^2]."""
+    seen: FloatArray
+    """(2,) samples each of both was learnt from."""
+    speed: FloatArray
+    """(n,) commanded joint velocities as late as the torques [rad/s]."""
+    queue: FloatArray
+    """(QUEUE, b) blocks that wait: sums of torques, features, both variances and their weight, and the joints' spread,
+    the last one whether the arm moved."""
+    block: FloatArray
+    """(b,) the block being filled."""
+    filled: int
+    """Samples in it."""
+    waiting: int
+    """Blocks in the queue, the oldest first."""
+
+
+def features_of(n: int) -> int:
+    """Count the features of a joint of an arm with n joints."""
+    return PLAIN + n + 1
+
+
+def prior_of(n: int, p: DetectionParams) -> FloatArray:
+    """Variances (f,) of the weights before anything is learnt [Nm^2]."""
+    friction = p.friction_prior_nm**2
+    return np.array([p.offset_prior_nm**2, friction, friction, friction, *[p.mass_prior**2] * n, p.payload_prior_kg**2])
+
+
+def residual_init(n: int, p: DetectionParams) -> ResidualModel:
+    """Return the model that has learnt nothing: zero mean, wide spread."""
+    f, size = features_of(n), block_size(n)
+    spread = np.stack([np.full(n, p.velocity_prior_rad_s2**2), np.full(n, p.torque_prior_nm**2)])
+    return ResidualModel(
+        weights=np.zeros((n, f)), covariance=np.tile(np.diag(prior_of(n, p)), (n, 1, 1)),
+        spread=np.stack([spread, spread]), seen=np.zeros(2), speed=np.zeros(n),
+        queue=np.zeros((QUEUE, size)), block=np.zeros(size), filled=0, waiting=0,
+    )  # fmt: skip
+
+
+def block_size(n: int) -> int:
+    """Count the numbers in a block of an arm with n joints."""
+    return n + n * features_of(n) + 3 * n + 2
+
+
+def features(model: RobotModel, kin: Kinematics, speed: FloatArray, growth: FloatArray) -> FloatArray:
+    """Features (n, f) of each joint's mean torque at joint velocities (n,) [rad/s] that grow by `growth` [rad/s^2].
+
+    1; tanh(qd / 0.1), tanh(qd / 0.3) and qd, friction that turns round smoothly; the torque of weight and inertia of
+    the links behind each joint, as point masses [Nm], and that of 1 kg at the end-effector.
+    """
+    x = np.empty((model.n, features_of(model.n)))
+    features_into(
+        kin.anchor, kin.axis, kin.position, kin.rotation, model.moved_by, model.mass, model.com, model.ee, speed,
+        growth, x,
+    )  # fmt: skip
+    return x
+
+
+@compiled
+def features_into(
+    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
+    mass: FloatArray, com: FloatArray, ee: int, speed: FloatArray, growth: FloatArray, x: FloatArray,
+) -> None:  # fmt: skip
+    """Write what `features` returns."""
+    n, point = len(speed), np.empty(3)
+    V, torque = np.empty((n, 3)), np.empty(n)
+    x[:] = 0.0
+    for j in range(n):
+        x[j, 0], x[j, 1], x[j, 2] = 1.0, np.tanh(speed[j] / _SLOW), np.tanh(speed[j] / _FAST)
+        x[j, 3] = speed[j]
+    for m in range(-1, len(mass)):
+        last, link = PLAIN + n, m
+        if m < 0:
+            link = ee
+            point[:] = position[ee]
+        else:
+            last = -1
+            for j in range(n):
+                if moved_by[m, j]:
+                    last = PLAIN + j
+            if last < 0 or mass[m] <= 0.0:
+                continue
+            for i in range(3):
+                point[i] = position[m, i]
+                for k in range(3):
+                    point[i] += rotation[m, i, k] * com[m, k]
+        _carried(anchor, axis, moved_by[link], point, growth, V, torque)
+        for j in range(n):
+            x[j, last] += (1.0 if m < 0 else mass[m]) * torque[j]
+
+
+@compiled
+def _carried(
+    anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, growth: FloatArray, V: FloatArray,
+    torque: FloatArray,
+) -> None:  # fmt: skip
+    """Write the torques (n,) of weight and inertia of 1 kg at a point; `V` (n, 3) is overwritten."""
+    ax, ay, az = 0.0, 0.0, _GRAVITY
+    for j in range(len(growth)):
+        V[j] = 0.0
+        if moved[j]:
+            x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
+            V[j, 0] = axis[j, 1] * z - axis[j, 2] * y
+            V[j, 1] = axis[j, 2] * x - axis[j, 0] * z
+            V[j, 2] = axis[j, 0] * y - axis[j, 1] * x
+            ax, ay, az = ax + V[j, 0] * growth[j], ay + V[j, 1] * growth[j], az + V[j, 2] * growth[j]
+    for j in range(len(growth)):
+        torque[j] = -(V[j, 0] * ax + V[j, 1] * ay + V[j, 2] * az)
+
+
+@compiled
+def mean_and_doubt(
+    weights: FloatArray, covariance: FloatArray, x: FloatArray, mean: FloatArray, doubt: FloatArray
+) -> None:
+    """Write the mean (n,) [Nm] of the torques with features x (n, f), and the variance of its error (n,) [Nm^2]."""
+    n, f = x.shape
+    for j in range(n):
+        mean[j], doubt[j] = 0.0, 0.0
+        for a in range(f):
+            if x[j, a] != 0.0:
+                mean[j] += weights[j, a] * x[j, a]
+                part = 0.0
+                for b in range(f):
+                    part += covariance[j, a, b] * x[j, b]
+                doubt[j] += x[j, a] * part
+
+
+@compiled
+def least_squares_step(
+    w: FloatArray, P: FloatArray, x: FloatArray, y: float, noise: float, prior: FloatArray, forget: float
+) -> None:
+    """Take one sample y = w . x + noise into the weights w (f,) and their covariance P (f, f), in place.
+
+    Recursive least squares; then P moves by the part `forget` towards the prior's diagonal, so that it stays between
+    nothing and the prior whatever is or is not excited (stabilised forgetting, Kulhavy and Zarrop 1993).
+    """
+    f, gain = len(w), np.zeros(len(w))
+    total, error = noise, y
+    for a in range(f):
+        for b in range(f):
+            gain[a] += P[a, b] * x[b]
+        total += x[a] * gain[a]
+        error -= w[a] * x[a]
+    for a in range(f):
+        w[a] += gain[a] / total * error
+        for b in range(f):
+            P[a, b] -= gain[a] * gain[b] / total
+            P[a, b] *= 1.0 - forget
+        P[a, a] += forget * prior[a]
+
+
+@compiled
+def add_sample(
+    block: FloatArray, torque: FloatArray, x: FloatArray, residual: FloatArray, M: FloatArray, spread: FloatArray,
+    doubt: FloatArray, moving: int, tails: float, floor: float,
+) -> None:  # fmt: skip
+    """Add a sample to a block: its torques and features, and what it says of both variances of the spread (2, n).
+
+    With e = M v + d, of spread S = M A M^T + D, the sample's expectation of v_i^2 is (A M^T S^-1 e)_i^2 + A_i -
+    A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. `doubt` (n,) is the variance of the mean's
+    error, which is in the sample but not in D.
+    """
+    n, f = x.shape
+    S, L, y, z = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n)
+    spread_of_sample(M, spread, floor, S)
+    for i in range(n):
+        S[i, i] += doubt[i]
+    if not factor(S, L):
+        return
+    trust = (tails + n) / (tails + forward(L, residual, y))
+    backward(L, y, z)
+    unit, start = np.zeros(n), n + n * f
+    for i in range(n):
+        block[i] += torque[i]
+        for a in range(f):
+            block[n + i * f + a] += x[i, a]
+        A, D, along = spread[0, i], spread[1, i] + floor**2 + doubt[i], 0.0
+        for j in range(n):
+            along += M[j, i] * z[j]
+        block[start + i] += trust * (A * along) ** 2 + A - A * A * forward(L, M[i], y)
+        unit[i] = 1.0
+        jitter = trust * (D * z[i]) ** 2 + D - D * D * forward(L, unit, y)
+        unit[i] = 0.0
+        block[start + n + i] += max(jitter - doubt[i] - floor**2, 0.0)
+        block[start + 2 * n + i] += S[i, i]
+    block[-2] += 1.0
+    block[-1] = moving
+
+
+@compiled
+def spread_of_sample(M: FloatArray, spread: FloatArray, floor: float, S: FloatArray) -> None:
+    """Write S = M A M^T + D (n, n) [Nm^2], D not below the square of a floor [Nm]."""
+    n = len(M)
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(n):
+                total += M[i, k] * spread[0, k] * M[j, k]
+            S[i, j] = total
+            S[j, i] = total
+        S[i, i] += spread[1, i] + floor**2
+
+
+@compiled
+def learn_block(
+    block: FloatArray, weights: FloatArray, covariance: FloatArray, spread: FloatArray, seen: FloatArray,
+    prior: FloatArray, forget: float, least_gain: float, first: float, most_velocity: float, most_torque: float,
+) -> None:  # fmt: skip
+    """Learn a block of samples: weights by their mean torques and features, and one step of both variances.
+
+    `least_gain` is the weight of a block once many have been seen, `first` [samples] what the prior of the spread
+    counts; the last two bound the variances A and D.
+    """
+    n, f = weights.shape
+    x, samples, start, k = np.empty(f), block[-2], n + n * f, int(block[-1])
+    if samples <= 0.0:
+        return
+    for j in range(n):
+        for a in range(f):
+            x[a] = block[n + j * f + a] / samples
+        noise = block[start + 2 * n + j] / samples**2
+        least_squares_step(weights[j], covariance[j], x, block[j] / samples, noise, prior, forget)
+    seen[k] += samples
+    gain = max(samples / (first + seen[k]), least_gain)
+    for part in range(2):
+        ceiling = most_torque if part else most_velocity
+        for j in range(n):
+            new = block[start + part * n + j] / samples
+            spread[k, part, j] = min(spread[k, part, j] + gain * (new - spread[k, part, j]), ceiling)
+
+
+KEPT = ("weights", "covariance", "spread", "seen")
+"""What is kept from one session to the next."""
+
+
+def kept(model: ResidualModel) -> dict[str, FloatArray]:
+    """Return what is to be kept of a model, by name."""
+    return {name: getattr(model, name) for name in KEPT}
+
+
+def resumed(numbers: dict[str, FloatArray], p: DetectionParams) -> ResidualModel:
+    """Return a model with what was kept of an earlier one; one that could not be is a ParameterError.
+
+    The covariances must be positive definite and the variances positive.
+    """
+    n = len(numbers["weights"])
+    fresh = residual_init(n, p)
+    for name in KEPT:
+        if numbers[name].shape != getattr(fresh, name).shape or not np.isfinite(numbers[name]).all():
+            raise ParameterError(f"What was learnt has {name} of the shape {numbers[name].shape}: learn it anew.")
+    if np.linalg.eigvalsh(numbers["covariance"]).min() <= 0.0 or numbers["spread"].min() < 0.0:
+        raise ParameterError("What was learnt has a variance below zero: learn it anew.")
+    weights, covariance, spread, seen = (numbers[name].copy() for name in KEPT)
+    return replace(fresh, weights=weights, covariance=covariance, spread=spread, seen=seen)

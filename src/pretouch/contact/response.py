@@ -1,0 +1,188 @@
+"""The answer to contacts: eq. 12's decay or the admittance, with clamps and places the arm gives up."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from pretouch.contact import reaction
+from pretouch.contact.admittance import (
+    AdmittanceState,
+    admittance_init,
+    begun,
+    dead_band,
+    fastest_point,
+    learnt,
+    yielded,
+)
+from pretouch.contact.clamp import ClampState, clamp_init, clamped, opened
+from pretouch.contact.detect import Detection
+from pretouch.contact.place import PlaceState, given_up, met, passed, place_init, pushed, waited
+from pretouch.params import Profile, ReactionParams
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.types import FloatArray, Obstacles, RobotState
+from pretouch.values import value
+
+
+@value
+class ResponseState:
+    """Memory of the answer to contacts."""
+
+    decay: reaction.ReactionState
+    yielding: AdmittanceState
+    clamp: ClampState
+    place: PlaceState
+
+
+@value
+class Felt:
+    """What the answer is made from in one step."""
+
+    model: RobotModel
+    kin: Kinematics
+    robot: RobotState
+    found: Detection
+    near: bool
+    """Whether something is seen near the body, or cannot be seen for a unit is silent."""
+    command: FloatArray
+    """(n,) joint velocities commanded last [rad/s]."""
+    profile: Profile
+
+
+def seen_near(obstacles: Obstacles, params: ReactionParams) -> bool:
+    """Whether something is seen near the body, for an answer that asks."""
+    return params.method == "admittance" and float(obstacles.body_distance.min(initial=np.inf)) < params.near_m
+
+
+@value
+class Answer:
+    """How the arm moves with a contact."""
+
+    velocity: FloatArray
+    """(3,) of the end-effector origin [m/s]."""
+    qd: FloatArray | None
+    """(n,) joint velocities [rad/s], None where only the end-effector's are asked for."""
+    touch: float | None
+    """Speed at which it may touch what it sees [m/s]: none where a push moves it, and as fast as it opens where it is
+    caught, for it is between two things; None as without a contact."""
+
+
+Doing = Literal["task", "learn", "react", "soft", "still"]
+"""What the arm does: follow its task or stand with its window filling (`learn`), react, hold softly, hold still."""
+
+
+def response_init(q: FloatArray, params: ReactionParams) -> ResponseState:
+    """Return the state without a contact, at joint positions (n,) [rad]."""
+    return ResponseState(
+        reaction.reaction_init(params), admittance_init(len(q), params), clamp_init(q), place_init()
+    )  # fmt: skip
+
+
+def adopted(state: ResponseState, mine: ReactionParams, theirs: ReactionParams) -> ResponseState:
+    """Go on under other parameters; a reaction of eq. 12 that is over stays so."""
+    going = reaction.active(state.decay, theirs)
+    return replace(state, decay=state.decay if going else reaction.reaction_init(mine))
+
+
+def noticed(state: ResponseState, doing: Doing, felt: Felt, phase: float, resume: bool) -> ResponseState:
+    """Take in what is felt in one step, before it is known what the arm will do.
+
+    Args:
+        state: memory.
+        doing: what the arm has done up to this step.
+        felt: what is felt.
+        phase: how far the task is along the path [m].
+        resume: whether a person asks to go on.
+    """
+    p, dt = felt.profile.reaction, felt.profile.task.control_period_s
+    if p.method == "decay":
+        return state
+    yielding, clamp, place, residual = state.yielding, state.clamp, state.place, _residual(state.yielding, felt)
+    if doing == "learn" or (doing == "task" and felt.found.contact is None):
+        yielding = learnt(yielding, residual, dt, p)
+    elif doing in ("react", "soft"):
+        band = dead_band(felt.model.description.tau_max, p)
+        yielding = yielded(yielding, felt.model, felt.kin, residual, felt.command, band, dt, p)
+    if doing == "soft" and clamp.torque:
+        # out of the clamp it may be moved, not back into it
+        yielding = replace(yielding, velocity=np.where(yielding.velocity * clamp.course > 0, 0.0, yielding.velocity))
+    if doing == "react" and p.clamps and not clamp.torque:
+        clamp = clamped(clamp, yielding.torque, yielding.velocity, felt.robot.q_commanded, _COURSE_RAD_S, dt, p)
+    if doing == "react":
+        place = pushed(place, yielding.tank - p.start_energy_j)
+    if resume:
+        place, clamp = place_init(), clamp_init(felt.robot.q_commanded)
+    elif given_up(place, p) and doing != "react":
+        place = waited(place, felt.near, dt, p)
+    elif doing == "task":
+        place = passed(place, phase, p)
+    return ResponseState(state.decay, yielding, clamp, place)
+
+
+def _residual(state: AdmittanceState, felt: Felt) -> FloatArray:
+    """Return the external torques (n,) [Nm]; without an estimate, those of free motion, which drive nothing."""
+    found = felt.found.residual
+    return state.mean[1] if np.isnan(found).any() else found
+
+
+_COURSE_RAD_S = 0.05
+"""Speed in joint space from which the arm is on a course [rad/s]."""
+
+
+def began(state: ResponseState, doing: Doing, felt: Felt, phase: float, point: FloatArray) -> ResponseState:
+    """Begin to move with the contact that was found; one the arm brought about in its task counts for its place.
+
+    Args:
+        state: memory.
+        doing: what the arm has done up to this step.
+        felt: what is felt.
+        phase: how far the task is along the path [m].
+        point: (3,) where the end-effector is [m].
+    """
+    p, contact = felt.profile.reaction, felt.found.contact
+    if contact is None:
+        return state
+    if p.method == "decay":
+        return replace(state, decay=reaction.start_reaction(contact.force, p))
+    torque, band = (
+        _residual(state.yielding, felt) - state.yielding.mean[1],
+        dead_band(felt.model.description.tau_max, p),
+    )
+    yielding = begun(replace(state.yielding, torque=torque), felt.model, felt.kin, band, p)
+    # what the arm ran into pushes against its motion; what pushes it on has come by itself
+    mine = doing == "task" and float(torque @ felt.command) < 0
+    place = replace(state.place, counted=False)
+    if mine:
+        kinetic = 0.5 * float(felt.command @ felt.model.mass_matrix(felt.robot.q) @ felt.command)
+        place = met(state.place, phase, point, felt.near, kinetic, p)
+    return ResponseState(state.decay, yielding, clamp_init(felt.robot.q_commanded), place)
+
+
+def answered(state: ResponseState, doing: Doing, felt: Felt) -> tuple[Answer | None, ResponseState]:
+    """Return how the arm moves with a contact in this step, None where it does not, and what to remember."""
+    p, dt = felt.profile.reaction, felt.profile.task.control_period_s
+    if p.method == "decay":
+        if doing != "react":
+            return None, ResponseState(reaction.reaction_init(p), state.yielding, state.clamp, state.place)
+        return Answer(reaction.decayed(state.decay, p), None, None), replace(state, decay=reaction.advance(state.decay))
+    if doing not in ("react", "soft"):
+        return None, state
+    qd, model, kin = state.yielding.velocity, felt.model, felt.kin
+    opens = doing == "react" and state.clamp.torque > 0 and not state.clamp.open
+    if opens:
+        way, clamp = opened(state.clamp, state.yielding.torque, felt.robot.q_commanded, dt, p)
+        body = model.body
+        fastest = fastest_point(
+            kin.position, kin.rotation, kin.anchor, kin.axis, model.moved_by, body.link, body.a, body.b, way
+        )
+        qd = way * min(1.0, p.open_m_s / fastest) if fastest > 0 else way
+        state = replace(state, clamp=clamp, yielding=replace(state.yielding, velocity=np.zeros(len(qd))))
+    if doing == "soft" and not qd.any():
+        return None, state
+    return Answer(model.ee_jacobian(kin)[:3] @ qd, qd, p.open_m_s if opens else 0.0), state
+
+
+def waits(state: ResponseState, near: bool, params: ReactionParams) -> bool:
+    """Whether the arm still yields, or waits for more of the push or, where it will go on, for what is near to go."""
+    quiet = state.yielding.quiet
+    return quiet < params.quiet_s or (near and quiet < params.patience_s and not given_up(state.place, params))

@@ -1,0 +1,171 @@
+"""A sequential test for a contact: a bank of windows, each held against forces on each link.
+
+The statistic is Shiryaev's and Roberts', R = sum of prior weights times likelihood ratios, over the links that may be
+touched and the instants at which it may have begun, of which those 1, 2, 4, ... 32 samples ago are kept. In free motion
+its expectation is the sum of the weights, so that it passes A with a probability of at most sum / A a sample (Markov).
+The force of a contact is unknown, and integrated out in closed form with a Gaussian prior whose spread is g times that
+of free motion (Zellner 1986): so wide a prior as that of the forces that can be would cost a contact that only some
+joints feel what the others do not.
+"""
+
+import math
+
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.contact.gaussian import factor, forward
+from pretouch.params import DetectionParams
+from pretouch.types import FloatArray, IntArray
+
+LENGTHS = (1, 2, 4, 8, 16, 32)
+"""Lengths of the windows [samples]."""
+LONGEST = LENGTHS[-1]
+_LENGTHS = np.array(LENGTHS)
+_LARGEST = 300.0
+"""Logarithm of a likelihood ratio from which on it is all the same."""
+_SMALLEST = 1e-300
+_SINGULAR = 1e-6
+"""Part of its trace by which a force's information is made regular: a force along a joint's axis has none."""
+
+
+def alarm_level(p: DetectionParams, period: float) -> float:
+    """Return ln A for the chosen rate of false alarms, at one sample a period [s]."""
+    return max(1.0, math.log(3600.0 / period / p.false_alarms_per_hour) - p.slack_nats)
+
+
+@compiled
+def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> int:
+    """Write the means (6, n) of the newest 1, 2, ... 32 samples of a ring, and return how many of them are whole.
+
+    `at` is where the next sample goes, `count` how many there are.
+    """
+    size, n = ring.shape
+    total = np.zeros(n)
+    taken = whole = 0
+    for k in range(len(_LENGTHS)):
+        if _LENGTHS[k] > count:
+            break
+        while taken < _LENGTHS[k]:
+            taken += 1
+            for j in range(n):
+                total[j] += ring[(at - taken) % size, j]
+        for j in range(n):
+            means[k, j] = total[j] / taken
+        whole += 1
+    return whole
+
+
+@compiled
+def judge(
+    means: FloatArray, whole: int, S: FloatArray, doubt: FloatArray, J: FloatArray, joints: IntArray,
+    weight: FloatArray, away: FloatArray, gain: float, tails: float,
+) -> tuple[float, int, int]:  # fmt: skip
+    """Return ln R, and the window and the hypothesis that have the largest part in it.
+
+    The first n hypotheses are torques on the joints before each link, of any wrench. The others are forces at a point.
+
+    Args:
+        means: (6, n) means of the windows' samples [Nm].
+        whole: how many of them there are.
+        S: (n, n) spread of a sample [Nm^2].
+        doubt: (n,) variance of the error of their mean [Nm^2]: it does not average out.
+        J: (H, 3, n) Jacobians of the points.
+        joints: (H,) how many joints move each point.
+        weight: (n + H,) prior weights of all hypotheses, for all windows together.
+        away: (H, 3) direction of the force where one is expected, zero where it may be any.
+        gain: g, how much larger a contact's spread is than that of free motion.
+        tails: degrees of freedom of the Student distribution.
+    """
+    n, total, best, window, which = S.shape[0], 0.0, -1.0, 0, 0
+    S0, L, z, y, pivot = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n)
+    scratch, widened = np.empty((n, 3)), np.log1p(gain)
+    for k in range(whole):
+        # the last joint comes first, so that what the joints behind a link say is the beginning of y
+        for i in range(n):
+            z[i] = means[k, n - 1 - i]
+            for j in range(i + 1):
+                S0[i, j] = S[n - 1 - i, n - 1 - j] / _LENGTHS[k]
+            S0[i, i] += doubt[n - 1 - i]
+        if not factor(S0, L):
+            continue
+        for i in range(n):
+            pivot[i] = 1.0 / L[i, i]
+        square, behind = forward(L, z, y), 0.0
+        alone = np.log1p(square / tails)
+        for h in range(n + len(J)):
+            link, size, explained, one_sided = h, 3, 0.0, 1.0
+            if h < n:
+                link, size, explained = n - 1 - h, n - h, square - behind
+                behind += y[h] ** 2
+            if weight[link] <= 0.0:
+                continue
+            if h >= n:
+                explained, one_sided = explained_by_force(L, pivot, y, J[h - n], joints[h - n], away[h - n], scratch)
+            ratio = log_ratio(alone, square, explained, size, n, gain, widened, tails)
+            part = weight[link] * np.exp(min(ratio, _LARGEST)) * one_sided / len(_LENGTHS)
+            total += part
+            if part > best:
+                best, window, which = part, k, link
+    return np.log(max(total, _SMALLEST)), window, which
+
+
+@compiled
+def log_ratio(
+    alone: float, square: float, explained: float, size: int, n: int, gain: float, widened: float, tails: float
+) -> float:
+    """Logarithm of how much likelier a sample z (n,) is with a contact than in free motion.
+
+    Free motion is Student's, of spread S and `tails` degrees of freedom; with a contact the spread is 1 + g times as
+    large in the `size` directions it can push. `square` is z^T S^-1 z, `explained` the part of it in these directions;
+    `alone` = ln(1 + square / tails) and `widened` = ln(1 + g) are the same for many contacts.
+    With many degrees of freedom this is ((1 + g)^-size exp(g / (1 + g) explained))^(1/2).
+    """
+    rest = square - gain / (1.0 + gain) * explained
+    return 0.5 * (tails + n) * (alone - np.log1p(rest / tails)) - 0.5 * size * widened
+
+
+@compiled
+def explained_by_force(
+    L: FloatArray, pivot: FloatArray, y: FloatArray, J: FloatArray, joints: int, away: FloatArray, a: FloatArray
+) -> tuple[float, float]:
+    """Part of y . y that a force at a point explains, and how much likelier it is that it points `away`, from 0 to 2.
+
+    `L` is the factor of S, `pivot` (n,) the inverse of its diagonal, and y = L^-1 z, the last joint first; `J` (3, n)
+    the point's Jacobian, moved by the first so many joints. The second value is 1 where `away` (3,) is zero. `a` (n, 3)
+    is overwritten.
+    """
+    n, first = len(y), len(y) - joints
+    b0 = b1 = b2 = g00 = g10 = g11 = g20 = g21 = g22 = 0.0
+    for j in range(first, n):
+        # L^-1 of the columns of J^T, whose entries before `first` are zero
+        a0, a1, a2 = J[0, n - 1 - j], J[1, n - 1 - j], J[2, n - 1 - j]
+        for k in range(first, j):
+            a0 -= L[j, k] * a[k, 0]
+            a1 -= L[j, k] * a[k, 1]
+            a2 -= L[j, k] * a[k, 2]
+        a0, a1, a2 = a0 * pivot[j], a1 * pivot[j], a2 * pivot[j]
+        a[j, 0], a[j, 1], a[j, 2] = a0, a1, a2
+        b0, b1, b2 = b0 + a0 * y[j], b1 + a1 * y[j], b2 + a2 * y[j]
+        g00, g10, g11 = g00 + a0 * a0, g10 + a1 * a0, g11 + a1 * a1
+        g20, g21, g22 = g20 + a2 * a0, g21 + a2 * a1, g22 + a2 * a2
+    # the Cholesky factor c of J S^-1 J^T, and u = c^-1 b
+    regular = _SINGULAR * (g00 + g11 + g22)
+    if not regular > 0.0:
+        return 0.0, 1.0
+    c00 = 1.0 / np.sqrt(g00 + regular)
+    c10, c20 = g10 * c00, g20 * c00
+    c11 = 1.0 / np.sqrt(g11 + regular - c10 * c10)
+    c21 = (g21 - c20 * c10) * c11
+    c22 = 1.0 / np.sqrt(g22 + regular - c20 * c20 - c21 * c21)
+    u0 = b0 * c00
+    u1 = (b1 - c10 * u0) * c11
+    u2 = (b2 - c20 * u0 - c21 * u1) * c22
+    explained = u0 * u0 + u1 * u1 + u2 * u2
+    if away[0] == 0.0 and away[1] == 0.0 and away[2] == 0.0:
+        return explained, 1.0
+    # along . force / its deviation, both with v = c^-1 away
+    v0 = away[0] * c00
+    v1 = (away[1] - c10 * v0) * c11
+    v2 = (away[2] - c20 * v0 - c21 * v1) * c22
+    along, deviation = u0 * v0 + u1 * v1 + u2 * v2, np.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+    return explained, 1.0 + math.erf(along / deviation / math.sqrt(2.0))

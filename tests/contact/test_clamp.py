@@ -1,0 +1,96 @@
+"""What is a clamp and what is none, by scripted courses of the torque."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.contact.clamp import clamp_init, clamped, opened
+from pretouch.params import ReactionParams
+
+P = ReactionParams(method="admittance", clamps=True)
+DT, N = 0.01, 7
+WAY, ASIDE = np.eye(N)[0], np.eye(N)[1]
+Q = np.zeros(N)
+
+
+def judged(*course):
+    """Clamp state after spells of (cycles, torque, velocity)."""
+    state = clamp_init(Q)
+    for cycles, torque, velocity in course:
+        for _ in range(cycles):
+            if not state.torque:
+                state = clamped(state, torque, velocity, Q, 0.05, DT, P)
+    return state
+
+
+PUSHED = (50, 10.0 * WAY, 0.3 * WAY)
+
+
+def test_a_torque_against_the_yielding_for_30_ms_is_a_clamp():
+    state = judged(PUSHED, (3, -12.0 * WAY, 0.3 * WAY))
+    assert state.torque == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize(
+    "course",
+    [
+        (PUSHED, (2, -12.0 * WAY, 0.3 * WAY), (20, 10.0 * WAY, 0.3 * WAY)),  # a noisy sample or two
+        (PUSHED, (50, 30.0 * WAY, 0.3 * WAY)),  # harder the same way
+        (PUSHED, (50, 10.0 * ASIDE, 0.2 * ASIDE)),  # from the side
+        (PUSHED, (50, -3.0 * WAY, 0.1 * WAY)),  # weaker than what makes a clamp
+        (PUSHED, (40, 0.0 * WAY, 0.0 * WAY), (50, -12.0 * WAY, -0.3 * WAY)),  # a push of its own, later
+        ((50, -12.0 * WAY, 0.01 * WAY),),  # the first contact itself, while the arm still brakes
+    ],
+)
+def test_what_is_no_clamp(course):
+    assert not judged(*course).torque
+
+
+def test_sent_to_and_fro_there_is_no_way_out():
+    calm = (40, 0.0 * WAY, 0.0 * WAY)
+    back, on = (30, -12.0 * WAY, -0.3 * WAY), (30, 12.0 * WAY, 0.3 * WAY)
+    assert not judged(PUSHED, calm, back).torque
+    assert judged(PUSHED, calm, back, calm, on).torque
+    # long after each other they are pushes
+    long = (300, 0.0 * WAY, 0.0 * WAY)
+    assert not judged(PUSHED, long, back, long, on, long, back).torque
+
+
+def moved() -> tuple:
+    """The state of an arm that yielded by 0.3 rad at 0.3 rad/s, and where it is."""
+    state, q = clamp_init(Q), Q
+    for _ in range(100):
+        q = q + 0.003 * WAY
+        state = clamped(state, 10.0 * WAY, 0.3 * WAY, q, 0.05, DT, P)
+    return replace(state, torque=8.0), q
+
+
+def test_it_opens_the_way_it_came_and_ends_by_time():
+    state, q = moved()
+    start, cycles = q, 0
+    while not state.open:
+        way, state = opened(state, 0.0 * WAY, q, DT, P)
+        assert way[0] < 0
+        assert not way[1:].any()
+        q, cycles = q + np.clip(way, -0.2, 0.2) * DT, cycles + 1
+    assert cycles == pytest.approx(P.open_s / DT, abs=1)
+    assert start[0] - q[0] == pytest.approx(0.2 * P.open_s, rel=0.05)
+
+
+def test_it_ends_where_the_way_began():
+    state, q = moved()
+    for _ in range(49):
+        way, state = opened(state, 0.0 * WAY, q, DT, P)
+        q = q + np.clip(way, -5.0, 5.0) * DT
+    assert state.open
+    # the trail holds the last 12 places, 0.05 s apart
+    assert q[0] == pytest.approx(0.3 - 11 * 0.05 * 0.3, abs=0.02)
+
+
+def test_it_does_not_open_into_what_pushes_it():
+    state, q = moved()
+    for i in range(3):
+        assert not state.open, i
+        _, state = opened(state, 12.0 * WAY, q, DT, P)
+    assert state.open

@@ -1,0 +1,185 @@
+"""Detection by each method through its one entry: what is felt, what is learnt and when, and which way the force is."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pretouch.contact.feel import feel, feel_init, learnt
+from pretouch.errors import ParameterError
+from pretouch.params import DetectionParams, profile
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.types import Obstacles, RobotState
+
+MODEL = RobotModel(panda())
+Q = MODEL.description.q_ready
+KIN = MODEL.kinematics(Q)
+PRETOUCH = profile("pretouch:threshold.window_samples=10")
+STILL = np.zeros(7)
+
+
+def robot(tau_ext: np.ndarray, wrench: np.ndarray | None = None) -> RobotState:
+    return RobotState(0.0, Q, STILL, Q, STILL, tau_ext, np.zeros(6) if wrench is None else wrench)
+
+
+def object_at(distance: float, direction: np.ndarray) -> Obstacles:
+    """One object near the hand's origin, in a direction from it."""
+    at = KIN.position[MODEL.ee]
+    return Obstacles(
+        np.zeros(1, np.int64), (at + distance * direction)[None], np.array([distance]), at[None],
+        np.array([MODEL.ee]), direction[None], np.array([distance]), np.zeros(1),
+    )  # fmt: skip
+
+
+NOTHING = Obstacles(
+    np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 3)),
+    np.zeros(0), np.zeros(0),
+)  # fmt: skip
+
+
+def noise(samples: int, seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal((samples, 7)) * np.array([0.5, 0.5, 0.4, 0.4, 0.1, 0.1, 0.1])
+
+
+def settled(samples: int = 400, p=PRETOUCH, bias: float = 0.3):
+    """State after some free motion, all its torques off by the same."""
+    state = feel_init(MODEL, p)
+    for sample in noise(samples):
+        found, state = feel(state, MODEL, KIN, robot(sample + bias), NOTHING, False, p)
+        assert found.contact is None
+    return state
+
+
+SETTLED = settled()
+
+
+def torques(force: np.ndarray) -> np.ndarray:
+    return MODEL.ee_jacobian(KIN)[:3].T @ force
+
+
+@pytest.mark.parametrize("direction", [*np.eye(3), *-np.eye(3)])
+def test_a_push_is_a_contact_with_its_direction(direction):
+    state, found = SETTLED, None
+    for _ in range(5):
+        found, state = feel(state, MODEL, KIN, robot(0.3 + torques(20.0 * direction)), NOTHING, False, PRETOUCH)
+        if found.contact:
+            break
+    assert found.contact is not None
+    assert found.evidence >= 1.0
+    assert found.contact.force @ direction > 0.9 * np.linalg.norm(found.contact.force)
+
+
+def test_the_residual_is_what_the_mean_leaves():
+    found, _ = feel(SETTLED, MODEL, KIN, robot(np.full(7, 0.3)), NOTHING, False, PRETOUCH)
+    assert np.abs(found.residual).max() < 0.15  # 0.3 Nm was learnt from 3.7 s
+    assert found.learning
+    assert found.thresholds.upper[0] > found.thresholds.mean[0] > found.thresholds.lower[0]
+
+
+def test_a_seen_object_is_felt_at_a_smaller_force_and_never_yielded_to():
+    towards = np.array([0.0, 1.0, 0.0])
+    evidence = {}
+    for name, sign in (("away", -1.0), ("towards", 1.0), ("nothing", -1.0)):
+        near = NOTHING if name == "nothing" else object_at(0.01, towards)
+        found, _ = feel(SETTLED, MODEL, KIN, robot(0.3 + torques(sign * 6.0 * towards)), near, False, PRETOUCH)
+        evidence[name] = found.evidence
+        if name == "away" and found.contact:
+            assert found.contact.force @ towards <= 1e-9
+    assert evidence["away"] > evidence["nothing"]
+    assert evidence["towards"] <= evidence["away"]
+
+
+def weights_after(state, samples: int, p=PRETOUCH, near=NOTHING, reacting=False, watched=True, push=None):
+    for sample in noise(samples, 2):
+        given = robot(sample + 1.0 if push is None else sample + push)
+        _, state = feel(state, MODEL, KIN, given, near, reacting, p, watched)
+    found = learnt(state)
+    assert found is not None
+    return found.weights
+
+
+@given(st.floats(-0.05, 0.29))
+def test_nothing_is_learnt_near_an_object(distance):
+    before = learnt(SETTLED)
+    after = weights_after(SETTLED, 45, near=object_at(distance, np.array([0.0, 0.0, 1.0])))
+    assert before is not None
+    assert_array_equal(after, before.weights)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"reacting": True},
+        {"watched": False},
+        {"p": profile("pretouch:threshold.window_samples=10:detection.learn=no")},
+    ],
+)
+def test_nothing_is_learnt_while_reacting_unwatched_or_when_told_not_to(how):
+    before = learnt(SETTLED)
+    assert before is not None
+    assert_array_equal(weights_after(SETTLED, 60, **how), before.weights)
+
+
+def test_the_beginning_of_a_contact_is_not_learnt():
+    before = learnt(SETTLED)
+    assert before is not None
+    calm = weights_after(SETTLED, 60, push=np.full(7, 0.3))
+    assert np.abs(calm - before.weights).max() > 0  # free motion goes on being learnt
+    assert_array_equal(weights_after(SETTLED, 60, push=0.3 + torques(np.array([0.0, 30.0, 0.0]))), before.weights)
+
+
+def test_the_window_is_frozen_while_reacting_only_if_the_profile_says_so():
+    force = np.array([0.0, 40.0, 0.0, 0.0, 0.0, 0.0])
+    for p, moved in ((PRETOUCH, False), (profile("paper:threshold.window_samples=10"), True)):
+        state = feel_init(MODEL, p)
+        for _ in range(12):
+            _, state = feel(state, MODEL, KIN, robot(STILL), NOTHING, False, p)
+        for _ in range(8):
+            _, state = feel(state, MODEL, KIN, robot(STILL, force), NOTHING, True, p)
+        assert bool(abs(state.window.mean()[1]) > 1.0) is moved
+
+
+@pytest.mark.parametrize("name", ["pretouch", "fixed", "observer"])
+def test_without_torques_nothing_is_felt(name):
+    p = profile(f"{name}:threshold.window_samples=10")
+    state = feel_init(MODEL, p)
+    for _ in range(12):
+        found, state = feel(state, MODEL, KIN, robot(np.full(7, np.nan)), NOTHING, False, p)
+    assert found.contact is None
+    assert not found.armed
+    assert found.evidence == 0.0
+
+
+def test_fixed_bounds_by_numbers():
+    p = profile("fixed:threshold.window_samples=2")
+    state = feel_init(MODEL, p)
+    for _ in range(3):
+        found, state = feel(state, MODEL, KIN, robot(STILL), NOTHING, False, p)
+    for torque, wrench, evidence in ((10.0, 0.0, 0.5), (19.9, 0.0, 0.995), (20.1, 0.0, 1.005), (0.0, 21.0, 1.05)):
+        tau, force = STILL.copy(), np.zeros(6)
+        tau[1], force[0] = torque, wrench
+        found, _ = feel(state, MODEL, KIN, robot(tau, force), NOTHING, False, p)
+        assert found.evidence == pytest.approx(evidence)
+        assert (found.contact is not None) is (evidence >= 1.0)
+        assert_array_equal(found.residual, tau)
+
+
+def test_the_papers_rule_tells_its_evidence_and_passes_torques_on():
+    p = profile("paper:threshold.window_samples=4:threshold.compare=raw")
+    state = feel_init(MODEL, p)
+    for size in (0.0, 0.0, 0.0, 0.0, 5.0, 40.0):
+        given = robot(np.full(7, size), np.array([size, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        found, state = feel(state, MODEL, KIN, given, NOTHING, False, p)
+        assert (found.contact is not None) is (found.evidence > 1.0)
+        assert_allclose(found.residual, size)
+
+
+def test_bounds_are_read_from_a_profiles_text_and_bad_ones_refused():
+    given = profile("fixed:detection.joint_torques_nm=10,9,8")
+    assert given.detection.joint_torques_nm == (10.0, 9.0, 8.0)
+    with pytest.raises(ParameterError, match="joint_torques_nm"):
+        DetectionParams(joint_torques_nm=(1.0, -1.0))
+    with pytest.raises(ParameterError, match="numbers with commas"):
+        profile("fixed:detection.joint_torques_nm=many")

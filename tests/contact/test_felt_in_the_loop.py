@@ -1,0 +1,75 @@
+"""The sequential detector in the controller: absent torques, a change of method, and a simulated arm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.contact.feel import learnt
+from pretouch.control.path import Circle, line
+from pretouch.controller import Controller
+from pretouch.experiments.claims.forces import Event, apply
+from pretouch.experiments.trial import Setup, play
+from pretouch.params import profile
+from pretouch.sensing.skin import Skin, paper_skin
+from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.types import Inputs, Mode, RangeReadings, RobotState
+
+NONE = RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
+
+
+def controller(model, name: str) -> Controller:
+    x = model.kinematics(model.description.q_ready).position[model.ee]
+    way = line(tuple(x.tolist()), (float(x[0]), float(x[1]) + 0.1, float(x[2])))
+    return Controller(model, Skin([], model), fixtures(SceneSpec()), way, profile(name))
+
+
+def robot(model, stamp: float, tau_ext: object) -> RobotState:
+    q, still = model.description.q_ready, np.zeros(model.n)
+    return RobotState(stamp, q, still, q, still, tau_ext, np.zeros(6))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("given", [None, "many", np.full(7, np.nan), np.zeros(3), np.full(7, 1e9)])
+@pytest.mark.parametrize(("name", "holds"), [("pretouch", True), ("fixed", True), ("paper", False)])
+def test_an_arm_without_torques_holds_if_its_detector_needs_them(panda_model, given, name, holds):
+    c = controller(panda_model, f"{name}:threshold.window_samples=10")
+    state = c.init(robot(panda_model, 0.0, given))
+    for k in range(1, 40):
+        step, state = c.step(state, Inputs(0.01 * k, robot(panda_model, 0.01 * k, given), NONE))
+    assert (step.mode is Mode.HOLD) is holds
+    assert np.isnan(step.residual).all()
+    assert ("force" in step.reason) is holds
+
+
+def test_another_method_begins_anew_and_what_was_learnt_can_be_given(panda_model):
+    paper, ours = controller(panda_model, "paper"), controller(panda_model, "pretouch")
+    state = paper.init(robot(panda_model, 0.0, np.zeros(7)))
+    step, state = paper.step(state, Inputs(0.01, robot(panda_model, 0.01, np.zeros(7)), NONE))
+    assert step.evidence == 0.0
+    adopted = ours.adopt(state, paper)
+    model = learnt(adopted.feel)
+    assert model is not None
+    assert not model.weights.any()
+    known = replace(model, weights=model.weights + 0.5)
+    again = learnt(ours.init(robot(panda_model, 0.0, np.zeros(7)), known).feel)
+    assert again is not None
+    np.testing.assert_array_equal(again.weights, 0.5)
+
+
+@pytest.mark.slow
+def test_a_simulated_arm_is_quiet_alone_and_feels_pushes(panda_model):
+    pushes = tuple(
+        Event("push", 20.0, start, np.array([0.0, side, 0.0])) for start, side in ((70.0, 1.0), (75.0, -1.0))
+    )
+    record = play(
+        Setup(
+            panda_model, paper_skin(panda_model), profile("pretouch"), SceneSpec(), Circle(), 1071,
+            prepare=lambda plant, _: apply(plant, pushes),
+        ),
+        lambda step, _: step.stamp >= 80.0,
+    )  # fmt: skip
+    felt = [(s.stamp, s.contact.force[1]) for s in record.steps if s.contact is not None]
+    assert len(felt) == 2
+    for (at, force), push in zip(felt, pushes, strict=True):
+        assert 0.0 < at - push.start < 0.1
+        assert force * push.direction[1] > 0

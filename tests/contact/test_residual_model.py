@@ -1,0 +1,126 @@
+"""Free motion learnt: mean against batch least squares, spread against its definition, bounds, and what is kept."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from pretouch.contact.residual_model import (
+    PLAIN,
+    add_sample,
+    block_size,
+    features,
+    features_of,
+    kept,
+    least_squares_step,
+    prior_of,
+    residual_init,
+    resumed,
+    spread_of_sample,
+)
+from pretouch.errors import ParameterError
+from pretouch.params import DetectionParams
+
+P = DetectionParams()
+
+
+def test_recursive_least_squares_is_the_batch_solution_with_the_same_prior():
+    rng, f = np.random.default_rng(3), 5
+    X, prior = rng.standard_normal((40, f)), np.array([1.0, 2.0, 0.5, 1.0, 4.0])
+    y = X @ np.arange(f) + 0.3 * rng.standard_normal(40)
+    w, C = np.zeros(f), np.diag(prior)
+    for row, sample in zip(X, y, strict=True):
+        least_squares_step(w, C, row, sample, 0.09, prior, 0.0)
+    # the prior as f more equations: w_i / sqrt(prior_i) = 0
+    whole = np.vstack([X / 0.3, np.diag(1 / np.sqrt(prior))])
+    batch, *_ = np.linalg.lstsq(whole, np.append(y / 0.3, np.zeros(f)), rcond=None)
+    assert_allclose(w, batch, rtol=1e-9)
+    assert_allclose(C, np.linalg.inv(whole.T @ whole), rtol=1e-9)
+
+
+def test_one_step_of_least_squares_by_hand():
+    # prior 4, x = 1, noise 1, y = 5: gain 4/5, w = 4, P = 4 - 16/5 = 0.8, then half way back to 4: 2.4
+    w, C = np.zeros(1), np.array([[4.0]])
+    least_squares_step(w, C, np.ones(1), 5.0, 1.0, np.array([4.0]), 0.5)
+    assert_allclose(w, 4.0)
+    assert_allclose(C, 2.4)
+
+
+@given(st.floats(-3, 3), st.floats(0.0, 0.5), st.integers(0, 1000))
+def test_the_covariance_stays_between_nothing_and_the_prior_whatever_is_excited(x, forget, seed):
+    rng, prior = np.random.default_rng(seed), np.array([1.0, 2.0, 3.0])
+    w, C = np.zeros(3), np.diag(prior)
+    for k in range(50):
+        row = np.array([x, 0.0, 1e-9]) if k % 2 else rng.standard_normal(3)
+        least_squares_step(w, C, row, rng.standard_normal(), 0.1, prior, forget)
+    values = np.linalg.eigvalsh((C + C.T) / 2)
+    assert values.min() > 0
+    assert np.linalg.eigvalsh(np.diag(prior) - C).min() > -1e-9
+
+
+def test_features_of_gravity_are_the_gravity_torques_of_the_model(panda_model):
+    q = panda_model.description.q_ready + 0.1
+    x = features(panda_model, panda_model.kinematics(q), np.zeros(7), np.zeros(7))
+    gravity = panda_model.dynamics(q, np.zeros(7)).gravity
+    # the torque that holds the arm is the opposite of what gravity does, summed over all links
+    assert_allclose(x[:, PLAIN : PLAIN + 7].sum(axis=1), -gravity, atol=1e-9)
+    J = panda_model.ee_jacobian(panda_model.kinematics(q))
+    assert_allclose(x[:, -1], J[:3].T @ np.array([0.0, 0.0, -9.81]), atol=1e-12)
+
+
+def test_the_feature_of_a_load_has_its_inertia(panda_model):
+    q, growth = panda_model.description.q_ready + 0.1, np.linspace(-3.0, 4.0, 7)
+    x = features(panda_model, panda_model.kinematics(q), np.zeros(7), growth)
+    J = panda_model.ee_jacobian(panda_model.kinematics(q))[:3]
+    assert_allclose(x[:, -1], J.T @ (np.array([0.0, 0.0, -9.81]) - J @ growth), atol=1e-12)
+
+
+def test_the_spread_turns_with_the_inertia_and_has_a_floor():
+    M, spread, S = np.array([[2.0, 1.0], [1.0, 3.0]]), np.array([[0.25, 1.0], [0.1, 0.0]]), np.empty((2, 2))
+    spread_of_sample(M, spread, 0.2, S)
+    # M diag(.25, 1) M^T = [[1 + 1, .5 + 3], [3.5, .25 + 9]]
+    assert_allclose(S, [[2.0 + 0.1 + 0.04, 3.5], [3.5, 9.25 + 0.04]])
+
+
+def test_both_variances_are_found_from_samples(panda_model):
+    rng, n = np.random.default_rng(0), 7
+    true = np.array([np.full(n, 0.2), np.array([0.03, 0.02, 0.02, 0.02, 0.01, 0.01, 0.01])])
+    M, _ = panda_model.mass_matrix_and_bias(panda_model.description.q_ready, np.zeros(n), np.zeros(n))
+    spread, x = np.array([np.full(n, 1.0), np.full(n, 0.25)]), np.zeros((n, features_of(n)))
+    for _ in range(40):
+        block = np.zeros(block_size(n))
+        for _ in range(250):
+            e = M @ (np.sqrt(true[0]) * rng.standard_normal(n)) + np.sqrt(true[1]) * rng.standard_normal(n)
+            add_sample(block, e, x, e, M, spread, np.zeros(n), 1, 1000.0, 0.0)
+        start = n + n * features_of(n)
+        spread = block[start : start + 2 * n].reshape(2, n) / block[-2]
+    found, expected = np.empty((n, n)), np.empty((n, n))
+    spread_of_sample(M, spread, 0.0, found)
+    spread_of_sample(M, true, 0.0, expected)
+    assert_allclose(np.linalg.eigvals(np.linalg.solve(expected, found)).real, 1.0, atol=0.35)
+
+
+def test_what_is_kept_comes_back():
+    model = residual_init(7, P)
+    model = replace(model, weights=model.weights + 1.0, queue=model.queue + 1.0, waiting=3)
+    back = resumed(kept(model), P)
+    assert_allclose(back.weights, 1.0)
+    assert back.waiting == 0
+    assert not back.queue.any()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"covariance": np.zeros((7, 12, 12))}, {"spread": -np.ones((2, 2, 7))}, {"weights": np.zeros((7, 3))}],
+)
+def test_what_cannot_have_been_learnt_is_refused(change):
+    with pytest.raises(ParameterError, match="anew"):
+        resumed(kept(residual_init(7, P)) | change, P)
+
+
+def test_the_memory_is_bounded_and_the_prior_has_one_variance_a_feature():
+    assert len(prior_of(7, P)) == features_of(7) == 12
+    assert sum(a.nbytes for a in (residual_init(7, P).covariance, residual_init(7, P).queue)) < 20_000
