@@ -8,14 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.contact import reaction
-from pretouch.contact.detect import detect
-from pretouch.contact.window import WindowState, window_init
+from pretouch.contact import response
+from pretouch.contact.feel import FeelState, feel, feel_init
+from pretouch.contact.residual_model import ResidualModel
 from pretouch.control import path as paths
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.motion import joint_motion
+from pretouch.control.near import NearState, near_init, near_motion, near_settings
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.errors import RobotStateError, SkinError
+from pretouch.events import doing, events_of
 from pretouch.faults import Watch, examine, sound_readings, sound_robot, watch_init
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.params import Profile
@@ -24,7 +25,7 @@ from pretouch.perception.perceive import perceive, silent_units
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Contact, ControlStep, FloatArray, Inputs, Mode, QpOutcome, RobotState
+from pretouch.types import ControlStep, FloatArray, Inputs, Mode, QpOutcome, RobotState
 from pretouch.values import value
 
 
@@ -34,10 +35,11 @@ class ControllerState:
 
     watch: Watch
     tracks: TrackState
-    window: WindowState
+    feel: FeelState
     reduction: ReductionState
-    reaction: reaction.ReactionState
+    reaction: response.ResponseState
     path: paths.PathState
+    near: NearState
     mode: ModeState
     command: FloatArray
     """(n,) last joint velocity command [rad/s]."""
@@ -64,20 +66,25 @@ class Controller:
             if model.link_index(unit.link) != link:
                 raise SkinError(f"The skin was made for another arm than {model.description.name}: make one for it.")
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
+        self._nearness = near_settings(profile)
         self._mark = mark
 
-    def init(self, robot: RobotState) -> ControllerState:
-        """Return the state before the first step; a robot state that cannot be used is a RobotStateError."""
+    def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
+        """Return the state before the first step; a robot state that cannot be used is a RobotStateError.
+
+        `learnt` is the arm's free motion as an earlier session left it, for a detector that learns it.
+        """
         sound, wrong = sound_robot(robot, self.limits.qd_max)
         if sound is None:
             raise RobotStateError(f"The controller cannot start: {wrong}: check the connection to the arm.")
         return ControllerState(
             watch=watch_init(sound),
             tracks=track_init(len(self.skin)),
-            window=window_init(self.profile.threshold.window_samples),
+            feel=feel_init(self.model, self.profile, learnt),
             reduction=ReductionState(),
-            reaction=reaction.reaction_init(self.profile.reaction),
+            reaction=response.response_init(sound.q_commanded, self.profile.reaction),
             path=paths.PathState(),
+            near=near_init(self.model, len(self.skin)),
             mode=mode_init(),
             command=sound.qd_commanded,
             rotation_goal=self.model.kinematics(sound.q).rotation[self.model.ee],
@@ -86,22 +93,23 @@ class Controller:
     def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
         """Go on from a state of another controller of the same arm and skin, with this one's profile and path.
 
-        A force window of another length is filled anew; another path is joined where it is nearest, and the speed along
-        it grows from 0. A reaction that is over stays so.
+        A force window of another length, and another method of detection, begin anew; another path is joined where it
+        is nearest, and the speed along it grows from 0. A reaction that is over stays so.
         """
         mine, theirs, robot = self.profile, before.profile, state.watch.robot
         if len(state.command) != self.model.n or len(state.tracks.point) != len(self.skin):
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.threshold.window_samples == theirs.threshold.window_samples
-        reacting = reaction.active(state.reaction, theirs.reaction)
+        same_window = same_window and mine.detection.method == theirs.detection.method
         way = state.path
         if self.path is not before.path:
             way = paths.joined(self.path, self.model.kinematics(robot.q).position[self.model.ee])
         return replace(
             state,
-            window=state.window if same_window else window_init(mine.threshold.window_samples),
-            reaction=state.reaction if reacting else reaction.reaction_init(mine.reaction),
+            feel=state.feel if same_window else feel_init(self.model, mine),
+            reaction=response.adopted(state.reaction, mine.reaction, theirs.reaction),
             path=way,
+            near=near_init(self.model, len(self.skin)) if mine.anticipation != theirs.anticipation else state.near,
         )
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
@@ -110,7 +118,13 @@ class Controller:
         if len(state.command) != model.n or len(state.tracks.point) != len(self.skin):
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         robot, events, watch = examine(
-            state.watch, inputs, state.command, self.limits.period, self.limits.qd_max, p.failure
+            state.watch,
+            inputs,
+            state.command,
+            self.limits.period,
+            self.limits.qd_max,
+            p.failure,
+            p.detection.method != "thresholds",
         )
         readings, unfit = sound_readings(inputs.readings, len(self.skin))
         now = watch.stamp
@@ -126,35 +140,40 @@ class Controller:
         mark("perception")
 
         # what is felt: eqs. 8-11
-        force = None if robot.wrench is None else robot.wrench[:3]
-        felt, window = detect(state.window, force, x, seen.obstacles, p.threshold)
+        watched = p.perception.enabled and len(self.skin) > 0 and heard >= 1.0 and not silent
+        felt, feeling = feel(state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p, watched)
         mark("contact")
 
         # what to do
-        events |= _events(unfit, silent, felt.armed, window.count, felt.contact, state.reaction, p)
+        close, before = bool(silent) or response.seen_near(seen.obstacles, p.reaction), doing(state.mode, felt.armed, p)
+        push = response.Felt(model, kin, robot, felt, close, state.command, p)
+        react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
+        events |= events_of(
+            unfit, silent, felt, feeling.window.count, react, close, before == "react", state.near.detour.blocked, p
+        )  # fmt: skip
         mode = next_mode(state.mode, events, inputs.resume)
-        begins = mode.mode is Mode.REACT and state.mode.mode is not Mode.REACT
-        contact = felt.contact if begins else None
-        react = reaction.start_reaction(contact.force, p.reaction) if contact else state.reaction
+        contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
+        if contact is not None:
+            react = response.began(react, before, push, state.path.phase, x)
         mark("mode")
 
         # how fast: eqs. 3-4 on the path, or eq. 12
         slowed = speed_scale(seen.nearest, p.reduction.d_max_m) if p.reduction.enabled else 1.0
         scale, reduction = reduce_speed(state.reduction, min(heard, slowed), p.reduction)
-        way = paths.follow(self.path, state.path, x, p.task)
-        if mode.mode is Mode.REACT:
-            desired = reaction.decayed(react, p.reaction)
-        else:
-            react = reaction.reaction_init(p.reaction)
-            desired = way.scaled(scale)
+        shifted = x - state.near.detour.offset if p.anticipation.detour else x
+        way = paths.follow(self.path, state.path, shifted, p.task)
+        answer, react = response.answered(react, doing(mode, felt.armed, p), push)
+        desired, qd = (way.scaled(scale), None) if answer is None else (answer.velocity, answer.qd)
         mark("path")
 
         # how near: eqs. 5-7, and the joint velocities: eq. 2
-        motion = joint_motion(
-            model, kin, robot, seen.obstacles, desired, state.rotation_goal, self.limits, p, mode.mode is Mode.HOLD
-        )
+        touch = None if answer is None else answer.touch
+        motion, near = near_motion(
+            state.near, self._nearness, model, kin, robot, seen.obstacles, desired, state.rotation_goal, self.limits, p,
+            mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch,
+        )  # fmt: skip
         qp = motion.qp
-        if qp.outcome in _TROUBLE:
+        if qp.outcome in _TROUBLE and (qp.outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)
         mark("motion")
 
@@ -164,46 +183,20 @@ class Controller:
             ee_position=x, ee_velocity=motion.ee_velocity, path_position=way.point,
             path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
             speed_scale=scale, range_distance=seen.distance, obstacles=seen.obstacles,
-            force=np.full(3, np.nan) if force is None else force, filtered_force=window.newest,
-            thresholds=felt.thresholds, armed=felt.armed, contact=contact,
+            force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
+            filtered_force=feeling.window.newest, thresholds=felt.thresholds, armed=felt.armed, contact=contact,
             reaction_velocity=desired if reacting else np.zeros(3), restricted=motion.restricted,
             approach_limit=motion.approach_limit,
-            qp=qp, command=qp.qd,
+            qp=qp, command=qp.qd, residual=felt.residual, evidence=felt.evidence,
         )  # fmt: skip
         after = ControllerState(
-            watch=watch, tracks=tracks, window=window, reduction=reduction,
-            reaction=reaction.advance(react) if reacting else react,
+            watch=watch, tracks=tracks, feel=feeling, reduction=reduction, reaction=react,
             path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
-            mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal,
+            near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal,
         )  # fmt: skip
         mark("record")
         return step, after
 
 
 _TROUBLE = {QpOutcome.FAILED: Event.SOLVER_FAILED, QpOutcome.INFEASIBLE: Event.BLOCKED}
-
-
-def _events(
-    unfit: str,
-    silent: str,
-    armed: bool,
-    samples: int,
-    contact: Contact | None,
-    react: reaction.ReactionState,
-    p: Profile,
-) -> dict[Event, str]:
-    """What this step saw that may change the mode, each with the detail its sentence needs."""
-    events: dict[Event, str] = {}
-    if contact is not None:
-        events[Event.CONTACT] = f"{np.linalg.norm(contact.force):.1f} N"
-    if reaction.active(react, p.reaction):
-        left = (p.reaction.decay_cycles - react.cycle) * p.task.control_period_s
-        events[Event.REACTING] = f"{left:.2f} s"
-    if unfit and p.perception.enabled:
-        events[Event.SKIN_UNFIT] = unfit
-    if silent:
-        events[Event.SKIN_SILENT] = silent
-    if not armed:
-        events[Event.WINDOW_FILLING] = f"{samples} of {p.threshold.window_samples} samples"
-    return events

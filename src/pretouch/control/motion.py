@@ -7,9 +7,10 @@ functions: five calls from Python cost more time than what they do.
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.control.baselines import MODES, baseline_motion
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.control.penalty import SOLVED, excesses, minimise
-from pretouch.control.qp import ENDING, cost_into, solve, task_cost
+from pretouch.control.qp import ENDING, Cost, cost_into, solve, task_cost
 from pretouch.control.restriction import approach_rows, least_limit, rows_into
 from pretouch.control.task import task, twist
 from pretouch.params import Profile
@@ -26,7 +27,7 @@ class Motion:
     restricted: IntArray
     """(K',) which of the obstacles restrict the arm."""
     approach_limit: FloatArray
-    """(K',) approach limit of eq. 7 for each of them [m/s]."""
+    """(K',) approach limit for each of them, of eq. 7 or the braking curve [m/s]."""
     ee_velocity: FloatArray
     """(3,) measured velocity of the end-effector origin [m/s]."""
     ee_velocity_commanded: FloatArray
@@ -43,6 +44,7 @@ def joint_motion(
     limits: JointLimits,
     profile: Profile,
     hold: bool,
+    reaction_qd: FloatArray | None = None,
 ) -> Motion:
     """Joint velocities that track the task (eq. 2) within joint limits and approach limits (eqs. 5-7).
 
@@ -56,8 +58,11 @@ def joint_motion(
         limits: joint limits.
         profile: parameters.
         hold: whether to brake, whatever is asked.
+        reaction_qd: (n,) joint velocities asked for in place of the task's [rad/s]; within the same limits.
     """
     t, r = profile.task, profile.restriction
+    if r.mode in MODES:
+        return Motion(*baseline_motion(model, kin, robot, obstacles, velocity, rotation_goal, limits, profile, hold))
     n, count = model.n, 0 if r.mode == "off" else len(obstacles.unit)
     qd, multipliers, velocities = np.empty(n), np.empty(n + count), np.empty((2, 3))
     restricted, rows = np.empty(count, WHOLE), np.empty((2, count))
@@ -69,11 +74,13 @@ def joint_motion(
         velocity, rotation_goal, model.q_mid, limits.table,
         r.v_max_m_s, r.beta, r.d_crit_m, r.d_repulse_m, r.d_notice_m, least_limit(r), r.slack_weight if soft else 0.0,
         t.orientation == "hold", t.orientation_gain_1_s, t.damping_max, t.manipulability_threshold, t.mid_joint_gain,
-        t.mid_joint_time_s, profile.failure.solver_iterations, hold,
+        t.mid_joint_time_s, profile.failure.solver_iterations, hold, _NO_JOINT if reaction_qd is None else reaction_qd,
         qd, multipliers, velocities, restricted, rows,
     )  # fmt: skip
     if violated and not soft and not hold:
-        return _motion_with_hard_rows(model, kin, robot, obstacles, velocity, rotation_goal, limits, profile)
+        return _motion_with_hard_rows(
+            model, kin, robot, obstacles, velocity, rotation_goal, limits, profile, reaction_qd
+        )
     outcome, status = QpOutcome.SOLVED, "solved, an approach row is violated" if violated else "solved"
     if hold:
         outcome, status = QpOutcome.SKIPPED, "not posed: the arm holds"
@@ -84,6 +91,7 @@ def joint_motion(
 
 
 _NO_LINK = np.zeros(0, np.int64)
+_NO_JOINT = np.zeros(0)
 
 
 @compiled
@@ -94,7 +102,7 @@ def _motion(
     velocity: FloatArray, rotation_goal: FloatArray, q_mid: FloatArray, limits: FloatArray,
     v_max: float, beta: float, d_crit: float, d_repulse: float, d_notice: float, floor: float, weight: float,
     keep_orientation: bool, orientation_gain: float, damping_max: float, threshold: float, mid_gain: float,
-    mid_time: float, budget: int, hold: bool,
+    mid_time: float, budget: int, hold: bool, reaction_qd: FloatArray,
     answer: FloatArray, multipliers: FloatArray, velocities: FloatArray, restricted: IntArray, rows: FloatArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Write the last line of arguments; return how many rows, how the solver ended, and whether any is violated."""
@@ -114,7 +122,10 @@ def _motion(
         m = 6 if keep_orientation else 3
         x_d = twist(velocity, rotation[ee], rotation_goal, orientation_gain)
         H, f = np.empty((n, n)), np.empty(n)
-        cost_into(J[:m], x_d[:m], q, q_mid, damping_max, threshold, mid_gain, mid_time, H, f)
+        if len(reaction_qd):
+            H[:], f[:] = np.eye(n), -reaction_qd
+        else:
+            cost_into(J[:m], x_d[:m], q, q_mid, damping_max, threshold, mid_gain, mid_time, H, f)
         ending = minimise(H, f, lower, upper, G, h, weight, budget, answer, slack[:found], multipliers[: n + found])
     if hold or ending != SOLVED:
         for j in range(n):
@@ -136,13 +147,15 @@ def _motion(
 
 def _motion_with_hard_rows(
     model: RobotModel, kin: Kinematics, robot: RobotState, obstacles: Obstacles, velocity: FloatArray,
-    rotation_goal: FloatArray, limits: JointLimits, profile: Profile,
+    rotation_goal: FloatArray, limits: JointLimits, profile: Profile, reaction_qd: FloatArray | None,
 ) -> Motion:  # fmt: skip
     """Answer of `joint_motion` where a hard row is in the way, which takes another solver."""
     rows, restricted = approach_rows(kin, model.moved_by, obstacles, profile.restriction)
     J = model.ee_jacobian(kin)
     goal = task(J, velocity, kin.rotation[model.ee], rotation_goal, profile.task)
     cost = task_cost(*goal, robot.q, model.q_mid, profile.task)
+    if reaction_qd is not None:
+        cost = Cost(np.eye(model.n), -reaction_qd)
     lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, limits.table)
     qp = solve(cost, lower, upper, rows, profile.restriction.slack_weight, stop, profile.failure.solver_iterations)
     return Motion(qp, restricted, rows.h, J[:3] @ robot.qd, J[:3] @ qp.qd)

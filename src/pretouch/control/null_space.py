@@ -1,0 +1,107 @@
+"""What the arm does with the joint motion that leaves its task as it is."""
+
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.control.qp import damping, manipulability, mid_joint_velocity
+from pretouch.types import BoolArray, FloatArray, IntArray
+
+_DAMPING = 1e-6
+"""Added to J J^T, so that the projector is defined at singularities too [m^2]."""
+
+
+@compiled
+def projector(J: FloatArray) -> FloatArray:
+    """N = I - J^T (J J^T + c I)^-1 J (n, n), symmetric: onto joint velocities that leave the task of J (m, n) alone.
+
+    Damped by c, so that it is defined everywhere: J N v is c (J J^T + c I)^-1 J v, nothing away from singularities.
+    """
+    m, n = J.shape
+    A, X = np.empty((m, m)), J.copy()
+    for i in range(m):
+        for j in range(i + 1):
+            total = _DAMPING if i == j else 0.0
+            for c in range(n):
+                total += J[i, c] * J[j, c]
+            for c in range(j):
+                total -= A[i, c] * A[j, c]
+            A[i, j] = np.sqrt(total) if i == j else total / A[j, j]
+    # with A the Cholesky factor, N = I - X^T X for X = A^-1 J
+    for i in range(m):
+        for c in range(n):
+            for j in range(i):
+                X[i, c] -= A[i, j] * X[j, c]
+            X[i, c] /= A[i, i]
+    N = np.eye(n)
+    for i in range(n):
+        for j in range(n):
+            for c in range(m):
+                N[i, j] -= X[c, i] * X[c, j]
+    return N
+
+
+@compiled
+def cost_with_null_space(
+    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, damping_max: float, threshold: float, k: float,
+    time: float, projected: bool, null_velocity: FloatArray,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """H (n, n) and f (n,) of eq. 2 with its mid-joint term, and a motion asked for, in the task's null space.
+
+    1/2 |x_d - J qd|^2 + mu/2 |qd|^2 + k/2 |N (z - qd)|^2, z the motion (n,) [rad/s] asked for. With `projected` the
+    velocity to the middle of the joints is part of z, without it it stays a term of its own, k/2 |qd_mid - qd|^2.
+    """
+    n, N = len(q), projector(J)
+    mu = damping(manipulability(J), damping_max, threshold)
+    H, f, z = np.empty((n, n)), np.empty(n), null_velocity.copy()
+    for i in range(n):
+        middle = mid_joint_velocity(q[i], q_mid[i], time)
+        f[i] = 0.0 if projected else -k * middle
+        z[i] += middle if projected else 0.0
+    for i in range(n):
+        for m in range(len(x_d)):
+            f[i] -= J[m, i] * x_d[m]
+        for j in range(n):
+            f[i] -= k * N[i, j] * z[j]
+            H[i, j] = k * N[i, j]
+            if i == j:
+                H[i, j] += mu if projected else mu + k
+            for m in range(len(x_d)):
+                H[i, j] += J[m, i] * J[m, j]
+    return H, f
+
+
+@compiled
+def away(
+    last: FloatArray, G: FloatArray, which: IntArray, link: IntArray, distance: FloatArray, moved_by: BoolArray,
+    within: float, speed: float, most: float, change: float,
+) -> FloatArray:  # fmt: skip
+    """Joint velocities (n,) [rad/s] that take body points before the hand away from what is near.
+
+    Each row g = n^T J of G (R, n), that of obstacle `which` (R,), adds -g v / |g|^2 with v = speed (1 - d / within)^2:
+    alone it would move its point away at v. The sum is at most `most` long, and differs from `last` (n,) by no more
+    than `change`.
+    """
+    n = G.shape[1]
+    z = np.zeros(n)
+    for r in range(len(which)):
+        m = which[r]
+        if distance[m] >= within or moved_by[link[m]].all():
+            continue
+        size2 = 0.0
+        for j in range(n):
+            size2 += G[r, j] * G[r, j]
+        wanted = speed * (1.0 - max(0.0, distance[m]) / within) ** 2
+        # a point that hardly moves asks for no more than one 0.1 m off an axis
+        for j in range(n):
+            z[j] -= G[r, j] * wanted / max(size2, 0.01)
+    _shorten(z, most)
+    step = z - last
+    _shorten(step, change)
+    return last + step
+
+
+@compiled
+def _shorten(v: FloatArray, length: float) -> None:
+    size = np.sqrt((v * v).sum())
+    if size > length:
+        v *= length / size

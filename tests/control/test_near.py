@@ -1,0 +1,237 @@
+"""Anticipation in the whole control step, over an arm that follows its commands exactly."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from tests.following_arm import DT, Arm
+
+from pretouch.control.braking import braking_cap
+from pretouch.control.joint_box import joint_limits
+from pretouch.control.motion import joint_motion
+from pretouch.control.near import anticipates, near_init, near_motion, near_settings
+from pretouch.params import PROFILES, Profile, profile
+from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, Mode, RobotState
+
+PRETOUCH = PROFILES["pretouch"]
+LEFT = 0
+"""The unit of the paper's skin that looks along +y in the ready posture, the way the arm goes."""
+A = PRETOUCH.anticipation
+
+
+def on_its_way(model: RobotModel, skin: Skin, params: Profile = PRETOUCH) -> Arm:
+    arm = Arm(model, skin, params)
+    arm.run(150)
+    return arm
+
+
+def hand_speed(arm: Arm, step: ControlStep) -> np.ndarray:
+    return (arm.model.ee_jacobian(arm.model.kinematics(step.q)) @ step.command)[:3]
+
+
+def to_wall(arm: Arm, y: float) -> float:
+    """Reading [m] of the unit that looks along +y at a wall at y."""
+    kin, unit = arm.model.kinematics(arm.q), arm.skin.units[LEFT]
+    link = arm.model.link_index(unit.link)
+    sensor = kin.position[link] + kin.rotation[link] @ unit.T_link_sensor[:3, 3]
+    beam = kin.rotation[link] @ unit.T_link_sensor[:3, 2]
+    return float((y - sensor[1]) / beam[1])
+
+
+def run_into_a_wall(arm: Arm, cycles: int, ahead: float = 0.25) -> list[ControlStep]:
+    y = arm.ee()[1] + ahead
+    steps = []
+    for _ in range(cycles):
+        d = to_wall(arm, y)
+        steps.append(arm.step(seen={LEFT: max(d, 0.0)}))
+        if d < 0.005:
+            break
+    return steps
+
+
+def approach(arm: Arm, step: ControlStep, row: int = 0) -> float:
+    """Velocity [m/s] of the closest body point of a row towards its obstacle."""
+    o, m = step.obstacles, step.restricted[row]
+    kin = arm.model.kinematics(step.q)
+    J = arm.model.jacobian(kin, int(o.link[m]), o.body_point[m])[:3]
+    return float(o.direction[m] @ J @ step.command)
+
+
+def test_the_papers_profile_anticipates_nothing(panda_model: RobotModel, paper_skin: Skin):
+    assert not anticipates(PROFILES["paper"])
+    assert not anticipates(PROFILES["blind"])
+    arm = on_its_way(panda_model, paper_skin, PROFILES["paper"])
+    given = (
+        panda_model, panda_model.kinematics(arm.q), arm.robot(), no_obstacles(), np.array([0.0, 0.3, 0.0]), np.eye(3),
+        arm.controller.limits, PROFILES["paper"], False,
+    )  # fmt: skip
+    state = near_init(panda_model, 7)
+    assert near_settings(PROFILES["paper"]) is None
+    motion, after = near_motion(state, None, *given, True)
+    assert after is state
+    np.testing.assert_array_equal(motion.qp.qd, joint_motion(*given).qp.qd)
+
+
+def test_every_switch_can_be_turned_off_alone():
+    switches = [
+        "perception.closing_speed", "perception.reckon_below_minimum", "perception.keep_while_silent",
+        "task.mid_joint_projected", "anticipation.effective_mass", "anticipation.closing_speed",
+        "anticipation.tangential", "anticipation.null_space",
+    ]  # fmt: skip
+    for switch in switches:
+        group, field = switch.split(".")
+        assert getattr(getattr(PRETOUCH, group), field) is True
+        assert getattr(getattr(PROFILES["paper"], group), field) is False
+        assert getattr(getattr(profile(f"pretouch:{switch}=no"), group), field) is False
+    assert profile("pretouch:restriction.mode=slack").restriction.mode == "slack"
+
+
+def test_towards_a_wall_the_arm_keeps_the_braking_curve_and_comes_to_touch(panda_model: RobotModel, paper_skin: Skin):
+    arm = on_its_way(panda_model, paper_skin)
+    steps = run_into_a_wall(arm, 600)
+    near = [s for s in steps if len(s.restricted)]
+    for before, step in pairwise(near):
+        cap = braking_cap(
+            float(step.obstacles.body_distance[0]), A.touch_speed_max_m_s, A.deceleration_m_s2, A.latency_s, A.margin_m
+        )
+        v = approach(arm, step)
+        # soft rows give a little
+        assert v <= max(cap, approach(arm, before) - A.tighten_m_s2 * DT) + 0.003
+        assert {step.mode, before.mode} == {Mode.TRACK}
+    assert approach(arm, near[0]) > 0.25
+    # v_c = 0.25 * 65 N / sqrt(mu 75 N/mm), 1/mu = 1/4.4 + 1/m_R, is 0.044 m/s at m_R = 3 kg
+    assert approach(arm, near[-1]) == pytest.approx(0.044, abs=0.008)
+    # 0.25 m less the hand's 0.1: it took the braking of 0.3 m/s at 0.3 m/s^2 and less than a second more
+    assert len(steps) * DT < 0.9 + 1.6
+
+
+def test_the_command_keeps_the_acceleration_limits_whatever_a_unit_sees(panda_model: RobotModel, paper_skin: Skin):
+    arm, rng = on_its_way(panda_model, paper_skin), np.random.default_rng(1000)
+    last, most = arm.qd.copy(), panda_model.description.qdd_max * DT
+    for _ in range(200):
+        seen = {int(u): float(rng.uniform(0, 0.6)) for u in rng.permutation(7)[: rng.integers(0, 5)]}
+        step = arm.step(seen=seen)
+        assert np.all(np.abs(step.command - last) <= most + 1e-9)
+        last = step.command
+
+
+def test_when_sight_is_lost_the_arm_speeds_up_no_faster_than_rows_loosen(panda_model: RobotModel, paper_skin: Skin):
+    arm = on_its_way(panda_model, paper_skin)
+    steps = run_into_a_wall(arm, 100)
+    before = hand_speed(arm, steps[-1])[1]
+    assert before < 0.15
+    for _ in range(40):
+        after = hand_speed(arm, arm.step())[1]
+        assert after - before < A.loosen_m_s2 * DT + 0.002
+        before = after
+    assert before > 0.25
+
+
+def test_a_missed_reading_changes_nothing_but_a_little(panda_model: RobotModel, paper_skin: Skin):
+    arm = on_its_way(panda_model, paper_skin)
+    steps = run_into_a_wall(arm, 70)
+    before = hand_speed(arm, steps[-1])[1]
+    lost = [hand_speed(arm, s)[1] for s in arm.run(10, silent={LEFT: 0.07})]
+    assert max(lost) - before < 10 * A.loosen_m_s2 * DT + 0.002
+
+
+def test_a_push_away_from_an_obstacle_is_followed_at_once(panda_model: RobotModel, paper_skin: Skin):
+    arm = on_its_way(panda_model, paper_skin)
+    y = arm.ee()[1] + 0.13
+    for _ in range(60):
+        arm.step(seen={LEFT: max(to_wall(arm, y), 0.0)})
+    for _ in range(30):
+        step = arm.step(force=(0.0, -60.0, 0.0), seen={LEFT: max(to_wall(arm, y), 0.0)})
+    assert step.mode is Mode.REACT
+    assert hand_speed(arm, step)[1] == pytest.approx(step.reaction_velocity[1], abs=0.01)
+    assert step.reaction_velocity[1] < -0.2
+
+
+def test_near_a_thing_beside_it_the_arm_does_not_slide_past_at_full_speed(panda_model: RobotModel, paper_skin: Skin):
+    speeds = {}
+    for name in ("pretouch", "pretouch:anticipation.tangential=no"):
+        arm = on_its_way(panda_model, paper_skin, profile(name))
+        for _ in range(40):
+            # a unit of the hand that looks along x sees something all the time
+            step = arm.step(seen={2: 0.05})
+        assert len(step.restricted) == 1
+        d = float(step.obstacles.body_distance[0])
+        speeds[name] = abs(hand_speed(arm, step)[1])
+    assert speeds["pretouch:anticipation.tangential=no"] > 0.28
+    cap = A.tangential_speed_m_s + d / A.tangential_distance_m * (0.3 - A.tangential_speed_m_s)
+    assert d < 0.07
+    assert speeds["pretouch"] < cap + 0.01
+
+
+def test_a_path_blocked_for_long_is_said_to_be_and_its_phase_waits(panda_model: RobotModel, paper_skin: Skin):
+    arm = on_its_way(panda_model, paper_skin)
+    arm.run(60, seen={LEFT: 0.0})
+    begun = arm.state.path.phase
+    step = arm.run(200, seen={LEFT: 0.0})[-1]
+    assert step.mode is Mode.TRACK
+    assert "kept the hand from its path" in step.reason
+    assert step.path_phase - begun < 0.15
+    steps = arm.run(100)
+    assert steps[-1].reason == "Following the path."
+
+
+def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: RobotModel):
+    elbow, gaps = panda_model.link_index("panda_link4"), {}
+    limits = joint_limits(panda_model, 0.01, DT)
+    for name in ("pretouch", "pretouch:anticipation.null_space=no"):
+        params = replace(profile(name), task=replace(profile(name).task, mid_joint_gain=1e-3, mid_joint_time_s=1e5))
+        q, qd, state = panda_model.description.q_ready.copy(), np.zeros(7), near_init(panda_model, 1)
+        start = panda_model.kinematics(q)
+        thing = start.position[elbow] + np.array([0.0, 0.2, 0.0])
+        for _ in range(100):
+            kin = panda_model.kinematics(q)
+            near = closest_points(
+                kin, panda_model.body, kin.position[panda_model.ee], np.zeros(1, np.int64), thing[None], np.eye(3)[:1]
+            )
+            robot = RobotState(0.0, q, qd, q, qd, np.zeros(7), None)
+            motion, state = near_motion(
+                state, near_settings(params), panda_model, kin, robot, near, np.zeros(3),
+                start.rotation[panda_model.ee], limits, params, False, True,
+            )  # fmt: skip
+            qd = motion.qp.qd
+            q = q + qd * DT
+        gaps[name] = float(near.body_distance[0])
+        np.testing.assert_allclose(kin.position[panda_model.ee], start.position[panda_model.ee], atol=1e-3)
+    assert gaps["pretouch"] > gaps["pretouch:anticipation.null_space=no"] + 0.005
+
+
+def test_with_a_detour_the_hand_goes_aside_and_returns_to_the_path(panda_model: RobotModel, paper_skin: Skin):
+    arm = on_its_way(panda_model, paper_skin, profile("pretouch:anticipation.detour=yes"))
+    run_into_a_wall(arm, 150)
+    steps = arm.run(100, seen={LEFT: 0.01})
+    aside = arm.ee() - steps[-1].path_position
+    assert np.linalg.norm(aside[[0, 2]]) > 0.05
+    assert np.linalg.norm(arm.state.near.detour.offset) <= A.detour_distance_m + 1e-9
+    steps = arm.run(500)
+    np.testing.assert_array_equal(arm.state.near.detour.offset, np.zeros(3))
+    assert np.linalg.norm(steps[-1].ee_position - steps[-1].path_position) < 0.01
+
+
+def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin)
+    wanted = np.array([0.02, -0.01, 0.03, 0.0, 0.01, -0.02, 0.01])
+    for params in (PROFILES["paper"], PRETOUCH):
+        motion, _ = near_motion(
+            near_init(panda_model, 7), near_settings(params), panda_model, panda_model.kinematics(arm.q), arm.robot(),
+            no_obstacles(),
+            np.array([0.0, 0.3, 0.0]), np.eye(3), arm.controller.limits, params, False, True, wanted,
+        )  # fmt: skip
+        np.testing.assert_allclose(motion.qp.qd, wanted, atol=1e-12)
+
+
+def test_other_modes_rows_go_with_the_null_space_too(panda_model: RobotModel, paper_skin: Skin):
+    for mode in ("off", "slack", "hard"):
+        params = replace(PRETOUCH, restriction=replace(PRETOUCH.restriction, mode=mode))
+        arm = on_its_way(panda_model, paper_skin, params)
+        step = arm.run(5, seen={LEFT: 0.3})[-1]
+        assert len(step.restricted) == (mode != "off")
+        assert np.isfinite(step.command).all()
