@@ -56,7 +56,7 @@ def drawn(trace):
         "circle": circle_figure(trace, PAPER),
         "interaction": interaction_figure(trace, UNITS, PAPER),
         "close-up": close_up_figure(trace, UNITS, PAPER),
-        "force-difference": force_difference_figure(pairs, "paper"),
+        "force-difference": force_difference_figure(pairs, ["paper"]),
     }
 
 
@@ -135,8 +135,8 @@ def test_the_force_difference_counts_from_the_touch_away_from_the_object():
         assert estimate.get_xdata()[300] == 0.0
         assert estimate.get_ydata()[300] == sign * 20.0
         assert line(axes, "paper: detected").get_xdata() == pytest.approx([0.05])
-    assert force_difference_figure({}, "paper").axes[0].lines[:] == []
-    alone = force_difference_figure({("circle", "-y", "blind"): made_trace()}, "blind")
+    assert force_difference_figure({}, ["paper"]).axes[0].lines[:] == []
+    alone = force_difference_figure({("circle", "-y", "blind"): made_trace()}, ["blind"])
     assert alone.get_suptitle().endswith("thresholds, blind")
     assert len(alone.axes[0].get_legend_handles_labels()[1]) <= 4
 

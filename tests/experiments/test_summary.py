@@ -59,10 +59,10 @@ def test_only_experiments_that_ran_are_summarised():
 def test_tables_show_medians_and_ratios():
     rows = [static_row("blind", 0, 80.0), static_row("paper", 0, 20.0), dynamic_row([contact()])]
     static, dynamic = tables(summarise(rows))
-    assert [row[:2] for row in static.rows] == [("circle\n-y", "blind"), ("circle\n-y", "paper"), ("", "ratio")]
-    assert static.rows[0][6] == "80.0\n80-80"
-    assert static.rows[0][2] == "0.200\n0.20-0.20"
-    assert static.rows[2][6] == "4.00\n4.0-4.0"
+    assert [row[0] for row in static.rows] == ["blind\ncircle -y", "paper\ncircle -y", "ratio"]
+    assert static.rows[0][5] == "80.0\n80-80"
+    assert static.rows[0][1] == "0.200\n0.20-0.20"
+    assert static.rows[2][5] == "4.00\n4.0-4.0"
     assert static.rows[0][-1] == "1/1"
     assert dynamic.rows[0][:3] == ("paper", "1 of 1", "60")
     for table in (static, dynamic):
@@ -87,7 +87,7 @@ def test_more_of_a_grid_is_shown_in_more_tables():
     rows = [static_row(name, 0, 20.0) for name in ("blind", "paper", "slowing-only")]
     rows.append(static_row("paper", 0, None, restrictions="hard", contact=False, detection_delay_s=None))
     places, by_use, by_mode = tables(summarise(rows))
-    assert [row[1] for row in places.rows] == ["blind", "paper", "ratio"]
+    assert [row[0].split("\n")[0] for row in places.rows] == ["blind", "paper", "ratio"]
     names = [row[0].split("\n")[0] for row in by_use.rows]
     assert names == ["blind", "paper", "ratio", "slowing-only", "ratio"]
     assert [row[:2] for row in by_mode.rows] == [
@@ -98,7 +98,7 @@ def test_more_of_a_grid_is_shown_in_more_tables():
         assert all(len(row) == len(table.header) for row in table.rows)
 
 
-def test_what_is_shown_in_detail_is_blind_and_one_other_with_restrictions_off():
+def test_what_is_shown_in_detail_is_blind_one_other_with_restrictions_off_and_pretouch():
     def cell(profile, restrictions, stiffness=25e3):
         return {"profile": profile, "restrictions": restrictions, "stiffness_n_per_m": stiffness}
 
@@ -106,6 +106,8 @@ def test_what_is_shown_in_detail_is_blind_and_one_other_with_restrictions_off():
     assert shown_controllers(many) == (
         25e3, {"paper": "off", "slowing-only": "off", "blind": "off"}, ["blind", "paper"],
     )  # fmt: skip
+    three = shown_controllers([*many, cell("pretouch", "braking"), cell("other", "off")])
+    assert three[2] == ["blind", "paper", "pretouch"]
     assert shown_controllers([cell("blind", "off", 2e3)])[::2] == (2e3, ["blind"])
     assert shown_controllers([cell("paper", "slack"), cell("paper", "hard")])[1:] == ({"paper": "slack"}, ["paper"])
 

@@ -50,6 +50,7 @@ class Request:
     """Trials to record, `Recorded`."""
     arm: str | None = None
     """Folder of an imported arm, or its robot.toml; None for the Panda."""
+    first_seed: int = 0
 
     def __post_init__(self) -> None:
         for name in self.experiments:
@@ -63,6 +64,8 @@ class Request:
             )
         if self.seeds < 1:
             raise ExperimentError(f"The number of seeds is {self.seeds}: give at least 1.")
+        if self.first_seed < 0:
+            raise ExperimentError(f"The first seed is {self.first_seed}: give 0 or more.")
         if not self.profiles or len(set(self.profiles)) < len(self.profiles):
             raise ExperimentError(f"The profiles are {','.join(self.profiles) or 'none'}: name each wanted one once.")
         for name in self.profiles:
@@ -102,7 +105,7 @@ class Request:
         grid = Grid(self.profiles, cast(tuple[RestrictionMode, ...], self.restrictions), self.stiffness)
         cells = [cell for name in self.experiments for cell in EXPERIMENTS[name].cells(grid)]
         once = list({cell.name: cell for cell in cells}.values())
-        return [(cell, seed) for seed in range(self.seeds) for cell in once]
+        return [(cell, seed) for seed in range(self.first_seed, self.first_seed + self.seeds) for cell in once]
 
 
 def _arm_folder(arm: str) -> Path:

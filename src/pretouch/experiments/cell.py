@@ -11,6 +11,8 @@ from pretouch.params import Orientation, Profile, RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 
+_ITS_OWN = ("braking", "flacco", "ding")
+"""Restriction modes that make a profile what it is."""
 _SAFE = {"-y": "minus-y", "+y": "plus-y"}
 
 
@@ -27,12 +29,13 @@ class Grid:
     def controllers(self, restrictions: RestrictionMode) -> list[tuple[str, str]]:
         """Profiles with restriction modes; `restrictions` is the experiment's own.
 
-        Without proximity the mode is `off`; a profile that is named with a mode keeps it.
+        Without proximity the mode is `off`; a profile that is named with a mode keeps it, and so does one whose mode
+        is not of the paper's equations.
         """
         pairs = []
         for name in self.profiles:
             found = profile(name)
-            fixed = not found.perception.enabled or ":restriction.mode=" in name
+            fixed = not found.perception.enabled or ":restriction.mode=" in name or found.restriction.mode in _ITS_OWN
             modes = (found.restriction.mode,) if fixed else self.restrictions or (restrictions,)
             pairs += [(name, mode) for mode in modes]
         return list(dict.fromkeys(pairs))

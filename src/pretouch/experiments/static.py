@@ -166,7 +166,7 @@ def _draw(sources: Sources) -> list[Picture]:
             traces[trajectory, side, profile] = trace
     if not traces:
         return []
-    figure = force_difference_figure(traces, profiles[-1])
+    figure = force_difference_figure(traces, profiles)
     return [Picture("static", "Force and contact thresholds at the static object", figure)]
 
 

@@ -29,7 +29,15 @@ _STATIC = (
 )
 
 
+_MEANT = {
+    "slowing-only": "slowing-only: eqs. 3-4 without F_obs.",
+    "thresholds-only": "thresholds-only: F_obs without eqs. 3-4.",
+    "paper-0.5m": "paper-0.5m: objects count within the 0.5 m of the paper's text instead of Table I's 0.8 m.",
+    "pretouch": "pretouch: slower where it has to be to brake in time, and contacts felt by the joint torques.",
+}
 _SHOWN_STIFFNESS = 25_000.0
+_UNSAID = ("off", "braking")
+"""Restriction modes that the title does not name: without rows, and the one `pretouch` always has."""
 
 
 def static_tables(part: Row) -> list[TextTable]:
@@ -39,7 +47,7 @@ def static_tables(part: Row) -> list[TextTable]:
     made = [_places(part, stiffness, {name: modes[name] for name in shown})]
     if len(_values(cells, "stiffness_n_per_m")) > 1 or len(_values(cells, "profile")) > 2:
         made.append(_stiffnesses(part, modes))
-    if len({cell["restrictions"] for cell in cells if cell["profile"] != "blind"}) > 1:
+    if len({(cell["profile"], cell["restrictions"]) for cell in cells}) > len(_values(cells, "profile")):
         made.append(_restrictions(part, stiffness))
     return made
 
@@ -49,10 +57,12 @@ def shown_controllers(cells: list[Row]) -> tuple[float, dict[str, str], list[str
 
     Returns:
         A stiffness [N/m], the restriction mode of each profile (`off` if it has cells with that), and the names of one
-        or two profiles, `blind` first.
+        to three profiles, `blind` first and `pretouch` last.
     """
     stiffnesses, profiles = _values(cells, "stiffness_n_per_m"), _values(cells, "profile")
-    shown = ["blind", *(name for name in profiles if name != "blind")][:2] if "blind" in profiles else profiles[:1]
+    others = [name for name in profiles if name not in ("blind", "pretouch")]
+    shown = [name for name in ("blind", *others[:1], "pretouch") if name in profiles]
+    shown = shown if "blind" in profiles else profiles[:1]
     modes: dict[str, str] = {}
     for cell in cells:
         if cell["restrictions"] == "off" or cell["profile"] not in modes:
@@ -67,23 +77,24 @@ def _values(cells: list[Row], name: str) -> list[Any]:
 def _places(part: Row, stiffness: float, modes: dict[str, str]) -> TextTable:
     rows: list[tuple[str, ...]] = []
     false = 0
-    with_mode = "".join(f", {mode} restrictions" for mode in dict.fromkeys(modes.values()) if mode != "off")
+    with_mode = "".join(f", {mode} restrictions" for mode in dict.fromkeys(modes.values()) if mode not in _UNSAID)
     for cell in part["cells"]:
         if cell["stiffness_n_per_m"] != stiffness or cell["restrictions"] != modes.get(cell["profile"]):
             continue
         felt = f"{cell['detected_fraction'] * cell['trials']:.0f}/{cell['contact_fraction'] * cell['trials']:.0f}"
         false += cell["false_detections"]
-        where = f"{cell['trajectory']}\n{cell['side']}"
-        rows.append((where, cell["profile"], *_forces(cell), felt))
-        rows += [("", "ratio", *_force_ratios(ratio), "") for ratio in _its_ratio(part["ratios"], cell)]
+        name = f"{cell['profile']}\n{cell['trajectory']} {cell['side']}"
+        rows.append((name, *_forces(cell), felt))
+        rows += [("ratio", *_force_ratios(ratio), "") for ratio in _its_ratio(part["ratios"], cell)]
     return TextTable(
         f"Static object, {stiffness / 1000:g} N/mm{with_mode}: medians and ratios blind/profile, 10-90 % below",
-        ("where", "profile", *(label for _, label, _ in _STATIC), "felt"),
+        ("profile\nwhere", *(label for _, label, _ in _STATIC), "felt"),
         tuple(rows),
         "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
         " (eq. 8) and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, of its 20 ms"
         " mean and of itself. Felt: contacts detected, of all contacts. The paper finds forces about two times smaller"
         f" with proximity; which force is meant decides the number. False detections: {false}.",
+        names=1,
     )
 
 
@@ -98,8 +109,7 @@ def _stiffnesses(part: Row, modes: dict[str, str]) -> TextTable:
         "Static object, by stiffness and by what proximity is used for: all four places together",
         ("profile\nobject", *(label for _, label, _ in _STATIC)),
         tuple(rows),
-        "slowing-only: eqs. 3-4 without F_obs. thresholds-only: F_obs without eqs. 3-4. paper-0.5m: objects count"
-        " within the 0.5 m of the paper's text instead of Table I's 0.8 m.",
+        " ".join(said for name, said in _MEANT.items() if name in _values(part["pooled_cells"], "profile")),
         names=1,
     )
 

@@ -20,7 +20,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.wire_skin import WireSkin
-from pretouch.sim.hand import Hand, HandScript
+from pretouch.sim.hand import Hand, HandScript, PersonArm
 from pretouch.sim.plant import Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.posture import brought_to
@@ -49,6 +49,8 @@ class Setup:
     """Where the controller believes the same units to be, in the same order; none, and it knows the truth. A recording
     holds what it believes."""
     hand: HandScript | None = None
+    person: PersonArm = field(default_factory=PersonArm)
+    """What moves the hand."""
     plant: PlantParams = field(default_factory=PlantParams)
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
     wire: FleetParams | None = None
@@ -157,7 +159,8 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
     with _mounted(setup, plant) as units:
         finders, traffic = (units.range_finders, units.receiver.units) if isinstance(units, WireSkin) else (units, ())
-        hand = Hand(plant, setup.hand) if setup.hand else None
+        who = setup.person
+        hand = Hand(plant, setup.hand, who.speed_max, who.stiffness, who.damping) if setup.hand else None
         if setup.prepare:
             setup.prepare(plant, finders)
         known = setup.skin if setup.believed is None else setup.believed

@@ -23,6 +23,18 @@ class HandGoal:
     """Largest force the person pulls or pushes with [N]."""
 
 
+@dataclass(frozen=True, slots=True)
+class PersonArm:
+    """The arm behind the hand."""
+
+    speed_max: float = 0.8
+    """Limit of the goal's speed [m/s], so that the hand cannot jump into the robot."""
+    stiffness: float = ARM_STIFFNESS_N_M
+    """[N/m]"""
+    damping: float = 60.0
+    """[N s/m]"""
+
+
 class HandScript(Protocol):
     """What a person means to do."""
 

@@ -46,6 +46,9 @@ class RangeFinderParams(Checked):
     """Diffuse reflectance of all surfaces at 940 nm; skin and light cloth reach 0.5 and more."""
     reflectance_limit: Positive = 0.17
     """Reflectance of a target that fills the cone and is just seen at the mode's greatest distance (sheet: grey)."""
+    slant_power: Positive = 1.0
+    """Power of the cosine of incidence by which returns weaken: 1 for matt surfaces (Lambert), greater for glossy ones,
+    which throw light back in a lobe (Phong's exponent). An assumption where it is not 1."""
     merge_m: Positive = 0.1
     """Returns within this of the nearest one are taken as one target, weighted by their strength [m]."""
     noise_floor_m: NonNegative = 0.003
@@ -171,8 +174,8 @@ class RangeFinders:
         )  # fmt: skip
         return _reading(
             self._hit, rays, self._normal.reshape(-1, 3), p.reflectance, p.reflectance_limit,
-            self._mode.distance_max_m, p.merge_m, self._calibration, p.noise_floor_m, p.noise_rate, p.sigma_limit_m,
-            self._offset[unit], self._rng.standard_normal(),
+            self._mode.distance_max_m, p.merge_m, p.slant_power, self._calibration, p.noise_floor_m, p.noise_rate,
+            p.sigma_limit_m, self._offset[unit], self._rng.standard_normal(),
         )  # fmt: skip
 
 
@@ -232,7 +235,7 @@ _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
 @compiled
 def _reading(
     distance: FloatArray, rays: FloatArray, normal: FloatArray, reflectance: float, reflectance_limit: float,
-    distance_max: float, merge: float, calibration: float, noise_floor: float, noise_rate: float,
+    distance_max: float, merge: float, slant_power: float, calibration: float, noise_floor: float, noise_rate: float,
     sigma_limit: float, offset: float, draw: float,
 ) -> tuple[float, int, float, float]:  # fmt: skip
     """One reading [m], its status, its standard deviation [m], and the strength of what it shows.
@@ -251,6 +254,8 @@ def _reading(
             slant = abs(outwards)
             if outwards > 0:
                 distance[i] = 0.0
+            if slant_power != 1.0:
+                slant = slant**slant_power
             ratio = distance_max / max(distance[i], 0.01)
             strength[i] = reflectance / reflectance_limit * slant * ratio * ratio / count
     start = 0.0

@@ -42,11 +42,22 @@ class HandSpec:
 
 
 @dataclass(frozen=True)
+class GhostSpec:
+    """A ball that the units see and that touches nothing, moved by `pretouch.sim.ghost`."""
+
+    radius: float
+    """[m]"""
+    start: tuple[float, float, float]
+    """[m], base frame."""
+
+
+@dataclass(frozen=True)
 class SceneSpec:
     """What to build round the arm."""
 
     boxes: tuple[Box, ...] = ()
     hand: HandSpec | None = None
+    ghost: GhostSpec | None = None
     floor_height: float = -0.2
     """Height of the floor in the base frame [m]: the arm stands on a pedestal, or its hand would reach below it."""
     pedestal_radius: float = 0.1
@@ -128,7 +139,7 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
 
 
 def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
-    """Add floor, pedestal, boxes and hand; return the stiffness of each geom the arm can touch."""
+    """Add floor, pedestal, boxes, hand and ghost; return the stiffness of each geom the arm can touch."""
     world = mj.worldbody
     off = {"contype": 0, "conaffinity": 0}
     kind = mujoco.mjtGeom
@@ -147,6 +158,9 @@ def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
             body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
         body.add_geom(name="hand", type=kind.mjGEOM_SPHERE, size=[spec.hand.radius, 0, 0], mass=spec.hand.mass, **off)
         stiffness["hand"] = spec.hand.stiffness
+    if spec.ghost:  # in no pair, so it touches nothing
+        body = world.add_body(name="ghost", pos=spec.ghost.start, mocap=True)
+        body.add_geom(name="ghost", type=kind.mjGEOM_SPHERE, size=[spec.ghost.radius, 0, 0], **off)
     return stiffness
 
 

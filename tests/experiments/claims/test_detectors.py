@@ -28,6 +28,7 @@ def obstacles(points):
         link=np.zeros(n, np.int64),
         direction=np.zeros((n, 3)),
         body_distance=np.zeros(n),
+        closing_speed=np.zeros(n),
     )
 
 

@@ -18,8 +18,9 @@ def beside_link1(direction):
     """Return a point 0.05 m beside a point of link 1 that is 0.05 m off joint 1, the only one that moves it."""
     point, direction = np.array([[0.05, 0.0, 0.3]]), np.array([direction])
     return Obstacles(
-        np.zeros(1, np.int64), point + 0.05 * direction, np.ones(1), point, np.array([2]), direction, np.array([0.05])
-    )
+        np.zeros(1, np.int64), point + 0.05 * direction, np.ones(1), point, np.array([2]), direction,
+        np.array([0.05]), np.zeros(1),
+    )  # fmt: skip
 
 
 def answers(model, direction):

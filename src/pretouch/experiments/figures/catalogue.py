@@ -59,7 +59,7 @@ def _force_difference(played: Played, _units: tuple[str, ...], used: Profile) ->
     from pretouch.experiments.figures.force_difference import force_difference_figure
 
     traces = {(str(c.where["trajectory"]), str(c.where["side"]), c.profile): trace for c, trace in played}
-    return force_difference_figure(traces, used.name)
+    return force_difference_figure(traces, (used.name,))
 
 
 def _framework(_played: Played, _units: tuple[str, ...], _used: Profile) -> "Figure":

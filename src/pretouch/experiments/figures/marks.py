@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from pretouch.experiments.trace import Trace
 from pretouch.types import BoolArray, FloatArray
 
-BLIND, SENSING = "tab:blue", "tab:red"
+BLIND, SENSING, OURS = "tab:blue", "tab:red", "tab:green"
 AXES = "xyz"
 Y = 1
 """The axis the paper's figures show."""

@@ -1,0 +1,122 @@
+"""The obstacle of a scenario: how it moves, and how far from it things truly are."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pretouch.perception.vectors import placed
+from pretouch.robot.body import Capsules
+from pretouch.robot.model import Kinematics
+from pretouch.sim.hand import HandGoal
+from pretouch.sim.plant import Plant
+from pretouch.types import FloatArray
+
+_BRAKING_M_S2 = 4.0
+"""How hard one who walks slows down at the end."""
+_ALONG = np.linspace(0.0, 1.0, 51)[:, None, None]
+"""Places along a capsule's axis at which its distance from a box is taken."""
+
+
+@dataclass(frozen=True)
+class Walker:
+    """Comes straight from one point to another at a speed, and stays: a script of `pretouch.sim.hand`."""
+
+    begin: FloatArray
+    """(3,) [m]"""
+    end: FloatArray
+    """(3,) [m]"""
+    speed: float
+    """[m/s]"""
+    start: float
+    """[s]"""
+    force_max: float
+    """[N]"""
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        """Return where it wants to be at a time [s]."""
+        way = self.end - self.begin
+        length = float(np.linalg.norm(way))
+        return HandGoal(self.begin + way * (travelled(time - self.start, length, self.speed) / length), self.force_max)
+
+
+def travelled(time: float, length: float, speed: float) -> float:
+    """Way [m] of one who starts at full speed [m/s] at time 0 [s] and brakes to rest at the end of a length [m]."""
+    a = _BRAKING_M_S2
+    speed = min(speed, float(np.sqrt(2 * a * length)))
+    coasting = length / speed - speed / (2 * a)
+    slowing = min(max(time - coasting, 0.0), speed / a)
+    return speed * min(max(time, 0.0), coasting) + slowing * (speed - a * slowing / 2)
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The true closest points of the arm and an obstacle."""
+
+    distance: float
+    """Signed distance of the surfaces, negative where they meet [m]."""
+    link: int
+    """Index of the link that is nearest."""
+    point: FloatArray
+    """(3,) closest point of the arm's surface [m]."""
+    direction: FloatArray
+    """(3,) unit vector from there to the obstacle."""
+
+
+class Shape(Protocol):
+    """The surface of an obstacle."""
+
+    def closest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed distances (...) [m] of points (..., 3), and unit vectors (..., 3) from them towards the surface."""
+        ...
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball."""
+
+    center: FloatArray
+    """(3,) [m]"""
+    radius: float
+    """[m]"""
+
+    def closest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `Shape`."""
+        to = self.center - points
+        size = np.linalg.norm(to, axis=-1)
+        return size - self.radius, to / np.maximum(size, 1e-12)[..., None]
+
+
+@dataclass(frozen=True)
+class Cuboid:
+    """A box along the axes of the base frame."""
+
+    center: FloatArray
+    """(3,) [m]"""
+    half_size: FloatArray
+    """(3,) [m]"""
+
+    def closest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `Shape`; from inside, the direction is towards the middle."""
+        rel = self.center - points
+        beyond = np.abs(rel) - self.half_size
+        outside = np.maximum(beyond, 0.0) * np.sign(rel)
+        size = np.linalg.norm(outside, axis=-1)
+        inside = size < 1e-12
+        to = np.where(inside[..., None], rel, outside)
+        to = to / np.maximum(np.linalg.norm(to, axis=-1), 1e-12)[..., None]
+        return np.where(inside, beyond.max(axis=-1), size), to
+
+
+def nearest(kin: Kinematics, body: Capsules, shape: Shape) -> Nearest:
+    """Find the closest points of an arm's capsules and an obstacle.
+
+    Exact to a fiftieth of a capsule's length along its axis.
+    """
+    a, b = placed(body, kin)
+    along = a + _ALONG * (b - a)
+    distance, direction = shape.closest(along)
+    gap = distance - body.radius
+    place, k = np.unravel_index(int(np.argmin(gap)), gap.shape)
+    to = direction[place, k]
+    return Nearest(float(gap[place, k]), int(body.link[k]), along[place, k] + body.radius[k] * to, to)

@@ -1,0 +1,62 @@
+"""A detector given a recorded stream: what it would have taken for contacts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.contact.feel import feel, feel_init
+from pretouch.experiments.bench.detection.contenders import Contender
+from pretouch.experiments.bench.detection.stream import Stream
+from pretouch.params import ReactionParams
+from pretouch.perception.closest import no_obstacles
+from pretouch.robot.model import RobotModel
+from pretouch.types import BoolArray, FloatArray
+
+NOTHING = no_obstacles()
+"""What a profile without proximity is shown."""
+REST = ReactionParams().decay_cycles
+"""Control cycles for which an alarm is answered, and no other is looked for."""
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What a detector made of S steps."""
+
+    stamp: FloatArray
+    """(S,) [s]."""
+    alarm: BoolArray
+    """(S,) whether a contact was found."""
+    force: FloatArray
+    """(S, 3) force it was taken for [N], NaN where none was found."""
+    statistic: FloatArray
+    """(S,) see `Contender.statistic`."""
+
+    def onsets(self, value: float | None = None) -> list[int]:
+        """Return the steps at which an alarm begins; with another value of the sweep than the detector's, if given."""
+        return begun(self.alarm if value is None else self.statistic > value)
+
+
+def begun(alarm: BoolArray) -> list[int]:
+    """Steps at which an alarm begins, given those (S,) with one: each is answered for `REST` steps."""
+    at, found, i = np.flatnonzero(alarm), [], 0
+    while i < len(at):
+        found.append(int(at[i]))
+        i = int(np.searchsorted(at, at[i] + REST))
+    return found
+
+
+def replay(stream: Stream, contender: Contender, model: RobotModel) -> Replayed:
+    """Give a detector each step of a stream, from its beginning."""
+    params = contender.profile
+    sees = params.perception.enabled
+    state, steps = feel_init(model, params), len(stream.count)
+    alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
+    force = np.full((steps, 3), np.nan)
+    for i, (robot, obstacles, reacting, watched) in enumerate(stream.steps()):
+        near = obstacles if sees else NOTHING
+        kin = model.kinematics(robot.q)
+        found, state = feel(state, model, kin, robot, near, reacting, params, sees and watched)
+        statistic[i] = contender.statistic(found, state, robot.wrench, params.threshold)
+        if found.contact is not None:
+            alarm[i], force[i] = True, found.contact.force
+    return Replayed(stream.stamp, alarm, force, statistic)
