@@ -6,6 +6,9 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
+from pretouch.cli.bench_avoidance import Avoidance
+from pretouch.cli.bench_both import Both
+from pretouch.cli.bench_detection import Detection
 from pretouch.cli.commands import (
     Bench,
     Command,
@@ -32,6 +35,7 @@ from pretouch.errors import ParameterError, PretouchError
 # the rest of the package takes a second to import: only the functions that run something do
 
 _USAGE, _INTERRUPTED = 2, 130
+_DEMONSTRATED = ("blind", "paper", "pretouch")
 
 
 def main(args: list[str] | None = None) -> int:
@@ -50,6 +54,12 @@ def main(args: list[str] | None = None) -> int:
                     _reproduce(command)
                 case Figure():
                     _figure(command)
+                case Bench(Detection() as what):
+                    _bench_detection(what)
+                case Bench(Avoidance() as what):
+                    _avoidance(what)
+                case Bench(Both() as what):
+                    _both(what)
                 case Bench(FreeMotion() as what):
                     _free_motion(what)
                 case Bench(Cycle() as what):
@@ -87,8 +97,8 @@ def _demo(command: Demo) -> None:
     from pretouch.experiments.campaign import Request
 
     out = Path(command.out) if command.out else _new_folder("demo")
-    few = Request(("avoidance", "dynamic"), seeds=1)
-    many = Request(("static",), seeds=command.seeds)
+    few = Request(("avoidance", "dynamic"), seeds=1, profiles=_DEMONSTRATED)
+    many = Request(("static",), seeds=command.seeds, profiles=_DEMONSTRATED)
     run_all([(many, out / "static"), (few, out / "people")], out, out / "results.json")
 
 
@@ -113,6 +123,7 @@ def _reproduce(command: Reproduce) -> None:
         skin=command.skin or None,
         record=command.record,
         arm=command.arm or None,
+        first_seed=command.first_seed,
     )
     if request.arm and not everything:
         context = request.context()
@@ -128,6 +139,24 @@ def _figure(command: Figure) -> None:
     run = Path(command.run) if command.run else None
     out = Path(command.out or f"{command.name}.png")
     print(f"Figure: {draw_figure(command.name, run, out, command.profile, command.seed)}")
+
+
+def _bench_detection(command: Detection) -> None:
+    from pretouch.cli.bench_detection import bench_detection
+
+    bench_detection(command)
+
+
+def _both(command: Both) -> None:
+    from pretouch.cli.bench_both import bench_both
+
+    bench_both(command)
+
+
+def _avoidance(command: Avoidance) -> None:
+    from pretouch.cli.bench_avoidance import bench_avoidance
+
+    bench_avoidance(command)
 
 
 def _free_motion(command: FreeMotion) -> None:

@@ -5,6 +5,9 @@ from typing import Annotated, Literal
 
 import tyro
 
+from pretouch.cli.bench_avoidance import Avoidance
+from pretouch.cli.bench_both import Both
+from pretouch.cli.bench_detection import Detection
 from pretouch.cli.robot_commands import Robot
 from pretouch.cli.run.options import Run
 from pretouch.cli.serve_fci_command import ServeFci
@@ -14,7 +17,7 @@ from pretouch.hardware.address import HOST, PORT
 
 @dataclass(frozen=True)
 class Demo:
-    """Play a small part of the paper's three experiments, blind and with proximity, and show what came out."""
+    """Play a small part of the paper's three experiments: blind, as the paper, and as we do it, side by side."""
 
     seeds: int = 4
     """Trials of each cell of the static experiment; the other two take one."""
@@ -31,6 +34,8 @@ class Reproduce:
     them, which takes about three quarters of an hour on two processors."""
     seeds: int = 12
     """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
+    first_seed: int = 0
+    """The first of them; only seed 0 is recorded and drawn unasked."""
     profiles: str = "blind,paper"
     """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. With `all`,
     and where only the force estimate is studied, the studies have their own."""
@@ -103,9 +108,15 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure something: the force estimate of many simulated arms, or the time of a control step."""
+    """Measure something: detectors, ways to avoid people, the force estimate of many arms, or a control step's time."""
 
-    what: Annotated[FreeMotion, tyro.conf.subcommand("free-motion")] | Annotated[Cycle, tyro.conf.subcommand("cycle")]
+    what: (
+        Annotated[Detection, tyro.conf.subcommand("detection")]
+        | Annotated[Avoidance, tyro.conf.subcommand("avoidance")]
+        | Annotated[Both, tyro.conf.subcommand("both")]
+        | Annotated[FreeMotion, tyro.conf.subcommand("free-motion")]
+        | Annotated[Cycle, tyro.conf.subcommand("cycle")]
+    )
 
 
 @dataclass(frozen=True)
@@ -117,7 +128,7 @@ class WarmUp:
 class Live:
     """Watch the simulated arm in a browser and touch it: a page with the arm, your hand, plots and all parameters."""
 
-    profile: str = "paper"
+    profile: str = "pretouch"
     """Profile to begin with, or PROFILE:GROUP.FIELD=VALUE."""
     path: str = "circle"
     """circle or line."""

@@ -17,7 +17,8 @@ def show(console: Console, tables: Iterable[TextTable]) -> None:
         drawn = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
         for i, text in enumerate(table.header):
             if i < table.names:  # in a narrow terminal numbers are broken, names are not
-                drawn.add_column(escape(text), min_width=max((len(row[i]) for row in table.rows), default=0))
+                lines = (line for row in table.rows for line in row[i].split("\n"))
+                drawn.add_column(escape(text), min_width=max(map(len, lines), default=0))
             else:
                 drawn.add_column(escape(text), justify="right", overflow="fold")
         for row in table.rows:

@@ -21,6 +21,7 @@ _NOWHERE = np.zeros(3)
 _NOTHING = Obstacles(
     unit=np.zeros(0, np.int64), point=np.zeros((0, 3)), ee_distance=np.zeros(0), body_point=np.zeros((0, 3)),
     link=np.zeros(0, np.int64), direction=np.zeros((0, 3)), body_distance=np.zeros(0),
+    closing_speed=np.zeros(0),
 )  # fmt: skip
 
 
@@ -31,6 +32,11 @@ def detect_foreign(foreign: Foreign, profile: Profile, skin: Skin | None = None)
     turned, so that what its units saw counts; without one there are no obstacles. Times count from the first sample.
     Raises RecordingError for a recording too short or too slow to detect anything.
     """
+    if profile.detection.method != "thresholds":
+        raise RecordingError(
+            f"The profile {profile.name} detects by joint torques, and {foreign.place} is read for its force: choose"
+            " one with detection.method=thresholds."
+        )
     timeout, gap = profile.failure.force_timeout_s, float(np.median(np.diff(foreign.force.time))) / 1e9
     if gap > timeout:
         raise RecordingError(

@@ -87,7 +87,7 @@ def _robot(robot: RobotState) -> Any:
     try:
         tau_ext = _numbers(robot.tau_ext)
     except (UnreadableError, ValueError):
-        tau_ext = _NONE  # no step reads it
+        tau_ext = _NONE  # such are no torques to a step either
     wrench = None if robot.wrench is None else _numbers(robot.wrench)
     return make(
         _ROBOT, _number(robot.stamp), _numbers(robot.q), _numbers(robot.qd), _numbers(robot.q_commanded),
@@ -114,7 +114,7 @@ def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = N
     o, qp, contact = step.obstacles, step.qp, step.contact
     obstacles = make(
         _OBSTACLES, o.unit, _flat(o.point), o.ee_distance, _flat(o.body_point), o.link, _flat(o.direction),
-        o.body_distance,
+        o.body_distance, o.closing_speed,
     )  # fmt: skip
     felt = make(_CONTACT, np.zeros(3), np.zeros(3, np.bool_)) if contact is None else make(
         _CONTACT, contact.force, contact.axes
@@ -127,6 +127,7 @@ def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = N
         make(_THRESHOLDS, *np.ascontiguousarray(step.thresholds.parts)), step.armed, contact is not None, felt,
         _row(step.reaction_velocity), step.restricted, step.approach_limit,
         make(_QP, qp.qd, qp.slack, qp.multipliers, qp.outcome.value, plain_text(qp.status)), step.command,
+        step.residual, step.evidence,
     ))  # fmt: skip
 
 
@@ -148,12 +149,13 @@ def _step(m: Any) -> ControlStep:
         desired_velocity=m.desired_velocity, speed_scale=m.speed_scale, range_distance=m.range_distance,
         obstacles=Obstacles(
             o.unit, o.point.reshape(-1, 3), o.ee_distance, o.body_point.reshape(-1, 3), o.link,
-            o.direction.reshape(-1, 3), o.body_distance,
+            o.direction.reshape(-1, 3), o.body_distance, o.closing_speed,
         ),
         force=m.force, filtered_force=m.filtered_force, thresholds=Thresholds(parts), armed=m.armed,
         contact=Contact(m.contact.force, m.contact.axes) if m.has_contact else None,
         reaction_velocity=m.reaction_velocity, restricted=m.restricted, approach_limit=m.approach_limit,
         qp=QpSolution(qp.qd, qp.slack, qp.multipliers, QpOutcome(qp.outcome), qp.status), command=m.command,
+        residual=m.residual, evidence=m.evidence,
     )  # fmt: skip
 
 

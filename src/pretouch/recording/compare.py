@@ -78,7 +78,8 @@ class Decided:
 
     def add_step(self, step: ControlStep, profile: Profile) -> None:
         """Take in a controller's step; the profile says which force it compared."""
-        compared = step.filtered_force if profile.threshold.compare == "filtered" else step.force
+        filtered = profile.detection.method == "thresholds" and profile.threshold.compare == "filtered"
+        compared = step.filtered_force if filtered else step.force
         without = np.isnan(step.force).any()
         self.add(
             step.stamp, step.force, step.force if without else compared, step.thresholds, step.armed,

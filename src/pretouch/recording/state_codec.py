@@ -19,7 +19,7 @@ from pretouch.recording.messages import PACKAGE, decoded, encoded, make, plain_t
 STATE = f"{PACKAGE}/msg/State"
 
 _UNREAD = "watch.robot.tau_ext"
-"""Given by the robot and read by no step: it may be anything, and is kept only if it is an array of numbers."""
+"""Made an array of numbers by each step; what a caller puts there may be anything, and is kept only if it is one."""
 
 
 @cache

@@ -3,9 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from pretouch.controller import Controller, ControllerState
 from pretouch.recording.codec import encode_step
@@ -107,7 +105,7 @@ def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: No
         parts: list[Part] = []
         if kept.snapshot is not None:
             if state is not None and exact[kept.run] and not kept.anew:
-                parts += differing(_judged(kept.snapshot), _judged(state), True, "state before")
+                parts += differing(kept.snapshot, state, True, "state before")
             state = kept.snapshot
         if state is None or kept.inputs is None:
             count.skipped[_unchecked(recorded, i, kept)] += 1
@@ -127,12 +125,6 @@ def _unchecked(recorded: Recorded, i: int, kept: Kept) -> str:
     if kept.inputs is not None:
         return _NO_SNAPSHOT
     return _NO_INPUTS if recorded.unreadable(i) != MISSING_INPUTS else _MISSING
-
-
-def _judged(state: ControllerState) -> ControllerState:
-    """Leave out what no step reads: the estimated torques, which may be anything."""
-    robot = replace(state.watch.robot, tau_ext=np.zeros(0))
-    return replace(state, watch=replace(state.watch, robot=robot))
 
 
 def _verdict(recorded: Recorded, count: _Count, exact: bool) -> Verdict:

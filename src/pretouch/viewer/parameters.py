@@ -3,11 +3,11 @@
 import ast
 import inspect
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
+from pathlib import Path
 from types import MappingProxyType
 
-from pretouch import params
 from pretouch.errors import ParameterError
 from pretouch.params import Profile
 
@@ -84,7 +84,10 @@ TABLE_1: tuple[TableEntry, ...] = (
 def field_docs() -> Mapping[tuple[str, str], str]:
     """What the source says of each field of the parameters, by (class, field), on one line."""
     docs: dict[tuple[str, str], str] = {}
-    for node in ast.parse(inspect.getsource(params)).body:
+    groups = [type(getattr(Profile(), f.name)) for f in fields(Profile) if f.name != "name"]
+    sources = {inspect.getsourcefile(group) for group in groups}
+    nodes = [node for path in sources if path for node in ast.parse(Path(path).read_text(encoding="utf-8")).body]
+    for node in nodes:
         if not isinstance(node, ast.ClassDef):
             continue
         for field, text in zip(node.body, node.body[1:], strict=False):

@@ -110,9 +110,12 @@ def _checked_start(state: RobotState, tick: float, model: RobotModel, plan: Plan
     if sound is None:
         raise CalibrationError(f"The robot's state cannot be used: {wrong}; check the connection.")
     trouble = (
-        _old(sound, tick, params) or _misshapen(sound) or _elsewhere(sound, model, plan, params.start_tolerance_rad)
-        or _moving(sound, model, params) or _dragged(sound, model, params.start_tolerance_rad)
-    )  # fmt: skip
+        _old(sound, tick, params)
+        or _misshapen(state, model.n)
+        or _elsewhere(sound, model, plan, params.start_tolerance_rad)
+        or _moving(sound, model, params)
+        or _dragged(sound, model, params.start_tolerance_rad)
+    )
     if trouble:
         raise CalibrationError(trouble)
     return sound
@@ -149,15 +152,15 @@ def _old(state: RobotState, tick: float, params: PerformParams) -> str | None:
     return f"The robot's newest state is {when}: check the connection."
 
 
-def _misshapen(state: RobotState) -> str | None:
-    """Say what the external torques are if they are no number a joint, or None."""
+def _misshapen(state: RobotState, joints: int) -> str | None:
+    """Say what the external torques are, as the robot gave them, if they are no number a joint, or None."""
     try:
         shape = np.asarray(state.tau_ext, dtype=np.float64).shape
     except (TypeError, ValueError):
         return "The robot's external torques are no array of numbers: check what its driver reports."
-    if shape == state.q.shape:
+    if shape == (joints,):
         return None
-    return f"The robot's external torques have the shape {shape}, not {state.q.shape}: check what its driver reports."
+    return f"The robot's external torques have the shape {shape}, not ({joints},): check what its driver reports."
 
 
 def _dragged(state: RobotState, model: RobotModel, tolerance: float) -> str | None:
@@ -194,10 +197,11 @@ class _Follower:
         while math.isfinite(tick):
             if tick - self.begin >= self._plan.duration:
                 return None
-            state, wrong = sound_robot(self._robot.read(), self._limits.qd_max)
+            given = self._robot.read()
+            state, wrong = sound_robot(given, self._limits.qd_max)
             if state is None:
                 return f"The robot's state cannot be used: {wrong}."
-            trouble = self._trouble(state, tick)
+            trouble = _old(state, tick, self._params) or _misshapen(given, self._model.n) or self._trouble(state)
             if trouble:
                 return trouble
             self._keep(state)
@@ -206,12 +210,9 @@ class _Follower:
             tick = self._clock.tick()
         return f"The clock ticked at {tick} s: see what became of it."
 
-    def _trouble(self, state: RobotState, tick: float) -> str | None:
+    def _trouble(self, state: RobotState) -> str | None:
         """Say what is not as planned, or None."""
         p, names = self._params, self._model.joints
-        trouble = _old(state, tick, p) or _misshapen(state)
-        if trouble:
-            return trouble
         off = np.abs(state.q - self._plan.at(state.stamp - self.begin)[0])
         if off.max() > p.path_tolerance_rad:
             joint = int(np.argmax(off))

@@ -81,7 +81,7 @@ class TaskOptions:
     """Center of the circle [m], base frame."""
     radius: float = 0.25
     """Radius of the circle [m]."""
-    profile: str = "paper"
+    profile: str = "pretouch"
     """Parameters of the controller, or PROFILE:GROUP.FIELD=VALUE."""
     seconds: float = 0.0
     """How long [s]; 0: until it is stopped."""

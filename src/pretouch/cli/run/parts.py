@@ -73,12 +73,18 @@ def parts(command: Run) -> Parts:
     if units.no_skin:
         if profile.perception.enabled:
             raise ParameterError(
-                f"The profile {profile.name} needs sensor units, and there are none: choose --profile blind, or leave"
-                " out --no-skin."
+                f"The profile {profile.name} needs sensor units, and there are none: choose --profile blind or"
+                " pretouch:perception.enabled=no, or leave out --no-skin."
             )
         skin = Skin((), model)
     else:
         skin = load_skin(FilePath(units.skin), model) if units.skin else paper_skin(model)
+    by_torques = profile.detection.method != "thresholds" or profile.reaction.method == "admittance"
+    if command.robot.robot == "ros2" and by_torques:
+        raise ParameterError(
+            f"The profile {profile.name} feels contacts by external joint torques, and ROS 2 has no message for them:"
+            " choose --profile paper, or pretouch:detection.method=thresholds:reaction.method=decay."
+        )
     simulated = command.robot.robot == "simulated" or command.robot.lockstep
     floor = (SceneSpec().floor_height if simulated else 0.0) if task.floor is None else task.floor
     if not np.isfinite(floor):

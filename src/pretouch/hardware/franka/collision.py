@@ -69,6 +69,8 @@ class CollisionBehavior:
 
 def largest_threshold(profile: Profile, params: CollisionParams) -> float:
     """Largest force on one axis at which our detection may still be silent [N]."""
+    if profile.detection.method == "fixed":
+        return profile.detection.force_n
     return profile.threshold.f_base_n + profile.threshold.f_std_n + params.bias_n
 
 

@@ -1,0 +1,58 @@
+"""`pretouch bench both`: both benchmarks, and which of the goals of `pretouch` were reached."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from pretouch.cli.bench_avoidance import Avoidance, bench_avoidance
+from pretouch.cli.bench_detection import Detection, bench_detection
+
+
+@dataclass(frozen=True)
+class Both:
+    """Run the benchmarks detection and avoidance, and say which goals were reached.
+
+    About an hour and a half on two processors; a run that was stopped goes on with the same --out.
+    """
+
+    quick: bool = False
+    """A small part of both, in about ten minutes; it says what it cannot tell."""
+    seeds: Literal["published", "development"] = "published"
+    """Which simulated arms: those of the published tables, or others to build controllers with."""
+    out: str = ""
+    """Folder for both; by default runs/bench, with -quick if it is."""
+    docs: str = ""
+    """Folder of documents (docs) whose benchmarks.md and images are to be made anew; by default none."""
+    readme: str = ""
+    """Document for the one table, between its marks; by default none."""
+
+
+def bench_both(command: Both) -> None:
+    """Run what is missing of both, and show and write what came out of them together."""
+    import json
+
+    from rich.console import Console
+
+    from pretouch.cli.tables import show
+    from pretouch.experiments.bench.documents import DOCUMENT, around, markdown, put
+    from pretouch.experiments.bench.front import front_table
+    from pretouch.experiments.bench.goals import goal_table
+
+    out = Path(command.out or "runs/bench" + ("-quick" if command.quick else ""))
+    docs, readme = (Path(text) if text else None for text in (command.docs, command.readme))
+    parts = ("detection", "avoidance", "goals") if docs else ()
+    places = [(docs / DOCUMENT, part) for part in parts if docs] + ([(readme, "front")] if readme else [])
+    for document, part in places:
+        around(document, part)  # an hour later would be late
+    given = {"quick": command.quick, "seeds": command.seeds, "docs": command.docs}
+    bench_detection(Detection(out=str(out / "detection"), **given))  # type: ignore[arg-type]  # of both the same
+    bench_avoidance(Avoidance(out=str(out / "avoidance"), **given))  # type: ignore[arg-type]
+    detection, avoidance = (
+        json.loads((out / name / "results.json").read_text(encoding="utf-8")) for name in ("detection", "avoidance")
+    )
+    made = {"goals": goal_table(detection, avoidance), "front": front_table(detection, avoidance)}
+    show(Console(highlight=False), made.values())
+    for document, part in places:
+        if part in made:
+            put(document, part, markdown(made[part]))
+            print(f"Written: {document}")

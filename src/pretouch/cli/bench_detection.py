@@ -1,0 +1,76 @@
+"""`pretouch bench detection`: detectors held against each other, with tables, figures and numbers."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from pretouch.errors import PretouchError
+
+if TYPE_CHECKING:  # the help is to need none of the heavy packages
+    from pretouch.experiments.bench.detection.campaign import Rows
+    from pretouch.experiments.bench.store import Row
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Hold contact detectors against each other: delay against false alarms, what they miss, forces on a board.
+
+    A run that was stopped goes on with the same --out.
+    """
+
+    quick: bool = False
+    """A small part of it, in about ten minutes; it says what it cannot tell."""
+    seeds: Literal["published", "development"] = "published"
+    """Which simulated arms: those of the published tables, or others to develop detectors with."""
+    out: str = ""
+    """Folder for streams and results; by default runs/bench-detection, with -quick if it is."""
+    json: str = ""
+    """File for the numbers; by default results.json in the folder."""
+    docs: str = ""
+    """Folder of documents (docs) whose benchmarks.md and images are to be made anew; by default none."""
+
+
+def bench_detection(command: Detection) -> None:
+    """Run what is missing, and show, write and draw what came out."""
+    from pretouch.cli.bench_progress import worked
+    from pretouch.cli.writing import check_writable, unwritable_said
+    from pretouch.experiments.bench.detection.campaign import NAME, Bench, run_bench
+    from pretouch.experiments.bench.detection.published import summary_of
+    from pretouch.experiments.bench.documents import DOCUMENT, around
+    from pretouch.experiments.campaign import write_json
+
+    out = Path(command.out or "runs/bench-detection" + ("-quick" if command.quick else ""))
+    json_file = Path(command.json) if command.json else out / "results.json"
+    docs = Path(command.docs) if command.docs else None
+    if docs:
+        around(docs / DOCUMENT, NAME)  # an hour later would be late
+    bench = Bench(out, command.quick, command.seeds)
+    bench.open()
+    check_writable("file", json_file)
+    try:
+        rows = worked(NAME, bench.every(), lambda progress: run_bench(bench, progress))
+    except PretouchError:
+        raise
+    except BaseException:
+        print(f"Stopped: the same command with --out {out} goes on.", file=sys.stderr)
+        raise
+    results = summary_of(bench, rows)
+    with unwritable_said("file", json_file):
+        write_json(results, json_file)
+    _say(results, rows, out, docs)
+    print(f"Numbers: {json_file}")
+
+
+def _say(results: "Row", rows: "Rows", out: Path, docs: Path | None) -> None:
+    from rich.console import Console
+
+    from pretouch.cli.tables import show
+    from pretouch.experiments.bench.detection.published import pictures, publish
+    from pretouch.experiments.bench.detection.tables import detection_tables
+
+    console = Console(highlight=False)
+    show(console, detection_tables(results))
+    console.print(results["resolution"], soft_wrap=True, markup=False)
+    for path in publish(results, pictures(results, rows), out, docs):
+        console.print(f"Written: {path}", soft_wrap=True, markup=False)
