@@ -32,7 +32,9 @@ class Arm:
 
     def robot(self, force: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> RobotState:
         wrench = np.array([*force, 0.0, 0.0, 0.0])
-        return RobotState(self.time, self.q, self.qd, self.q, self.qd, np.zeros(7), wrench)
+        # a push at the end-effector's origin is felt in the joints too
+        tau = self.model.ee_jacobian(self.model.kinematics(self.q)).T @ wrench if any(force) else np.zeros(7)
+        return RobotState(self.time, self.q, self.qd, self.q, self.qd, tau, wrench)
 
     def readings(self, seen: dict[int, float] | None = None, silent: dict[int, float] | None = None) -> RangeReadings:
         """Fresh readings without a target, but for the distances `seen` and the ages `silent` of some units."""

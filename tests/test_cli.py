@@ -148,6 +148,7 @@ def test_help_names_the_commands(capsys):
     assert "reproduce" in said
 
 
+@pytest.mark.slow
 def test_a_run_writes_what_it_says(capsys, tmp_path):
     out, numbers = tmp_path / "out", tmp_path / "numbers.json"
     args = ("reproduce", "static", "--seeds", "1", "--out", str(out), "--json", str(numbers))

@@ -51,6 +51,7 @@ def at_begin(monkeypatch, seconds, then):
             ("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--approach"),
             "--approach does not go with --robot ros2",
         ),
+        (("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base"), "ROS 2 has no message for them"),
         (("--no-skin",), "choose --profile blind"),
         (("--no-skin", "--skin", "a.toml"), "--no-skin does not go with --skin"),
         (("--skin", "missing.toml"), "missing.toml cannot be read"),
@@ -79,6 +80,7 @@ def test_a_recording_that_is_there_is_not_written_over(tmp_path, capsys):
     assert (tmp_path / "a.mcap").read_text() == "precious"
 
 
+@pytest.mark.slow
 def test_a_rehearsal_checks_confirms_announces_moves_and_reports(tmp_path, capsys):
     assert cli.main([*BLIND, "--seconds", "0.3", "--yes", "--record", "a.mcap"]) == 0
     said = capsys.readouterr().out
@@ -187,6 +189,7 @@ def test_without_a_terminal_nobody_lets_the_arm_move(capsys, monkeypatch):
     assert "HOLD" not in shown.out
 
 
+@pytest.mark.slow
 def test_a_wrong_sign_is_refused_before_anything_moves(capsys, monkeypatch):
     read, began = simulated.SimulatedSessionArm.read, []
 
@@ -235,7 +238,8 @@ def test_units_that_fall_silent_in_the_middle_are_named_and_the_arm_holds(tmp_pa
             unit.silent = True
 
     at_begin(monkeypatch, 2.5, silence)
-    assert cli.main(["run", "--yes", "--seconds", "4", "--units-port", "0", "--record", "a.mcap"]) == 0
+    words = "--yes", "--seconds", "4", "--units-port", "0", "--record", "a.mcap", "--profile", "paper"
+    assert cli.main(["run", *words]) == 0
     assert "No usable reading from hand_left" in capsys.readouterr().out
     steps = [kept.step for kept in open_recording(tmp_path / "a.mcap")]
     assert any(step.mode is Mode.TRACK for step in steps)

@@ -118,6 +118,7 @@ def test_units_with_other_keys_are_told_from_silent_ones(keys, port, tmp_path, c
     assert "with a wrong tag: another key, or a forgery" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_posture_tells_whether_units_agree_with_the_model(panda_model, paper_skin, port, tmp_path, capsys):
     made = Keys(UnitKey(name, number, new_key()) for number, name in enumerate(paper_skin.ids, 1))
     save_keys(made, tmp_path / "keys.toml")
@@ -197,7 +198,14 @@ def started(*args):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [
+        (signal.SIGINT, 130),
+        pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow),
+        pytest.param(signal.SIGKILL, -9, marks=pytest.mark.slow),
+    ],
+)
 def test_a_monitor_that_is_ended_leaves_its_recording(keys, port, tmp_path, number, code):
     place = tmp_path / "units.mcap"
     with Desk(keys, port) as desk:
@@ -257,6 +265,7 @@ def test_a_simulation_that_makes_no_sense_is_refused(tmp_path, capsys, more, wor
     assert said.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_simulated_units_are_heard_by_the_monitor_with_the_keys_that_were_made(tmp_path, port, capsys):
     place = tmp_path / "keys.toml"
     simulation = started(

@@ -127,6 +127,7 @@ def test_a_port_that_is_taken_is_said_before_anything_is_planned(tmp_path, capsy
     assert "planned" not in told.out
 
 
+@pytest.mark.slow
 def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypatch):
     files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml", "--units-port", 0)
     for answer in ("", "n", "maybe"):
@@ -166,6 +167,7 @@ def elsewhere(options, q, *words, **more):
     return SimulatedArm(options, q + ASIDE, *words, **more)
 
 
+@pytest.mark.slow
 def test_nobody_who_reads_on_ends_the_command_quietly_with_the_motion_written(tmp_path):
     words = ("skin", "calibrate", "--plan", "m.csv", "--duration", "45")
     process = subprocess.Popen(

@@ -66,6 +66,9 @@ def test_names_in_the_notation_exist():
     text = (ROOT / "docs" / "notation.md").read_text()
     for owner, name in re.findall(r"`(\w+)\.(\w+)(?:\.min\(\))?`", text):
         if owner[0].isupper() and owner != "RobotModel":
-            modules = ("pretouch.types", "pretouch.params", "pretouch.control.reduction", "pretouch.contact.window")
+            modules = (
+                "pretouch.types", "pretouch.params", "pretouch.control.reduction", "pretouch.contact.window",
+                "pretouch.contact.residual_model",
+            )  # fmt: skip
             owners = [vars(importlib.import_module(m)).get(owner) for m in modules]
             assert any(name in o.__annotations__ or hasattr(o, name) for o in owners if o), f"{owner}.{name}"

@@ -9,8 +9,13 @@ from pretouch.modes import TABLE, Event, ModeState, mode_init, next_mode
 from pretouch.types import Mode
 
 LATCHING = [Event.UNUSABLE, Event.TIME_BACKWARDS, Event.STATE_STALE, Event.SOLVER_FAILED]
-PASSING = [Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.NO_FORCE, Event.OVERRUN, Event.WINDOW_FILLING]
-REPORTED = [*LATCHING, Event.BLOCKED, Event.REACTING, Event.CONTACT, *PASSING]
+PASSING = [
+    Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.NO_FORCE, Event.OVERRUN, Event.GIVEN_UP, Event.WINDOW_FILLING,
+]  # fmt: skip
+GOING = [Event.REACTING, Event.OPENING, Event.YIELDING]
+FAULTS = [Event.UNUSABLE, Event.SOLVER_FAILED]  # the other two stand beside them
+REPORTED = [*FAULTS, Event.BLOCKED, *GOING, Event.CLAMPED, Event.CONTACT, *PASSING]
+SOFT = {Event.CLAMPED, Event.GIVEN_UP, Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.NO_FORCE}
 STATES = [
     ModeState(Mode.TRACK, "before"), ModeState(Mode.REACT, "before"), ModeState(Mode.HOLD, "before"),
     ModeState(Mode.HOLD, "before", latched=True),
@@ -34,6 +39,11 @@ def expected(state: ModeState, events: dict[Event, str], resume: bool) -> tuple[
     if state.mode is Mode.REACT:  # one reaction at a time, to its end
         if Event.REACTING in events:
             return Mode.REACT, False, Event.REACTING
+        if Event.CLAMPED in events:  # caught, and opened as far as it can
+            return Mode.HOLD, True, Event.CLAMPED
+        for going in GOING:
+            if going in events:
+                return Mode.REACT, False, going
     elif Event.CONTACT in events:  # a push is answered even while holding
         return Mode.REACT, False, Event.CONTACT
     for cause in PASSING:

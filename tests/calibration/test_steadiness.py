@@ -41,7 +41,14 @@ class _Anywhere(Skin):
         self.units = tuple(units)
 
 
-@pytest.mark.parametrize(("angle", "shift"), [(0.0, 0.005), (np.deg2rad(2.0), 0.0), (0.5, 0.02)])
+@pytest.mark.parametrize(
+    ("angle", "shift"),
+    [
+        (0.0, 0.005),
+        pytest.param(np.deg2rad(2.0), 0.0, marks=pytest.mark.slow),
+        pytest.param(0.5, 0.02, marks=pytest.mark.slow),
+    ],
+)
 def test_a_slip_is_recognised_with_its_instant_and_size(panda_model, moving_arm, angle, shift):
     check_slips(panda_model, moving_arm, [1], angle, shift)
 

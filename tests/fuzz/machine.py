@@ -58,7 +58,7 @@ class Course:
     def robot(self) -> RobotState:
         """Return what the arm's interface reports: the truth, but for the measured joint positions."""
         measured = self.q + self.rng.normal(scale=self.world.measured_off, size=len(self.q))
-        return weather.report(self.time, self.q, self.qd, measured, self.weather.wrench())
+        return weather.report(self.time, self.q, self.qd, measured, self.weather.wrench(), self.weather.torques())
 
     def run(self, steps: int) -> None:
         """Let the arm be driven for so many steps."""
@@ -105,7 +105,7 @@ class Course:
     def _check(self, step: ControlStep, e: Expected, inputs: Inputs) -> str:
         p, model = self.world.profile, self.other
         invariants.check_command(step, e, p, model)
-        invariants.check_finite(step, e)
+        invariants.check_finite(step, e, p)
         invariants.check_braking(step, e, p, model)
         invariants.check_obstacles(step, len(self.world.skin))
         invariants.check_speed_scale(step, p)
@@ -133,7 +133,8 @@ class Course:
         self.machine.reached.update([
             "step", f"arm {self.world.model.description.name}",
             f"mode {step.mode.name}", f"outcome {step.qp.outcome.name}", f"cause {cause}",
-            f"restriction {p.restriction.mode}", f"period {p.task.control_period_s}", f"units {len(self.world.skin)}",
+            f"restriction {p.restriction.mode}", f"detection {p.detection.method}", f"reaction {p.reaction.method}",
+            f"period {p.task.control_period_s}", f"units {len(self.world.skin)}",
             f"sight {self.weather.sight}", f"force {self.weather.feel}", f"slack {bool(tight)}",
             f"slowed {step.speed_scale < 1}", f"on the axis {bool((step.obstacles.body_distance < -0.04).any())}",
         ])  # fmt: skip

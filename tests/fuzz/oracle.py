@@ -15,20 +15,33 @@ WORDS = {
     "failed": "gave no answer", "blocked": "What is near cannot be kept away from",
     "blocked reaction": "leaves no way within", "contact": "A contact of", "reacting": "Moving with a contact",
     "silent": "No usable reading from", "no force": "no force estimate", "overrun": "The step before this one was",
-    "filling": "The force window is filling", "clear": "Following the path.",
+    "filling": "The force window is filling", "clear": "Following the path.", "opening": "Caught between two things",
+    "caught": "The arm was caught between two things", "yielding": "Yielding to a contact",
+    "given up": "Given up after", "path blocked": "Something near has kept the hand from its path",
 }  # fmt: skip
 """Cause -> words its sentence holds."""
 
-MODES = {"contact": Mode.REACT, "reacting": Mode.REACT, "blocked reaction": Mode.REACT, "clear": Mode.TRACK}
+MODES = {
+    "contact": Mode.REACT,
+    "reacting": Mode.REACT,
+    "blocked reaction": Mode.REACT,
+    "clear": Mode.TRACK,
+    "opening": Mode.REACT,
+    "yielding": Mode.REACT,
+    "path blocked": Mode.TRACK,
+}
 """Cause -> mode; what is not here is a HOLD."""
 
 LARGEST = 1e3
 """Joint position or velocity from which on a robot's state is not believed [rad, rad/s]."""
 
+STRONGEST = 1e4
+"""External joint torque from which on it is none [Nm]."""
+
 LATEST = 1e12
 """Time stamp from which on it is none [s]."""
 
-LATCHING = {"unusable", "backwards", "stale", "failed", "latched"}
+LATCHING = {"unusable", "backwards", "stale", "failed", "latched", "caught"}
 
 
 @dataclass
@@ -43,6 +56,8 @@ class Expected:
     """(n,) commanded joint velocities to go by [rad/s]."""
     now: float
     force: np.ndarray | None
+    strained: bool
+    """Whether joint torques can be believed."""
     overrun: bool
     no_force: bool
     silent: list[str]
@@ -75,13 +90,17 @@ class Oracle:
         if not fault:
             self._believe(robot, last, now)
         w = None if fault else robot.wrench
+        tau = np.array(np.nan if fault or robot.tau_ext is None else robot.tau_ext, dtype=np.float64)
+        strained = tau.shape == self.qd_max.shape and bool((np.abs(tau) < STRONGEST).all())
         felt = w is not None and bool(np.isfinite(w).all() and np.abs(w).max() < p.failure.force_max_n)
-        self.force_stamp = now if felt else min(self.force_stamp, now)
+        self.force_stamp = (
+            now if (felt if p.detection.method == "thresholds" else strained) else min(self.force_stamp, now)
+        )
         self._hear(inputs, now, now < last)
         age = now - self.heard if p.perception.enabled and len(self.ids) else np.zeros(0)
         slow, stop = p.perception.slow_after_s, p.perception.silent_after_s
         return Expected(
-            not fault, fault, self.q, self.qd, now, w[:3].copy() if felt else None,
+            not fault, fault, self.q, self.qd, now, w[:3].copy() if felt else None, strained,
             overrun=not fault and now - last > p.failure.overrun_s,
             no_force=not fault and now - self.force_stamp > p.failure.force_timeout_s,
             silent=[name for name, a in zip(self.ids, age, strict=False) if a >= stop],
@@ -148,16 +167,43 @@ class Oracle:
         """What decides the mode of a step whose inputs can be believed, before the quadratic program."""
         if self.latched and not resume:
             return "latched"
-        if self.mode is Mode.REACT and self.reacted < self.p.reaction.decay_cycles:
+        if (
+            self.p.reaction.method == "decay"
+            and self.mode is Mode.REACT
+            and self.reacted < self.p.reaction.decay_cycles
+        ):
             return "reacting"
         if self.mode is not Mode.REACT and self.feels_contact(e, step):
             return "contact"
+        if self.p.detection.method != "thresholds" or self.p.reaction.method != "decay":
+            return self._told(e, step)
         filling = self.samples < self.p.threshold.window_samples
         seen = {"silent": bool(e.silent), "no force": e.no_force, "overrun": e.overrun, "filling": filling}
         return next((cause for cause, here in seen.items() if here), "clear")
 
+    def _told(self, e: Expected, step: ControlStep) -> str:
+        """Take the step's word for what has a memory of its own, where nothing it was given speaks against it."""
+        told = next(cause for cause, words in WORDS.items() if words in step.reason)
+        waiting = told in ("yielding", "opening", "caught")
+        assert not waiting or self.mode is Mode.REACT
+        if waiting or told in ("blocked", "blocked reaction", "failed"):
+            return told if waiting else "yielding" if told == "blocked reaction" else "clear"
+        seen = {
+            "silent": bool(e.silent),
+            "no force": e.no_force or (self.p.detection.method != "thresholds" and not e.strained),
+            "overrun": e.overrun,
+        }
+        first = next((cause for cause, here in seen.items() if here), "")
+        free = ("given up", "filling", "path blocked", "clear")
+        assert first or told in free, (told, step.reason)
+        if not first and told in ("path blocked", "clear"):
+            assert self.samples >= self.p.threshold.window_samples
+        return first or told
+
     def feels_contact(self, e: Expected, step: ControlStep) -> bool:
         """Whether the force crosses the thresholds the step gives."""
+        if self.p.detection.method != "thresholds":
+            return step.contact is not None
         if e.force is None or self.samples < self.p.threshold.window_samples:
             return False
         compared = step.filtered_force if self.p.threshold.compare == "filtered" else e.force

@@ -132,7 +132,7 @@ def test_a_window_that_fills_keeps_no_buffer(panda_model, paper_skin):
     step, state = moving.controller.step(state, inputs)
     inputs.robot.wrench[:] = 99.0
     np.testing.assert_array_equal(step.filtered_force, 0.5)
-    np.testing.assert_array_equal(state.window.newest, 0.5)
+    np.testing.assert_array_equal(state.feel.window.newest, 0.5)
     robot = deepcopy(moving.next.robot)
     state = moving.controller.init(robot)
     robot.qd_commanded[:] = 99.0

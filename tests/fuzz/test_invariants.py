@@ -115,11 +115,11 @@ def test_a_factor_that_is_not_kept_is_noticed(course: Course):
 
 def test_numbers_shapes_and_types_that_are_wrong_are_noticed(course: Course):
     step, e = stepped(course)
-    invariants.check_finite(step, e)
+    invariants.check_finite(step, e, SHORT)
     invariants.check_shapes(step, 7, 7)
     for wrong in (replace(step, ee_velocity=step.ee_velocity * np.inf), replace(step, speed_scale=1.5)):
         with pytest.raises(AssertionError):
-            invariants.check_finite(wrong, e)
+            invariants.check_finite(wrong, e, SHORT)
     for wrong in (replace(step, q=step.q[:6]), replace(step, command=step.command.astype(np.float32))):
         with pytest.raises(AssertionError):
             invariants.check_shapes(wrong, 7, 7)

@@ -40,6 +40,7 @@ class Weather:
         self.distance = self.rng.uniform(0.0, 1.0, self.units)
         self.status = self.rng.choice(STATUS, self.units)
         self.push = self.rng.normal(scale=60.0, size=3)
+        self.strain = self.rng.normal(scale=20.0, size=7) * (self.rng.random(7) < 0.6)
         self.began = np.nan
 
     def pass_on(self) -> None:
@@ -101,6 +102,23 @@ class Weather:
             w[:] = 5e-324
         return w
 
+    def torques(self) -> object:
+        """Return what the arm's joints feel; the force may say something else."""
+        torque, f = self.rng.normal(scale=0.3, size=7), self.feel
+        if f == "none":
+            return None if self.left % 2 else np.zeros(3)
+        if f in ("push", "torque"):
+            torque += self.strain
+        elif f == "steps":
+            torque += self.strain * (-1.0) ** (self.left // 4)
+        elif f in ("huge", "beyond"):
+            torque[self.left % 7] = -9e3 if f == "huge" else 1e4
+        elif f in ("nan", "inf"):
+            torque[self.left % 7] = np.nan if f == "nan" else np.inf
+        elif f == "denormal":
+            torque[:] = 5e-324
+        return torque
+
 
 def spoiled(inputs: Inputs, fault: str, value: float, joint: int = 3) -> Inputs:
     """The same inputs with one thing wrong."""
@@ -116,6 +134,8 @@ def spoiled(inputs: Inputs, fault: str, value: float, joint: int = 3) -> Inputs:
     return replace(inputs, robot=replace(robot, stamp=stamps[fault]))
 
 
-def report(time: float, q: np.ndarray, qd: np.ndarray, measured: np.ndarray, wrench: np.ndarray | None) -> RobotState:
+def report(
+    time: float, q: np.ndarray, qd: np.ndarray, measured: np.ndarray, wrench: np.ndarray | None, torques: object
+) -> RobotState:
     """Return a robot state in arrays of its own."""
-    return RobotState(time, measured, qd.copy(), q.copy(), qd.copy(), np.zeros(len(q)), wrench)
+    return RobotState(time, measured, qd.copy(), q.copy(), qd.copy(), torques, wrench)

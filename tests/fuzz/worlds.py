@@ -6,6 +6,7 @@ import numpy as np
 
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.params import (
+    PROFILES,
     FailureParams,
     PerceptionParams,
     Profile,
@@ -15,6 +16,8 @@ from pretouch.params import (
     TaskParams,
     ThresholdParams,
 )
+from pretouch.params.anticipation import AnticipationParams
+from pretouch.params.detection import DetectionParams
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
@@ -56,6 +59,41 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
 }  # fmt: skip
 
 
+# the same of what the paper has not: all of these are drawn for half of the worlds
+OURS: dict[type, dict[str, tuple[object, ...]]] = {
+    PerceptionParams: {
+        "closing_speed": (True, False), "reckon_below_minimum": (True, False), "closing_memory_s": (0.09, 0.01, 1.0),
+    },
+    TaskParams: {"mid_joint_projected": (True, False)},
+    RestrictionParams: {"mode": ("braking", "braking", "slack", "hard", "floor", "off")},
+    AnticipationParams: {
+        "deceleration_m_s2": (0.6, 0.01, 10.0), "latency_s": (0.06, 0.0, 1.0), "margin_m": (0.01, 0.0, 0.3),
+        "touch_speed_max_m_s": (0.05, 1e-3, 1.0), "retreat_max_m_s": (0.1, 0.0, 1.0),
+        "effective_mass": (True, False), "body_region": ("chest", "face"), "region_force_n": (0.0, 1.0, 1e3),
+        "closing_speed": (True, False), "tangential": (True, False), "tighten_m_s2": (3.0, 0.1, 100.0),
+        "loosen_m_s2": (1.0, 0.1, 100.0), "null_space": (True, False), "null_speed_m_s": (0.1, 2.0),
+        "null_joint_rad_s": (0.5, 5.0), "null_rate_rad_s2": (1.0, 100.0), "detour": (False, True),
+        "detour_distance_m": (0.2, 0.01, 1.0), "detour_speed_m_s": (0.1, 2.0), "blocked_after_s": (2.0, 0.05),
+    },
+    DetectionParams: {
+        "method": ("sequential", "sequential", "fixed", "thresholds"), "freeze_while_reacting": (True, False),
+        "false_alarms_per_hour": (1.0, 3600.0), "use_proximity": (True, False), "near_gain": (100.0, 1e4),
+        "learn": (True, False), "learn_unseen": (False, True), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0),
+        "suspect": (0.6, 1.0), "confirm_samples": (1, 3),
+    },
+    ReactionParams: {
+        "method": ("admittance", "admittance", "decay"), "clamps": (True, False), "gives_up": (True, False),
+        "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2), "inertia_kg_m2": (1.5, 1e-3, 100.0),
+        "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0), "dead_band_fraction": (0.02, 0.0, 0.5),
+        "reverse_band": (2.0, 1.0), "start_energy_j": (0.2, 0.0, 50.0), "tank_max_j": (2.0, 1e-3),
+        "mean_s": (0.5, 0.01), "quiet_s": (0.05, 1.0), "patience_s": (0.1, 10.0), "clamp_nm": (4.0, 0.1),
+        "clamp_s": (0.03, 0.01), "clamp_turns": (2, 1), "open_m_s": (0.1, 2.0), "open_s": (0.05, 0.5),
+        "give_up_contacts": (3, 1), "place_m": (0.1, 10.0), "clear_s": (0.1, 1.0), "retry_s": (0.3, 30.0),
+    },
+}  # fmt: skip
+NAMED = ("pretouch", "pretouch", "fixed", "observer", "flacco", "ding")
+
+
 @dataclass(frozen=True)
 class World:
     """One arm's controller and the state the arm is in when it takes over."""
@@ -84,12 +122,18 @@ def any_world(rng: np.random.Generator, model: RobotModel) -> World:
 
 
 def any_profile(rng: np.random.Generator) -> Profile:
-    """Draw each parameter: in a third of the profiles mostly the usual value."""
+    """Draw each parameter, mostly the usual value in a third of the profiles; a few are named ones as they are."""
     usual = 0.85 if rng.random() < 1 / 3 else 0.4
-    groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES}
-    drawn = {name: group(**_drawn(rng, CHOICES[group], usual)) for name, group in groups.items()}
-    restriction = replace(drawn["restriction"], mode=str(rng.choice(["slack", "hard", "floor", "off"])))
-    return Profile(**{**drawn, "restriction": restriction, "name": "fuzzed"})
+    if rng.random() < 0.15:
+        named = PROFILES[str(rng.choice(NAMED))]
+        return replace(named, threshold=replace(named.threshold, window_samples=5))
+    ours = rng.random() < 0.6
+    groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES or (ours and f.type in OURS)}
+    choices = {group: CHOICES.get(group, {}) | (OURS.get(group, {}) if ours else {}) for group in groups.values()}
+    drawn = {name: group(**_drawn(rng, choices[group], usual)) for name, group in groups.items()}
+    if not ours:
+        drawn["restriction"] = replace(drawn["restriction"], mode=str(rng.choice(["slack", "hard", "floor", "off"])))
+    return Profile(**{**drawn, "name": "fuzzed"})
 
 
 def _drawn(rng: np.random.Generator, choices: dict[str, tuple[object, ...]], usual: float) -> dict[str, object]:

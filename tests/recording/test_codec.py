@@ -68,7 +68,7 @@ def steps(draw: st.DrawFn) -> ControlStep:
     row = rows(3)
     obstacles = Obstacles(
         draw(wholes(k)), draw(rows(k, 3)), draw(rows(k)), draw(rows(k, 3)), draw(wholes(k)), draw(rows(k, 3)),
-        draw(rows(k)),
+        draw(rows(k)), draw(rows(k)),
     )  # fmt: skip
     contact = st.builds(Contact, row, npst.arrays(np.bool_, 3))
     qp = QpSolution(draw(rows(n)), draw(rows(m)), draw(rows(n + m)), draw(st.sampled_from(QpOutcome)), draw(TEXT))
@@ -79,7 +79,7 @@ def steps(draw: st.DrawFn) -> ControlStep:
         range_distance=draw(rows(units)), obstacles=obstacles, force=draw(row), filtered_force=draw(row),
         thresholds=Thresholds(draw(rows(6, 3))), armed=draw(st.booleans()), contact=draw(st.none() | contact),
         reaction_velocity=draw(row), restricted=draw(wholes(m)), approach_limit=draw(rows(m)), qp=qp,
-        command=draw(rows(n)),
+        command=draw(rows(n)), residual=draw(rows(n)), evidence=draw(NAN_TOO),
     )  # fmt: skip
 
 
@@ -124,8 +124,8 @@ def some_step() -> ControlStep:
     row, rows3 = np.zeros(3), np.zeros((0, 3))
     return ControlStep(
         0.0, Mode.HOLD, "", none, none, row, row, row, 0.0, row, 1.0, none,
-        Obstacles(no, rows3, none, rows3, no, rows3, none), row, row, Thresholds(np.zeros((6, 3))), False, None, row,
-        no, none, QpSolution(none, none, none, QpOutcome.SKIPPED, ""), none,
+        Obstacles(no, rows3, none, rows3, no, rows3, none, none), row, row, Thresholds(np.zeros((6, 3))), False, None,
+        row, no, none, QpSolution(none, none, none, QpOutcome.SKIPPED, ""), none, none, 0.0,
     )  # fmt: skip
 
 

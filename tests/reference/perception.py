@@ -130,5 +130,5 @@ def obstacles_of(found: list[tuple]) -> Obstacles:
     return Obstacles(
         np.array(unit, dtype=np.int64), np.reshape(point, (-1, 3)), np.array(ee_distance),
         np.reshape(body_point, (-1, 3)), np.array(link, dtype=np.int64), np.reshape(direction, (-1, 3)),
-        np.array(distance),
+        np.array(distance), np.zeros(len(unit)),
     )  # fmt: skip

@@ -116,6 +116,7 @@ def seen(model, points):
     return Obstacles(
         np.array(unit, dtype=np.int64), place, np.array(ee, dtype=float), place,
         np.array([model.link_index(name) for name in link], dtype=np.int64), place, np.array(body, dtype=float),
+        np.zeros(len(unit)),
     )  # fmt: skip
 
 
@@ -130,6 +131,7 @@ def step(model, units=7, stamp=0.0, near=(), **changes):
         thresholds=Thresholds(np.zeros((6, 3))), armed=True, contact=None, reaction_velocity=zero,
         restricted=np.zeros(0, np.int64), approach_limit=np.zeros(0),
         qp=QpSolution(np.zeros(n), np.zeros(0), np.zeros(n), QpOutcome.SOLVED, "Solved."), command=np.zeros(n),
+        residual=np.zeros(n), evidence=0.0,
     )  # fmt: skip
     return replace(made, **changes)
 

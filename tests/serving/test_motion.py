@@ -22,6 +22,7 @@ def options(panda_model, paper_skin):
     return made
 
 
+@pytest.mark.slow
 def test_once_all_units_are_heard_the_arm_makes_its_motion_and_each_state_is_kept(panda_model, paper_skin, options):
     plan, states, said, over = swinging(panda_model, 3.0), [], [], threading.Event()
     with SkinReceiver(paper_skin.ids, made_keys(paper_skin.ids, 0)) as receiver:

@@ -16,7 +16,7 @@ def obstacles(units: list[int], distances: list[float]) -> Obstacles:
     zeros = np.zeros((count, 3))
     return Obstacles(
         np.array(units, np.int64), zeros, np.zeros(count), zeros, np.zeros(count, np.int64), zeros,
-        np.array(distances),
+        np.array(distances), np.zeros(count),
     )  # fmt: skip
 
 

@@ -35,7 +35,7 @@ def seen_by(unit: int, point: tuple[float, float, float], step: ControlStep) -> 
     at = np.array([point])
     obstacles = Obstacles(
         np.array([unit]), at, np.array([0.2]), at - [0.2, 0.0, 0.0], np.array([10]), np.array([[1.0, 0.0, 0.0]]),
-        np.array([0.2]),
+        np.array([0.2]), np.zeros(1),
     )  # fmt: skip
     return replace(step, obstacles=obstacles, range_distance=distance)
 

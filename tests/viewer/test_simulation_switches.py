@@ -238,7 +238,7 @@ def test_a_stiffness_is_felt_from_the_next_touch_on(live):
 # Everything at once
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_no_command_leaves_the_limits_whatever_a_person_does(live, seed):
     rng, session = np.random.default_rng(seed), live(seed=seed, object=("none", "board -y", "board +y")[seed])
     names, ids = sorted(PROFILES), session.skin.ids

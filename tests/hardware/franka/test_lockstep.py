@@ -55,7 +55,7 @@ def test_the_same_motion_gives_the_same_states_to_the_last_bit(serve: Serve, kin
 
 
 @pytest.mark.parametrize("drop", [pytest.param("3/50", marks=pytest.mark.slow), "15/200"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["panda", pytest.param("fr3", marks=pytest.mark.slow)])
 def test_bursts_of_lost_commands_are_survived(serve: Serve, kind: str, drop: str) -> None:
     served = serve(kind, "--lockstep", "--drop", drop)
     result = drive(served, "staircase")

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+import pytest
 
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.robot.description import panda
@@ -14,6 +15,7 @@ from pretouch.serving.wire_skin import made_keys
 _LASTING = 600
 
 
+@pytest.mark.slow
 def test_in_lockstep_readings_are_the_same_to_the_last_bit(serve: Any, raw: Any) -> None:
     skin = paper_skin(RobotModel(panda()))
     runs = [_readings(serve, raw, skin) for _ in range(2)]

@@ -1,0 +1,244 @@
+"""Yielding, clamps and giving up through the whole controller, closed over an arm that follows its commands exactly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.modes import ModeState
+from pretouch.params import PROFILES, Profile, ReactionParams, ThresholdParams, profile
+from pretouch.recording.state_codec import decode_state, encode_state
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, Mode, RobotState
+from tests.following_arm import DT, Arm
+from tests.fuzz.invariants import same
+
+RIGHT = 1  # unit of the paper's skin that looks along -y in the ready posture
+OURS = replace(PROFILES["pretouch"], threshold=ThresholdParams(compare="raw"))
+NO_LAG = replace(OURS, reaction=replace(OURS.reaction, lag_s=0.0))
+
+
+class Pushed(Arm):
+    """An arm whose joints feel forces on its body, with no noise and no lag."""
+
+    def push(self, force: tuple[float, float, float], link: str = "", cycles: int = 1, **more: object):
+        k = self.model.link_index(link) if link else self.model.ee
+        steps = []
+        for _ in range(cycles):
+            kin = self.model.kinematics(self.q)
+            torque = self.model.jacobian(kin, k, kin.position[k])[:3].T @ np.array(force)
+            steps.append(self.step(force=force, change=with_torque(torque), **more))
+        return steps
+
+    def point(self, link: str) -> np.ndarray:
+        return self.model.kinematics(self.q).position[self.model.link_index(link)]
+
+
+def with_torque(torque: np.ndarray):
+    def change(robot: RobotState) -> RobotState:
+        return replace(robot, tau_ext=torque)
+
+    return change
+
+
+def arm_of(model: RobotModel, skin: Skin, params: Profile = NO_LAG) -> Pushed:
+    """An arm on its way along its path, which leads to +y."""
+    arm = Pushed(model, skin, params)
+    arm.run(150)
+    assert arm.state.mode.mode is Mode.TRACK
+    return arm
+
+
+@pytest.fixture
+def arm(panda_model: RobotModel, paper_skin: Skin) -> Pushed:
+    return arm_of(panda_model, paper_skin)
+
+
+def caught(arm: Pushed) -> list[ControlStep]:
+    """Push the arm to -y, and hold it up there."""
+    arm.push((0.0, -25.0, 0.0), cycles=50)
+    return arm.push((0.0, 25.0, 0.0), cycles=4)
+
+
+def modes(steps: list[ControlStep]) -> set[Mode]:
+    return {s.mode for s in steps}
+
+
+def test_it_yields_as_long_as_it_is_pushed_stands_and_goes_on_gently(arm: Pushed):
+    steps = arm.push((0.0, -20.0, 0.0), cycles=30)
+    speeds = [float(s.reaction_velocity[1]) for s in steps[1:]]
+    assert modes(steps[1:]) == {Mode.REACT}
+    assert max(speeds) < 0
+    first = arm.ee()[1]
+    arm.push((0.0, -20.0, 0.0), cycles=100)
+    assert arm.ee()[1] < first - 0.1, "it is pushed on, for longer than a reaction of a fixed length"
+    left = arm.push((0.0, 0.0, 0.0), cycles=99)
+    sizes = np.linalg.norm([s.command for s in left], axis=1)
+    assert np.all(np.diff(sizes) <= 1e-9), "let go, it only slows"
+    assert sizes[-1] < 1e-3
+    where = arm.ee()
+    after = arm.run(60)
+    assert modes(after[:10]) == {Mode.REACT}
+    begins = next(s for s in after if s.mode is Mode.TRACK)
+    np.testing.assert_allclose(begins.ee_position, where, atol=2e-3)
+    assert np.linalg.norm(begins.desired_velocity) <= 1.0 * DT + 1e-9, "the speed along the path grows from 0"
+
+
+def test_a_hand_that_keeps_pushing_keeps_it_away(arm: Pushed):
+    arm.push((0.0, -20.0, 0.0), cycles=100)
+    aside = arm.ee()[1]
+    steps = arm.push((0.0, -8.0, 0.0), cycles=500)
+    assert modes(steps) == {Mode.REACT}
+    assert arm.ee()[1] <= aside
+
+
+@pytest.mark.parametrize("link", ["panda_link4", "panda_link6", "panda_hand"])
+@pytest.mark.parametrize("force", [(0.0, -30.0, 0.0), (0.0, 30.0, 0.0), (0.0, 0.0, 30.0)])
+def test_the_link_that_is_pushed_goes_with_the_push(arm: Pushed, link: str, force):
+    arm.push(force, link, cycles=20)
+    before = arm.point(link)
+    arm.push(force, link, cycles=20)
+    assert (arm.point(link) - before) @ np.array(force) > 0
+
+
+def test_caught_between_two_things_it_opens_the_way_it_came_and_holds_until_resumed(arm: Pushed):
+    steps = caught(arm)
+    assert "Caught between two things" in steps[-1].reason
+    start = arm.ee()[1]
+    opening = arm.run(40)
+    assert modes(opening) == {Mode.REACT}
+    assert 0.02 < arm.ee()[1] - start < 0.06, "back, at no more than 0.1 m/s"
+    held = arm.run(60)
+    assert held[-1].mode is Mode.HOLD
+    assert "caught between two things" in held[-1].reason
+    assert "resume" in held[-1].reason
+    assert arm.step(resume=True).mode is Mode.TRACK
+
+
+def test_a_hand_moves_an_arm_that_holds_after_a_clamp_and_none_whose_state_is_not_known(arm: Pushed):
+    caught(arm)
+    arm.run(100)
+    before = arm.ee()[1]
+    steps = arm.push((0.0, 15.0, 0.0), cycles=50)
+    assert modes(steps) == {Mode.HOLD}
+    assert arm.ee()[1] > before + 0.01
+    arm.run(60)
+    before = arm.ee()[1]
+    arm.push((0.0, -15.0, 0.0), cycles=50)
+    assert arm.ee()[1] > before - 0.005, "back to where it was caught it cannot be pushed"
+    arm.run(60)
+    arm.step(change=lambda robot: replace(robot, q=np.full(7, np.nan)))
+    assert "cannot be used" in arm.state.mode.reason
+    arm.run(50)
+    steps = arm.push((0.0, -15.0, 0.0), cycles=50)
+    assert not any(s.command.any() for s in steps)
+
+
+def test_a_person_who_pushes_thrice_at_one_place_does_not_make_it_give_up(arm: Pushed):
+    for _ in range(4):
+        while arm.state.mode.mode is not Mode.TRACK:
+            arm.step()
+        arm.run(5)
+        arm.push((0.0, -20.0, 0.0), cycles=30)
+    assert Mode.TRACK in modes(arm.run(150))
+
+
+def test_after_three_contacts_at_one_place_it_gives_up_says_so_and_tries_again(panda_model, paper_skin):
+    quick = replace(NO_LAG.reaction, retry_s=1.0, quiet_s=0.3, pushed_j=100.0)
+    arm = arm_of(panda_model, paper_skin, replace(NO_LAG, reaction=quick))
+    for _ in range(3):
+        while arm.state.mode.mode is not Mode.TRACK:
+            arm.step()
+        arm.run(5)
+        arm.push((0.0, -20.0, 0.0), cycles=10)
+    steps = arm.run(60)
+    assert steps[-1].mode is Mode.HOLD
+    assert "3 contacts at one place" in steps[-1].reason
+    assert not arm.state.mode.latched
+    assert Mode.TRACK in modes(arm.run(100)), "no unit saw anything: it tries again after a while"
+    arm.push((0.0, -20.0, 0.0), cycles=10)
+    assert arm.run(60)[-1].mode is Mode.HOLD, "one contact more, and it gives up again"
+    assert arm.step(resume=True).mode is Mode.TRACK
+
+
+@pytest.mark.parametrize("board", [-0.06, -0.15, -0.3])
+def test_it_never_yields_into_what_it_sees(arm: Pushed, board: float):
+    arm.push((0.0, -25.0, 0.0), cycles=20)
+    unit = arm.skin.units[RIGHT]
+    k, place = arm.model.link_index(unit.link), unit.T_link_sensor[:3, 3]
+
+    def side() -> float:
+        kin = arm.model.kinematics(arm.q)
+        return float((kin.rotation[k] @ place + kin.position[k])[1])
+
+    face = side() + board
+    for _ in range(200):
+        (step,) = arm.push((0.0, -25.0, 0.0), seen={RIGHT: max(side() - face, 0.001)})
+        assert step.mode is Mode.REACT
+        assert np.all(step.qp.slack < 0.01)
+    near, kin = step.obstacles, arm.model.kinematics(step.q)
+    J = arm.model.jacobian(kin, near.link[0], near.body_point[0])[:3]
+    assert near.body_distance[0] > 0.0, "it stops before what the person pushes it to"
+    assert near.direction[0] @ (J @ step.command) < 0.002
+
+
+def test_what_holds_it_does_not_keep_a_caught_arm_from_opening(arm: Pushed):
+    left = arm.skin.ids.index("hand_left")
+    arm.push((0.0, -25.0, 0.0), cycles=50, seen={left: 0.04})
+    arm.push((0.0, 25.0, 0.0), cycles=4, seen={left: 0.04})
+    start = arm.ee()[1]
+    arm.run(45, seen={left: 0.04})
+    assert arm.ee()[1] - start > 0.02, "though it sees the hand that pushed it on the way back"
+
+
+def test_a_gap_of_the_estimate_is_no_push_and_leaves_nothing_behind(arm: Pushed):
+    arm.run(3, change=lambda robot: replace(robot, tau_ext=np.full(7, np.nan)))
+    assert arm.state.mode.mode is Mode.HOLD
+    assert "no force estimate" in arm.state.mode.reason
+    arm.run(150)
+    before = arm.ee()[1]
+    arm.push((0.0, -25.0, 0.0), cycles=10)
+    steps = arm.run(3, change=lambda robot: replace(robot, tau_ext=np.full(7, np.nan)))
+    assert np.isfinite([s.command for s in steps]).all()
+    arm.push((0.0, -25.0, 0.0), cycles=40)
+    assert arm.state.mode.mode is Mode.REACT
+    assert arm.ee()[1] < before - 0.03
+
+
+@pytest.mark.parametrize("name", ["paper", "blind"])
+def test_the_paper_does_not_look_at_joint_torques(panda_model, paper_skin, name: str):
+    rng = np.random.default_rng(5)
+    plain, other = (Pushed(panda_model, paper_skin, profile(name)) for _ in range(2))
+    for i in range(400):
+        force = (0.0, -25.0 * (150 < i < 180), 0.0)
+        one = plain.step(force)
+        two = other.step(force, change=with_torque(rng.normal(0, 20, 7)))
+        np.testing.assert_array_equal(one.command, two.command)
+        assert (one.mode, one.reason) == (two.mode, two.reason)
+
+
+@pytest.mark.parametrize("change", ["clamps=no", "gives_up=no", "soft_hold=no", "method=decay", "lag_s=0"])
+def test_each_switch_can_be_turned_off_alone(change: str):
+    name, _, text = change.partition("=")
+    varied = profile(f"pretouch:reaction.{change}").reaction
+    off = {"no": False, "decay": "decay", "0": 0.0}[text]
+    assert varied == replace(PROFILES["pretouch"].reaction, **{name: off})
+    assert ReactionParams() == PROFILES["paper"].reaction
+
+
+def test_the_state_of_a_clamp_is_recorded_to_the_bit(arm: Pushed):
+    caught(arm)
+    arm.run(3)
+    _, back = decode_state(encode_state(0, arm.state, False))
+    assert same(back, arm.state)
+    assert back.reaction.clamp.torque > 0
+
+
+def test_another_profile_can_take_over_in_a_reaction(arm: Pushed, panda_model, paper_skin):
+    arm.push((0.0, -25.0, 0.0), cycles=20)
+    other = Arm(panda_model, paper_skin, PROFILES["paper"])
+    arm.state = other.controller.adopt(arm.state, arm.controller)
+    arm.controller = other.controller
+    assert np.isfinite([s.command for s in arm.run(10)]).all()
+    assert isinstance(arm.state.mode, ModeState)
