@@ -42,7 +42,7 @@ def events_of(
     elif not felt.armed:
         events[Event.WINDOW_FILLING] = f"{samples} of {p.threshold.window_samples} samples"
     if blocked >= p.anticipation.blocked_after_s:
-        events[Event.PATH_BLOCKED] = f"{blocked:.0f} s"
+        events[Event.PATH_BLOCKED] = f"{blocked:.1f} s"
     return events
 
 

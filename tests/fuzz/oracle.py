@@ -179,7 +179,10 @@ class Oracle:
             return self._told(e, step)
         filling = self.samples < self.p.threshold.window_samples
         seen = {"silent": bool(e.silent), "no force": e.no_force, "overrun": e.overrun, "filling": filling}
-        return next((cause for cause, here in seen.items() if here), "clear")
+        # how long the path has been blocked is remembered by the arm's anticipation, and said only while it tracks
+        blocked = self.mode is Mode.TRACK and self.p.restriction.mode == "braking"
+        clear = "path blocked" if blocked and WORDS["path blocked"] in step.reason else "clear"
+        return next((cause for cause, here in seen.items() if here), clear)
 
     def _told(self, e: Expected, step: ControlStep) -> str:
         """Take the step's word for what has a memory of its own, where nothing it was given speaks against it."""
