@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.control.touch_speed import factor, mass_along, touch_parameters, touch_speed
+from pretouch.cholesky import factor
+from pretouch.control.touch_speed import mass_along, touch_parameters, touch_speed
 from pretouch.params.anticipation import REGIONS, AnticipationParams
 from pretouch.robot.model import RobotModel
 
@@ -73,19 +74,14 @@ def test_the_mass_along_a_direction_is_that_of_mujoco(panda_model: RobotModel):
         mujoco.mj_jac(mj, data, J, None, point, link)
         row = normal @ J
         mujoco.mj_solveM(mj, data, solved, row[None])
-        assert factor(panda_model.mass_matrix(q), 0.1, L)
+        assert factor(panda_model.mass_matrix(q) + 0.1 * np.eye(7), L)
         assert mass_along(L, row) == pytest.approx(1.0 / float(solved[0] @ row), rel=1e-9)
 
 
 def test_a_point_that_cannot_move_has_infinite_mass(panda_model: RobotModel):
     L = np.empty((7, 7))
-    assert factor(panda_model.mass_matrix(panda_model.description.q_ready), 0.0, L)
+    assert factor(panda_model.mass_matrix(panda_model.description.q_ready), L)
     assert mass_along(L, np.zeros(7)) == np.inf
-
-
-def test_what_is_no_mass_matrix_is_refused():
-    assert not factor(-np.eye(3), 0.1, np.empty((3, 3)))
-    assert not factor(np.full((2, 2), np.nan), 0.0, np.empty((2, 2)))
 
 
 def test_the_mass_matrix_is_that_of_the_whole_dynamics(panda_model: RobotModel):

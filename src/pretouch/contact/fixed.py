@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.gaussian import backward, factor, forward
 from pretouch.params import DetectionParams
 from pretouch.types import FloatArray
 

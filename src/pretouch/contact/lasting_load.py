@@ -6,8 +6,8 @@ is learnt as free motion. A person who is caught is none of that: near, or not c
 
 import numpy as np
 
+from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.gaussian import backward, factor, forward
 from pretouch.types import FloatArray
 
 MOST_KG = 3.0

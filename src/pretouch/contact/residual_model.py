@@ -17,8 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.gaussian import backward, factor, forward
 from pretouch.errors import ParameterError
 from pretouch.params import DetectionParams
 from pretouch.robot.model import Kinematics, RobotModel

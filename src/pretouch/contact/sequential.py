@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
+from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.gaussian import factor, forward
 from pretouch.params import DetectionParams
 from pretouch.types import FloatArray, IntArray
 

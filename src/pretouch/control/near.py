@@ -5,6 +5,7 @@ As in `joint_motion`, everything is done in one compiled call, made of the funct
 
 import numpy as np
 
+from pretouch.cholesky import factor
 from pretouch.compiled import compiled
 from pretouch.control.braking import braking_rows, slots_init
 from pretouch.control.detour import Detour, detour_init, shift
@@ -15,7 +16,7 @@ from pretouch.control.penalty import SOLVED, excesses, minimise
 from pretouch.control.qp import ENDING, Cost, solve
 from pretouch.control.restriction import ApproachRows, approach_rows
 from pretouch.control.task import twist
-from pretouch.control.touch_speed import factor, touch_parameters
+from pretouch.control.touch_speed import touch_parameters
 from pretouch.params import Profile
 from pretouch.robot.model import Kinematics, RobotModel, jacobian_into
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Obstacles, QpOutcome, QpSolution, RobotState
@@ -117,7 +118,7 @@ def near_motion(
         room = _ROWS_A_UNIT * (len(state.slots) // 2)
         G, h, which = np.empty((room, n)), np.empty(room), np.empty(len(obstacles.unit), WHOLE)
         if len(obstacles.unit) and settings.rows[-1] > 0:
-            mass = model.mass_matrix(robot.q)
+            mass = model.mass_matrix(robot.q) + profile.anticipation.rotor_inertia_kg_m2 * np.eye(n)
     else:
         rows, which = approach_rows(kin, model.moved_by, obstacles, r)
         G, h, room = rows.G, rows.h, len(rows.h)
@@ -127,7 +128,7 @@ def near_motion(
     seen, ending, violated = _near_motion(
         after.slots, after.null_velocity, after.detour.vectors, after.detour.times, state.null_velocity,
         kin.position, kin.rotation, kin.anchor, kin.axis, model.moved_by, model.ee,
-        robot.q, robot.qd, robot.q_commanded, robot.qd_commanded, mass, profile.anticipation.rotor_inertia_kg_m2,
+        robot.q, robot.qd, robot.q_commanded, robot.qd_commanded, mass,
         obstacles.unit, obstacles.link, obstacles.body_point, obstacles.direction, obstacles.body_distance,
         obstacles.closing_speed, settings.rows, settings.touch, settings.null, settings.detour,
         velocity, rotation_goal, model.q_mid, limits.table, r.slack_weight if soft else 0.0,
@@ -153,7 +154,7 @@ def near_motion(
 def _near_motion(
     slots: FloatArray, null: FloatArray, shifted: FloatArray, shift_times: FloatArray, null_before: FloatArray,
     position: FloatArray, rotation: FloatArray, anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, ee: int,
-    q: FloatArray, qd: FloatArray, q_commanded: FloatArray, qd_commanded: FloatArray, mass: FloatArray, rotor: float,
+    q: FloatArray, qd: FloatArray, q_commanded: FloatArray, qd_commanded: FloatArray, mass: FloatArray,
     unit: IntArray, link: IntArray, body_point: FloatArray, direction: FloatArray, distance: FloatArray,
     closing: FloatArray, row_settings: FloatArray, touch: FloatArray, null_settings: FloatArray, detour: FloatArray,
     velocity: FloatArray, rotation_goal: FloatArray, q_mid: FloatArray, limits: FloatArray, weight: float,
@@ -170,7 +171,7 @@ def _near_motion(
     n, seen, found = len(q), len(h), len(h)
     if braking:
         L, numbers = np.eye(n), row_settings.copy()
-        numbers[-1] = 1.0 if len(mass) > 0 and factor(mass, rotor, L) else 0.0
+        numbers[-1] = 1.0 if len(mass) > 0 and factor(mass, L) else 0.0
         seen, found = braking_rows(
             slots, unit, link, body_point, direction, distance, closing, anchor, axis, moved_by, qd_commanded, L,
             touch, numbers, G, h, which,
@@ -185,25 +186,21 @@ def _near_motion(
     J = np.empty((6, n))
     jacobian_into(anchor, axis, moved_by[ee], position[ee], J)
     lower, upper, stop = box_and_brake(q_commanded, qd_commanded, limits)
+    if len(reaction_qd):
+        H[:], f[:] = np.eye(n), -reaction_qd
+    elif not hold:
+        m = 6 if keep_orientation else 3
+        x_d = twist(velocity, rotation[ee], rotation_goal, orientation_gain)
+        H[:], f[:] = cost_with_null_space(
+            J[:m], x_d[:m], q, q_mid, damping_max, threshold, mid_gain, mid_time, projected, null
+        )
     ending = SOLVED
     if not hold:
-        if len(reaction_qd):
-            H[:], f[:] = np.eye(n), -reaction_qd
-        else:
-            m = 6 if keep_orientation else 3
-            x_d = twist(velocity, rotation[ee], rotation_goal, orientation_gain)
-            H[:], f[:] = cost_with_null_space(
-                J[:m], x_d[:m], q, q_mid, damping_max, threshold, mid_gain, mid_time, projected, null
-            )
         ending = minimise(H, f, lower, upper, G, h, weight, budget, answer, slack, multipliers[: n + found])
     if hold or ending != SOLVED:
         answer[:], multipliers[:] = stop, 0.0
         excesses(G, h, answer, slack)
-    for i in range(3):
-        velocities[0, i], velocities[1, i] = 0.0, 0.0
-        for j in range(n):
-            velocities[0, i] += J[i, j] * qd[j]
-            velocities[1, i] += J[i, j] * answer[j]
+    velocities[0], velocities[1] = J[:3] @ qd, J[:3] @ answer
     if tracks and not hold:
         hand, towards = np.empty(seen, np.bool_), np.empty((seen, 3))
         for k in range(seen):
@@ -212,7 +209,4 @@ def _near_motion(
             shifted, shift_times, velocity, velocities[1], towards, h[:seen], hand, detour[0], detour[1], detour[2],
             detour[3], detour[4],
         )  # fmt: skip
-    violated = False
-    for k in range(found):
-        violated = violated or slack[k] > 0
-    return seen, ending, violated
+    return seen, ending, bool((slack > 0.0).any())

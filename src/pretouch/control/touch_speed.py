@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pretouch.cholesky import forward
 from pretouch.compiled import compiled
 from pretouch.params.anticipation import REGIONS, AnticipationParams
 from pretouch.types import FloatArray
@@ -28,38 +29,10 @@ def touch_speed(mass: float, limits: FloatArray) -> float:
 
 
 @compiled
-def factor(mass_matrix: FloatArray, rotor: float, L: FloatArray) -> bool:
-    """Write the lower Cholesky factor L (n, n) of a mass matrix with `rotor` [kg m^2] added to each joint.
-
-    Returns whether there is one.
-    """
-    n = len(mass_matrix)
-    for i in range(n):
-        for j in range(i + 1):
-            total = mass_matrix[i, j] + (rotor if i == j else 0.0)
-            for k in range(j):
-                total -= L[i, k] * L[j, k]
-            if i == j:
-                if not total > 0:
-                    return False
-                L[i, i] = np.sqrt(total)
-            else:
-                L[i, j] = total / L[j, j]
-    return True
-
-
-@compiled
 def mass_along(L: FloatArray, row: FloatArray) -> float:
     """Effective mass 1 / (g M^-1 g^T) [kg] along a row g = n^T J (n,), of a mass matrix M = L L^T; infinite for g = 0.
 
     Khatib (1995): the inertial properties perceived at a point, along a direction.
     """
-    n, inverse = len(row), 0.0
-    y = np.empty(n)
-    for i in range(n):
-        total = row[i]
-        for k in range(i):
-            total -= L[i, k] * y[k]
-        y[i] = total / L[i, i]
-        inverse += y[i] * y[i]
+    inverse = forward(L, row, np.empty(len(row)))
     return 1.0 / inverse if inverse > 0 else np.inf

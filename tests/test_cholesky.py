@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.linalg import solve_triangular
 
-from pretouch.contact.gaussian import backward, factor, forward
+from pretouch.cholesky import backward, factor, forward
 
 
 def matrix(seed: int) -> np.ndarray:
@@ -30,3 +30,4 @@ def test_substitution_solves_both_triangular_systems():
 def test_what_is_not_positive_definite_is_told():
     assert not factor(np.diag([1.0, -1.0]), np.zeros((2, 2)))
     assert not factor(np.zeros((2, 2)), np.zeros((2, 2)))
+    assert not factor(np.full((2, 2), np.nan), np.zeros((2, 2)))
