@@ -34,7 +34,9 @@ def franka(command: Run, parts: Parts) -> Iterator[Opened]:
         ours = FrankaSessionArm(arm, kind, address)
         if command.robot.recover:
             _recover(ours, command.yes)
-        yield Opened(ours, units or NoUnits(), known, units, notes=lambda: notes)
+        told = arm.state()
+        robot = f"{known.key}, hand {told.m_ee:.3g} kg, load {told.m_load:.3g} kg"
+        yield Opened(ours, units or NoUnits(), known, units, notes=lambda: notes, learnt_as=robot)
 
 
 def _recover(arm: FrankaSessionArm, yes: bool) -> None:
