@@ -12,10 +12,10 @@ largest mean:
   40 N below which a reaction comes too late and the 60 N that a hand meets at 0.3 m/s.
 
 The sequential detector has no threshold: it feels least while it has learnt nothing. The largest force on one axis that
-it may then miss at the arm's ready posture is `felt_from_n`, 38 N with the profile `pretouch`; learnt, some 10 N. The
-arm stops by itself `upper_above_n` above that, but from `most_n` on at the latest: with an error of `bias_n` that is
-the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm that is pushed yields at
-0.27 m/s at least, whatever the direction, of the 0.3 m/s it may.
+it may then miss at the arm's ready posture is `felt_from_n`, 38 N with the profile `pretouch`; once it has learnt, 4 to
+9 N on a simulated Panda. The arm stops by itself `upper_above_n` above that, but from `most_n` on at the latest: with
+an error of `bias_n` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm
+that is pushed yields at 0.27 m/s at least, whatever the direction, of the 0.3 m/s it may.
 
 Joint torques are those of such a force at the end-effector with the longest lever its joint ever has, but at least the
 figures of the vendor's examples, which are above the noise of the estimate (20 20 18 18 16 14 12 Nm; libfranka,
