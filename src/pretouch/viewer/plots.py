@@ -104,7 +104,7 @@ class Plots:
         for axis in "xyz":
             gui.add_html(_caption(f"Force {axis} [N]", marks if axis == "x" else ()))
             # a page whose scale is changed no longer follows the time: unseen lines hold it open
-            self._force.append(_plot(gui, [*lines, _UNSEEN, _UNSEEN], 84, None, dashed=3))
+            self._force.append(_plot(gui, [*lines, _UNSEEN, _UNSEEN], 96, None, dashed=3))
         blue = palette.css(palette.PATH)
         gui.add_html(_caption("Evidence", [("a contact from 1 on", force)]))
         self._evidence = _plot(gui, [force, grey], 70, (0.0, 1.5), dashed=1)
@@ -140,7 +140,7 @@ def _plot(
         late = dashed is not None and i >= dashed
         lines.append({"stroke": colour, "width": 1.5, "points": {"show": False}, **({"dash": (4, 3)} if late else {})})
     small: dict[str, Any] = {"size": 18, "font": "10px system-ui", "ticks": {"size": 3}, "gap": 2}
-    axes: Any = (small, {**small, "size": 34, "space": 24})
+    axes: Any = (small, {**small, "size": 34, "space": 15})
     return gui.add_uplot(
         tuple(np.full(2, np.nan) if i else np.arange(2.0) for i in range(len(colours) + 1)), tuple(lines),
         height=height, scales=_scales(values), legend={"show": False}, cursor={"show": False},
