@@ -40,13 +40,13 @@ def begun(home, arm, now=1e9, **more):
     return FreeMotion(home, arm.controller, now=lambda: now, **more)
 
 
-def turned(arm, free, steps, recording=None):
-    """Let an arm follow its path, whose torques are off by OFFSET, from what is known of it."""
+def turned(arm, free, steps, recording=None, drift=0.0):
+    """Let an arm follow its path, whose torques are off by OFFSET and a drift [Nm], from what is known of it."""
     arm.state = arm.controller.init(arm.robot(), free.begin)
     residuals = []
     for _ in range(steps):
         before, robot = arm.state, arm.robot()
-        inputs = Inputs(arm.time, replace(robot, tau_ext=robot.tau_ext + OFFSET), arm.readings())
+        inputs = Inputs(arm.time, replace(robot, tau_ext=robot.tau_ext + OFFSET + drift), arm.readings())
         step, arm.state = arm.controller.step(before, inputs)
         arm.qd, arm.q, arm.time = step.command, arm.q + step.command * 0.01, arm.time + 0.01
         for one in (free, recording) if recording else (free,):
@@ -109,6 +109,15 @@ def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_do
     assert np.linalg.eigvalsh(later).min() > 0.0
     backwards = begun(home, arm, now=1e9 - DAY_S).begin.covariance  # the machine's time was set back
     np.testing.assert_allclose(backwards, later)
+
+
+@pytest.mark.parametrize(("pause", "felt"), [(0.0, True), (DAY_S, False)])
+def test_an_arm_that_drifted_in_a_long_pause_feels_no_contact_that_is_none(home, arm, another, pause, felt):
+    free = begun(home, arm)
+    turned(arm, free, 3000)
+    free.keep()
+    turned(another, begun(home, another, now=1e9 + pause), 60, drift=0.2)
+    assert (another.state.feel.sequential[0].calm == 0) is felt
 
 
 def test_a_run_that_learns_nothing_leaves_the_file_as_it_is(home, arm, another):
