@@ -12,6 +12,7 @@ import pytest
 from pretouch import cli
 from pretouch.cli.run.robots import Opened
 from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.session import simulated
 from pretouch.session.preflight import PreflightParams
@@ -65,6 +66,7 @@ def at_begin(monkeypatch, seconds, then):
         (("--path", "circle", "--radius", "3"), "cannot reach"),
         (("--robot", "franka", "--ip", "192.0.2.1", "--lockstep", "--seconds", "1"), "is for a simulated arm"),
         (("--robot", "franka", "--ip", "127.0.0.1", "--lockstep"), "needs --seconds"),
+        (("--no-learnt", "--learn-anew"), "--no-learnt does not go with"),
         (("--recover",), "--recover does not go with --robot simulated"),
     ],
 )  # fmt: skip
@@ -114,7 +116,11 @@ def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path,
     place.parent.mkdir(parents=True)
     place.write_text("[")
     known = Identity("test", "here", "nothing")
-    monkeypatch.setattr("pretouch.cli.run.robots.Opened", lambda arm, skin, _, *more: Opened(arm, skin, known, *more))
+
+    def opened(arm, skin, _, *more, **named):
+        return Opened(arm, skin, known, *more, **named)
+
+    monkeypatch.setattr("pretouch.cli.run.robots.Opened", opened)
     assert cli.main([*BLIND, "--seconds", "0.1", "--yes"]) == 2
     shown = capsys.readouterr()
     assert "is damaged: delete it" in shown.err
@@ -129,6 +135,48 @@ def test_a_recording_that_fails_in_the_middle_is_told_at_once_and_by_the_exit_co
     assert -1 < said.find("The disk is full.") < said.find("The arm is at rest.")
     assert said.count("The disk is full.") == 2
     assert "ended early" not in said
+
+
+LEARNING = (
+    "run", "--no-skin", "--path", "hold", "--yes", "--profile",
+    "pretouch:perception.enabled=no:detection.learn_unseen=yes",
+)  # fmt: skip
+
+
+@pytest.mark.usefixtures("_no_pushes")
+def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tmp_path, capsys):
+    place = tmp_path / "state" / "pretouch" / "free-motion" / "simulated-panda-seed-0.toml"
+    for name in ("a", "b"):
+        assert cli.main([*LEARNING, "--seconds", "2", "--record", f"{name}.mcap"]) == 0
+        said = capsys.readouterr().out
+        assert ("Nothing is known yet" if name == "a" else "Free motion of this robot is known since") in said
+        assert str(place) in said
+        assert verify(open_recording(tmp_path / f"{name}.mcap")).agrees
+    first, second = (open_recording(tmp_path / f"{name}.mcap")[0].snapshot for name in "ab")
+    assert not first.feel.sequential[0].model.weights.any()
+    assert second.feel.sequential[0].model.seen.sum() > 50
+    kept = place.read_text()
+    assert cli.main([*LEARNING, "--seconds", "2", "--no-learnt"]) == 0
+    assert place.read_text() == kept
+    assert "ree motion" not in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("_no_pushes")
+def test_what_was_learnt_is_kept_after_ctrl_c_in_the_file_that_was_named(tmp_path, capsys, monkeypatch):
+    at_begin(monkeypatch, 3.0, lambda _: os.kill(os.getpid(), signal.SIGINT))
+    assert cli.main([*LEARNING, "--learnt", "arms/mine.toml"]) == 130
+    assert "Free motion is kept" in capsys.readouterr().out
+    assert (tmp_path / "arms" / "mine.toml").exists()
+    assert not (tmp_path / "state").exists()
+
+
+def test_a_named_file_of_free_motion_must_be_one_and_the_profile_must_learn(tmp_path, capsys):
+    (tmp_path / "skin.toml").write_text("[[unit]]\n")
+    assert cli.main([*LEARNING, "--learnt", "skin.toml"]) == 2
+    assert "skin.toml cannot be used as --learnt" in capsys.readouterr().err
+    assert (tmp_path / "skin.toml").read_text() == "[[unit]]\n"
+    assert cli.main([*BLIND, "--learnt", "new.toml"]) == 2
+    assert "learns no free motion" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("_no_pushes")

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
@@ -177,12 +178,14 @@ def run(
     recorder: Recorder,
     done: Callable[[ControlStep], bool],
     resume: Callable[[], bool] = lambda: False,
+    learnt: ResidualModel | None = None,
 ) -> None:
     """Turn the controller until `done` says so of a step. However it ends, the arm is first brought to rest.
 
-    `resume` says whether a person now asks to leave a latched HOLD.
+    `resume` says whether a person now asks to leave a latched HOLD; `learnt` is free motion as an earlier session left
+    it.
     """
-    state = controller.init(robot.read())
+    state = controller.init(robot.read(), learnt)
     sent = state.command
     try:
         while True:

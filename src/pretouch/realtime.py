@@ -15,6 +15,7 @@ from types import FrameType
 import numpy as np
 
 from pretouch import loop
+from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.ports import Robot, Skin
@@ -39,6 +40,7 @@ def run(
     priority: int | None = None,
     cpu: int | None = None,
     tell: Callable[[str], None] = print,
+    learnt: ResidualModel | None = None,
 ) -> None:
     """`loop.run`, warmed up and in a process prepared for real time. However it ends, `clock.timing()` is the report.
 
@@ -55,6 +57,7 @@ def run(
         priority: see `real_time`.
         cpu: see `real_time`.
         tell: is given each sentence on what could not be had, before the loop begins.
+        learnt: free motion as an earlier session left it.
     """
     if not math.isclose(clock.period, controller.limits.period, rel_tol=1e-9):
         raise ParameterError(
@@ -65,7 +68,7 @@ def run(
     with _ended_in_order(), real_time(priority, cpu) as missing:
         for sentence in missing:
             tell(sentence)
-        loop.run(controller, robot, skin, clock, recorder, done, resume)
+        loop.run(controller, robot, skin, clock, recorder, done, resume, learnt)
 
 
 @contextmanager

@@ -310,3 +310,13 @@ def test_each_figure_is_drawn_from_trials_it_plays(tmp_path, name):
     made = draw_figure(name, out=tmp_path / "x.png", seed=102)
     with Image.open(made) as picture:
         assert np.asarray(picture.convert("L")).std() > 10
+
+
+def test_figures_of_a_detector_without_thresholds_show_none():
+    ours = profile("pretouch")
+    for figure in (interaction_figure(made_trace(), UNITS, ours), close_up_figure(made_trace(), UNITS, ours)):
+        labels = [text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]]
+        assert "bands of one sample" in labels
+        assert not {"thresholds", "thresholds without F_obs", "value of eq. 8"} & set(labels)
+        force = next(axes for axes in figure.axes if "force" in axes.get_ylabel())
+        assert line(force, "detected").get_ydata().tolist() == [20.0]

@@ -1,11 +1,11 @@
 import re
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
-from pretouch.params import profile
+from pretouch.params import Profile, profile
 from pretouch.reporting.html import bad, number, percent, table
 from pretouch.reporting.measures import measure
 from pretouch.reporting.orientation import ISO_TS_15066
@@ -16,6 +16,7 @@ from pretouch.reporting.sections.setting import parameter_section, setting_secti
 from pretouch.reporting.summary import summary
 from pretouch.sensing.skin import Skin
 from pretouch.types import Mode
+from pretouch.viewer.parameters import field_docs
 from tests.reporting import made
 
 
@@ -248,3 +249,25 @@ def test_directions_and_units_are_named():
     assert [unit_of(name) for name in ("speed_m_s", "compliance_m_s_n", "f_base_n", "alpha", "d_max_m")] == [
         "m/s", "(m/s)/N", "N", "", "m"
     ]  # fmt: skip
+
+
+def test_units_of_all_parameters_are_those_that_their_documentation_gives():
+    wrong, found = {}, 0
+    for group in fields(Profile):
+        params = getattr(Profile(), group.name)
+        for item in fields(params) if is_dataclass(params) else ():
+            told = re.findall(r"\[([^\]]*)\]", field_docs().get((type(params).__name__, item.name), ""))
+            if told and told[0] != "1":
+                found += 1
+                if unit_of(item.name) not in told[0].replace("^2", "²").split(", "):
+                    wrong[item.name] = told[0], unit_of(item.name)
+    assert found > 70
+    assert wrong == {}
+
+
+def test_a_detector_without_thresholds_is_not_said_to_have_them(panda_model, paper_skin):
+    ours = read(made.played(panda_model, paper_skin, "pretouch", seconds=1.5)[0])
+    assert "bands in which one sample of it alone would be no contact" in ours.said
+    assert "contact thresholds by axis" not in ours.said
+    paper = read(made.played(panda_model, paper_skin, "paper", seconds=1.5)[0])
+    assert "contact thresholds by axis" in paper.said

@@ -7,7 +7,7 @@ from numpy.testing import assert_array_equal
 from pretouch.contact.residual_model import kept, residual_init, resumed
 from pretouch.errors import RobotModelError
 from pretouch.params import DetectionParams
-from pretouch.robot.residual_file import load_residual, save_residual
+from pretouch.robot.residual_file import Residual, load_residual, save_residual
 
 P = DetectionParams()
 
@@ -20,11 +20,12 @@ def test_what_was_learnt_comes_back_to_the_bit(tmp_path, panda_model):
     rng = np.random.default_rng(1)
     numbers = kept(residual_init(7, P))
     numbers["weights"] = rng.standard_normal(numbers["weights"].shape)
-    save_residual(tmp_path / "free.toml", panda_model, numbers)
+    save_residual(tmp_path / "free.toml", panda_model, Residual(numbers, "panda at here", 1e9, 1.5e9))
     back = load_residual(tmp_path / "free.toml", panda_model, shapes())
+    assert (back.robot, back.since, back.saved) == ("panda at here", 1e9, 1.5e9)
     for name, array in numbers.items():
-        assert_array_equal(back[name], array)
-    assert_array_equal(resumed(back, P).weights, numbers["weights"])
+        assert_array_equal(back.numbers[name], array)
+    assert_array_equal(resumed(back.numbers, P).weights, numbers["weights"])
 
 
 @pytest.mark.parametrize(
@@ -38,7 +39,7 @@ def test_what_was_learnt_comes_back_to_the_bit(tmp_path, panda_model):
 )
 def test_one_for_another_arm_or_version_is_refused(tmp_path, panda_model, old, new, said):
     path = tmp_path / "free.toml"
-    save_residual(path, panda_model, kept(residual_init(7, P)))
+    save_residual(path, panda_model, Residual(kept(residual_init(7, P)), "panda at here", 1e9, 1e9))
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))

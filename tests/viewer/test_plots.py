@@ -29,6 +29,13 @@ def test_a_short_peak_of_force_is_not_lost(some_step: ControlStep) -> None:
     assert history.columns()[1 + K + 1].min() == -40.0
 
 
+def test_a_short_peak_of_evidence_is_not_lost(some_step: ControlStep) -> None:
+    history = History(K)
+    for i in range(500):
+        history.add(replace(some_step, stamp=i / 100, evidence=1.2 if i == 251 else 0.0))
+    assert history.columns()[12 + K].max() == 1.2
+
+
 def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
     history = History(K, more=1)
     for i in range(50):
@@ -39,6 +46,7 @@ def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
     np.testing.assert_array_equal(last[7 + K : 10 + K], some_step.thresholds.lower)
     speeds = [np.linalg.norm(some_step.ee_velocity), np.linalg.norm(some_step.desired_velocity)]
     np.testing.assert_array_equal(last[10 + K : 12 + K], speeds)
+    assert last[12 + K] == some_step.evidence
     assert last[-1] == 5.0
 
 
@@ -57,7 +65,7 @@ def test_a_history_of_little_can_be_drawn(some_step: ControlStep, samples: int) 
     for _ in range(samples):
         history.add(some_step)
     columns = history.columns()
-    assert columns.shape[0] == 1 + K + 11
+    assert columns.shape[0] == 1 + K + 12
     assert columns.shape[1] >= 2
     assert np.all(np.isfinite(columns[0]))
 
@@ -86,10 +94,22 @@ def test_axes_of_force_are_symmetric_and_grow_with_the_force(some_step: ControlS
     for i, force in enumerate((3.0, -20.0, 65.0, np.nan)):
         history.add(replace(some_step, stamp=float(i), force=np.array([0.0, force, 0.0]), thresholds=limits))
         plots.draw(float(i))
-        seen.append([plot.scales["y"]["range"] for plot in gui.plots[1:4]])
+        lines = [np.array(plot.data[-2:]) for plot in gui.plots[1:4]]
+        seen.append([(frame.min(), frame.max()) for frame in lines])
     at_rest = (-FORCE_N, FORCE_N)
     assert [forces[1] for forces in seen] == [at_rest, (-30.0, 30.0), (-120.0, 120.0), (-120.0, 120.0)]
     assert all(forces[0] == forces[2] == at_rest for forces in seen)
+
+
+def test_no_scale_changes_for_a_page_would_no_longer_follow_the_time(some_step: ControlStep) -> None:
+    history, gui = History(K), FakeGui()
+    plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
+    before = [plot.scales for plot in gui.plots]
+    for i, force in enumerate((3.0, -20.0, 65.0, 0.0)):
+        history.add(replace(some_step, stamp=float(i), force=np.full(3, force)))
+        plots.draw(float(i))
+    assert all(plot.scales is scales for plot, scales in zip(gui.plots, before, strict=True))
+    assert all(len({len(line) for line in plot.data}) == 1 for plot in gui.plots)
 
 
 class FakeGui:

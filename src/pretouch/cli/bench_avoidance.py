@@ -3,8 +3,9 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
+from pretouch.cli.bench_options import BenchOptions
 from pretouch.cli.words import words
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
@@ -12,27 +13,20 @@ if TYPE_CHECKING:  # the help is to need none of the heavy packages
 
 
 @dataclass(frozen=True)
-class Avoidance:
+class Avoidance(BenchOptions):
     """How near arms come to people and objects, with what forces, and what it costs to keep clear of them.
 
-    A run that was stopped goes on with the same --out.
+    About half an hour on two processors, with --quick three minutes. A run that was stopped goes on with the same
+    --out.
     """
 
-    quick: bool = False
-    """Few trials, in about three minutes on two processors; the full run takes about half an hour."""
-    seeds: Literal["published", "development"] = "published"
-    """Which simulated arms: those of the published tables, or others to build controllers with."""
+    json: str = ""
+    """File for the numbers, with a row for each contender and scenario; by default results.json in the folder."""
     contenders: str = ""
     """Contenders, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
     profile; by default all, and pretouch with each switch off alone."""
     scenarios: str = ""
     """Scenarios, separated by commas; by default all."""
-    out: str = ""
-    """Folder for results and figures; by default runs/bench-avoidance, with -quick if it is."""
-    json: str = ""
-    """File for the numbers, with a row for each contender and scenario; by default results.json in the folder."""
-    docs: str = ""
-    """Folder of documents (docs) whose benchmarks.md and images are to be made anew; by default none."""
 
 
 def bench_avoidance(command: Avoidance) -> None:
@@ -44,8 +38,8 @@ def bench_avoidance(command: Avoidance) -> None:
 
     c = command
     request = Request(words(c.contenders), c.quick, c.seeds, words(c.scenarios))
-    out = Path(c.out or "runs/bench-avoidance" + ("-quick" if c.quick else ""))
-    json_file, docs = Path(c.json) if c.json else out / "results.json", Path(c.docs) if c.docs else None
+    out, docs = c.folder("bench-avoidance"), c.documents
+    json_file = Path(c.json) if c.json else out / "results.json"
     if docs:
         around(docs / DOCUMENT, NAME)  # half an hour later would be late
     open_run(request, out)

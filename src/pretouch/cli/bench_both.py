@@ -2,27 +2,20 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from pretouch.cli.bench_avoidance import Avoidance, bench_avoidance
 from pretouch.cli.bench_detection import Detection, bench_detection
+from pretouch.cli.bench_options import BenchOptions
 
 
 @dataclass(frozen=True)
-class Both:
+class Both(BenchOptions):
     """Run the benchmarks detection and avoidance, and say which goals were reached.
 
-    About an hour and a half on two processors; a run that was stopped goes on with the same --out.
+    About an hour and a half on two processors, with --quick ten minutes. A run that was stopped goes on with the same
+    --out.
     """
 
-    quick: bool = False
-    """A small part of both, in about ten minutes; it says what it cannot tell."""
-    seeds: Literal["published", "development"] = "published"
-    """Which simulated arms: those of the published tables, or others to build controllers with."""
-    out: str = ""
-    """Folder for both; by default runs/bench, with -quick if it is."""
-    docs: str = ""
-    """Folder of documents (docs) whose benchmarks.md and images are to be made anew; by default none."""
     readme: str = ""
     """Document for the one table, between its marks; by default none."""
 
@@ -38,8 +31,8 @@ def bench_both(command: Both) -> None:
     from pretouch.experiments.bench.front import front_table
     from pretouch.experiments.bench.goals import goal_table
 
-    out = Path(command.out or "runs/bench" + ("-quick" if command.quick else ""))
-    docs, readme = (Path(text) if text else None for text in (command.docs, command.readme))
+    out, docs = command.folder("bench"), command.documents
+    readme = Path(command.readme) if command.readme else None
     parts = ("detection", "avoidance", "goals") if docs else ()
     places = [(docs / DOCUMENT, part) for part in parts if docs] + ([(readme, "front")] if readme else [])
     for document, part in places:

@@ -3,8 +3,9 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
+from pretouch.cli.bench_options import BenchOptions
 from pretouch.errors import PretouchError
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
@@ -13,22 +14,14 @@ if TYPE_CHECKING:  # the help is to need none of the heavy packages
 
 
 @dataclass(frozen=True)
-class Detection:
+class Detection(BenchOptions):
     """Hold contact detectors against each other: delay against false alarms, what they miss, forces on a board.
 
-    A run that was stopped goes on with the same --out.
+    About an hour on two processors, with --quick five minutes. A run that was stopped goes on with the same --out.
     """
 
-    quick: bool = False
-    """A small part of it, in about ten minutes; it says what it cannot tell."""
-    seeds: Literal["published", "development"] = "published"
-    """Which simulated arms: those of the published tables, or others to develop detectors with."""
-    out: str = ""
-    """Folder for streams and results; by default runs/bench-detection, with -quick if it is."""
     json: str = ""
     """File for the numbers; by default results.json in the folder."""
-    docs: str = ""
-    """Folder of documents (docs) whose benchmarks.md and images are to be made anew; by default none."""
 
 
 def bench_detection(command: Detection) -> None:
@@ -40,9 +33,8 @@ def bench_detection(command: Detection) -> None:
     from pretouch.experiments.bench.documents import DOCUMENT, around
     from pretouch.experiments.campaign import write_json
 
-    out = Path(command.out or "runs/bench-detection" + ("-quick" if command.quick else ""))
+    out, docs = command.folder("bench-detection"), command.documents
     json_file = Path(command.json) if command.json else out / "results.json"
-    docs = Path(command.docs) if command.docs else None
     if docs:
         around(docs / DOCUMENT, NAME)  # an hour later would be late
     bench = Bench(out, command.quick, command.seeds)

@@ -287,14 +287,17 @@ def kept(model: ResidualModel) -> dict[str, FloatArray]:
 def resumed(numbers: dict[str, FloatArray], p: DetectionParams) -> ResidualModel:
     """Return a model with what was kept of an earlier one; one that could not be is a ParameterError.
 
-    The covariances must be positive definite and the variances positive.
+    The covariances must be symmetric and positive definite, the variances and counts not below zero.
     """
     n = len(numbers["weights"])
     fresh = residual_init(n, p)
     for name in KEPT:
         if numbers[name].shape != getattr(fresh, name).shape or not np.isfinite(numbers[name]).all():
             raise ParameterError(f"What was learnt has {name} of the shape {numbers[name].shape}: learn it anew.")
-    if np.linalg.eigvalsh(numbers["covariance"]).min() <= 0.0 or numbers["spread"].min() < 0.0:
-        raise ParameterError("What was learnt has a variance below zero: learn it anew.")
+    turned = numbers["covariance"].swapaxes(1, 2)
+    if not np.array_equal(numbers["covariance"], turned) or np.linalg.eigvalsh(turned).min() <= 0.0:
+        raise ParameterError("What was learnt has a covariance that is none: learn it anew.")
+    if numbers["spread"].min() < 0.0 or numbers["seen"].min() < 0.0:
+        raise ParameterError("What was learnt has a variance or a count below zero: learn it anew.")
     weights, covariance, spread, seen = (numbers[name].copy() for name in KEPT)
     return replace(fresh, weights=weights, covariance=covariance, spread=spread, seen=seen)

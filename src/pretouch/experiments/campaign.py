@@ -240,17 +240,17 @@ def run_campaign(request: Request, out: Path, progress: Callable[[float], None])
     # the long ones first, so that no processor waits for one at the end
     missing.sort(key=lambda task: (task[1], -_cost(task[0])))
     with workers(min(len(missing), os.cpu_count() or 1)) as pool:
-        with interrupt_held_back(), _failure_said(out):
+        with interrupt_held_back(), failure_said(out):
             futures = {pool.submit(_work, request, out, cell, seed): _cost(cell) for cell, seed in missing}
         for future in as_completed(futures):
-            with _failure_said(out):
+            with failure_said(out):
                 future.result()
             progress(futures[future])
 
 
 @contextmanager
-def _failure_said(out: Path) -> Iterator[None]:
-    """Say in a sentence that a worker was killed or could not write."""
+def failure_said(out: Path) -> Iterator[None]:
+    """Turn a worker that was killed, or results that could not be written, into an ExperimentError."""
     try:
         yield
     except BrokenProcessPool as error:
@@ -259,8 +259,8 @@ def _failure_said(out: Path) -> Iterator[None]:
         ) from error
     except OSError as error:
         raise ExperimentError(
-            f"A worker process failed with results for {out} ({error.strerror or error}): remove the cause, and the"
-            " same command with the same --out goes on."
+            f"Results could not be written to {out} ({error.strerror or error}): remove the cause, and the same command"
+            " with the same --out goes on."
         ) from error
 
 

@@ -22,9 +22,9 @@ class Detection:
     """[s]"""
     run: int
     force: FloatArray
-    """(3,) F_ext of eq. 12, the reading above the window's mean [N]."""
+    """(3,) F_ext of eq. 12: the reading above the window's mean, or what explains the torques best [N]."""
     axes: BoolArray
-    """(3,) axes whose threshold was crossed."""
+    """(3,) axes whose threshold or band was crossed, or came nearest to it."""
     filtered: FloatArray
     """(3,) value of eq. 8 at the detection [N]."""
     raw: FloatArray

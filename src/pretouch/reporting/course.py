@@ -66,6 +66,8 @@ class Course:
     """(S, 3) threshold [N]"""
     sigma: FloatArray
     """(S, 3) standard deviation of the force window [N]"""
+    evidence: FloatArray
+    """(S,) how far the detector was on the way to a contact, one from 1 on."""
     armed: BoolArray
     """(S,)"""
     contacts: tuple[tuple[int, Contact, float], ...]
@@ -115,6 +117,11 @@ class Course:
     def proximity_used(self) -> bool:
         """Whether any of the profiles looks at what the units say."""
         return any(run.profile.perception.enabled for run in self.runs)
+
+    @property
+    def by_thresholds(self) -> bool:
+        """Whether any of the profiles feels contacts by the paper's thresholds."""
+        return any(run.profile.detection.method == "thresholds" for run in self.runs)
 
     def of_runs(self, value: Callable[["Run"], float]) -> FloatArray:
         """Value (S,) that each step's run has."""

@@ -81,7 +81,10 @@ def _empty(layout: _Layout) -> Block:
         "link_distance": len(layout.links), "q_margin": n, "q_margin_measured": n, "command": n, "speed_limit": n,
     }  # fmt: skip
     block: Block = {name: np.empty((0, width)) for name, width in widths.items()}
-    block |= {name: np.empty(0) for name in ("time", "speed", "speed_scale", "ee_distance", "slack", "robot_stamp")}
+    block |= {
+        name: np.empty(0)
+        for name in ("time", "speed", "speed_scale", "ee_distance", "slack", "robot_stamp", "evidence")
+    }
     block |= {name: np.empty(0, np.int64) for name in ("run", "mode", "restricted", "outcome")}
     block |= {name: np.empty(0, np.bool_) for name in ("armed", "given", "force_missing")}
     return block | {"reading_status": np.empty((0, u), np.int64)}
@@ -113,6 +116,7 @@ def _block(batch: list["Kept"], run: "Run", layout: _Layout) -> Block:
         "upper": parts[:, 0],
         "lower": parts[:, 1],
         "sigma": parts[:, 3],
+        "evidence": np.array([s.evidence for s in steps], dtype=np.float64),
         "armed": np.array([s.armed for s in steps]),
         "range_distance": _spread([s.range_distance for s in steps], place, len(layout.units)),
         "restricted": np.array([len(s.restricted) for s in steps]),

@@ -6,6 +6,7 @@ from string import Template
 import numpy as np
 
 from pretouch import __version__
+from pretouch.reporting.course import Course
 from pretouch.reporting.figures.force import close_up_figure, force_figure
 from pretouch.reporting.figures.image import picture, style
 from pretouch.reporting.figures.motion import joint_figure, motion_figure, path_figure
@@ -106,7 +107,7 @@ def _body(m: Measures, limits: BodyLimits) -> list[Text]:
     return [
         element("h3", "Contacts"),
         contact_section(m),
-        picture(force_figure(course), f"Force on the arm and contact thresholds by axis, base frame. {shaded}"),
+        picture(force_figure(course), _force_said(course) + f" {shaded}"),
         *_strongest(m),
         element("h3", "Distances"),
         distance_section(m),
@@ -126,6 +127,15 @@ def _body(m: Measures, limits: BodyLimits) -> list[Text]:
         element("h3", "Parameters"),
         parameter_section(m),
     ]
+
+
+def _force_said(course: Course) -> str:
+    if course.by_thresholds:
+        return "Force on the arm and contact thresholds by axis, base frame; evidence, a contact from 1 on."
+    return (
+        "Force on the arm by axis, base frame, with the bands in which one sample of it alone would be no contact."
+        " What decides is the evidence, made of all joint torques and many samples: a contact from 1 on."
+    )
 
 
 def _strongest(m: Measures) -> list[Text]:

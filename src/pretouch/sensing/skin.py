@@ -1,7 +1,5 @@
 """A set of sensor units on one arm, and the TOML file that describes it."""
 
-import os
-import shutil
 import tomllib
 from collections.abc import Sequence
 from importlib.resources import files
@@ -22,6 +20,7 @@ from pretouch.sensing.unit import (
     SensorUnit,
 )
 from pretouch.types import FloatArray, IntArray
+from pretouch.whole_file import write_whole
 
 _FAR = 0.5
 """Distance from its link beyond which a unit cannot be mounted on it [m]: millimetres taken for metres, most likely."""
@@ -110,28 +109,9 @@ def save_skin(skin: Skin, path: Path) -> None:
     it leads to is replaced.
     """
     try:
-        _replace(Path(os.path.realpath(path)), tomli_w.dumps({"unit": [_entry(unit) for unit in skin.units]}))
+        write_whole(path, tomli_w.dumps({"unit": [_entry(unit) for unit in skin.units]}))
     except OSError as error:
         raise SkinError(f"The skin cannot be written to {path}: {error.strerror}.") from error
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all; into a device or pipe as it is."""
-    if path.exists() and not path.is_file() and not path.is_dir():
-        path.write_text(text, encoding="utf-8")
-        return
-    unfinished = path.with_name(f".skin.{os.getpid()}.tmp")
-    try:
-        with unfinished.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        if path.is_file():
-            shutil.copymode(path, unfinished)
-        os.replace(unfinished, path)
-    except BaseException:
-        unfinished.unlink(missing_ok=True)
-        raise
 
 
 def paper_skin(model: RobotModel) -> Skin:

@@ -1,6 +1,6 @@
 """What is kept of a run: a recording, if one is asked for, and the last seconds before each HOLD that latches."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from pretouch.loop import Cycle, Recorder
 from pretouch.recording.codec import encode_inputs
 from pretouch.recording.last_seconds import LastSeconds
 from pretouch.recording.writer import Recording
+from pretouch.session.free_motion import FreeMotion
 from pretouch.types import Inputs, RangeReadings, RobotState
 
 
@@ -23,6 +24,7 @@ class Kept:
     """To be given each cycle."""
     recording: Recording | None
     last_seconds: LastSeconds
+    learnt: FreeMotion | None
 
     @property
     def trouble(self) -> str:
@@ -31,8 +33,9 @@ class Kept:
 
     def close(self) -> tuple[str, ...]:
         """Finish the files; return a sentence on each."""
+        said = list(self.learnt.keep()) if self.learnt else []
         self.last_seconds.close()
-        said = [f"The last seconds before a HOLD: {place}" for place in self.last_seconds.written]
+        said += [f"The last seconds before a HOLD: {place}" for place in self.last_seconds.written]
         said += [self.last_seconds.trouble] if self.last_seconds.trouble else []
         return (*said, self.recording.close().sentence) if self.recording else tuple(said)
 
@@ -44,6 +47,7 @@ def keeping(
     place: Path | None,
     folder: Path,
     tell: Callable[[str], None],
+    learnt: FreeMotion | None = None,
     further: Recorder | None = None,
 ) -> Iterator[Kept]:
     """Open what a run is kept in.
@@ -54,14 +58,15 @@ def keeping(
         place: recording to write, if any.
         folder: for the last seconds before each HOLD that latches.
         tell: is told at once, without waiting, that the recording fails.
-        further: what else is given each cycle.
+        learnt: what keeps free motion, if anything does.
+        further: what else is given each cycle, if anything.
     """
     _warm_up(controller)
     with ExitStack() as stack:
         recording = stack.enter_context(Recording(place, controller, {"robot": robot})) if place else None
         last = stack.enter_context(LastSeconds(controller, folder, recording, about={"robot": robot}))
-        recorder: Recorder = _Both(last, further) if further else last
-        yield Kept(_Both(recorder, _Minder(recording, tell)) if recording else recorder, recording, last)
+        minder = _Minder(recording, tell) if recording else None
+        yield Kept(_All([one for one in (last, learnt, further, minder) if one]), recording, last, learnt)
 
 
 def _warm_up(controller: Controller) -> None:
@@ -72,16 +77,16 @@ def _warm_up(controller: Controller) -> None:
     encode_inputs(0, Inputs(0.0, RobotState(0.0, zero, zero, zero, zero, zero, np.zeros(6)), readings))
 
 
-class _Both:
-    """Two recorders as one."""
+class _All:
+    """Several recorders as one."""
 
-    def __init__(self, first: Recorder, second: Recorder) -> None:
-        self._first, self._second = first, second
+    def __init__(self, recorders: Sequence[Recorder]) -> None:
+        self._recorders = recorders
 
     def record(self, cycle: Cycle) -> None:
         """Keep one turn of the loop."""
-        self._first.record(cycle)
-        self._second.record(cycle)
+        for recorder in self._recorders:
+            recorder.record(cycle)
 
 
 class _Minder:

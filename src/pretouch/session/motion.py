@@ -10,6 +10,7 @@ import numpy as np
 from pretouch import realtime
 from pretouch.calibration.motion.perform import PerformParams, perform
 from pretouch.calibration.motion.plan import Plan
+from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock, Recorder
@@ -88,6 +89,7 @@ def follow(
     wishes: Wishes,
     tell: Callable[[str], None],
     ending: Ending,
+    learnt: ResidualModel | None = None,
 ) -> None:
     """Turn the controller until `done` says so, a signal comes, or something fails. The arguments are `realtime.run`'s.
 
@@ -98,7 +100,7 @@ def follow(
     def move(came: list[int]) -> str:
         realtime.run(
             controller, arm, skin, clock, recorder, lambda step: bool(came) or done(step), resume,
-            priority=wishes.priority, cpu=wishes.cpu, tell=tell,
+            priority=wishes.priority, cpu=wishes.cpu, tell=tell, learnt=learnt,
         )  # fmt: skip
         return ""
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pretouch.errors import RobotError
+from pretouch.whole_file import write_whole
 
 _FILE = "force-sign.json"
 
@@ -49,14 +50,9 @@ class Remembered:
     def keep(self, robot: Identity) -> None:
         """Note that a robot is confirmed; RobotError where that cannot be written."""
         entries = self._read() | {robot.key: robot.through}
-        unfinished = self.place.with_name(f".{_FILE}.{os.getpid()}.tmp")
         try:
             self.place.parent.mkdir(parents=True, exist_ok=True)
-            with unfinished.open("w", encoding="utf-8") as file:
-                json.dump(entries, file, indent=1)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(unfinished, self.place)
+            write_whole(self.place, json.dumps(entries, indent=1))
         except OSError as error:
             raise RobotError(
                 f"The confirmed push cannot be noted in {self.place} ({error.strerror}): make that folder writable, or"

@@ -1,4 +1,4 @@
-"""The last seconds as plots: distances of the units, force with its moving thresholds, speed."""
+"""The last seconds as plots: distances of the units, force with its moving thresholds, evidence, speed."""
 
 import math
 from collections import deque
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 SPAN_S = 10.0
 """Time that is shown [s]."""
 SAMPLE_S = 0.06
-"""Time from one shown sample to the next [s]; of the forces in it, the one farthest from the mean is shown."""
+"""Time from one shown sample to the next [s]; of the forces in it the one farthest from the mean is shown, and the
+most evidence."""
 PERIOD_S = 0.125
 """Time between two updates of a page [s]."""
 _ROUNDING_S = 1e-6
@@ -25,15 +26,19 @@ _NOTHING_M = 9.0
 """Where a unit that shows nothing is drawn [m]: out of sight."""
 FORCE_N = 15.0
 """What the axes of force reach to at least, up and down [N]."""
+_UNSEEN = "transparent"
 SAMPLES = int(SPAN_S / SAMPLE_S)
 
 
 class History:
-    """Samples of the last `SPAN_S`: time, distances (K), then force, upper and lower threshold (3 each), two speeds."""
+    """Samples of the last `SPAN_S`: time, distances (K), then force, upper and lower threshold (3 each), two speeds.
+
+    After these the evidence of a contact, and what else is given.
+    """
 
     def __init__(self, units: int, more: int = 0, start: float = 0.0) -> None:
         """Take the number of units and of further columns that `add` is given, and the stamp of time 0 [s]."""
-        self._units, self._width, self._start = units, 1 + units + 9 + 2 + more, start
+        self._units, self._width, self._start = units, 1 + units + 9 + 2 + 1 + more, start
         self._rows: deque[FloatArray] = deque(maxlen=SAMPLES)
         self._open: FloatArray | None = None
 
@@ -56,7 +61,7 @@ class History:
         row = np.concatenate(
             [
                 [time], distance, step.force, thresholds.upper, thresholds.lower,
-                [np.linalg.norm(step.ee_velocity), np.linalg.norm(step.desired_velocity)], more,
+                [np.linalg.norm(step.ee_velocity), np.linalg.norm(step.desired_velocity), step.evidence], more,
             ]
         )  # fmt: skip
         if self._open is None:
@@ -67,6 +72,7 @@ class History:
         else:
             far = np.abs(self._open[force] - thresholds.mean) > np.abs(row[force] - thresholds.mean)
             row[force] = np.where(far, self._open[force], row[force])
+            row[12 + self._units] = max(row[12 + self._units], self._open[12 + self._units])
             row[0] = self._open[0]
             self._open = row
 
@@ -82,7 +88,7 @@ class History:
 
 
 class Plots:
-    """Five plots of a history, one below the other."""
+    """Six plots of a history, one below the other."""
 
     def __init__(self, gui: "GuiApi", history: History, ids: Sequence[str], other: str = "") -> None:
         """`other` names a second profile, whose thresholds (upper 3, lower 3) are the history's further columns."""
@@ -90,18 +96,20 @@ class Plots:
         self._sent = -np.inf
         colours = [palette.css(palette.UNITS[i % len(palette.UNITS)]) for i in range(len(ids))]
         gui.add_html(_caption("Distance [m]", zip(ids, colours, strict=True)))
-        self._distance = _plot(gui, colours, 130, (0.0, 1.0))
+        self._distance = _plot(gui, colours, 112, (0.0, 1.0))
         grey, force, second = (palette.css(c) for c in (palette.FOLLOWING, palette.FORCE, palette.REACTING))
-        marks = [("force", force), ("thresholds", grey)] + ([(f"of {other}", second)] if other else [])
+        marks = [("force", force), ("thresholds or bands", grey)] + ([(f"of {other}", second)] if other else [])
         lines = [force, grey, grey] + ([second] * 2 if other else [])
         self._force = []
         for axis in "xyz":
             gui.add_html(_caption(f"Force {axis} [N]", marks if axis == "x" else ()))
-            self._force.append(_plot(gui, lines, 96, (-FORCE_N, FORCE_N), dashed=3))
-        self._reach = [FORCE_N] * 3
+            # a page whose scale is changed no longer follows the time: unseen lines hold it open
+            self._force.append(_plot(gui, [*lines, _UNSEEN, _UNSEEN], 96, None, dashed=3))
         blue = palette.css(palette.PATH)
+        gui.add_html(_caption("Evidence", [("a contact from 1 on", force)]))
+        self._evidence = _plot(gui, [force, grey], 70, (0.0, 1.5), dashed=1)
         gui.add_html(_caption("Speed [m/s]", [("end-effector", blue), ("desired", grey)]))
-        self._speed = _plot(gui, [blue, grey], 96, (0.0, 0.4), dashed=1)
+        self._speed = _plot(gui, [blue, grey], 84, (0.0, 0.4), dashed=1)
 
     def draw(self, now: float) -> None:
         """Send the history, at a time [s]; not more often than eight times a second."""
@@ -113,24 +121,26 @@ class Plots:
         self._distance.data = (time, *rows[1 : 1 + k])
         for axis, plot in enumerate(self._force):
             at = [1 + k + axis, 4 + k + axis, 7 + k + axis]
-            at += [12 + k + axis, 15 + k + axis] if self._other else []
-            reach = _reach(rows[at])
-            if reach != self._reach[axis]:  # the page builds a plot anew for it
-                self._reach[axis], plot.scales = reach, _scales((-reach, reach))
-            plot.data = (time, *rows[at])
+            at += [13 + k + axis, 16 + k + axis] if self._other else []
+            reach = np.full(len(time), _reach(rows[at]))
+            plot.data = (time, *rows[at], -reach, reach)
+        self._evidence.data = (time, rows[12 + k], np.ones(len(time)))
         self._speed.data = (time, *rows[10 + k : 12 + k])
 
 
 def _plot(
-    gui: "GuiApi", colours: Sequence[str], height: int, values: tuple[float, float], dashed: int | None = None
+    gui: "GuiApi", colours: Sequence[str], height: int, values: tuple[float, float] | None, dashed: int | None = None
 ) -> "GuiUplotHandle":
-    """A plot with a line of each colour over time; from the `dashed`th on they are dashed."""
+    """A plot with a line of each colour over time; from the `dashed`th on they are dashed.
+
+    Without `values` it reaches as far as its lines.
+    """
     lines: list[Any] = [{}]
     for i, colour in enumerate(colours):
         late = dashed is not None and i >= dashed
         lines.append({"stroke": colour, "width": 1.5, "points": {"show": False}, **({"dash": (4, 3)} if late else {})})
     small: dict[str, Any] = {"size": 18, "font": "10px system-ui", "ticks": {"size": 3}, "gap": 2}
-    axes: Any = (small, {**small, "size": 34, "space": 24})
+    axes: Any = (small, {**small, "size": 34, "space": 15})
     return gui.add_uplot(
         tuple(np.full(2, np.nan) if i else np.arange(2.0) for i in range(len(colours) + 1)), tuple(lines),
         height=height, scales=_scales(values), legend={"show": False}, cursor={"show": False},
@@ -138,8 +148,8 @@ def _plot(
     )  # fmt: skip
 
 
-def _scales(values: tuple[float, float]) -> dict[str, Any]:
-    return {"x": {"time": False}, "y": {"range": values}}
+def _scales(values: tuple[float, float] | None) -> dict[str, Any]:
+    return {"x": {"time": False}, "y": {} if values is None else {"range": values}}
 
 
 def _reach(forces: FloatArray) -> float:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.cli.run.asking import demand_yes, say
+from pretouch.cli.run.learnt import free_motion
 from pretouch.cli.run.moving import Way, moved
 from pretouch.cli.run.options import Run, check_options
 from pretouch.cli.run.parts import Parts, parts
@@ -53,6 +54,7 @@ def _run(command: Run, made: Parts, found: Opened, last: ExitStack) -> int:
     known = found.identity is not None and remembered.knows(found.identity)  # a damaged file is found out first
     controller = made.controller(np.array(found.arm.read().q))
     clock = MonotonicClock(made.profile.task.control_period_s)
+    learnt = free_motion(command.robot, controller, found.learnt_as)
     session = Session(found.arm, found.skin, found.units, controller, made.floor, clock)
     say(f"{found.arm.name}: checks, while it stands still and nobody touches it.")
     rest = _checked(session, command.task.approach, found.notes())
@@ -63,7 +65,7 @@ def _run(command: Run, made: Parts, found: Opened, last: ExitStack) -> int:
         if found.identity:
             remembered.keep(found.identity)
         say("The force sign is confirmed: force on the arm, base frame.")
-    return moved(command, session, found, _allowed(command, session, made, rest), last)
+    return moved(command, session, found, _allowed(command, session, made, rest), learnt, last)
 
 
 def _checked(session: Session, approach: bool, notes: Sequence[str]) -> Standing:

@@ -8,7 +8,7 @@ from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
 from pretouch.cli.run.robots import Opened, network_units
 from pretouch.hardware.franka.arm import FrankaArm
-from pretouch.hardware.franka.collision import collision_behavior
+from pretouch.hardware.franka.collision import CollisionParams, collision_behavior, largest_threshold
 from pretouch.session.franka import FrankaSessionArm, identity
 from pretouch.session.session import NoUnits
 from pretouch.session.signals import children_undisturbed
@@ -23,8 +23,8 @@ def franka(command: Run, parts: Parts) -> Iterator[Opened]:
     known = identity(kind, address)
     behavior = collision_behavior(parts.profile, parts.model)
     say(
-        f"The arm stops by itself from {behavior.upper_force[0]:.0f} N on; the profile reacts from"
-        f" {parts.profile.threshold.f_base_n:g} N above the mean."
+        f"The arm stops by itself from {behavior.upper_force[0]:.0f} N on; the profile feels"
+        f" {largest_threshold(parts.profile, parts.model, CollisionParams()):.0f} N at the latest."
     )
     priority = command.priority and min(command.priority + 1, 99)
     with children_undisturbed():
@@ -34,7 +34,9 @@ def franka(command: Run, parts: Parts) -> Iterator[Opened]:
         ours = FrankaSessionArm(arm, kind, address)
         if command.robot.recover:
             _recover(ours, command.yes)
-        yield Opened(ours, units or NoUnits(), known, units, notes=lambda: notes)
+        told = arm.state()
+        robot = f"{known.key}, hand {told.m_ee:.3g} kg, load {told.m_load:.3g} kg"
+        yield Opened(ours, units or NoUnits(), known, units, notes=lambda: notes, learnt_as=robot)
 
 
 def _recover(arm: FrankaSessionArm, yes: bool) -> None:

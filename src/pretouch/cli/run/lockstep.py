@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.cli.run.asking import say
+from pretouch.cli.run.learnt import free_motion
 from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
 from pretouch.cli.skin_keys import keys_file
@@ -49,10 +50,12 @@ def run_lockstep(command: Run, parts: Parts) -> int:
         say("In lockstep nothing is checked, and no push is asked for: the arm is a simulated one.")
         place, folder = Path(command.record) if command.record else None, Path(command.holds)
         name, ending = f"{command.robot.arm} at {address}, in lockstep", Ending()
-        with keeping(controller, name, place, folder, say) as kept:
+        learnt = free_motion(command.robot, controller, name, remembered=False)  # runs alike are to stay alike
+        with keeping(controller, name, place, folder, say, learnt) as kept:
             watcher = Watcher(kept.recorder, say, "", controller.limits.period)
             try:
-                run_in_lockstep(client, controller, readings_at, watcher, _Until(seconds))
+                until, begin = _Until(seconds), learnt.begin if learnt else None
+                run_in_lockstep(client, controller, readings_at, watcher, until, learnt=begin)
             except Exception as error:
                 ending = _ended(error)
                 if not watcher.course.steps:

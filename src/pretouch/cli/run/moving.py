@@ -14,6 +14,7 @@ from pretouch.cli.run.robots import Opened
 from pretouch.errors import HardwareError, PretouchError
 from pretouch.loop import MonotonicClock
 from pretouch.session.finding import refusals
+from pretouch.session.free_motion import FreeMotion
 from pretouch.session.keeping import Kept, keeping
 from pretouch.session.motion import Ending, Wishes, follow, go, named
 from pretouch.session.session import Session
@@ -38,7 +39,7 @@ class Way:
     """How long it follows the path [s]; infinite until it is stopped."""
 
 
-def moved(command: Run, session: Session, found: Opened, way: Way, last: ExitStack) -> int:
+def moved(command: Run, session: Session, found: Opened, way: Way, learnt: FreeMotion | None, last: ExitStack) -> int:
     """Let the arm move and report, whatever ends it; return 1 if it did not end as asked, or else 0.
 
     All that the run is kept in is opened first. From the report to the end of `last`, signals are only noted.
@@ -50,11 +51,12 @@ def moved(command: Run, session: Session, found: Opened, way: Way, last: ExitSta
     with ExitStack() as stack:
         tell = stack.enter_context(Narrator(say))
         further = stack.enter_context(found.output(controller))
-        kept = stack.enter_context(keeping(controller, session.arm.name, place, Path(command.holds), tell, further))
+        folder = Path(command.holds)
+        kept = stack.enter_context(keeping(controller, session.arm.name, place, folder, tell, learnt, further))
         watcher = Watcher(kept.recorder, tell, latched, controller.limits.period)
         try:
             if _arrived(session, way.approach, tell, ending):
-                _follow(command, session, way, watcher, enter, clock, tell, ending)
+                _follow(command, session, way, watcher, enter, clock, tell, ending, learnt)
         finally:
             last.enter_context(signals_noted())
             tell.close()
@@ -81,12 +83,15 @@ def _arrived(session: Session, approach: Plan | None, tell: Callable[[str], None
 
 def _follow(
     command: Run, session: Session, way: Way, watcher: Watcher, enter: EnterKey, clock: MonotonicClock,
-    tell: Callable[[str], None], ending: Ending,
+    tell: Callable[[str], None], ending: Ending, learnt: FreeMotion | None,
 ) -> None:  # fmt: skip
     """Let the controller move the arm."""
     until, wishes = _Until(way.seconds, session.units), Wishes(command.priority, command.cpu)
     try:
-        follow(session.arm, session.skin, session.controller, clock, watcher, until, enter, wishes, tell, ending)
+        follow(
+            session.arm, session.skin, session.controller, clock, watcher, until, enter, wishes, tell, ending,
+            learnt.begin if learnt else None,
+        )  # fmt: skip
     except PretouchError as error:  # before the arm took the controller's commands
         if way.approach is None:
             raise

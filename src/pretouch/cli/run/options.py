@@ -23,6 +23,12 @@ class RobotOptions:
     """The robot is a `pretouch serve-fci --lockstep` on this machine: it waits for each command."""
     confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Ask for the guided pushes although the force sign of this robot is confirmed."""
+    learnt: str = ""
+    """File of the arm's free motion, to begin with and to keep it in; by default one for each robot is remembered."""
+    learn_anew: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Begin with no free motion learnt, and keep what is learnt now in place of what was."""
+    no_learnt: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Begin with no free motion learnt, and keep none."""
     recover: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """With franka: let an arm that has stopped by itself recover first, once what it touched is cleared."""
     ros_sign: Literal["", "on-robot", "by-robot"] = ""
@@ -135,6 +141,8 @@ def check_options(command: Run) -> None:
         )
     if units.no_skin and (units.skin or units.keys):
         raise HardwareError("--no-skin does not go with --skin and --keys: leave one or the other out.")
+    if robot.no_learnt and (robot.learnt or robot.learn_anew):
+        raise RobotError("--no-learnt does not go with --learnt and --learn-anew: leave one or the other out.")
     if not units.units_host:
         raise HardwareError("--units-host is empty: give 127.0.0.1, or 0.0.0.0 for every address of this machine.")
     if not 0.0 <= command.task.seconds < float("inf"):

@@ -52,6 +52,8 @@ class Opened:
     """What is to be known of the connection by now, a sentence each."""
     output: Callable[[Controller], AbstractContextManager[Output | None]] = _no_output
     """Opens what else is told of each control step."""
+    learnt_as: str = ""
+    """What the robot is known by as its free motion is remembered, where that may be learnt."""
 
 
 @contextmanager
@@ -100,4 +102,7 @@ def _simulated(command: Run, parts: Parts) -> Iterator[Opened]:
         options = SimulateOptions(model, parts.skin, keys, HOST, port, hand=False, seed=command.seed)
         begin = parts.simulated_start()
         with SimulatedSessionArm(options, begin, SceneSpec(floor_height=parts.floor)) as arm:
-            yield Opened(arm, units or NoUnits(), None, units, lambda direction: arm.push(direction.axis))
+            yield Opened(
+                arm, units or NoUnits(), None, units, lambda direction: arm.push(direction.axis),
+                learnt_as=f"{arm.name}, seed {command.seed}",
+            )  # fmt: skip

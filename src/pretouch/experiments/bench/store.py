@@ -4,7 +4,6 @@ import json
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from functools import cache
 from hashlib import sha256
@@ -17,7 +16,7 @@ import numpy as np
 from pretouch import __version__
 from pretouch.errors import ExperimentError
 from pretouch.experiments.bench.scenario_files import checksums
-from pretouch.experiments.campaign import write_json
+from pretouch.experiments.campaign import failure_said, write_json
 from pretouch.experiments.workers import interrupt_held_back, workers
 from pretouch.params import Profile
 from pretouch.types import FloatArray
@@ -86,7 +85,7 @@ def run_tasks(tasks: list[Task], out: Path, progress: Callable[[float], None], p
     left = sorted(missing(tasks), key=lambda task: -task.cost)
     if not left:
         return
-    try:
+    with failure_said(out):
         for folder in {task.file.parent for task in left}:
             folder.mkdir(parents=True, exist_ok=True)
         if processes == 1:
@@ -100,15 +99,6 @@ def run_tasks(tasks: list[Task], out: Path, progress: Callable[[float], None], p
             for future in as_completed(futures):
                 future.result()
                 progress(futures[future])
-    except BrokenProcessPool as error:
-        raise ExperimentError(
-            "A worker process was killed, for want of memory perhaps: the same command with the same --out goes on."
-        ) from error
-    except OSError as error:
-        raise ExperimentError(
-            f"Results could not be written to {out} ({error.strerror or error}): remove the cause, and the same command"
-            " with the same --out goes on."
-        ) from error
 
 
 def write_arrays(arrays: dict[str, FloatArray], path: Path) -> None:

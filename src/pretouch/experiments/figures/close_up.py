@@ -15,15 +15,17 @@ def close_up_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -> F
     figure = Figure(figsize=(9, 6.4), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
     distances(top, trace, units)
-    d_max = profile.threshold.d_max_m
+    paper = profile.detection.method == "thresholds"
+    d_max, name = (profile.threshold.d_max_m, "d_max") if paper else (profile.detection.near_m, "near")
     top.axhspan(0.0, d_max, facecolor="gold", alpha=0.18, zorder=0)
-    top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"d_max {d_max:g} m")
+    top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"{name} {d_max:g} m")
     top.annotate("region of interest", (0.01, d_max), (0, -5), ("axes fraction", "data"), "offset points", va="top")
     top.set(ylim=(0.0, 1.4), title=f"Objects on both sides of the robot's hand, profile {profile.name}")
-    force_with_thresholds(bottom, trace, Y)
-    without = trace.upper + trace.obstacle_negative, trace.lower - trace.obstacle_positive
-    bottom.plot(trace.time, without[0][:, Y], color="black", ls=":", label="thresholds without F_obs")
-    bottom.plot(trace.time, without[1][:, Y], color="black", ls=":")
+    force_with_thresholds(bottom, trace, Y, profile)
+    if paper:
+        without = trace.upper + trace.obstacle_negative, trace.lower - trace.obstacle_positive
+        bottom.plot(trace.time, without[0][:, Y], color="black", ls=":", label="thresholds without F_obs")
+        bottom.plot(trace.time, without[1][:, Y], color="black", ls=":")
     both = (trace.obstacle_positive[:, Y] > 0) & (trace.obstacle_negative[:, Y] > 0)
     for axes in (top, bottom):
         shade(axes, trace.time, both, "tab:red", label="both bounds lowered")

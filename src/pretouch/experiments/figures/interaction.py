@@ -25,9 +25,10 @@ def interaction_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     distances(top, trace, units)
     d_max = profile.reduction.d_max_m
-    top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"activation, d_max {d_max:g} m")
+    if profile.reduction.enabled or profile.detection.method == "thresholds":
+        top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"activation, d_max {d_max:g} m")
     top.set(ylim=(0.0, 1.4), title=f"Three pushes in thirty seconds, profile {profile.name}")
-    force_with_thresholds(middle, trace, Y)
+    force_with_thresholds(middle, trace, Y, profile)
     _name_pushes(middle, trace)
     bottom.plot(trace.time, trace.ee_velocity[:, Y], color="black", lw=1, label="end-effector")
     bottom.set(ylabel=f"velocity along {AXES[Y]} [m/s]", xlabel="time [s]", xlim=(trace.time[0], trace.time[-1]))

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pretouch.experiments.trace import Trace
+from pretouch.params import Profile
 from pretouch.types import BoolArray, FloatArray
 
 BLIND, SENSING, OURS = "tab:blue", "tab:red", "tab:green"
@@ -72,16 +73,20 @@ def distances(axes: Axes, trace: Trace, units: tuple[str, ...]) -> None:
     axes.set_ylabel("distance read [m]")
 
 
-def force_with_thresholds(axes: Axes, trace: Trace, axis: int) -> None:
-    """Draw the force estimate along an axis, the value of eq. 8 and the moving thresholds."""
-    axes.plot(trace.time, trace.upper[:, axis], color="black", lw=1, label="thresholds")
+def force_with_thresholds(axes: Axes, trace: Trace, axis: int, profile: Profile) -> None:
+    """Draw the force estimate along an axis, the value of eq. 8 and the moving thresholds.
+
+    Of a detector without thresholds, the bands in which one sample alone is no contact.
+    """
+    paper = profile.detection.method == "thresholds"
+    bounds = "thresholds" if paper else "bands of one sample"
+    axes.plot(trace.time, trace.upper[:, axis], color="black", lw=1, label=bounds)
     axes.plot(trace.time, trace.lower[:, axis], color="black", lw=1)
     axes.plot(trace.time, trace.force[:, axis], color="0.7", lw=0.8, label="estimate")
-    axes.plot(
-        trace.time, trace.filtered_force[:, axis], color="tab:blue", lw=1.8, ls=(0, (4, 1)), label="value of eq. 8"
-    )
-    found = trace.detected
-    axes.plot(
-        trace.time[found], trace.filtered_force[found, axis], "v", color="tab:red", mec="black", ms=8, label="detected"
-    )
+    if paper:
+        axes.plot(
+            trace.time, trace.filtered_force[:, axis], color="tab:blue", lw=1.8, ls=(0, (4, 1)), label="value of eq. 8"
+        )
+    found, force = trace.detected, trace.filtered_force if paper else trace.force
+    axes.plot(trace.time[found], force[found, axis], "v", color="tab:red", mec="black", ms=8, label="detected")
     axes.set_ylabel(f"force along {AXES[axis]} [N]")

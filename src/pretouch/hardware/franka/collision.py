@@ -1,7 +1,8 @@
 """Where the arm's own collision reflex lies: above our thresholds, or it would stop the arm before we react.
 
-The vendor holds the *whole* estimate against fixed thresholds, ours are about the mean of a window (eq. 9). So the
-largest reading at which we react, on one axis, is `f_base + f_std` (13 N in the paper) above the largest mean:
+The vendor holds the *whole* estimate against fixed thresholds. With the paper's detection ours are about the mean of a
+window (eq. 9), so the largest reading at which we react, on one axis, is `f_base + f_std` (13 N in the paper) above the
+largest mean:
 
 - the mean in free motion is at most `bias_n`: real Pandas show 0.4 to 1.7 N per axis with nothing attached
   (franka_ros issue 404), and a slow drift with the posture of 2 to 5 N when they move;
@@ -10,20 +11,27 @@ largest reading at which we react, on one axis, is `f_base + f_std` (13 N in the
   filtered comparison, in which the force of a push still grows. For the paper's parameters that is 48 N, between the
   40 N below which a reaction comes too late and the 60 N that a hand meets at 0.3 m/s.
 
+The sequential detector has no threshold: it feels least while it has learnt nothing. The largest force on one axis that
+it may then miss at the arm's ready posture is `felt_from_n`, 38 N with the profile `pretouch`; once it has learnt, 4 to
+9 N on a simulated Panda. The arm stops by itself `upper_above_n` above that, but from `most_n` on at the latest: with
+an error of `bias_n` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm
+that is pushed yields at 0.27 m/s at least, whatever the direction, of the 0.3 m/s it may.
+
 Joint torques are those of such a force at the end-effector with the longest lever its joint ever has, but at least the
 figures of the vendor's examples, which are above the noise of the estimate (20 20 18 18 16 14 12 Nm; libfranka,
 `examples_common.cpp`). Moments are to forces as in the same examples, 25 Nm to 20 N.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pretouch.checks import Checked, Positive
+from pretouch.contact.felt import sequential_init, take_sample
 from pretouch.errors import ParameterError
 from pretouch.params import Profile
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray
+from pretouch.types import FloatArray, Obstacles, RobotState
 
 _VENDOR_NM = np.array([20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0])
 """Joint torques of the vendor's examples [Nm]."""
@@ -32,6 +40,8 @@ _MOMENT_M = 1.25
 _UPPER_SHARE = 1.5
 """Least ratio of an upper joint threshold to the vendor's figure."""
 _POSTURES = 1000
+_LARGEST_N, _TO_N = 1000.0, 0.1
+"""Up to which force the sequential detector is asked, and how exactly [N]."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,8 @@ class CollisionParams(Checked):
     """From our largest threshold to the arm's lower one [N]."""
     upper_above_n: Positive = 30.0
     """From our largest threshold to the arm's upper one, at which it stops by itself [N]."""
+    most_n: Positive = 60.0
+    """Most that upper one may be with the sequential detector [N]."""
 
 
 @dataclass(frozen=True)
@@ -67,18 +79,29 @@ class CollisionBehavior:
         )  # fmt: skip
 
 
-def largest_threshold(profile: Profile, params: CollisionParams) -> float:
+def largest_threshold(profile: Profile, model: RobotModel, params: CollisionParams) -> float:
     """Largest force on one axis at which our detection may still be silent [N]."""
     if profile.detection.method == "fixed":
         return profile.detection.force_n
+    if profile.detection.method == "sequential":
+        return felt_from_n(profile, model)
     return profile.threshold.f_base_n + profile.threshold.f_std_n + params.bias_n
 
 
 def collision_behavior(profile: Profile, model: RobotModel, params: CollisionParams | None = None) -> CollisionBehavior:
     """Return thresholds for the arm that leave room for our reaction; see the top of this file."""
     given = params or CollisionParams()
-    ours = largest_threshold(profile, given)
+    ours = largest_threshold(profile, model, given)
     lower, upper = ours + given.lower_above_n, ours + given.upper_above_n
+    if profile.detection.method == "sequential":
+        upper = min(upper, given.most_n)
+        lower = min(lower, 0.5 * (ours + upper))
+        if not ours < upper:
+            raise ParameterError(
+                f"The profile {profile.name} may miss {ours:.0f} N before it has learnt anything, and the arm must stop"
+                f" by itself from {given.most_n:g} N on: make its detection feel less, by smaller priors of free motion"
+                " or more detection.false_alarms_per_hour."
+            )
     levers, shape = longest_levers(model), np.array([1.0, 1.0, 1.0, _MOMENT_M, _MOMENT_M, _MOMENT_M])
     behavior = CollisionBehavior(
         lower_torque=np.maximum(lower * levers, _VENDOR_NM),
@@ -86,13 +109,15 @@ def collision_behavior(profile: Profile, model: RobotModel, params: CollisionPar
         lower_force=lower * shape,
         upper_force=upper * shape,
     )
-    check(behavior, profile, given)
+    check(behavior, profile, model, given)
     return behavior
 
 
-def check(behavior: CollisionBehavior, profile: Profile, params: CollisionParams | None = None) -> None:
+def check(
+    behavior: CollisionBehavior, profile: Profile, model: RobotModel, params: CollisionParams | None = None
+) -> None:
     """Raise a ParameterError unless ours < lower < upper on each axis, and lower < upper for all else."""
-    ours = largest_threshold(profile, params or CollisionParams())
+    ours = largest_threshold(profile, model, params or CollisionParams())
     lowest = float(behavior.lower_force[:3].min())
     if not lowest > ours:
         raise ParameterError(
@@ -109,6 +134,34 @@ def check(behavior: CollisionBehavior, profile: Profile, params: CollisionParams
             raise ParameterError(
                 f"CollisionBehavior.upper_{what}[{i}] is {upper[i]:g}: it must be greater than the lower, {lower[i]:g}."
             )
+
+
+def felt_from_n(profile: Profile, model: RobotModel) -> float:
+    """Force on one axis [N] from which one sample is a contact to a moving arm at its ready posture that knows nothing.
+
+    Of the sequential detector itself, by bisection; infinite where it would miss any force up to `_LARGEST_N`.
+    """
+    q, speed = model.description.q_ready, np.full(model.n, profile.task.speed_m_s)
+    kin, rows, none, whole = model.kinematics(q), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64)
+    p, period, J = profile.detection, profile.task.control_period_s, model.ee_jacobian(kin)[:3]
+    fresh = sequential_init(model, p)
+    state = replace(fresh, model=replace(fresh.model, speed=speed))
+    nothing = Obstacles(whole, rows, none, rows, whole, rows, none, none)
+
+    def is_felt(force: FloatArray) -> bool:
+        robot = RobotState(0.0, q, speed, q, speed, J.T @ force, None)
+        return take_sample(state, model, kin, robot, nothing, False, False, period, p)[0].evidence >= 1.0
+
+    latest = 0.0
+    for axis in np.eye(3):
+        if not is_felt(_LARGEST_N * axis):
+            return np.inf
+        low, high = 0.0, _LARGEST_N
+        while high - low > _TO_N:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if is_felt(middle * axis) else (middle, high)
+        latest = max(latest, high)
+    return latest
 
 
 def longest_levers(model: RobotModel) -> FloatArray:

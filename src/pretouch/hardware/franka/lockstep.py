@@ -11,6 +11,7 @@ from types import FrameType
 
 import numpy as np
 
+from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.client import Client
@@ -33,6 +34,7 @@ def run_in_lockstep(
     resume: Callable[[], bool] = lambda: False,
     *,
     params: LimiterParams | None = None,
+    learnt: ResidualModel | None = None,
 ) -> None:
     """Turn the controller once a period of the robot's time, until `done` says so of a step.
 
@@ -49,6 +51,7 @@ def run_in_lockstep(
         done: whether a step was the last.
         resume: whether a person now asks to leave a latched HOLD.
         params: of the way from one set-point to the next.
+        learnt: free motion as an earlier session left it.
     """
     every = round(controller.limits.period / PERIOD_S)
     if every < 1 or abs(every * PERIOD_S - controller.limits.period) > 1e-9:
@@ -58,7 +61,7 @@ def run_in_lockstep(
         )
     warm_up(controller, robot_state(client.read(), 0.0))
     limiter = SetPointLimiter(motion_limits(controller.model, client.kind), params or LimiterParams())
-    turning = _Turning(controller, skin_at, recorder, done, resume, every)
+    turning = _Turning(controller, skin_at, recorder, done, resume, every, learnt)
     with _asked_to_end() as came:
 
         def answer(state: FrankaState, _since: float) -> tuple[FloatArray, bool]:
@@ -76,10 +79,11 @@ class _Turning:
 
     def __init__(
         self, controller: Controller, skin_at: Callable[[float], RangeReadings], recorder: Recorder,
-        done: Callable[[ControlStep], bool], resume: Callable[[], bool], every: int,
+        done: Callable[[ControlStep], bool], resume: Callable[[], bool], every: int, learnt: ResidualModel | None,
     ) -> None:  # fmt: skip
         self._controller, self._skin_at, self._recorder = controller, skin_at, recorder
         self._done, self._resume, self._every = done, resume, every
+        self._learnt = learnt
         self._state: ControllerState | None = None
         self._began, self._turns = 0.0, 0
         self._wanted = _REST
@@ -109,7 +113,7 @@ class _Turning:
     def _turn(self, state: FrankaState, readings: RangeReadings) -> None:
         stamp = state.time
         robot = robot_state(state, stamp)
-        before = self._controller.init(robot) if self._state is None else self._state
+        before = self._controller.init(robot, self._learnt) if self._state is None else self._state
         inputs = Inputs(stamp, robot, readings, self._resume())
         step, self._state = self._controller.step(before, inputs)
         self._recorder.record(Cycle(inputs, before, step, self._state))

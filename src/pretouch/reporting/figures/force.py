@@ -1,4 +1,4 @@
-"""Force estimate with the moving thresholds of each axis."""
+"""Force estimate with the moving thresholds of each axis, and the detector's evidence of a contact."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,11 +14,17 @@ _BEFORE_S, _AFTER_S = 0.3, 0.7
 
 
 def force_figure(course: Course) -> Figure:
-    """One panel an axis: estimate, value of eq. 8, thresholds, true force where it is known, and detections."""
-    figure, made = panels(3, course, (1, 1, 1), 7.6)
-    for k, axes in enumerate(made):
+    """One panel an axis: estimate, value of eq. 8, thresholds, true force where it is known, and detections.
+
+    Below them the evidence. Detectors without thresholds have bands in which one sample alone is no contact.
+    """
+    figure, made = panels(4, course, (1, 1, 1, 0.7), 9.2)
+    for k, axes in enumerate(made[:3]):
         _along(axes, course, k, slice(None), slice(None))
     legend(made[0], 7)
+    draw(made[3], course.time, course.evidence, color=BLUE, lw=1.0)
+    made[3].axhline(1.0, color=INK, lw=1.0)
+    made[3].set_ylabel("evidence")
     return figure
 
 
@@ -42,13 +48,21 @@ def _along(axes: Axes, course: Course, k: int, shown: slice, known: slice) -> No
             label="true force",
         )  # fmt: skip
     draw(axes, time, course.force[shown, k], color=GREY, lw=0.9, label="estimate")
-    draw(axes, time, course.filtered[shown, k], color=BLUE, lw=1.3, label="value of eq. 8")
-    draw(axes, time, course.upper[shown, k], color=INK, lw=1.0, label="thresholds")
+    if course.by_thresholds:
+        draw(axes, time, course.filtered[shown, k], color=BLUE, lw=1.3, label="value of eq. 8")
+    draw(axes, time, course.upper[shown, k], color=INK, lw=1.0, label=bounds(course))
     draw(axes, time, course.lower[shown, k], color=INK, lw=1.0)
     first, past, _ = shown.indices(len(course))
-    at = np.array([i for i, contact, _ in course.contacts if contact.axes[k] and first <= i < past], dtype=np.int64)
-    axes.plot(course.time[at], course.filtered[at, k], "v", color=RED, mec="white", mew=0.6, ms=7, label="detected")
+    felt = [i for i, contact, _ in course.contacts if contact.axes[k] or not course.by_thresholds]
+    at = np.array([i for i in felt if first <= i < past], dtype=np.int64)
+    found = course.filtered if course.by_thresholds else course.force
+    axes.plot(course.time[at], found[at, k], "v", color=RED, mec="white", mew=0.6, ms=7, label="detected")
     axes.set_ylabel(f"force along {AXES[k]} [N]")
+
+
+def bounds(course: Course) -> str:
+    """What the two lines about a force are called."""
+    return "thresholds" if course.by_thresholds else "bands of one sample"
 
 
 def _within(time: FloatArray, span: tuple[float, float]) -> slice:

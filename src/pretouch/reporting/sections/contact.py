@@ -13,6 +13,12 @@ _ROWS = 40
 """Contacts and touches that are listed; touches that were not answered are listed up to `_MOST`."""
 _MOST = 200
 _AXES = "xyz"
+_FORCE = {
+    True: "Force: norm of the estimate above the window's mean",
+    False: "Force: at the end-effector, as the joint torques beyond those of free motion tell it; the contact may be"
+    " elsewhere. Axes: where that passes the band of one sample, or is nearest to it",
+}
+"""What a contact's force is, by whether the paper's thresholds feel it."""
 
 
 def contact_section(m: Measures) -> Html:
@@ -41,7 +47,7 @@ def _felt(m: Measures) -> Html:
         table(head, rows, words=3),
         *_left_out(len(m.detections), len(rows)),
         note(
-            "Force: norm of the estimate above the window's mean; on the arm, base frame. Filtered: value of eq. 8."
+            f"{_FORCE[m.course.by_thresholds]}; on the arm, base frame. Filtered: value of eq. 8."
             " Raw: the estimate. Peak: on each axis the estimate farthest from zero during the contact."
         ),
     ])  # fmt: skip

@@ -35,8 +35,10 @@ _RUNS = 30
 _PROFILE_COLUMNS = 6
 """Profiles that are shown side by side."""
 _UNITS = {
-    "_m_s_n": "(m/s)/N", "_m_s2": "m/s²", "_nm_rad": "Nm/rad", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_s": "s",
-    "_m": "m", "_n": "N", "_cycles": "cycles", "_samples": "samples",
+    "_m_s_n": "(m/s)/N", "_kg_m2": "kg m²", "_rad_s2": "rad/s²", "_nm_s": "Nm s/rad", "_m_s2": "m/s²",
+    "_nm_rad": "Nm/rad", "_rad_s": "rad/s", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_nm": "Nm", "_kg": "kg",
+    "_s": "s", "_m": "m", "_n": "N", "_j": "J", "_per_hour": "1/h", "_nats": "nats", "_cycles": "cycles",
+    "_samples": "samples",
 }  # fmt: skip
 """Units by the end of a parameter's name, longest first."""
 _LOST = 0.05
@@ -177,7 +179,7 @@ def health_section(m: Measures) -> Html:
     rows_of_rest: list[tuple[Text, Text]] = [
         ("robot states", f"{number(r.rate, 1)} Hz; age {_milliseconds(r.age)}"),
         ("force estimate missing", percent(r.force_missing, 1)),
-        ("noise of the force estimate x y z (median of the window's σ)", Html(vector(r.sigma, 2) + " N")),
+        ("noise of the force estimate x y z (median of the detector's σ)", Html(vector(r.sigma, 2) + " N")),
         ("period of the loop", _milliseconds(loop.period)),
         ("late steps (by half a period or more)", str(loop.late)),
         ("steps whose inputs could not be kept", bad(str(loop.without_inputs)) if loop.without_inputs else "0"),

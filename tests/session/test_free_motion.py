@@ -1,0 +1,289 @@
+"""What was learnt of free motion, from one run to the next."""
+
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from pretouch.contact.residual_model import kept
+from pretouch.controller import Controller
+from pretouch.errors import RobotModelError
+from pretouch.loop import Cycle
+from pretouch.params import PROFILES
+from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
+from pretouch.recording.writer import Recording
+from pretouch.robot.description import fr3
+from pretouch.robot.model import RobotModel
+from pretouch.robot.residual_file import Residual, save_residual
+from pretouch.sensing.skin import paper_skin as skin_of_arm
+from pretouch.session.free_motion import FreeMotion, Home, home_of
+from pretouch.types import Inputs
+from tests.following_arm import Arm
+
+PROFILE = PROFILES["pretouch"]
+OFFSET = np.array([0.6, -0.8, 0.5, 0.7, -0.3, 0.2, 0.3])
+DAY_S = 86_400.0
+
+
+@pytest.fixture
+def home(tmp_path):
+    return home_of("panda at 172.16.0.2, hand 0.73 kg", tmp_path / "pretouch")
+
+
+def begun(home, arm, now=1e9, **more):
+    return FreeMotion(home, arm.controller, now=lambda: now, **more)
+
+
+def turned(arm, free, steps, recording=None, drift=0.0):
+    """Let an arm follow its path, whose torques are off by OFFSET and a drift [Nm], from what is known of it."""
+    arm.state = arm.controller.init(arm.robot(), free.begin)
+    residuals = []
+    for _ in range(steps):
+        before, robot = arm.state, arm.robot()
+        inputs = Inputs(arm.time, replace(robot, tau_ext=robot.tau_ext + OFFSET + drift), arm.readings())
+        step, arm.state = arm.controller.step(before, inputs)
+        arm.qd, arm.q, arm.time = step.command, arm.q + step.command * 0.01, arm.time + 0.01
+        for one in (free, recording) if recording else (free,):
+            one.record(Cycle(inputs, before, step, arm.state))
+        residuals.append(np.linalg.norm(step.residual))
+    return np.array(residuals)
+
+
+@pytest.fixture
+def arm(panda_model, paper_skin):
+    return Arm(panda_model, paper_skin, PROFILE)
+
+
+@pytest.fixture
+def another(panda_model, paper_skin):
+    return Arm(panda_model, paper_skin, PROFILE)
+
+
+def test_a_second_run_begins_with_what_the_first_has_learnt(home, arm, another):
+    first = begun(home, arm)
+    assert first.begin is None
+    assert "Nothing is known yet" in first.found[0]
+    residuals = turned(arm, first, 400)
+    (said,) = first.keep()
+    assert str(home.place) in said
+    second = begun(home, another, now=1e9 + DAY_S)
+    assert "this robot is known since 2001-09-09 01:46 UTC, 3 s of it" in second.found[0]
+    assert_array_equal(second.begin.weights, arm.state.feel.sequential[0].model.weights)
+    again = turned(another, second, 100)
+    assert residuals[0] > 1.0
+    assert again[:50].max() < 0.3 * residuals[:50].max()
+
+
+def test_a_recording_of_a_run_that_began_with_something_is_recomputed_bit_for_bit(tmp_path, home, arm, another):
+    first = begun(home, arm)
+    turned(arm, first, 200)
+    first.keep()
+    with Recording(tmp_path / "run.mcap", another.controller) as recording:
+        turned(another, begun(home, another), 50, recording)
+    recorded = open_recording(tmp_path / "run.mcap")
+    verdict = verify(recorded)
+    assert verdict.agrees
+    assert verdict.exact
+    assert verdict.checked == 50
+    assert np.abs(recorded[0].snapshot.feel.sequential[0].model.weights).max() > 0.1
+
+
+def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_does_not(home, arm):
+    free = begun(home, arm)
+    turned(arm, free, 400)
+    free.keep()
+    at_once, later = (begun(home, arm, now=1e9 + pause).begin.covariance for pause in (0.0, DAY_S))
+    learnt, prior = arm.state.feel.sequential[0].model.covariance, PROFILE.detection
+    assert_array_equal(at_once, learnt)
+    grown = (later - learnt)[:, range(12), range(12)]
+    assert np.all(grown[:, 0] > 0.4 * (0.25 * prior.offset_prior_nm) ** 2)
+    assert np.all(grown[:, 4:11] == 0.0)
+    assert np.all(later[:, 0, 0] < prior.offset_prior_nm**2)
+    np.testing.assert_allclose(later[:, 11, 11], prior.payload_prior_kg**2)
+    assert np.linalg.eigvalsh(later).min() > 0.0
+    backwards = begun(home, arm, now=1e9 - DAY_S).begin.covariance  # the machine's time was set back
+    np.testing.assert_allclose(backwards, later)
+
+
+@pytest.mark.parametrize(("pause", "felt"), [(0.0, True), (DAY_S, False)])
+def test_an_arm_that_drifted_in_a_long_pause_feels_no_contact_that_is_none(home, arm, another, pause, felt):
+    free = begun(home, arm)
+    turned(arm, free, 3000)
+    free.keep()
+    turned(another, begun(home, another, now=1e9 + pause), 60, drift=0.2)
+    assert (another.state.feel.sequential[0].calm == 0) is felt
+
+
+def test_a_run_that_learns_nothing_leaves_the_file_as_it_is(home, arm, another):
+    free = begun(home, arm)
+    assert free.keep() == ()
+    turned(arm, free, 5)
+    assert free.keep() == ()
+    assert not home.place.exists()
+    turned(arm, free, 200)
+    free.keep()
+    before = home.place.read_bytes()
+    second = begun(home, another, now=2e9)
+    turned(another, second, 5)
+    assert second.keep() == ()
+    assert home.place.read_bytes() == before
+
+
+def test_it_adds_up_over_runs_and_keeps_since_when(home, arm, another):
+    free = begun(home, arm)
+    turned(arm, free, 200)
+    free.keep()
+    second = begun(home, another, now=1e9 + DAY_S)
+    turned(another, second, 200)
+    second.keep()
+    third = begun(home, another, now=1e9 + 2 * DAY_S)
+    assert third.begin.seen.sum() > 1.5 * arm.state.feel.sequential[0].model.seen.sum()
+    assert "since 2001-09-09 01:46 UTC" in third.found[0]
+    assert "the last 2001-09-10 01:46 UTC" in third.found[0]
+
+
+def test_anew_begins_with_nothing_and_replaces_what_was(home, arm, another):
+    free = begun(home, arm)
+    turned(arm, free, 200)
+    free.keep()
+    second = begun(home, another, now=2e9, anew=True)
+    assert second.begin is None
+    assert home.place.exists()
+    turned(another, second, 200)
+    second.keep()
+    assert "since 2033-05-18 03:33 UTC" in begun(home, arm, now=2e9).found[0]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda text: text[: len(text) // 2], "not valid TOML"),
+        (lambda text: "", "format = None"),
+        (lambda text: text.replace('arm = "panda"', 'arm = "fr3"'), "arm = 'fr3'"),
+        (lambda text: text.replace("format = 1", "format = 2"), "format = 2"),
+        (lambda text: text.replace("172.16.0.2", "172.16.0.3"), "is of panda at 172.16.0.3"),
+        (lambda text: text.replace("saved = 1000000000.0", "saved = nan"), "since when"),
+        (lambda text: text.replace("saved = 1000000000.0", "saved = 1e300"), "since when"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_named_and_put_aside_once_something_is_learnt(home, arm, spoil, said):
+    free = begun(home, arm)
+    turned(arm, free, 200)
+    free.keep()
+    good = home.place.read_text()
+    spoilt = spoil(good)
+    assert spoilt != good
+    home.place.write_text(spoilt)
+    free = begun(home, arm)
+    assert free.begin is None
+    assert said in free.found[0]
+    assert str(home.place) in free.found[0]
+    assert home.place.read_text() == spoilt
+    turned(arm, free, 200)
+    assert "is kept" in free.keep()[0]
+    assert home.place.with_name(home.place.name + ".unusable").read_text() == spoilt
+    assert begun(home, arm).begin is not None
+
+
+@pytest.mark.parametrize("anew", [False, True])
+def test_a_named_file_that_cannot_be_used_is_refused_and_never_written_over(tmp_path, arm, anew):
+    (tmp_path / "skin.toml").write_text("[[unit]]\n")
+    with pytest.raises(RobotModelError, match=r"skin\.toml cannot be used as --learnt"):
+        begun(Home("panda at here", tmp_path / "skin.toml", True), arm, anew=anew)
+
+
+def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kind(home, arm):
+    free = begun(home, arm)
+    turned(arm, free, 200)
+    free.keep()
+    named = Home("panda at 172.16.0.9", home.place, True)
+    found = begun(named, arm)
+    assert found.begin is not None
+    assert "of panda at 172.16.0.2" in found.found[0]
+    model = RobotModel(fr3())
+    other = Arm(model, skin_of_arm(model), PROFILE)
+    with pytest.raises(RobotModelError, match="arm = 'panda'"):
+        begun(named, other)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("covariance", lambda a: -a),
+        ("covariance", lambda a: a + np.triu(np.ones(12), 1)),
+        ("spread", lambda a: -a),
+        ("seen", lambda a: -a - 1.0),
+    ],
+)
+def test_numbers_that_no_arm_can_have_are_not_taken(home, arm, name, change):
+    numbers = kept(arm.state.feel.sequential[0].model)
+    numbers[name] = change(numbers[name])
+    home.place.parent.mkdir(parents=True)
+    save_residual(home.place, arm.model, Residual(numbers, home.robot, 1e9, 1e9))
+    free = begun(home, arm)
+    assert free.begin is None
+    assert "learn it anew" in free.found[0]
+
+
+def test_writing_that_fails_is_a_sentence_and_leaves_the_old_file(home, arm, another, monkeypatch):
+    free = begun(home, arm)
+    turned(arm, free, 200)
+    free.keep()
+    before = home.place.read_bytes()
+    second = begun(home, another, now=2e9)
+    turned(another, second, 200)
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    (said,) = second.keep()
+    assert "No space left on device" in said
+    assert "What was kept before is still there" in said
+    assert home.place.read_bytes() == before
+    assert [file.name for file in home.place.parent.iterdir()] == [home.place.name]
+
+
+def test_a_folder_that_cannot_be_made_is_a_sentence(tmp_path, arm):
+    (tmp_path / "file").write_text("")
+    free = begun(home_of("panda at here", tmp_path / "file"), arm)
+    turned(arm, free, 200)
+    assert "is lost" in free.keep()[0]
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+os.fsync = lambda _: os.kill(os.getpid(), signal.SIGKILL)
+from pretouch.whole_file import write_whole
+write_whole(Path(sys.argv[1]), "half of it")
+"""
+
+
+def test_a_process_that_is_killed_while_it_writes_leaves_the_old_file(tmp_path):
+    place = tmp_path / "kept.toml"
+    place.write_text("precious")
+    done = subprocess.run([sys.executable, "-c", KILLED, str(place)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert place.read_text() == "precious"
+
+
+def test_robots_have_files_of_their_own(tmp_path):
+    names = {home_of(f"{kind} at {where}, hand 0.7 kg", tmp_path).place for kind in "ab" for where in ("x", "y")}
+    assert len(names) == 4
+    strange = home_of("../../etc/passwd: a\0b", tmp_path).place
+    assert strange.parent == tmp_path / "free-motion"
+
+
+def test_the_paper_s_detector_has_nothing_to_keep(home, panda_model, paper_skin):
+    paper = Arm(panda_model, paper_skin)
+    assert isinstance(paper.controller, Controller)
+    free = begun(home, paper)
+    turned(paper, free, 5)
+    assert free.keep() == ()
