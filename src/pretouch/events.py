@@ -29,7 +29,7 @@ def events_of(
     if felt.contact is not None:
         events[Event.CONTACT] = f"{np.linalg.norm(felt.contact.force):.1f} N"
     if p.reaction.method == "admittance":
-        events |= _of_yielding(answer, near, reacting, p)
+        events |= _of_yielding(answer, near, felt.lasting, reacting, p)
     elif reaction.active(answer.decay, p.reaction):
         left = (p.reaction.decay_cycles - answer.decay.cycle) * p.task.control_period_s
         events[Event.REACTING] = f"{left:.2f} s"
@@ -46,13 +46,13 @@ def events_of(
     return events
 
 
-def _of_yielding(answer: ResponseState, near: bool, reacting: bool, p: Profile) -> dict[Event, str]:
+def _of_yielding(answer: ResponseState, near: bool, lasting: bool, reacting: bool, p: Profile) -> dict[Event, str]:
     """Name what the admittance is at, and what it gave up."""
     events: dict[Event, str] = {}
     r, clamp, place = p.reaction, answer.clamp, answer.place
     if clamp.torque:
         events[Event.CLAMPED if clamp.open else Event.OPENING] = f"{clamp.torque:.1f} Nm against its way"
-    elif reacting and waits(answer, near, r):
+    elif reacting and waits(answer, near, lasting, r):
         clear = ", once nothing is seen near it" if near and not given_up(place, r) else ""
         events[Event.YIELDING] = f"{r.quiet_s:g} s after the last push{clear}"
     if given_up(place, r):

@@ -75,3 +75,45 @@ def test_it_is_not_learnt_near_something_unwatched_or_when_told_not_to(how):
 
 def test_a_lasting_push_aside_is_never_learnt():
     assert evidence_after(J[:3].T @ np.array([0.0, 12.0, 0.0])) >= 1.0
+
+
+def alone(joint: int, torque: float) -> np.ndarray:
+    return torque * np.eye(7)[joint]
+
+
+@pytest.mark.parametrize("joint", [0, 3, 5])
+def test_a_small_step_of_one_joint_is_learnt(joint):
+    assert evidence_after(alone(joint, 1.5)) < 0.3
+
+
+def test_a_larger_one_is_not():
+    assert evidence_after(alone(0, 3.0)) >= 1.0
+
+
+def test_what_is_learnt_of_one_joint_does_not_add_up():
+    """Each step would be small enough: a person who pushes back again and again is not learnt step by step."""
+    rng, state = np.random.default_rng(4), feel_init(MODEL, PRETOUCH)
+    for k in range(1200):
+        pushed = 1.5 * max(0, k // 250) * np.eye(7)[0]
+        found, state = feel(state, MODEL, KIN, robot(0.1 * rng.standard_normal(7) + pushed), NOTHING, k > 251, PRETOUCH)
+    assert found.evidence >= 1.0
+
+
+def test_a_push_straight_down_that_varies_is_not_learnt():
+    rng, state = np.random.default_rng(4), feel_init(MODEL, PRETOUCH)
+    for k in range(800):
+        push = 2.5 * KG * (1.0 + 0.3 * np.sin(0.06 * k)) if k >= 250 else np.zeros(7)
+        found, state = feel(state, MODEL, KIN, robot(0.1 * rng.standard_normal(7) + push), NOTHING, k > 251, PRETOUCH)
+        assert k < 300 or found.evidence >= 1.0
+
+
+def test_it_is_said_that_it_is_being_found_out():
+    state = feel_init(MODEL, PRETOUCH)
+    rng, said = np.random.default_rng(4), []
+    for k in range(500):
+        sample = 0.1 * rng.standard_normal(7) + (KG if k >= 250 else 0.0)
+        found, state = feel(state, MODEL, KIN, robot(sample), NOTHING, k > 251, PRETOUCH)
+        said.append(found.lasting)
+    assert not any(said[:250])
+    assert all(said[300:340])
+    assert not any(said[450:])

@@ -25,6 +25,8 @@ class Detection:
     """How far the test is on the way to a contact: one from 1 on, while armed."""
     learning: bool = False
     """Whether the sample is to be learnt as free motion."""
+    lasting: bool = False
+    """Whether it is being found out if what is felt is a load or an error of the estimate: the arm waits for that."""
 
 
 def detect(

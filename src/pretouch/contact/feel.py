@@ -76,7 +76,7 @@ def feel(
     )  # fmt: skip
     bands = Thresholds(felt.bands)
     contact = _contact(felt.force, bands) if felt.sure and found.armed else None
-    made = Detection(bands, contact, found.armed, felt.residual, felt.evidence, felt.learning)
+    made = Detection(bands, contact, found.armed, felt.residual, felt.evidence, felt.learning, felt.lasting)
     return made, FeelState(window, (after,))
 
 

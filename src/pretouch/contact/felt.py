@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.contact.fixed import force_map_into
 from pretouch.contact.hypotheses import write_hypotheses
-from pretouch.contact.lasting_load import MOST_KG, is_load, still_constant
+from pretouch.contact.lasting_load import find_lasting, learn_lasting, still_explains, weight_part
 from pretouch.contact.proximity_prior import MOST
 from pretouch.contact.residual_model import (
     BLOCK,
@@ -16,13 +16,13 @@ from pretouch.contact.residual_model import (
     add_sample,
     features_into,
     learn_block,
-    least_squares_step,
     mean_and_doubt,
     prior_of,
     residual_init,
     spread_of_sample,
 )
 from pretouch.contact.sequential import LENGTHS, LONGEST, alarm_level, judge, window_means
+from pretouch.contact.turning import learn_turning, turning_doubt, turning_init
 from pretouch.params import DetectionParams
 from pretouch.robot.mass_matrix import mass_matrix_into
 from pretouch.robot.model import Kinematics, RobotModel, jacobian_into
@@ -52,10 +52,12 @@ class SequentialState:
     """Samples since a contact was suspected, something was near, or the arm reacted."""
     confirmed: int
     """Samples in a row with the evidence of a contact."""
-    held: FloatArray
-    """(n,) mean residual that has lasted [Nm]."""
+    lasting: FloatArray
+    """(3 + n,) load or step of a joint's torque that explains a residual that stays, see `find_lasting`."""
     steady: int
-    """Samples for which it has, while the arm stood with nothing near."""
+    """Samples that it has explained with nothing near, the arm reacting or a contact suspected."""
+    turning: FloatArray
+    """(3, n) how much worse free motion is known where the arm accelerates hard, see `turning_init`."""
 
 
 @value
@@ -75,12 +77,16 @@ class Felt:
     """Whether it is a contact."""
     learning: bool
     """Whether the sample is to be learnt as free motion."""
+    lasting: bool
+    """Whether it is being found out if what is felt is a load or a step of an estimate."""
 
 
 def sequential_init(model: RobotModel, p: DetectionParams, learnt: ResidualModel | None = None) -> SequentialState:
     """Return the state before the first sample; `learnt` is what an earlier session knew of the arm."""
     known = residual_init(model.n, p) if learnt is None else learnt
-    return SequentialState(known, np.zeros((LONGEST, model.n)), 0, 0, 0, 0, np.zeros(model.n), 0)
+    return SequentialState(
+        known, np.zeros((LONGEST, model.n)), 0, 0, 0, 0, np.zeros(3 + model.n), 0, turning_init(model.n)
+    )
 
 
 def take_sample(
@@ -110,7 +116,7 @@ def take_sample(
         if m.waiting == QUEUE or 0 < settle <= state.steady:
             prior = prior_of(n, p)
             weights, covariance, spread, seen = weights.copy(), covariance.copy(), spread.copy(), seen.copy()
-    held, late = state.held.copy(), math.exp(-p.observer_gain_1_s * period)
+    lasting, turning = state.lasting.copy(), state.turning.copy()
     may = p.learn and (watched or p.learn_unseen)
     evidence, calm, filled, waiting, steady = _take(
         kin.anchor, kin.axis, kin.position, kin.rotation,
@@ -118,22 +124,22 @@ def take_sample(
         robot.qd, robot.qd_commanded, robot.tau_ext, m.speed,
         o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
         ring, state.at, min(state.count + 1, LONGEST), state.calm, block, m.filled, queue, m.waiting,
-        weights, covariance, spread, seen, prior,
-        late, may, p.inertia, reacting, held, state.steady, settle, p.offset_prior_nm**2,
+        weights, covariance, spread, seen, prior, lasting, state.steady, settle, turning,
+        math.exp(-p.observer_gain_1_s * period), may, p.inertia, p.widen_at_turns, reacting, p.offset_prior_nm,
         alarm_level(p, period), period, p.use_proximity, p.contact_gain, p.tails,
         p.near_gain, p.near_m, p.near_horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm, p.still_rad_s,
         p.memory_s, p.spread_memory_s, (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2,
         residual, speed, force, bands,
     )  # fmt: skip
-    if steady < 0:  # learnt: what was felt before is no contact
-        felt = Felt(residual, 0.0, np.zeros(3), bands, False, True)
-        after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, 0, 0)
-        return felt, SequentialState(after, ring, state.at, 0, 0, 0, held, 0)
-    confirmed = state.confirmed + 1 if evidence >= 1.0 else 0
-    felt = Felt(residual, evidence, force, bands, confirmed >= p.confirm_samples, calm == _CALM)
-    after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, filled, waiting)
     at, count = (state.at + 1) % LONGEST, min(state.count + 1, LONGEST)
-    return felt, SequentialState(after, ring, at, count, calm, confirmed, held, steady)
+    if steady < 0:  # learnt: what was felt before is no contact
+        felt = Felt(residual, 0.0, np.zeros(3), bands, False, True, False)
+        after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, 0, 0)
+        return felt, SequentialState(after, ring, at, 0, 0, 0, lasting, 0, turning)
+    confirmed = state.confirmed + 1 if evidence >= 1.0 else 0
+    felt = Felt(residual, evidence, force, bands, confirmed >= p.confirm_samples, calm == _CALM, steady > 0)
+    after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, filled, waiting)
+    return felt, SequentialState(after, ring, at, count, calm, confirmed, lasting, steady, turning)
 
 
 _NONE = np.zeros(0)
@@ -147,7 +153,8 @@ def _take(
     link: IntArray, body_point: FloatArray, direction: FloatArray, distance: FloatArray, closing: FloatArray,
     ring: FloatArray, at: int, count: int, calm: int, block: FloatArray, filled: int, queue: FloatArray, waiting: int,
     weights: FloatArray, covariance: FloatArray, spread: FloatArray, seen: FloatArray, prior: FloatArray,
-    late: float, may: bool, inertial: bool, reacting: bool, held: FloatArray, steady: int, settle: int, widen: float,
+    lasting: FloatArray, steady: int, settle: int, turning: FloatArray,
+    late: float, may: bool, inertial: bool, widened: bool, reacting: bool, offset_prior: float,
     level: float, period: float, use_proximity: bool, gain: float, tails: float,
     near_gain: float, near: float, horizon: float, clear: float, suspect: float, floor: float, bias_floor: float,
     still: float, memory: float, spread_memory: float, most_velocity: float, most_torque: float,
@@ -155,27 +162,25 @@ def _take(
 ) -> tuple[float, int, int, int, int]:  # fmt: skip
     """Write the last line of arguments and what is learnt; return evidence, calm samples, and what waits for that."""
     n, growth = len(qd), np.empty(len(qd))
-    for j in range(n):
-        speed[j] = late * speed_before[j] + (1.0 - late) * qd_commanded[j]
-        growth[j] = (speed[j] - speed_before[j]) / period if inertial else 0.0
+    moving = _velocities(qd_commanded, speed_before, late, period, still, speed, growth)
     x, mean, doubt = np.empty((n, weights.shape[1])), np.empty(n), np.empty(n)
-    M, S = np.empty((n, n)), np.empty((n, n))
-    features_into(anchor, axis, position, rotation, moved_by, mass, com, ee, speed, growth, x)
+    M, S, J_ee = np.empty((n, n)), np.empty((n, n)), np.empty((6, n))
+    features_into(
+        anchor, axis, position, rotation, moved_by, mass, com, ee, speed, growth if inertial else np.zeros(n), x
+    )
     mean_and_doubt(weights, covariance, x, mean, doubt)
-    moving = 0
+    mass_matrix_into(anchor, axis, position, rotation, moved_by, mass, com, inertia, M)
+    spread_of_sample(M, spread[moving], floor, S)
     for j in range(n):
         doubt[j] += bias_floor**2
         residual[j] = torque[j] - mean[j]
         ring[at, j] = residual[j]
-        if abs(speed[j]) > still:
-            moving = 1
-    mass_matrix_into(anchor, axis, position, rotation, moved_by, mass, com, inertia, M)
-    spread_of_sample(M, spread[moving], floor, S)
+    if widened:
+        turning_doubt(M, growth, turning, doubt)
 
     means = np.zeros((len(LENGTHS), n))
     whole = window_means(ring, (at + 1) % LONGEST, count, means)
-    objects = min(MOST, len(distance)) if use_proximity else 0
-    most = len(parts) + objects
+    most = len(parts) + (min(MOST, len(distance)) if use_proximity else 0)
     J, joints, weight = np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most)
     away = np.zeros((most, 3))
     write_hypotheses(
@@ -185,78 +190,117 @@ def _take(
     log_r, window, which = judge(means, whole, S, doubt, J, joints, weight, away, gain, tails)
     evidence = max(0.0, log_r / level)
 
-    is_near = False
-    for d in distance:
-        is_near = is_near or d < clear
-    calm = 0 if evidence >= suspect or is_near or reacting or not may else min(calm + 1, _CALM)
+    alone = may and distance.min() >= clear if len(distance) else may
+    jacobian_into(anchor, axis, moved_by[ee], position[ee], J_ee)
+    calm = 0 if evidence >= suspect or reacting or not alone else min(calm + 1, _CALM)
+    if widened and alone and not reacting and whole == len(LENGTHS):
+        learn_turning(at, means, S, doubt, period / memory, turning)
     if calm < _CALM:
         filled, waiting = 0, 0
     else:
-        if filled == 0:
-            block[:] = 0.0
-        add_sample(block, torque, x, residual, M, spread[moving], doubt, moving, tails, floor)
-        filled += 1
-        if filled == BLOCK:
-            filled = 0
-            if waiting < QUEUE:
-                queue[waiting] = block
-                waiting += 1
-            else:
-                learn_block(
-                    queue[0], weights, covariance, spread, seen, prior, BLOCK * period / memory,
-                    BLOCK * period / spread_memory, _FIRST_S / period, most_velocity, most_torque,
-                )  # fmt: skip
-                queue[:-1] = queue[1:].copy()
-                queue[-1] = block
-    steady = steady + 1 if settle and may and not is_near and not moving and whole == len(LENGTHS) else 0
-    if steady and (steady == 1 or not still_constant(means[-1], held, S, LONGEST)):
-        held[:], steady = means[-1], 1
-    if steady > settle and evidence >= suspect:
+        add_sample(block, filled == 0, torque, x, residual, M, spread[moving], doubt, moving, tails, floor)
+        filled, waiting = _learn_calm(
+            block, filled + 1, queue, waiting, weights, covariance, spread, seen, prior, period, memory, spread_memory,
+            most_velocity, most_torque,
+        )  # fmt: skip
+    suspected = evidence >= suspect
+    if settle and alone and whole == len(LENGTHS) and calm < _CALM and (steady or suspected):
+        steady = _still_there(
+            lasting,
+            steady,
+            settle,
+            suspected or reacting,
+            means[-1],
+            x,
+            J_ee,
+            S,
+            weights,
+            covariance,
+            prior,
+            offset_prior,
+            moving,
+        )
+    else:
         steady = 0
-        if _learn_load(anchor, axis, moved_by[ee], position[ee], means[-1], x, S, weights, covariance, prior, widen):
-            steady = -1
     for j in range(n):
         S[j, j] += doubt[j]
     _write_force(
-        anchor, axis, moved_by[ee], position[ee], means[window], mean, S, away[max(which - n, 0)] if which >= n else
-        np.zeros(3), math.sqrt(2.0 * level), force, bands,
+        J_ee, means[window], mean, S, away[max(which - n, 0)] if which >= n else np.zeros(3), math.sqrt(2.0 * level),
+        force, bands,
     )  # fmt: skip
     return evidence, calm, filled, waiting, steady
 
 
 @compiled
-def _learn_load(
-    anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, residual: FloatArray, x: FloatArray,
-    S: FloatArray, weights: FloatArray, covariance: FloatArray, prior: FloatArray, widen: float,
-) -> bool:  # fmt: skip
-    """Learn a lasting residual (n,) at once if it can be a load, and return whether it can."""
-    n, load = x.shape[0], x.shape[1] - 1
-    J, known, unit = np.empty((6, n)), np.empty(n), np.empty(n)
-    jacobian_into(anchor, axis, moved, point, J)
-    for j in range(n):
-        unit[j] = x[j, load]
-        known[j] = weights[j, load] * unit[j]
-    if not is_load(residual, known, unit, J, S, LONGEST):
-        return False
-    for j in range(n):
-        torque = residual[j]
-        for a in range(load + 1):
-            torque += weights[j, a] * x[j, a]
-        covariance[j, 0, 0] += widen
-        covariance[j, load, load] += MOST_KG**2
-        least_squares_step(weights[j], covariance[j], x[j], torque, S[j, j] / LONGEST, prior, 0.0)
-    return True
+def _velocities(
+    commanded: FloatArray, before: FloatArray, late: float, period: float, still: float, speed: FloatArray,
+    growth: FloatArray,
+) -> int:  # fmt: skip
+    """Write the commanded velocities as late as the torques are, and their growth; return 1 if the arm moves, or 0."""
+    moving = 0
+    for j in range(len(commanded)):
+        speed[j] = late * before[j] + (1.0 - late) * commanded[j]
+        growth[j] = (speed[j] - before[j]) / period
+        if abs(speed[j]) > still:
+            moving = 1
+    return moving
+
+
+@compiled
+def _learn_calm(
+    block: FloatArray, filled: int, queue: FloatArray, waiting: int, weights: FloatArray, covariance: FloatArray,
+    spread: FloatArray, seen: FloatArray, prior: FloatArray, period: float, memory: float, spread_memory: float,
+    most_velocity: float, most_torque: float,
+) -> tuple[int, int]:  # fmt: skip
+    """Let a block that is full wait, and learn the one that has waited longest; return what waits now."""
+    if filled < BLOCK:
+        return filled, waiting
+    if waiting < QUEUE:
+        queue[waiting] = block
+        return 0, waiting + 1
+    learn_block(
+        queue[0], weights, covariance, spread, seen, prior, BLOCK * period / memory, BLOCK * period / spread_memory,
+        _FIRST_S / period, most_velocity, most_torque,
+    )  # fmt: skip
+    queue[:-1] = queue[1:].copy()
+    queue[-1] = block
+    return 0, waiting
+
+
+@compiled
+def _still_there(
+    lasting: FloatArray, steady: int, settle: int, counts: bool, residual: FloatArray, x: FloatArray, J: FloatArray,
+    S: FloatArray, weights: FloatArray, covariance: FloatArray, prior: FloatArray, offset_prior: float,
+    moving: int,
+) -> int:  # fmt: skip
+    """Return for how many samples that count the same load or step has explained the residual; -1: it was learnt."""
+    n = len(residual)
+    learnt, offset, unit = np.empty(n), np.empty(n), np.empty(n)
+    weight_part(weights, x, learnt, offset, unit)
+    if steady and still_explains(lasting, residual, unit, J, S, LONGEST, moving):
+        steady += int(counts)
+    else:
+        steady = 0
+    if counts and (steady == 0 or steady > settle):
+        now = np.empty(3 + n)
+        if not find_lasting(residual, learnt, offset, unit, J, S, LONGEST, offset_prior, now):
+            return steady if steady <= 2 * settle else 0
+        if steady > settle:
+            learn_lasting(now, residual, x, S, LONGEST, offset_prior**2, weights, covariance, prior)
+            return -1
+        lasting[:] = now
+        steady = 1
+    return steady
 
 
 @compiled
 def _write_force(
-    anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, torque: FloatArray, mean: FloatArray,
-    S: FloatArray, away: FloatArray, wide: float, force: FloatArray, bands: FloatArray,
+    J: FloatArray, torque: FloatArray, mean: FloatArray, S: FloatArray, away: FloatArray, wide: float,
+    force: FloatArray, bands: FloatArray,
 ) -> None:  # fmt: skip
     """Write force and bands of `Felt`, of torques (n,) and of the mean and spread in free motion."""
     n = len(torque)
-    J, W = np.empty((6, n)), np.empty((3, n))
-    jacobian_into(anchor, axis, moved, point, J)
+    W = np.empty((3, n))
     force_map_into(J, W)
     against = 0.0
     for i in range(3):

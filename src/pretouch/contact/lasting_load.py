@@ -1,85 +1,210 @@
-"""A load that stays: something gripped or put down, told from a contact by what it can and cannot be.
+"""A residual that stays: a load gripped or put down, or a step of an estimate, told from a contact by what it can be.
 
-While the arm stands and nothing is near, a torque that does not change and that a weight at the end-effector explains
-is learnt as free motion. A person who is caught is none of that: near, or not constant, or not straight down.
+While nothing is near, a torque that goes on being explained by the same weight at the end-effector, or by the same
+small torque on one joint alone, is learnt as free motion, whether the arm stands or yields. A person who is caught is
+neither: near, or not constant, or not straight down, or felt by more than one joint.
 """
 
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
+from pretouch.contact.residual_model import PLAIN, least_squares_step
 from pretouch.types import FloatArray
 
 MOST_KG = 3.0
 """Largest load: a Panda's payload [kg]."""
-_LEAST_KG = -0.2
-"""A load that seems to be less than nothing by more than this is a force from below [kg]."""
+_LEAST_KG = -0.3
+"""A load that seems to be less than nothing by more than this is a force from below [kg]: what is wrong with the links'
+masses may look like so much."""
 _FAR_M = 0.15
 """How far its centre may be from the end-effector's axis [m]."""
+_OFFSETS = 3.0
+"""Deviations of a joint's offset before anything is learnt that its whole offset may be, for a step to be learnt."""
 _UNKNOWN_NM = 0.3
-"""What the mean of a joint's torque may be off where the arm came to stand, by friction [Nm]."""
+"""What the mean of a joint's torque may be off, by friction [Nm]."""
+_UNKNOWN_ALONE_NM = 0.15
+"""The same where a step of one joint is told from a contact, which other joints feel too [Nm]."""
 _CHANGE_NM = 0.6
 """How much a constant torque may change while the arm creeps, by friction [Nm]."""
+_CHANGE_PART = 0.1
+"""What part of a load's largest torque is added to that while the arm moves."""
 _DEVIATIONS = 4.0
 """How many deviations a constant torque may seem to change, and what is not a load may be."""
+_ALONE_DEVIATIONS = 2.5
+"""The same for what is not a step of one joint."""
 _GRAVITY = 9.81
 
 
 @compiled
-def still_constant(mean: FloatArray, held: FloatArray, S: FloatArray, samples: int) -> bool:
-    """Whether the mean torque (n,) of so many samples, of spread S (n, n) each, is what it was."""
-    for j in range(len(mean)):
-        allowed = _DEVIATIONS**2 * (2.0 * S[j, j] / samples + (_CHANGE_NM / _DEVIATIONS) ** 2)
-        if (mean[j] - held[j]) ** 2 > allowed:
+def still_explains(
+    lasting: FloatArray, residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int,
+    moving: int,
+) -> bool:  # fmt: skip
+    """Whether what has lasted (3 + n,), see `find_lasting`, still explains the mean (n,) of so many samples [Nm].
+
+    It does if no joint's torque has changed, and most of what is felt is not felt without it.
+    """
+    whole = left = largest = 0.0
+    for j in range(len(residual)):
+        largest = max(largest, abs(unit[j] * lasting[0]))
+    for j in range(len(residual)):
+        rest = residual[j] - _torque_of(lasting, unit, J, j)
+        allowed = _DEVIATIONS**2 * 2.0 * S[j, j] / samples + _CHANGE_NM**2
+        if moving:  # the mean is of another posture than this one
+            allowed += (_CHANGE_PART * largest) ** 2
+        if rest**2 > allowed:
             return False
-    return True
+        whole, left = whole + residual[j] ** 2 / allowed, left + rest**2 / allowed
+    return left < 0.5 * whole
+
+
+@compiled
+def _torque_of(lasting: FloatArray, unit: FloatArray, J: FloatArray, j: int) -> float:
+    """Torque on a joint of what has lasted, in this posture [Nm]."""
+    moments = _GRAVITY * (J[3, j] * lasting[1] + J[4, j] * lasting[2])
+    return float(lasting[0] * unit[j] + moments + lasting[3 + j])
+
+
+@compiled
+def find_lasting(
+    residual: FloatArray, learnt: FloatArray, offset: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray,
+    samples: int, offset_prior: float, lasting: FloatArray,
+) -> bool:  # fmt: skip
+    """Write a load or a step of one joint that a residual can be, and return whether there is one.
+
+    Args:
+        residual: (n,) mean of the torques that free motion does not explain [Nm].
+        learnt: (n,) what of the mean learnt so far may be weight [Nm].
+        offset: (n,) constant part of that mean [Nm].
+        unit: (n,) torques of 1 kg at the end-effector [Nm].
+        J: (6, n) Jacobian there.
+        S: (n, n) spread of a sample [Nm^2].
+        samples: how many the mean is of.
+        offset_prior: deviation of a joint's offset [Nm].
+        lasting: (3 + n,) written: load [kg], its moments about both horizontal axes [kg m], each joint's torque [Nm].
+    """
+    lasting[:] = 0.0
+    load, misfit = np.zeros(3), np.inf
+    joint, step, rest = _one_joint(residual, S, samples)
+    if is_load(residual, learnt, unit, J, S, samples):
+        misfit = fit_load(residual, unit, J, S, samples, load)
+    if joint >= 0 and abs(offset[joint] + step) <= _OFFSETS * offset_prior and rest < misfit:
+        lasting[3 + joint] = step
+        return True
+    if misfit < np.inf:
+        lasting[:3] = load
+        return True
+    return False
+
+
+@compiled
+def _one_joint(residual: FloatArray, S: FloatArray, samples: int) -> tuple[int, float, float]:
+    """Return the joint whose torque alone explains a residual, that torque and the misfit; joint -1 if none does."""
+    n, joint, step, best = len(residual), -1, 0.0, np.inf
+    C, L, y, a, unit = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n), np.zeros(n)
+    _spread_of_mean(S, samples, _UNKNOWN_ALONE_NM, C)
+    if not factor(C, L):
+        return -1, 0.0, np.inf
+    square = forward(L, residual, y)
+    for j in range(n):
+        unit[j] = 1.0
+        size, along = forward(L, unit, a), 0.0
+        unit[j] = 0.0
+        for i in range(n):
+            along += a[i] * y[i]
+        if square - along**2 / size < best:
+            joint, step, best = j, along / size, square - along**2 / size
+    return (joint, step, best) if best < n + _ALONE_DEVIATIONS * np.sqrt(2.0 * n) else (-1, 0.0, np.inf)
 
 
 @compiled
 def is_load(
     residual: FloatArray, learnt: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int
 ) -> bool:
-    """Whether a weight at the end-effector, or one less, explains a lasting residual.
+    """Whether a weight at the end-effector, or one less, explains a lasting residual; arguments as `find_lasting`."""
+    n, change, whole = len(residual), np.empty(3), np.empty(3)
+    misfit = fit_load(residual, unit, J, S, samples, change)
+    fit_load(residual + learnt, unit, J, S, samples, whole)
+    if abs(change[1]) + abs(change[2]) > 2.0 * _FAR_M * max(abs(change[0]), 0.1):
+        return False
+    few = misfit < n + _DEVIATIONS * np.sqrt(2.0 * n)
+    return bool(few and abs(change[0]) < MOST_KG - _LEAST_KG and _LEAST_KG < whole[0] < MOST_KG - _LEAST_KG)
 
-    Args:
-        residual: (n,) mean of the torques that free motion does not explain [Nm].
-        learnt: (n,) what the load known so far makes [Nm].
-        unit: (n,) torques of 1 kg at the end-effector [Nm].
-        J: (6, n) Jacobian there.
-        S: (n, n) spread of a sample [Nm^2].
-        samples: how many the mean is of.
-    """
+
+@compiled
+def fit_load(
+    residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int, load: FloatArray
+) -> float:
+    """Write the load (3,) that explains a residual best, see `find_lasting`, and return what is left of its square."""
     n = len(residual)
     C, L, y, a = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty((3, n))
-    G, K, b, u, f = np.zeros((3, 3)), np.zeros((3, 3)), np.empty(3), np.empty(3), np.empty(3)
-    for i in range(n):
-        for j in range(n):
-            C[i, j] = S[i, j] / samples
-        C[i, i] += _UNKNOWN_NM**2
+    G, K, b, u = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.empty(3)
+    load[:] = 0.0
+    _spread_of_mean(S, samples, _UNKNOWN_NM, C)
     if not factor(C, L):
-        return False
+        return np.inf
     forward(L, unit, a[0])
     for k in range(2):  # what its centre off the axis adds: moments about the horizontal axes
         forward(L, J[3 + k] * _GRAVITY, a[1 + k])
+    square = forward(L, residual, y)
     for i in range(3):
-        for k in range(3):
-            for j in range(n):
+        for j in range(n):
+            b[i] += a[i, j] * y[j]
+            for k in range(3):
                 G[i, k] += a[i, j] * a[k, j]
         G[i, i] += 1.0 / (MOST_KG if i == 0 else MOST_KG * _FAR_M) ** 2
     if not factor(G, K):
-        return False
-    total, kg = 0.0, np.empty(2)
-    for k in range(2):  # the change, then all of the load
-        square = forward(L, residual if k == 0 else residual + learnt, y)
-        for i in range(3):
-            b[i] = 0.0
-            for j in range(n):
-                b[i] += a[i, j] * y[j]
-        explained = forward(K, b, u)
-        backward(K, u, f)
-        kg[k] = f[0]
-        if k == 0:
-            total = square - explained
-            if abs(f[1]) + abs(f[2]) > 2.0 * _FAR_M * max(abs(f[0]), 0.1):
-                return False
-    return bool(total < n + _DEVIATIONS * np.sqrt(2.0 * n) and abs(kg[0]) < MOST_KG and _LEAST_KG < kg[1] < MOST_KG)
+        return np.inf
+    explained = forward(K, b, u)
+    backward(K, u, load)
+    return float(square - explained)
+
+
+@compiled
+def _spread_of_mean(S: FloatArray, samples: int, unknown: float, C: FloatArray) -> None:
+    """Write the spread C (n, n) of a mean of so many samples, each joint's `unknown` [Nm] with it."""
+    for i in range(len(S)):
+        for j in range(len(S)):
+            C[i, j] = S[i, j] / samples
+        C[i, i] += unknown**2
+
+
+@compiled
+def learn_lasting(
+    lasting: FloatArray, residual: FloatArray, x: FloatArray, S: FloatArray, samples: int, widen: float,
+    weights: FloatArray, covariance: FloatArray, prior: FloatArray,
+) -> None:  # fmt: skip
+    """Take what has lasted into the mean at once: all joints carry a load, one joint its step.
+
+    What is left of the residual (n,) goes into the load and the offset of each joint alone, `widen` being the variance
+    that the offset then has more [Nm^2].
+    """
+    n, load = x.shape[0], x.shape[1] - 1
+    kg = lasting[0]
+    for j in range(n):
+        torque = residual[j]
+        for a in range(load + 1):
+            torque += weights[j, a] * x[j, a]
+        weights[j, load] += kg
+        weights[j, 0] += lasting[3 + j]
+        if kg != 0.0:
+            covariance[j, 0, 0] += widen
+            covariance[j, load, load] += (_LOAD_KG + _LOAD_PART * abs(kg)) ** 2
+        elif lasting[3 + j] != 0.0:
+            covariance[j, 0, 0] += _UNKNOWN_NM**2
+        least_squares_step(weights[j], covariance[j], x[j], torque, S[j, j] / samples, prior, 0.0)
+
+
+_LOAD_KG, _LOAD_PART = 0.1, 0.05
+"""Deviation of a load that has just been learnt, and what part of it is added [kg]."""
+
+
+@compiled
+def weight_part(weights: FloatArray, x: FloatArray, learnt: FloatArray, offset: FloatArray, unit: FloatArray) -> None:
+    """Write what of the mean may be weight, its constant part, and the torques of 1 kg (n,) each [Nm]."""
+    n, load = x.shape[0], x.shape[1] - 1
+    for j in range(n):
+        offset[j], unit[j], learnt[j] = weights[j, 0] * x[j, 0], x[j, load], weights[j, 0] * x[j, 0]
+        for a in range(PLAIN, load + 1):
+            learnt[j] += weights[j, a] * x[j, a]

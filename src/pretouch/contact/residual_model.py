@@ -197,10 +197,10 @@ def least_squares_step(
 
 @compiled
 def add_sample(
-    block: FloatArray, torque: FloatArray, x: FloatArray, residual: FloatArray, M: FloatArray, spread: FloatArray,
-    doubt: FloatArray, moving: int, tails: float, floor: float,
+    block: FloatArray, first: bool, torque: FloatArray, x: FloatArray, residual: FloatArray, M: FloatArray,
+    spread: FloatArray, doubt: FloatArray, moving: int, tails: float, floor: float,
 ) -> None:  # fmt: skip
-    """Add a sample to a block: its torques and features, and what it says of both variances of the spread (2, n).
+    """Add a sample to a block, to an empty one if it is the first: torques, features, both variances of the spread.
 
     With e = M v + d, of spread S = M A M^T + D, the sample's expectation of v_i^2 is (A M^T S^-1 e)_i^2 + A_i -
     A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. `doubt` (n,) is the variance of the mean's
@@ -208,6 +208,8 @@ def add_sample(
     """
     n, f = x.shape
     S, L, y, z = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n)
+    if first:
+        block[:] = 0.0
     spread_of_sample(M, spread, floor, S)
     for i in range(n):
         S[i, i] += doubt[i]

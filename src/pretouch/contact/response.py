@@ -182,7 +182,11 @@ def answered(state: ResponseState, doing: Doing, felt: Felt) -> tuple[Answer | N
     return Answer(model.ee_jacobian(kin)[:3] @ qd, qd, p.open_m_s if opens else 0.0), state
 
 
-def waits(state: ResponseState, near: bool, params: ReactionParams) -> bool:
-    """Whether the arm still yields, or waits for more of the push or, where it will go on, for what is near to go."""
+def waits(state: ResponseState, near: bool, lasting: bool, params: ReactionParams) -> bool:
+    """Whether the arm still yields, or waits for more of the push or, where it will go on, for what is near to go.
+
+    It waits too while it is being found out if what is felt is a load (`Detection.lasting`).
+    """
     quiet = state.yielding.quiet
-    return quiet < params.quiet_s or (near and quiet < params.patience_s and not given_up(state.place, params))
+    stays = near and quiet < params.patience_s and not given_up(state.place, params)
+    return lasting or quiet < params.quiet_s or stays

@@ -62,8 +62,12 @@ class DetectionParams(Checked):
     """Whether what accelerates is part of the mean, as what weighs is: an unknown load's inertia where a path turns
     round."""
     relearn_after_s: NonNegative = 5.0
-    """Time after which a residual is learnt that looks like a contact, stays as it is while the arm stands and nothing
-    is near, and that a weight gripped or put down explains [s]; 0: never."""
+    """Time after which a residual is learnt that looks like a contact and that all the while, with nothing near, the
+    same weight gripped or put down explains, or the same small torque on one joint [s]; 0: never. The arm waits so
+    long."""
+    widen_at_turns: bool = True
+    """Whether it is learnt how much less of free motion is known where the arm accelerates hard, as where it turns
+    round."""
     memory_s: Positive = 300.0
     """Time in which what was learnt of the mean fades towards not knowing [s]."""
     spread_memory_s: Positive = 30.0
