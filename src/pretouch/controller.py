@@ -149,7 +149,7 @@ class Controller:
         push = response.Felt(model, kin, robot, felt, close, state.command, p)
         react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
         events |= events_of(
-            unfit, silent, felt, feeling.window.count, react, close, before == "react", state.near.detour.blocked, p
+            unfit, silent, felt, feeling.window.count, react, close, before, state.near.detour.blocked, p
         )  # fmt: skip
         mode = next_mode(state.mode, events, inputs.resume)
         contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None

@@ -80,7 +80,9 @@ PROFILES: dict[str, Profile] = {
         restriction=RestrictionParams(mode="braking"),
         anticipation=AnticipationParams(effective_mass=True, closing_speed=True, tangential=True, null_space=True),
         detection=DetectionParams(method="sequential", freeze_while_reacting=True),
-        reaction=ReactionParams(method="admittance", clamps=True, gives_up=True, soft_hold=True),
+        reaction=ReactionParams(
+            method="admittance", clamps=True, gives_up=True, soft_hold=True, static_friction_nm=3.0
+        ),
     ),
     "flacco": _avoiding("flacco"),
     "ding": _avoiding("ding"),
