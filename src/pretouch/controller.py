@@ -135,7 +135,7 @@ class Controller:
 
         # what is near: eq. 1 and the closest points of the body
         known = track_init(len(self.skin)) if Event.TIME_BACKWARDS in events else state.tracks
-        seen, tracks = perceive(known, model, self.skin, self.fixtures, kin, readings, now, p.perception)
+        seen, tracks = perceive(known, model, self.skin, self.fixtures, kin, readings, now, p.perception, robot)
         heard, silent = silent_units(self.skin, tracks, readings.status, seen.longest_silence, now, p.perception)
         mark("perception")
 

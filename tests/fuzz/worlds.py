@@ -62,7 +62,8 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
 # the same of what the paper has not: all of these are drawn for half of the worlds
 OURS: dict[type, dict[str, tuple[object, ...]]] = {
     PerceptionParams: {
-        "closing_speed": (True, False), "reckon_below_minimum": (True, False), "closing_memory_s": (0.09, 0.01, 1.0),
+        "closing_speed": (True, False), "reckon_below_minimum": (True, False),
+        "place_at_stamp": (True, False), "closing_memory_s": (0.09, 0.01, 1.0),
     },
     TaskParams: {"mid_joint_projected": (True, False)},
     RestrictionParams: {"mode": ("braking", "braking", "slack", "hard", "floor", "off")},

@@ -74,7 +74,9 @@ PROFILES: dict[str, Profile] = {
     ),
     "pretouch": Profile(
         name="pretouch",
-        perception=PerceptionParams(closing_speed=True, reckon_below_minimum=True, keep_while_silent=True),
+        perception=PerceptionParams(
+            closing_speed=True, reckon_below_minimum=True, place_at_stamp=True, keep_while_silent=True
+        ),
         task=TaskParams(mid_joint_projected=True),
         reduction=ReductionParams(enabled=False),
         restriction=RestrictionParams(mode="braking"),
