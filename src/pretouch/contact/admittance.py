@@ -40,12 +40,14 @@ class AdmittanceState:
     """Time since a torque moved a joint or kept it moving [s]."""
     unfelt: float
     """Time since the detector felt a contact [s]."""
+    since: float
+    """Time since the contact that began a reaction [s], infinite without one."""
 
 
 def admittance_init(n: int, params: ReactionParams) -> AdmittanceState:
     """Return the state of n joints at rest, before the first sample."""
     none, twice = np.zeros(n), np.zeros((2, n))
-    return AdmittanceState(twice, 0, none, none, none, params.start_energy_j, twice, none, 0.0, 0.0)
+    return AdmittanceState(twice, 0, none, none, none, params.start_energy_j, twice, none, 0.0, 0.0, math.inf)
 
 
 def dead_band(torque_limit: FloatArray, params: ReactionParams) -> FloatArray:
@@ -64,7 +66,7 @@ def learnt(state: AdmittanceState, residual: FloatArray, dt: float, params: Reac
     _learn(state.mean, residual, weight, mean, torque)
     return AdmittanceState(
         mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros_like(mean), none,
-        0.0, 0.0,
+        0.0, 0.0, math.inf,
     )  # fmt: skip
 
 
@@ -98,7 +100,7 @@ def begun(
     velocity = _no_faster(velocity, model, kin, params.speed_max_m_s)
     return AdmittanceState(
         state.mean, state.samples, torque, velocity, np.sign(drive), params.start_energy_j, np.stack((torque, lesser)),
-        np.abs(np.sign(drive)), 0.0, 0.0,
+        np.abs(np.sign(drive)), 0.0, 0.0, 0.0,
     )  # fmt: skip
 
 
@@ -122,14 +124,18 @@ def yielded(
     p, torque = params, residual - state.mean[1]
     velocity, side, sliding, steady = np.empty_like(band), np.empty_like(band), np.empty_like(band), state.steady.copy()
     keep = math.exp(-dt / p.lag_s) if p.lag_s > 0 else 0.0
+    # just after a contact the filters still lag, and the detector has found a push already
+    at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
     tank, pushed = _yield(
         torque, state.torque, state.velocity, command, state.side, state.sliding, band, keep, p.inertia_kg_m2,
-        p.damping_nm_s, p.reverse_band, p.static_friction_nm, _KEEPS, _AT_ONCE, _REST_RAD_S,
+        p.damping_nm_s, p.reverse_band, p.static_friction_nm, _KEEPS, at_once, _REST_RAD_S,
         1.0 - math.exp(-dt / _STEADY_S), dt, state.tank, p.tank_max_j, velocity, side, sliding, steady,
     )  # fmt: skip
     velocity = _no_faster(velocity, model, kin, p.speed_max_m_s)
     quiet, unfelt = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.unfelt + dt
-    return AdmittanceState(state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, unfelt)
+    return AdmittanceState(
+        state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, unfelt, state.since + dt
+    )
 
 
 def _no_faster(velocity: FloatArray, model: RobotModel, kin: Kinematics, most: float) -> FloatArray:
@@ -148,6 +154,8 @@ _KEEPS = 0.85
 it lets a joint stop, and does not tear it loose again."""
 _AT_ONCE = 2.0
 """Times the static friction from which two samples in a row tear a joint loose, whatever the filters say."""
+_FIRST_S = 0.3
+"""Time after the onset of a contact in which two samples beyond what keeps a joint moving do the same [s]."""
 _REST_RAD_S = 1e-3
 """Speed at which a joint that nothing drives sticks [rad/s]: none that can be seen."""
 
