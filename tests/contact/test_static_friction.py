@@ -63,3 +63,23 @@ def test_noise_of_one_sample_begins_no_motion(arm):
     # the lesser of both beyond the band, where it is more than 0.85 times the friction
     np.testing.assert_array_equal(np.flatnonzero(started.velocity), [0, 5])
     assert started.velocity[0] / started.velocity[5] == pytest.approx((7.0 - 2.24) / (2.9 - 0.74))
+
+
+def test_a_noisy_and_biased_estimate_moves_nobody_who_pushes_back(panda_model):
+    """Over the first 0.1 s, at the point that is pushed, against the true force: without friction 16 of 3000 do."""
+    model, rng, keep = panda_model, np.random.default_rng(1400), np.exp(-DT / P.lag_s)
+    band, links = dead_band(model.description.tau_max, P), ("panda_link4", "panda_link6", "panda_hand")
+    for i in range(300):
+        q = model.description.q_ready + rng.uniform(-0.7, 0.7, N)
+        kin, M, link = model.kinematics(q), model.mass_matrix(q), model.link_index(links[i % 3])
+        force = rng.normal(size=3)
+        force *= (5.0, 10.0, 15.0, 30.0)[i % 4] / np.linalg.norm(force)
+        J = model.jacobian(kin, link, kin.position[link] + rng.uniform(-0.06, 0.06, 3))[:3]
+        bias, torque, samples = rng.uniform(-1, 1, N) * np.array([1, 1, 1, 1, 0.3, 0.3, 0.1]), np.zeros(N), []
+        for _ in range(16):
+            torque = keep * torque + (1 - keep) * (J.T @ force)
+            samples.append(torque + bias + M @ (0.48 * rng.standard_normal(N)))
+        state = begun(admittance_init(N, P), model, kin, samples[4], samples[3], band, P)
+        for sample in samples[5:]:
+            assert force @ J @ state.velocity >= 0.0
+            state = yielded(state, model, kin, sample, state.velocity, band, DT, P)
