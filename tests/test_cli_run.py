@@ -286,7 +286,7 @@ def test_units_that_fall_silent_in_the_middle_are_named_and_the_arm_holds(tmp_pa
             unit.silent = True
 
     at_begin(monkeypatch, 2.5, silence)
-    words = "--yes", "--seconds", "4", "--units-port", "0", "--record", "a.mcap", "--profile", "paper"
+    words = "--yes", "--seconds", "4", "--units-port", "0", "--record", "a.mcap"
     assert cli.main(["run", *words]) == 0
     assert "No usable reading from hand_left" in capsys.readouterr().out
     steps = [kept.step for kept in open_recording(tmp_path / "a.mcap")]

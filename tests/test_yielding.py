@@ -218,7 +218,9 @@ def test_the_paper_does_not_look_at_joint_torques(panda_model, paper_skin, name:
         assert (one.mode, one.reason) == (two.mode, two.reason)
 
 
-@pytest.mark.parametrize("change", ["clamps=no", "gives_up=no", "soft_hold=no", "method=decay", "lag_s=0"])
+@pytest.mark.parametrize(
+    "change", ["clamps=no", "gives_up=no", "soft_hold=no", "method=decay", "lag_s=0", "static_friction_nm=0"]
+)
 def test_each_switch_can_be_turned_off_alone(change: str):
     name, _, text = change.partition("=")
     varied = profile(f"pretouch:reaction.{change}").reaction

@@ -135,7 +135,7 @@ class Controller:
 
         # what is near: eq. 1 and the closest points of the body
         known = track_init(len(self.skin)) if Event.TIME_BACKWARDS in events else state.tracks
-        seen, tracks = perceive(known, model, self.skin, self.fixtures, kin, readings, now, p.perception)
+        seen, tracks = perceive(known, model, self.skin, self.fixtures, kin, readings, now, p.perception, robot)
         heard, silent = silent_units(self.skin, tracks, readings.status, seen.longest_silence, now, p.perception)
         mark("perception")
 
@@ -149,7 +149,7 @@ class Controller:
         push = response.Felt(model, kin, robot, felt, close, state.command, p)
         react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
         events |= events_of(
-            unfit, silent, felt, feeling.window.count, react, close, before == "react", state.near.detour.blocked, p
+            unfit, silent, felt, feeling.window.count, react, close, before, state.near.detour.blocked, p
         )  # fmt: skip
         mode = next_mode(state.mode, events, inputs.resume)
         contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None

@@ -5,7 +5,7 @@ import numpy as np
 from pretouch.contact import reaction
 from pretouch.contact.detect import Detection
 from pretouch.contact.place import given_up
-from pretouch.contact.response import Doing, ResponseState, waits
+from pretouch.contact.response import Doing, ResponseState, moves, presses_on, waits
 from pretouch.modes import Event, ModeState
 from pretouch.params import Profile
 from pretouch.types import Mode
@@ -21,15 +21,18 @@ def doing(mode: ModeState, armed: bool, params: Profile) -> Doing:
 
 
 def events_of(
-    unfit: str, silent: str, felt: Detection, samples: int, answer: ResponseState, near: bool, reacting: bool,
+    unfit: str, silent: str, felt: Detection, samples: int, answer: ResponseState, near: bool, before: Doing,
     blocked: float, p: Profile,
 ) -> dict[Event, str]:  # fmt: skip
-    """Name what was seen, heard and felt in one step; `blocked` is for how long the path has been so [s]."""
+    """Name what was seen, heard and felt in one step.
+
+    `before` is what the arm has done up to it, `blocked` for how long the path has been so [s].
+    """
     events: dict[Event, str] = {}
-    if felt.contact is not None:
+    if felt.contact is not None and (p.reaction.method == "decay" or moves(answer, before, p.reaction)):
         events[Event.CONTACT] = f"{np.linalg.norm(felt.contact.force):.1f} N"
     if p.reaction.method == "admittance":
-        events |= _of_yielding(answer, near, felt.lasting, reacting, p)
+        events |= _of_yielding(answer, near, felt.lasting, before, p)
     elif reaction.active(answer.decay, p.reaction):
         left = (p.reaction.decay_cycles - answer.decay.cycle) * p.task.control_period_s
         events[Event.REACTING] = f"{left:.2f} s"
@@ -46,15 +49,18 @@ def events_of(
     return events
 
 
-def _of_yielding(answer: ResponseState, near: bool, lasting: bool, reacting: bool, p: Profile) -> dict[Event, str]:
+def _of_yielding(answer: ResponseState, near: bool, lasting: bool, before: Doing, p: Profile) -> dict[Event, str]:
     """Name what the admittance is at, and what it gave up."""
     events: dict[Event, str] = {}
     r, clamp, place = p.reaction, answer.clamp, answer.place
     if clamp.torque:
         events[Event.CLAMPED if clamp.open else Event.OPENING] = f"{clamp.torque:.1f} Nm against its way"
-    elif reacting and waits(answer, near, lasting, r):
+    elif before == "react" and waits(answer, near, lasting, r):
         clear = ", once nothing is seen near it" if near and not given_up(place, r) else ""
         events[Event.YIELDING] = f"{r.quiet_s:g} s after the last push{clear}"
+    elif before in ("react", "soft") and presses_on(answer, r):
+        torque = np.abs(answer.yielding.steady[1])
+        events[Event.PRESSED] = f"{r.patience_s:g} s, about {torque.max():.0f} Nm at joint {torque.argmax() + 1}"
     if given_up(place, r):
         x, y, z = place.point
         when = f"nothing is seen within {r.near_m:g} m of it" if place.seen else f"{r.retry_s:g} s have passed"

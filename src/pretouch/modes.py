@@ -26,6 +26,7 @@ class Event(Enum):
     SKIN_SILENT = auto()
     NO_FORCE = auto()
     GIVEN_UP = auto()
+    PRESSED = auto()
     WINDOW_FILLING = auto()
     PATH_BLOCKED = auto()
     CLEAR = auto()
@@ -110,6 +111,12 @@ TABLE: tuple[Transition, ...] = (
         "The step before this one was {} ago: braking; give the controller a process of its own.",
     ),
     Transition(Event.GIVEN_UP, _ANY, Mode.HOLD, "Given up after {}.", soft=True),
+    Transition(
+        Event.PRESSED, frozenset({Mode.REACT, Mode.HOLD}), Mode.HOLD,
+        "Something is felt that does not move the arm, for {}: free the arm, or, if nothing touches it, tell the robot"
+        " its load; the arm goes on when it is no longer felt.",
+        soft=True,
+    ),
     Transition(
         Event.WINDOW_FILLING, _ANY, Mode.HOLD,
         "The force window is filling ({}): contacts cannot be told from noise yet.",

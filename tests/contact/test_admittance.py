@@ -85,9 +85,9 @@ def test_what_has_lasted_for_60_ms_is_hardly_in_the_mean():
 
 
 def test_a_contact_begins_at_the_damper_s_speed_as_far_as_the_start_energy_goes(arm):
-    weak = begun(replace(admittance_init(N, P), torque=only(3, 3.0)), *arm, BAND, P)
+    weak = begun(admittance_init(N, P), *arm, only(3, 3.0), np.zeros(N), BAND, P)
     np.testing.assert_allclose(weak.velocity, only(3, 2.0 / 20.0))
-    strong = begun(replace(admittance_init(N, P), torque=only(3, -60.0)), *arm, BAND, P)
+    strong = begun(admittance_init(N, P), *arm, only(3, -60.0), np.zeros(N), BAND, P)
     # 1/2 M v^2 = 0.2 J
     np.testing.assert_allclose(strong.velocity, only(3, -math.sqrt(0.2)))
 
@@ -163,7 +163,11 @@ def test_it_takes_energy_and_gives_none_whatever_is_pushed(panda_model, pushes, 
     arm = panda_model, panda_model.kinematics(panda_model.description.q_ready)
     rng, keep = np.random.default_rng(seed), math.exp(-DT / P.lag_s)
     noise = 0.5 / ((1 + keep) / (1 - keep))  # with the bias within the dead band
-    state, command, estimate = begun(admittance_init(N, P), *arm, BAND, P), np.zeros(N), np.zeros(N)
+    state, command, estimate = (
+        begun(admittance_init(N, P), *arm, np.zeros(N), np.zeros(N), BAND, P),
+        np.zeros(N),
+        np.zeros(N),
+    )
     taken, most, strongest = 0.0, 0.0, 0.0
     course = [*pushes, (60 + int(2.0 / (acceleration * DT)), [0.0, 0.0])]
     for samples, torques in course:
@@ -189,7 +193,7 @@ def test_it_takes_energy_and_gives_none_whatever_is_pushed(panda_model, pushes, 
 def test_a_push_never_moves_the_arm_towards_who_pushes(panda_model, torque):
     """The power that the person gives is never negative, on whatever link: it is torque times joint velocity."""
     arm = panda_model, panda_model.kinematics(panda_model.description.q_ready)
-    state = begun(replace(admittance_init(N, NO_LAG), torque=np.array(torque)), *arm, BAND, NO_LAG)
+    state = begun(admittance_init(N, NO_LAG), *arm, np.array(torque), np.zeros(N), BAND, NO_LAG)
     for _ in range(5):
         assert np.all(state.velocity * torque >= 0)
         state = after(state, arm, torque)

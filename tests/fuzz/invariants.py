@@ -12,7 +12,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Mode, QpOutcome
 from tests.fuzz.oracle import LATCHING, MODES, WORDS, Expected, Oracle
 
-SOFT = {"silent", "no force", "given up", "caught", "latched"}
+SOFT = {"silent", "no force", "given up", "pressed", "caught", "latched"}
 MAY_BE_NAN = {"range_distance", "force"}
 
 

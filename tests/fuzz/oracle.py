@@ -17,7 +17,8 @@ WORDS = {
     "silent": "No usable reading from", "no force": "no force estimate", "overrun": "The step before this one was",
     "filling": "The force window is filling", "clear": "Following the path.", "opening": "Caught between two things",
     "caught": "The arm was caught between two things", "yielding": "Yielding to a contact",
-    "given up": "Given up after", "path blocked": "Something near has kept the hand from its path",
+    "given up": "Given up after", "pressed": "Something is felt that does not move the arm",
+    "path blocked": "Something near has kept the hand from its path",
 }  # fmt: skip
 """Cause -> words its sentence holds."""
 
@@ -197,7 +198,7 @@ class Oracle:
             "overrun": e.overrun,
         }
         first = next((cause for cause, here in seen.items() if here), "")
-        free = ("given up", "filling", "path blocked", "clear")
+        free = ("given up", "pressed", "filling", "path blocked", "clear")
         assert first or told in free, (told, step.reason)
         if not first and told in ("path blocked", "clear"):
             assert self.samples >= self.p.threshold.window_samples
@@ -205,7 +206,9 @@ class Oracle:
 
     def feels_contact(self, e: Expected, step: ControlStep) -> bool:
         """Whether the force crosses the thresholds the step gives."""
-        if self.p.detection.method != "thresholds":
+        r = self.p.reaction
+        sticks = self.mode is Mode.HOLD and r.soft_hold and r.method == "admittance" and r.static_friction_nm > 0
+        if self.p.detection.method != "thresholds" or sticks:
             return step.contact is not None
         if e.force is None or self.samples < self.p.threshold.window_samples:
             return False

@@ -62,7 +62,8 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
 # the same of what the paper has not: all of these are drawn for half of the worlds
 OURS: dict[type, dict[str, tuple[object, ...]]] = {
     PerceptionParams: {
-        "closing_speed": (True, False), "reckon_below_minimum": (True, False), "closing_memory_s": (0.09, 0.01, 1.0),
+        "closing_speed": (True, False), "reckon_below_minimum": (True, False),
+        "place_at_stamp": (True, False), "closing_memory_s": (0.09, 0.01, 1.0),
     },
     TaskParams: {"mid_joint_projected": (True, False)},
     RestrictionParams: {"mode": ("braking", "braking", "slack", "hard", "floor", "off")},
@@ -85,6 +86,7 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "method": ("admittance", "admittance", "decay"), "clamps": (True, False), "gives_up": (True, False),
         "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2), "inertia_kg_m2": (1.5, 1e-3, 100.0),
         "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0), "dead_band_fraction": (0.02, 0.0, 0.5),
+        "static_friction_nm": (3.0, 0.0, 20.0),
         "reverse_band": (2.0, 1.0), "start_energy_j": (0.2, 0.0, 50.0), "tank_max_j": (2.0, 1e-3),
         "mean_s": (0.5, 0.01), "quiet_s": (0.05, 1.0), "patience_s": (0.1, 10.0), "clamp_nm": (4.0, 0.1),
         "clamp_s": (0.03, 0.01), "clamp_turns": (2, 1), "open_m_s": (0.1, 2.0), "open_s": (0.05, 0.5),

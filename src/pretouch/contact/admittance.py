@@ -33,15 +33,21 @@ class AdmittanceState:
     tank: float
     """Energy taken from the push and not given back, with the start value [J]."""
     steady: FloatArray
-    """(n,) torque filtered, without most of its noise [Nm]."""
+    """(2, n) torque filtered once and twice, without most of its noise [Nm]."""
+    sliding: FloatArray
+    """(n,) 1 of a joint that a push has torn loose from static friction, 0 of one that sticks."""
     quiet: float
-    """Time since that was beyond the dead band [s]."""
+    """Time since a torque moved a joint or kept it moving [s]."""
+    unfelt: float
+    """Time since the detector felt a contact [s]."""
+    since: float
+    """Time since the contact that began a reaction [s], infinite without one."""
 
 
 def admittance_init(n: int, params: ReactionParams) -> AdmittanceState:
     """Return the state of n joints at rest, before the first sample."""
-    none = np.zeros(n)
-    return AdmittanceState(np.zeros((2, n)), 0, none, none, none, params.start_energy_j, none, 0.0)
+    none, twice = np.zeros(n), np.zeros((2, n))
+    return AdmittanceState(twice, 0, none, none, none, params.start_energy_j, twice, none, 0.0, 0.0, math.inf)
 
 
 def dead_band(torque_limit: FloatArray, params: ReactionParams) -> FloatArray:
@@ -59,7 +65,8 @@ def learnt(state: AdmittanceState, residual: FloatArray, dt: float, params: Reac
     none, mean, torque = np.zeros(len(residual)), np.empty((2, len(residual))), np.empty(len(residual))
     _learn(state.mean, residual, weight, mean, torque)
     return AdmittanceState(
-        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, none, 0.0
+        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros_like(mean), none,
+        0.0, 0.0, math.inf,
     )  # fmt: skip
 
 
@@ -73,23 +80,33 @@ def _learn(before: FloatArray, residual: FloatArray, weight: float, mean: FloatA
 
 
 def begun(
-    state: AdmittanceState, model: RobotModel, kin: Kinematics, band: FloatArray, params: ReactionParams
-) -> AdmittanceState:
-    """Begin a reaction: at the speed that the torque would keep up, as far as the start energy allows."""
-    drive = _shrunk(state.torque, band)
+    state: AdmittanceState, model: RobotModel, kin: Kinematics, torque: FloatArray, before: FloatArray,
+    band: FloatArray, params: ReactionParams,
+) -> AdmittanceState:  # fmt: skip
+    """Begin a reaction: at the speed that the torque (n,) [Nm] would keep up, as far as the start energy allows.
+
+    With static friction a joint begins only where what was felt `before` (n,) [Nm] says the same, and at the lesser of
+    both: what only noise or a small bias says moves no joint, and so none towards who pushes.
+    """
+    lesser, least = torque, band
+    if params.static_friction_nm > 0:
+        lesser = np.where(torque * before > 0, np.sign(torque) * np.minimum(np.abs(torque), np.abs(before)), 0.0)
+        least = np.maximum(band, _KEEPS * params.static_friction_nm)
+    drive = np.where(np.abs(lesser) > least, _shrunk(lesser, band), 0.0)
     velocity = drive / params.damping_nm_s
     energy = 0.5 * params.inertia_kg_m2 * float(velocity @ velocity)
     if energy > params.start_energy_j:
         velocity = velocity * math.sqrt(params.start_energy_j / energy)
     velocity = _no_faster(velocity, model, kin, params.speed_max_m_s)
     return AdmittanceState(
-        state.mean, state.samples, state.torque, velocity, np.sign(drive), params.start_energy_j, state.torque, 0.0
-    )
+        state.mean, state.samples, torque, velocity, np.sign(drive), params.start_energy_j, np.stack((torque, lesser)),
+        np.abs(np.sign(drive)), 0.0, 0.0, 0.0,
+    )  # fmt: skip
 
 
 def yielded(
     state: AdmittanceState, model: RobotModel, kin: Kinematics, residual: FloatArray, command: FloatArray,
-    band: FloatArray, dt: float, params: ReactionParams,
+    band: FloatArray, dt: float, params: ReactionParams, contact: bool = True,
 ) -> AdmittanceState:  # fmt: skip
     """Move the virtual mass by one period under the torque that is felt.
 
@@ -102,18 +119,23 @@ def yielded(
         band: (n,) dead band [Nm].
         dt: period [s].
         params: parameters.
+        contact: whether the detector feels one.
     """
-    p = params
-    torque, velocity, side = residual - state.mean[1], np.empty(len(band)), np.empty(len(band))
+    p, torque = params, residual - state.mean[1]
+    velocity, side, sliding, steady = np.empty_like(band), np.empty_like(band), np.empty_like(band), state.steady.copy()
     keep = math.exp(-dt / p.lag_s) if p.lag_s > 0 else 0.0
-    tank = _yield(
-        torque, state.torque, state.velocity, command, state.side, band, keep, p.inertia_kg_m2, p.damping_nm_s,
-        p.reverse_band, dt, state.tank, p.tank_max_j, velocity, side,
+    # just after a contact the filters still lag, and the detector has found a push already
+    at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
+    tank, pushed = _yield(
+        torque, state.torque, state.velocity, command, state.side, state.sliding, band, keep, p.inertia_kg_m2,
+        p.damping_nm_s, p.reverse_band, p.static_friction_nm, _KEEPS, at_once, _REST_RAD_S,
+        1.0 - math.exp(-dt / _STEADY_S), dt, state.tank, p.tank_max_j, velocity, side, sliding, steady,
     )  # fmt: skip
     velocity = _no_faster(velocity, model, kin, p.speed_max_m_s)
-    steady = state.steady + (1.0 - math.exp(-dt / _STEADY_S)) * (torque - state.steady)
-    quiet = 0.0 if bool((np.abs(steady) > band).any()) else state.quiet + dt
-    return AdmittanceState(state.mean, state.samples, torque, velocity, side, tank, steady, quiet)
+    quiet, unfelt = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.unfelt + dt
+    return AdmittanceState(
+        state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, unfelt, state.since + dt
+    )
 
 
 def _no_faster(velocity: FloatArray, model: RobotModel, kin: Kinematics, most: float) -> FloatArray:
@@ -126,25 +148,42 @@ def _no_faster(velocity: FloatArray, model: RobotModel, kin: Kinematics, most: f
 
 
 _STEADY_S = 0.1
-"""Time constant that takes the noise out of the torque [s]."""
+"""Time constant of each of the two filters that take the noise out of the torque [s]."""
+_KEEPS = 0.85
+"""Share of the static friction beyond which a torque keeps a joint moving that it tore loose: a bias of two thirds of
+it lets a joint stop, and does not tear it loose again."""
+_AT_ONCE = 2.0
+"""Times the static friction from which two samples in a row tear a joint loose, whatever the filters say."""
+_FIRST_S = 0.3
+"""Time after the onset of a contact in which two samples beyond what keeps a joint moving do the same [s]."""
+_REST_RAD_S = 1e-3
+"""Speed at which a joint that nothing drives sticks [rad/s]: none that can be seen."""
 
 
 @compiled
 def _yield(
-    torque: FloatArray, before: FloatArray, v: FloatArray, command: FloatArray, side: FloatArray, band: FloatArray,
-    keep: float, inertia: float, damping: float, reverse: float, dt: float, tank: float, tank_max: float,
-    velocity: FloatArray, sides: FloatArray,
-) -> float:  # fmt: skip
-    """Write the last line of arguments; return the energy in the tank [J]."""
-    n, power = len(v), 0.0
+    torque: FloatArray, before: FloatArray, v: FloatArray, command: FloatArray, side: FloatArray, loose: FloatArray,
+    band: FloatArray, keep: float, inertia: float, damping: float, reverse: float, friction: float, keeps: float,
+    at_once: float, rest: float, weight: float, dt: float, tank: float, tank_max: float,
+    velocity: FloatArray, sides: FloatArray, sliding: FloatArray, steady: FloatArray,
+) -> tuple[float, bool]:  # fmt: skip
+    """Write the last line of arguments; return the energy in the tank [J], and whether a push goes on."""
+    n, power, pushed = len(v), 0.0, False
     for i in range(n):
+        steady[0, i] += weight * (torque[i] - steady[0, i])
+        steady[1, i] += weight * (steady[0, i] - steady[1, i])
+        lasts = abs(steady[0, i]) > max(band[i], keeps * friction)
+        starts = _both(steady[0, i], steady[1, i], friction) or _both(torque[i], before[i], at_once * friction)
+        sliding[i] = 1.0 if friction == 0.0 or starts or (loose[i] > 0.0 and lasts) else 0.0
+        pushed = pushed or (lasts and sliding[i] > 0.0)
+
         # what acted in the last period, by the exact inverse of the estimate's lag over one period
         acted = (torque[i] - keep * before[i]) / (1.0 - keep)
         # the least energy that it gave, whichever of the two is true and whatever is wrong within the dead band
         power += min(torque[i] * v[i], acted * v[i]) - band[i] * abs(v[i])
         felt, now = _beyond(torque[i], band[i]), _beyond(acted, band[i])
         drive = 0.0
-        if felt * now > 0.0:
+        if felt * now > 0.0 and sliding[i] > 0.0:
             drive = felt if abs(felt) < abs(now) else now
         if drive * side[i] < 0.0:
             least = reverse * band[i]
@@ -154,7 +193,7 @@ def _yield(
         sides[i] = side[i]
         if drive != 0.0:
             sides[i] = np.sign(drive)
-        elif velocity[i] * command[i] <= 0.0:
+        elif velocity[i] * command[i] <= 0.0 or (friction > 0.0 and abs(velocity[i]) < rest):
             velocity[i] = 0.0
         elif abs(velocity[i]) > abs(command[i]):
             # nothing drives it: it is never asked for more than it does
@@ -166,7 +205,13 @@ def _yield(
             acted = (torque[i] - keep * before[i]) / (1.0 - keep)
             if min(torque[i] * velocity[i], acted * velocity[i]) <= band[i] * abs(velocity[i]):
                 velocity[i] = 0.0
-    return tank
+    return tank, pushed
+
+
+@compiled
+def _both(one: float, other: float, level: float) -> bool:
+    """Whether both are beyond a level, on the same side."""
+    return one * other > 0.0 and min(abs(one), abs(other)) > level
 
 
 @compiled

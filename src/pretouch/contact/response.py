@@ -102,7 +102,8 @@ def noticed(state: ResponseState, doing: Doing, felt: Felt, phase: float, resume
         yielding = learnt(yielding, residual, dt, p)
     elif doing in ("react", "soft"):
         band = dead_band(felt.model.description.tau_max, p)
-        yielding = yielded(yielding, felt.model, felt.kin, residual, felt.command, band, dt, p)
+        contact = felt.found.evidence >= 1.0
+        yielding = yielded(yielding, felt.model, felt.kin, residual, felt.command, band, dt, p, contact)
     if doing == "soft" and clamp.torque:
         # out of the clamp it may be moved, not back into it
         yielding = replace(yielding, velocity=np.where(yielding.velocity * clamp.course > 0, 0.0, yielding.velocity))
@@ -148,7 +149,8 @@ def began(state: ResponseState, doing: Doing, felt: Felt, phase: float, point: F
         _residual(state.yielding, felt) - state.yielding.mean[1],
         dead_band(felt.model.description.tau_max, p),
     )
-    yielding = begun(replace(state.yielding, torque=torque), felt.model, felt.kin, band, p)
+    before = {"soft": state.yielding.steady[0], "still": torque}.get(doing, state.yielding.torque)
+    yielding = begun(state.yielding, felt.model, felt.kin, torque, before, band, p)
     # what the arm ran into pushes against its motion; what pushes it on has come by itself
     mine = doing == "task" and float(torque @ felt.command) < 0
     place = replace(state.place, counted=False)
@@ -183,10 +185,26 @@ def answered(state: ResponseState, doing: Doing, felt: Felt) -> tuple[Answer | N
 
 
 def waits(state: ResponseState, near: bool, lasting: bool, params: ReactionParams) -> bool:
-    """Whether the arm still yields, or waits for more of the push or, where it will go on, for what is near to go.
+    """Whether the arm still yields, or waits for more of the push, or for what presses or is near to go.
 
-    It waits too while it is being found out if what is felt is a load (`Detection.lasting`).
+    For what is near it waits only where it will go on; it waits too while it is being found out if what is felt is a
+    load (`Detection.lasting`).
     """
     quiet = state.yielding.quiet
-    stays = near and quiet < params.patience_s and not given_up(state.place, params)
-    return lasting or quiet < params.quiet_s or stays
+    waits_for = (near and not given_up(state.place, params)) or _presses(state, params)
+    return lasting or quiet < params.quiet_s or (waits_for and quiet < params.patience_s)
+
+
+def presses_on(state: ResponseState, params: ReactionParams) -> bool:
+    """Whether the arm has waited for long for something that is felt and does not move it."""
+    return _presses(state, params) and state.yielding.quiet >= max(params.quiet_s, params.patience_s)
+
+
+def _presses(state: ResponseState, params: ReactionParams) -> bool:
+    """Whether an arm that static friction holds has felt something of late."""
+    return params.static_friction_nm > 0 and state.yielding.unfelt < params.quiet_s
+
+
+def moves(state: ResponseState, doing: Doing, params: ReactionParams) -> bool:
+    """Whether a contact that is felt makes the arm move: an arm that holds softly sticks to static friction."""
+    return doing != "soft" or params.static_friction_nm == 0 or bool(state.yielding.sliding.any())

@@ -29,6 +29,9 @@ class PerceptionParams(Checked):
 
     reckon_below_minimum: bool = False
     """Whether something nearer than a sensor measures (40 mm) stays where it was last seen, rather than at 40 mm."""
+    place_at_stamp: bool = False
+    """Whether a reading is placed from where its unit was when it measured, by the joint velocities since, rather than
+    from where it is now: late readings of an arm that moves at 0.3 m/s are 15 mm off after 50 ms."""
     keep_while_silent: bool = False
     """Whether the point that a unit showed last is kept until it tells something else, or counts as silent: silence
     is never free space. Off, it goes after `persistence_s`."""

@@ -74,13 +74,17 @@ PROFILES: dict[str, Profile] = {
     ),
     "pretouch": Profile(
         name="pretouch",
-        perception=PerceptionParams(closing_speed=True, reckon_below_minimum=True, keep_while_silent=True),
+        perception=PerceptionParams(
+            closing_speed=True, reckon_below_minimum=True, place_at_stamp=True, keep_while_silent=True
+        ),
         task=TaskParams(mid_joint_projected=True),
         reduction=ReductionParams(enabled=False),
         restriction=RestrictionParams(mode="braking"),
         anticipation=AnticipationParams(effective_mass=True, closing_speed=True, tangential=True, null_space=True),
         detection=DetectionParams(method="sequential", freeze_while_reacting=True),
-        reaction=ReactionParams(method="admittance", clamps=True, gives_up=True, soft_hold=True),
+        reaction=ReactionParams(
+            method="admittance", clamps=True, gives_up=True, soft_hold=True, static_friction_nm=3.0
+        ),
     ),
     "flacco": _avoiding("flacco"),
     "ding": _avoiding("ding"),

@@ -39,6 +39,9 @@ class ReactionParams(Checked):
     """
     dead_band_fraction: NonNegative = 0.02
     """What is added to it, as a fraction of the joint's torque limit: twice the noise of a Panda's larger joints."""
+    static_friction_nm: NonNegative = 0.0
+    """Switch: filtered torque that tears a joint loose which stands [Nm], 0 for none (ours, 3 in `pretouch`): a bias of
+    2 Nm and five deviations of a Panda's filtered noise. 15 N move the arm where they have a lever of 0.2 m."""
     reverse_band: Annotated[float, Check(low=1.0)] = 2.0
     """Factor on the dead band of a joint for torques against the push it has just yielded to: what the release of a
     push leaves in the estimate must not pull the arm towards the person."""

@@ -21,11 +21,12 @@ from pretouch.perception.obstacles import (
 )
 from pretouch.perception.scene_filter import RAYS, Fixtures, leave_out, leave_out_planes
 from pretouch.perception.spread import bring_nearer, widen
+from pretouch.perception.stamped import move_back
 from pretouch.perception.vectors import placed_ends, rotate
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE
-from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus
+from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus, RobotState
 from pretouch.values import value
 
 
@@ -51,8 +52,12 @@ def perceive(
     readings: RangeReadings,
     now: float,
     params: PerceptionParams,
+    robot: RobotState | None = None,
 ) -> tuple[Perception, TrackState]:
     """Locate what the units see (eq. 1), leave out the arm and fixtures, and find the closest body points.
+
+    `robot` is the state that `kin` is of: with it and the switch for it, a reading is placed from where its unit was at
+    the stamp.
 
     Where the skin says how uncertain the places of its units are, distances are less by the points' spread, and the
     arm and fixtures are expected earlier by it.
@@ -62,11 +67,14 @@ def perceive(
     arm, body, others, count = model.capsules, model.body, fixtures.capsules, len(skin)
     motion = state.motion.copy() if params.closing_speed else state.motion
     tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy(), motion)
+    moving = robot if params.place_at_stamp else None
     distance = np.empty(count)
     indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
     found, nearest, oldest = _perceive(
         tracks.point, tracks.direction, tracks.times, tracks.motion,
         kin.position, kin.rotation, model.ee, skin.link, skin.T_link_sensor,
+        kin.anchor, kin.axis, model.moved_by, _NO_JOINT if moving is None else moving.qd,
+        0.0 if moving is None else moving.stamp,
         readings.stamp, readings.distance, readings.status, now,
         arm.link, arm.a, arm.b, arm.radius, body.link, body.a, body.b, body.radius,
         others.link, others.a, others.b, others.radius, fixtures.planes, RAYS,
@@ -85,10 +93,14 @@ def perceive(
     return Perception(obstacles, distance, nearest, now - oldest), tracks
 
 
+_NO_JOINT = np.zeros(0)
+
+
 @compiled
 def _perceive(
     point: FloatArray, last_direction: FloatArray, times: FloatArray, motion: FloatArray,
     link_position: FloatArray, link_rotation: FloatArray, ee: int, unit_link: IntArray, T_link_sensor: FloatArray,
+    anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, qd: FloatArray, posed: float,
     stamp: FloatArray, reading: FloatArray, status: IntArray, now: float,
     arm_link: IntArray, arm_a: FloatArray, arm_b: FloatArray, arm_radius: FloatArray,
     body_link: IntArray, body_a: FloatArray, body_b: FloatArray, body_radius: FloatArray,
@@ -111,15 +123,19 @@ def _perceive(
     if any_fresh:
         position, rotation = poses(link_position, link_rotation, unit_link, T_link_sensor)
         tells, shows = tells_anything(reading, status, distance), np.empty(len(distance), np.bool_)
+        ends = distance + margin
         for k in range(len(shows)):
             shows[k] = not np.isnan(distance[k])
         if filter_views:
             arm_from, arm_to = placed_ends(arm_link, arm_a, arm_b, link_position, link_rotation)
-            other_from, other_to = placed_ends(other_link, other_a, other_b, link_position, link_rotation)
-            ends = distance + margin
             if sigmas > 0:
                 widen(ends, sigmas, position_sigma, orientation_sigma, distance, margin)
             leave_out(shows, fresh, ends, position, rotation, unit_link, arm_link, arm_from, arm_to, arm_radius, rays)
+        if len(qd):
+            # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
+            move_back(position, rotation, unit_link, anchor, axis, moved_by, qd, stamp, posed, persistence)
+        if filter_views:
+            other_from, other_to = placed_ends(other_link, other_a, other_b, link_position, link_rotation)
             leave_out(
                 shows, fresh, ends, position, rotation, unit_link, other_link, other_from, other_to, other_radius, rays
             )

@@ -9,6 +9,7 @@ WITHOUT = "without "
 OFF = {
     "perception.closing_speed": "no",
     "perception.reckon_below_minimum": "no",
+    "perception.place_at_stamp": "no",
     "perception.keep_while_silent": "no",
     "task.mid_joint_projected": "no",
     "reduction.enabled": "yes",
@@ -25,6 +26,7 @@ OFF = {
     "reaction.clamps": "no",
     "reaction.gives_up": "no",
     "reaction.soft_hold": "no",
+    "reaction.static_friction_nm": "0",
     "reaction.lag_s": "0",
 }
 """What each switch of `pretouch` is when it is off, as `GROUP.FIELD`: the paper's value, or the part without effect."""

@@ -1,0 +1,63 @@
+"""Where the sensors were when they measured: the arm goes on while a reading is on its way."""
+
+import math
+
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.types import BoolArray, FloatArray, IntArray
+
+
+@compiled
+def move_back(
+    position: FloatArray, rotation: FloatArray, unit_link: IntArray, anchor: FloatArray, axis: FloatArray,
+    moved_by: BoolArray, qd: FloatArray, stamp: FloatArray, posed: float, longest: float,
+) -> None:  # fmt: skip
+    """Move sensor poses, (K, 3) [m] and (K, 3, 3), from the instant of the arm's posture back to their stamps (K,) [s].
+
+    That is the motion of their links at the joint velocities (n,) [rad/s], to first order in the place; the rotation is
+    exact for a constant angular velocity. No reading is taken for older than `longest` [s].
+
+    Args:
+        position: changed.
+        rotation: changed.
+        unit_link: (K,) link of each unit.
+        anchor: (n, 3) a point on each joint's axis [m].
+        axis: (n, 3) its direction.
+        moved_by: (L, n) whether a link is moved by a joint.
+        qd: joint velocities.
+        stamp: of the readings.
+        posed: instant of the arm's posture [s].
+        longest: see above.
+    """
+    v, w, turned = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(len(unit_link)):
+        age = min(posed - stamp[k], longest)
+        if not age > 0.0:
+            continue
+        v[:], w[:] = 0.0, 0.0
+        for j in range(len(qd)):
+            if moved_by[unit_link[k], j]:
+                x, y, z = position[k, 0] - anchor[j, 0], position[k, 1] - anchor[j, 1], position[k, 2] - anchor[j, 2]
+                v[0] += (axis[j, 1] * z - axis[j, 2] * y) * qd[j]
+                v[1] += (axis[j, 2] * x - axis[j, 0] * z) * qd[j]
+                v[2] += (axis[j, 0] * y - axis[j, 1] * x) * qd[j]
+                for i in range(3):
+                    w[i] += axis[j, i] * qd[j]
+        speed = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        for i in range(3):
+            position[k, i] -= age * v[i]
+        if speed == 0.0:
+            continue
+        # the formula of Rodrigues, about -w
+        s, c = math.sin(-age * speed), math.cos(age * speed)
+        for i in range(3):
+            w[i] /= speed
+        for column in range(3):
+            a, b, d = rotation[k, 0, column], rotation[k, 1, column], rotation[k, 2, column]
+            along = (1.0 - c) * (w[0] * a + w[1] * b + w[2] * d)
+            turned[0] = c * a + s * (w[1] * d - w[2] * b) + along * w[0]
+            turned[1] = c * b + s * (w[2] * a - w[0] * d) + along * w[1]
+            turned[2] = c * d + s * (w[0] * b - w[1] * a) + along * w[2]
+            for i in range(3):
+                rotation[k, i, column] = turned[i]

@@ -1,0 +1,91 @@
+"""Late readings of an arm that moves: with the pose at their stamp, what stands still is where it stands."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.params import PROFILES, PerceptionParams
+from pretouch.perception.obstacles import poses, track_init
+from pretouch.perception.perceive import perceive
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.perception.stamped import move_back
+from pretouch.types import RangeReadings, RangeStatus, RobotState
+
+LATE_S = 0.05
+QD = np.array([0.8, -0.2, 0.1, 0.3, 0.0, 0.4, 0.6])
+
+
+def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[float]:
+    """How far from a plane ahead of a unit its points are [m], while the arm turns and the readings are late."""
+    unit, rng, q0 = skin.ids.index("hand_left"), np.random.default_rng(1000), model.description.q_ready
+    position, rotation = placed(model, skin, q0)
+    normal, on = rotation[unit, :, 2].copy(), position[unit] + 0.5 * rotation[unit, :, 2]
+    state, found = track_init(len(skin)), []
+    for i in range(6, 60):
+        now = 0.01 * i
+        then = now - LATE_S
+        at, turned = placed(model, skin, q0 + QD * then)
+        beam = turned[unit, :, 2]
+        distance = float((on - at[unit]) @ normal / (beam @ normal)) + noise * rng.standard_normal()
+        heard = np.arange(len(skin)) == unit
+        readings = RangeReadings(
+            np.where(heard, then, -np.inf), np.where(heard, distance, np.nan),
+            np.where(heard, int(RangeStatus.OK), int(RangeStatus.NONE)),
+        )  # fmt: skip
+        q = q0 + QD * now
+        robot = RobotState(now, q, QD, q, QD, np.zeros(7), None)
+        seen, state = perceive(
+            state, model, skin, no_fixtures(), model.kinematics(q), readings, now, params, robot
+        )  # fmt: skip
+        found.append(float((seen.obstacles.point[0] - on) @ normal))
+    return found
+
+
+def placed(model, skin, q):
+    kin = model.kinematics(q)
+    return poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
+
+
+def test_a_plane_stays_where_it_is_while_the_arm_turns(panda_model, paper_skin):
+    exact = replace(PROFILES["pretouch"].perception, spread_sigmas=0.0)
+    late = replace(exact, place_at_stamp=False)
+    assert max(map(abs, errors(panda_model, paper_skin, exact))) < 0.004
+    assert max(map(abs, errors(panda_model, paper_skin, late))) > 0.01, "and not where the arm has gone on to"
+
+
+def test_with_noise_its_place_is_within_noise(panda_model, paper_skin):
+    found = np.array(errors(panda_model, paper_skin, PROFILES["pretouch"].perception, 0.02))
+    assert abs(found.mean()) < 2 * 0.02 / np.sqrt(len(found))
+    assert found.std() == pytest.approx(0.02, rel=0.25)
+
+
+def test_poses_go_back_as_the_arm_came(panda_model, paper_skin):
+    q = panda_model.description.q_ready
+    position, rotation = placed(panda_model, paper_skin, q)
+    kin, age = panda_model.kinematics(q), 0.001
+    stamp = np.full(len(paper_skin), 7.0 - age)
+    move_back(
+        position, rotation, paper_skin.link, kin.anchor, kin.axis, panda_model.moved_by, QD, stamp, 7.0, 0.06
+    )  # fmt: skip
+    at, turned = placed(panda_model, paper_skin, q - QD * age)
+    np.testing.assert_allclose(position, at, atol=1e-6)
+    np.testing.assert_allclose(rotation, turned, atol=1e-6)
+    np.testing.assert_allclose(rotation @ rotation.transpose(0, 2, 1), np.tile(np.eye(3), (len(at), 1, 1)), atol=1e-12)
+
+
+def test_no_reading_is_moved_back_by_more_than_it_lasts_nor_into_the_future(panda_model, paper_skin):
+    q = panda_model.description.q_ready
+    kin, arm = panda_model.kinematics(q), (paper_skin.link, QD)
+    here = placed(panda_model, paper_skin, q)
+    stays = placed(panda_model, paper_skin, q)
+    move_back(
+        *stays, arm[0], kin.anchor, kin.axis, panda_model.moved_by, arm[1], np.full(len(paper_skin), 7.5), 7.0, 0.06
+    )  # fmt: skip
+    np.testing.assert_array_equal(stays[0], here[0])
+    for stamp, same in ((-np.inf, 6.94), (6.0, 6.94)):
+        first, second = placed(panda_model, paper_skin, q), placed(panda_model, paper_skin, q)
+        for at, pose in ((stamp, first), (same, second)):
+            stamps = np.full(len(paper_skin), at)
+            move_back(*pose, arm[0], kin.anchor, kin.axis, panda_model.moved_by, arm[1], stamps, 7.0, 0.06)
+        np.testing.assert_allclose(first[0], second[0], atol=1e-12)

@@ -1,0 +1,90 @@
+"""A held or reacting arm under a bias of its torque estimate: it stands, says what is wrong, and a push moves it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.types import ControlStep, Mode, RobotState
+from tests.test_yielding import OURS, Pushed
+
+SILENT = {0: 10.0}
+
+
+class Noisy(Pushed):
+    """An arm whose joint torques have noise and, from some instant on, a bias."""
+
+    def __init__(self, model, skin, seed: int, params=OURS) -> None:
+        super().__init__(model, skin, params)
+        self.rng, self.bias = np.random.default_rng(seed), np.zeros(7)
+
+    def feel(self, cycles: int, force=(0.0, 0.0, 0.0), link: str = "panda_hand", **more: object) -> list[ControlStep]:
+        steps = []
+        for _ in range(cycles):
+            k, kin = self.model.link_index(link), self.model.kinematics(self.q)
+            push = self.model.jacobian(kin, k, kin.position[k])[:3].T @ np.array(force)
+            # measured velocities are off by 0.008 rad/s, and the observer has a gain of 60 1/s
+            noise = self.model.mass_matrix(self.q) @ (0.48 * self.rng.standard_normal(7))
+            torque = push + self.bias + noise
+
+            def change(robot: RobotState, torque: np.ndarray = torque) -> RobotState:
+                return replace(robot, tau_ext=torque)
+
+            steps.append(self.step(change=change, **more))
+        return steps
+
+
+def held(model, skin, seed: int) -> Noisy:
+    """An arm that holds softly, for one unit is silent."""
+    arm = Noisy(model, skin, seed)
+    arm.feel(300)
+    assert arm.state.mode.mode is Mode.TRACK
+    arm.feel(100, silent=SILENT)
+    assert arm.state.mode.soft
+    return arm
+
+
+@pytest.mark.parametrize("joint", [0, 1, 3, 5, 6])
+def test_a_soft_hold_stands_exactly_still_with_noise_and_a_bias(panda_model, paper_skin, joint: int):
+    arm = held(panda_model, paper_skin, 1000 + joint)
+    assert not any(s.command.any() for s in arm.feel(500, silent=SILENT)), "with noise alone"
+    arm.bias = 2.0 * np.eye(7)[joint]
+    steps = arm.feel(1000, silent=SILENT)
+    assert not any(s.command.any() for s in steps)
+    assert {s.mode for s in steps} == {Mode.HOLD}, "what moves nothing is no contact to a held arm"
+
+
+@pytest.mark.parametrize(
+    ("link", "force"),
+    [
+        ("panda_hand", (0.0, 15.0, 0.0)), ("panda_hand", (0.0, 0.0, -15.0)), ("panda_hand", (15.0, 0.0, 0.0)),
+        ("panda_link4", (15.0, 0.0, 0.0)), ("panda_link4", (-15.0, 0.0, 0.0)),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("bias", [0.0, 1.0])
+def test_a_push_of_15_n_moves_a_held_arm(panda_model, paper_skin, link: str, force, bias: float):
+    arm = held(panda_model, paper_skin, 1010)
+    arm.bias = np.full(7, bias) * np.array([1, -1, 1, -1, 1, -1, 1])
+    arm.feel(200, silent=SILENT)
+    before = arm.point(link)
+    arm.feel(150, force, link, silent=SILENT)
+    assert (arm.point(link) - before) @ np.array(force) > 15.0 * 0.02
+    arm.feel(150, silent=SILENT)
+    assert not any(s.command.any() for s in arm.feel(200, silent=SILENT)), "and it stands where it is left"
+
+
+@pytest.mark.parametrize(("joint", "near"), [(0, 0.2), (3, 0.2), (5, 0.2)])
+def test_under_a_bias_that_is_not_learnt_a_reacting_arm_holds_and_says_why(panda_model, paper_skin, joint, near):
+    arm = Noisy(panda_model, paper_skin, 1020 + joint)
+    seen = {0: near}  # with something near nothing is learnt
+    arm.feel(400)
+    arm.bias = 2.0 * np.eye(7)[joint]
+    steps = arm.feel(1500, seen=seen)
+    assert any(s.mode is Mode.REACT for s in steps)
+    stood = steps[300:]
+    assert not any(s.command.any() for s in stood)
+    assert stood[-1].mode is Mode.HOLD
+    assert "felt that does not move the arm" in stood[-1].reason
+    assert f"joint {joint + 1}" in stood[-1].reason
+    arm.bias = np.zeros(7)
+    assert any(s.mode is Mode.TRACK for s in arm.feel(300, seen=seen)), "gone, the arm goes on"
