@@ -31,6 +31,14 @@ class Pushed(Arm):
             steps.append(self.step(force=force, change=with_torque(torque), **more))
         return steps
 
+    def wait(self, most: int = 1000) -> None:
+        """Until it goes on with its task."""
+        for _ in range(most):
+            if self.state.mode.mode is Mode.TRACK:
+                return
+            self.step()
+        pytest.fail(f"It does not go on: {self.state.mode.reason}")
+
     def point(self, link: str) -> np.ndarray:
         return self.model.kinematics(self.q).position[self.model.link_index(link)]
 
@@ -137,8 +145,7 @@ def test_a_hand_moves_an_arm_that_holds_after_a_clamp_and_none_whose_state_is_no
 
 def test_a_person_who_pushes_thrice_at_one_place_does_not_make_it_give_up(arm: Pushed):
     for _ in range(4):
-        while arm.state.mode.mode is not Mode.TRACK:
-            arm.step()
+        arm.wait()
         arm.run(5)
         arm.push((0.0, -20.0, 0.0), cycles=30)
     assert Mode.TRACK in modes(arm.run(150))
@@ -148,8 +155,7 @@ def test_after_three_contacts_at_one_place_it_gives_up_says_so_and_tries_again(p
     quick = replace(NO_LAG.reaction, retry_s=1.0, quiet_s=0.3, pushed_j=100.0)
     arm = arm_of(panda_model, paper_skin, replace(NO_LAG, reaction=quick))
     for _ in range(3):
-        while arm.state.mode.mode is not Mode.TRACK:
-            arm.step()
+        arm.wait()
         arm.run(5)
         arm.push((0.0, -20.0, 0.0), cycles=10)
     steps = arm.run(60)

@@ -77,6 +77,8 @@ def test_a_simulated_arm_is_quiet_alone_and_feels_pushes(panda_model):
     for (at, force), push in zip(felt, pushes, strict=True):
         assert 0.0 < at - push.start < 0.1
         assert force * push.direction[1] > 0
+        goes_on = next(s.stamp for s in trial.steps if s.stamp > at and s.mode is Mode.TRACK)
+        assert goes_on - at < 3.0, "nothing is left of the push to be found out"
 
 
 def loaded(kg: float, since: float, until: float):

@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.contact.fixed import force_map_into
 from pretouch.contact.hypotheses import write_hypotheses
-from pretouch.contact.lasting_load import find_lasting, learn_lasting, still_explains, weight_part
+from pretouch.contact.lasting_load import find_lasting, learn_lasting, stands_out, still_explains, weight_part
 from pretouch.contact.proximity_prior import MOST
 from pretouch.contact.residual_model import (
     BLOCK,
@@ -204,22 +204,11 @@ def _take(
             most_velocity, most_torque,
         )  # fmt: skip
     suspected = evidence >= suspect
-    if settle and alone and whole == len(LENGTHS) and calm < _CALM and (steady or suspected):
+    if settle and alone and whole == len(LENGTHS) and calm < _CALM and (steady or suspected or reacting):
         steady = _still_there(
-            lasting,
-            steady,
-            settle,
-            suspected or reacting,
-            means[-1],
-            x,
-            J_ee,
-            S,
-            weights,
-            covariance,
-            prior,
-            offset_prior,
-            moving,
-        )
+            lasting, steady, settle, suspected, reacting, means[-1], x, J_ee, S, weights, covariance, prior,
+            offset_prior, moving,
+        )  # fmt: skip
     else:
         steady = 0
     for j in range(n):
@@ -269,18 +258,22 @@ def _learn_calm(
 
 @compiled
 def _still_there(
-    lasting: FloatArray, steady: int, settle: int, counts: bool, residual: FloatArray, x: FloatArray, J: FloatArray,
-    S: FloatArray, weights: FloatArray, covariance: FloatArray, prior: FloatArray, offset_prior: float,
+    lasting: FloatArray, steady: int, settle: int, suspected: bool, reacting: bool, residual: FloatArray, x: FloatArray,
+    J: FloatArray, S: FloatArray, weights: FloatArray, covariance: FloatArray, prior: FloatArray, offset_prior: float,
     moving: int,
 ) -> int:  # fmt: skip
-    """Return for how many samples that count the same load or step has explained the residual; -1: it was learnt."""
+    """Return for how many samples that count the same load or step has explained the residual; -1: it was learnt.
+
+    Samples count in which a contact is suspected or the arm reacts, but only what stands out is something to find out.
+    """
     n = len(residual)
     learnt, offset, unit = np.empty(n), np.empty(n), np.empty(n)
     weight_part(weights, x, learnt, offset, unit)
+    counts = suspected or reacting
     if steady and still_explains(lasting, residual, unit, J, S, LONGEST, moving):
         steady += int(counts)
     else:
-        steady = 0
+        steady, counts = 0, suspected or (reacting and stands_out(residual, S, LONGEST))
     if counts and (steady == 0 or steady > settle):
         now = np.empty(3 + n)
         if not find_lasting(residual, learnt, offset, unit, J, S, LONGEST, offset_prior, now):

@@ -37,6 +37,15 @@ _GRAVITY = 9.81
 
 
 @compiled
+def stands_out(residual: FloatArray, S: FloatArray, samples: int) -> bool:
+    """Whether the mean (n,) of so many samples [Nm] is more than noise and friction leave of nothing."""
+    n = len(residual)
+    C, L = np.empty((n, n)), np.zeros((n, n))
+    _spread_of_mean(S, samples, _UNKNOWN_ALONE_NM, C)
+    return bool(factor(C, L) and forward(L, residual, np.empty(n)) > n + _ALONE_DEVIATIONS * np.sqrt(2.0 * n))
+
+
+@compiled
 def still_explains(
     lasting: FloatArray, residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int,
     moving: int,

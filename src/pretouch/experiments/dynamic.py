@@ -62,7 +62,8 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     true = np.linalg.norm(record.true_force, axis=1)
-    reactions, spans = record.reactions(), [span for span in person.contacts if span is not None]
+    beginnings, spans = record.beginnings(), [span for span in person.contacts if span is not None]
+    reactions = [step for step, _ in beginnings]
     missing = [None] * (len(person.pushes) - len(person.contacts))
     row = {
         "experiment": NAME,
@@ -76,7 +77,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         "impact_speed_m_s": None,
         **_at_detection(reactions, spans),
         "contacts": [
-            _contact(record, reactions, push, touched)
+            _contact(record, beginnings, push, touched)
             for push, touched in zip(person.pushes, [*person.contacts, *missing], strict=True)
         ],
         "peak_estimate_n": rounded(peak(_touched_estimate(record, spans))),
@@ -109,7 +110,7 @@ def _touched_estimate(record: Record, spans: list[tuple[float, float]]) -> Float
 
 
 def _contact(
-    record: Record, reactions: list[ControlStep], push: Push, touched: tuple[float, float] | None
+    record: Record, beginnings: list[tuple[ControlStep, FloatArray]], push: Push, touched: tuple[float, float] | None
 ) -> dict[str, Any]:
     """Judge how the arm answered one push."""
     row: dict[str, Any] = {
@@ -123,15 +124,15 @@ def _contact(
     if touched is None:
         return row | {"push_s": 0.0}
     touch, release = touched
-    answers = [s for s in reactions if touch <= s.stamp <= release + _REBOUND_S]
+    answers = [(s, v) for s, v in beginnings if touch <= s.stamp <= release + _REBOUND_S]
     pushed = _mean_force(record, touch, release)
-    row["reaction_towards_person"] = any(float(s.reaction_velocity @ pushed) < 0 for s in answers)
-    if answers and answers[0].stamp <= release + _NOTICE_S:
-        first = answers[0]
+    row["reaction_towards_person"] = any(float(v @ pushed) < 0 for _, v in answers)
+    if answers and answers[0][0].stamp <= release + _NOTICE_S:
+        first, velocity = answers[0]
         row["detected"] = True
         row["delay_s"] = rounded(first.stamp - touch, 4)
         before = _mean_force(record, max(touch, first.stamp - 0.05), first.stamp)
-        angle = angle_deg(first.reaction_velocity, before)
+        angle = angle_deg(velocity, before)
         row["direction_error_deg"] = None if angle is None else rounded(angle, 2)
     return row
 

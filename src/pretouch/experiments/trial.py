@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -97,10 +98,23 @@ class Record:
         """Return the steps in which a reaction began."""
         return [s for s in self.steps if s.contact is not None]
 
+    def beginnings(self) -> list[tuple[ControlStep, FloatArray]]:
+        """Return the steps in which a reaction began, each with the first velocity (3,) [m/s] that came of it.
+
+        That may be some steps later, where a joint at rest has to be torn loose; 0 if the arm never moved.
+        """
+        return [(s, _first_velocity(self.steps[i:])) for i, s in enumerate(self.steps) if s.contact is not None]
+
     def held(self) -> bool:
         """Whether the arm held for another reason than filling its window at the start."""
         start = next((i for i, s in enumerate(self.steps) if s.mode is not Mode.HOLD), len(self.steps))
         return any(s.mode is Mode.HOLD for s in self.steps[start:])
+
+
+def _first_velocity(steps: list[ControlStep]) -> FloatArray:
+    """Return the first velocity (3,) [m/s] of the reaction that begins with these steps."""
+    going = takewhile(lambda step: step.mode is Mode.REACT, steps)
+    return next((s.reaction_velocity for s in going if s.reaction_velocity.any()), np.zeros(3))
 
 
 def record_of(recorded: Recorded) -> Record:

@@ -26,6 +26,7 @@ def step(stamp, y, mean=0.0, reaction=0.0, begins=False, force=0.0):
         stamp=stamp,
         ee_position=y * Y,
         thresholds=SimpleNamespace(mean=mean * Y),
+        mode=Mode.REACT if reaction or begins else Mode.TRACK,
         reaction_velocity=reaction * Y,
         contact="contact" if begins else None,
         force=force * Y,
@@ -76,6 +77,13 @@ def test_a_reaction_against_the_push_while_it_is_held_is_no_answer_to_it():
     assert (push["against_while_held"], push["against_after_release"]) == (1, 0)
     assert push["mean_peak_n"] == 5.0
     assert push["reaction_speed_towards_m_s"] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("later", "felt"), [(0.3, True), (-0.3, False), (0.0, False)])
+def test_a_reaction_from_standstill_is_judged_by_its_first_motion(later, felt):
+    steps = [step(1.0, 0.0), step(1.1, 0.0, begins=True), step(1.2, 0.0, reaction=later), step(5.1, 0.0)]
+    (push,) = release.judged(record(steps), PERSON)
+    assert (push["felt"], push["reactions"], push["against_while_held"]) == (felt, 1, int(later < 0))
 
 
 def test_a_push_that_never_touched_is_left_out_and_the_next_touch_ends_the_watch():

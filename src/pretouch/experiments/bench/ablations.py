@@ -22,6 +22,7 @@ OFF = {
     "detection.freeze_while_reacting": "no",
     "detection.use_proximity": "no",
     "detection.learn": "no",
+    "detection.widen_at_turns": "no",
     "reaction.method": "decay",
     "reaction.clamps": "no",
     "reaction.gives_up": "no",

@@ -119,8 +119,8 @@ def _judge(record: Record, force_n: float, touch: float, release: float, end: fl
     mean = record.true_force[pushed].mean(axis=0)
     along = mean / np.linalg.norm(mean)
     steps = [s for s in record.steps if touch <= s.stamp <= end]
-    reactions = [s for s in steps if s.contact is not None]
-    against = [s.stamp for s in reactions if s.reaction_velocity @ along < 0]
+    reactions = [(s.stamp, float(v @ along)) for s, v in record.beginnings() if touch <= s.stamp <= end]
+    against = [stamp for stamp, speed in reactions if speed < 0]
     speed = towards(steps, along)
     after = np.array([s.stamp > release for s in steps[1:]])
     opposed = np.array([bool(s.reaction_velocity @ along < 0) for s in steps[1:]])
@@ -131,7 +131,7 @@ def _judge(record: Record, force_n: float, touch: float, release: float, end: fl
         "estimated_fraction": rounded(
             float(np.mean([np.isfinite(s.force).all() for s in steps if s.stamp <= release]))
         ),
-        "felt": any(s.reaction_velocity @ along > 0 and s.stamp <= release + _NOTICE_S for s in reactions),
+        "felt": any(speed > 0 and stamp <= release + _NOTICE_S for stamp, speed in reactions),
         "reactions": len(reactions),
         "against_while_held": sum(t <= release for t in against),
         "against_after_release": sum(t > release for t in against),

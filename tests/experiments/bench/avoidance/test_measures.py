@@ -124,7 +124,9 @@ def test_reactions_are_judged_by_the_true_force_before_them():
     # pushed towards +y from 1.0 to 1.2 s: an answer with it, an echo against it, and one for nothing
     steps = [step(i) for i in range(900)]
     for i, speed in ((110, 0.2), (250, -0.2), (800, -0.2)):
-        steps[i].contact, steps[i].reaction_velocity = object(), np.array([0.0, speed, 0.0])
+        steps[i].contact, steps[i].mode = object(), Mode.REACT
+        # torn loose one step later
+        steps[i + 1].mode, steps[i + 1].reaction_velocity = Mode.REACT, np.array([0.0, speed, 0.0])
     row = measures.reactions(record(steps, [(1.0, 1.2, 15.0)]))
     assert row == {"reactions": 3, "false_reactions": 2, "towards_person": 1}
 

@@ -169,13 +169,13 @@ def reactions(record: Record) -> Row:
     force, time = record.true_force, record.true_time
     touching = time[np.linalg.norm(force, axis=1) > TOUCH_N]
     false = towards = 0
-    for step in record.reactions():
+    for step, velocity in record.beginnings():
         before = touching[touching <= step.stamp]
         since = step.stamp - float(before[-1]) if len(before) else np.inf
         false += since > _CAUSE_S
         if since <= _ECHO_S:
             last = (time > before[-1] - 0.05) & (time <= before[-1])
-            towards += float(step.reaction_velocity @ force[last].mean(axis=0)) < 0
+            towards += float(velocity @ force[last].mean(axis=0)) < 0
     return {"reactions": len(record.reactions()), "false_reactions": int(false), "towards_person": int(towards)}
 
 
