@@ -201,7 +201,7 @@ def _play_with(monkeypatch, result):
             BrokenProcessPool("a process ended"),
             "A worker process was killed.*the same command with the same --out goes on",
         ),
-        (OSError(28, "No space left on device"), r"failed with results .*\(No space left on device\).* goes on"),
+        (OSError(28, "No space left on device"), r"could not be written .*\(No space left on device\).* goes on"),
     ],
 )
 def test_what_ended_a_worker_is_said(tmp_path, monkeypatch, error, words):
