@@ -97,13 +97,13 @@ def test_goals_that_are_just_reached_are_reached():
     assert [goal.reached for goal in goals(*measured())] == [True] * 14
     table = goal_table(*measured())
     assert table.rows[0][1:] == ("reached", "0.4/h (2 in 5 h)", "0.05 to 1.4/h")
-    assert table.rows[9][2:] == ("5 times (32 trials)", "4.5 to 10 times")
+    assert table.rows[9][2:] == ("5 times (32 trials)", "4.55 to 10 times")
     assert table.rows[12][2:] == ("30 % (32 trials); 6.0 N and 6.0 N", "23 to 65 %")
 
 
 def test_a_goal_that_is_missed_says_so_with_its_number():
     late = goal_table(*measured(of=("paper-off", "first_contact_s"), part=None))
-    assert late.rows[11][1:] == ("not reached", "0 times (32 trials)", "1.8 to 4 times")
+    assert late.rows[11][1:] == ("not reached", "0 times (32 trials)", "1.82 to 4 times")
     assert goal_table(*measured(towards_person=1)).rows[8][1] == "not reached"
     detection, avoidance = measured()
     detection["rows"][4]["missed"] = 1

@@ -127,7 +127,7 @@ def pair(paired: list[Row], family: str, reference: str, measure: str, contender
 
 
 def _times(part: float | None) -> str:
-    return "0" if part is None else "more than all" if part == 0.0 else short(1 / part)
+    return "0" if part is None else "more than all" if part == 0.0 else f"{1 / part:.3g}"
 
 
 def _boards(paired: list[Row]) -> list[Goal]:
