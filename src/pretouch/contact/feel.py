@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.detect import Detection, detect
 from pretouch.contact.felt import SequentialState, sequential_init, take_sample
 from pretouch.contact.fixed import force_map, share_of_band, share_of_bounds
@@ -39,7 +40,7 @@ def learnt(state: FeelState) -> ResidualModel | None:
 
 def feel(
     state: FeelState, model: RobotModel, kin: Kinematics, robot: RobotState, obstacles: Obstacles, reacting: bool,
-    profile: Profile, watched: bool = True,
+    profile: Profile, watched: bool = True, cues: Cues | None = None,
 ) -> tuple[Detection, FeelState]:  # fmt: skip
     """Take in one sample of what the robot feels, and say whether it is a contact.
 
@@ -52,6 +53,7 @@ def feel(
         reacting: whether the arm moves with a contact.
         profile: parameters.
         watched: whether a skin watches, all of its units heard: else nothing is learnt of free motion.
+        cues: what units say of a touch, for the method sequential; None for nothing.
     """
     p, force = profile.detection, None if robot.wrench is None else robot.wrench[:3]
     found, window = detect(state.window, force, kin.position[model.ee], obstacles, profile.threshold)
@@ -72,7 +74,8 @@ def feel(
         return Detection(bands, contact, found.armed, robot.tau_ext, share), FeelState(window, ())
     before = state.sequential[0] if state.sequential else sequential_init(model, p)
     felt, after = take_sample(
-        before, model, kin, robot, obstacles, reacting, watched, profile.task.control_period_s, p
+        before, model, kin, robot, obstacles, reacting, watched, profile.task.control_period_s, p,
+        no_cues(len(model.links)) if cues is None else cues,
     )  # fmt: skip
     bands = Thresholds(felt.bands)
     contact = _contact(felt.force, bands) if felt.sure and found.armed else None

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.contact.cues import Cues
 from pretouch.contact.fixed import force_map_into
 from pretouch.contact.hypotheses import write_hypotheses
 from pretouch.contact.lasting_load import find_lasting, learn_lasting, stands_out, still_explains, weight_part
@@ -91,7 +92,7 @@ def sequential_init(model: RobotModel, p: DetectionParams, learnt: ResidualModel
 
 def take_sample(
     state: SequentialState, model: RobotModel, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-    reacting: bool, watched: bool, period: float, p: DetectionParams,
+    reacting: bool, watched: bool, period: float, p: DetectionParams, cues: Cues,
 ) -> tuple[Felt, SequentialState]:  # fmt: skip
     """Hold one sample of the external torques against free motion, and learn from it if nothing can be a contact.
 
@@ -105,6 +106,7 @@ def take_sample(
         watched: whether a skin watches, all of it heard.
         period: of control [s].
         p: parameters.
+        cues: what units say of a touch.
     """
     m, o, n = state.model, obstacles, model.n
     residual, speed, force, bands = np.empty(n), np.empty(n), np.empty(3), np.empty((6, 3))
@@ -127,6 +129,7 @@ def take_sample(
         weights, covariance, spread, seen, prior, lasting, state.steady, settle, turning,
         math.exp(-p.observer_gain_1_s * period), may, p.inertia, p.widen_at_turns, reacting, p.offset_prior_nm,
         alarm_level(p, period), period, p.use_proximity, p.contact_gain, p.tails,
+        cues.gain,
         p.near_gain, p.near_m, p.near_horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm, p.still_rad_s,
         p.memory_s, p.spread_memory_s, (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2,
         residual, speed, force, bands,
@@ -156,6 +159,7 @@ def _take(
     lasting: FloatArray, steady: int, settle: int, turning: FloatArray,
     late: float, may: bool, inertial: bool, widened: bool, reacting: bool, offset_prior: float,
     level: float, period: float, use_proximity: bool, gain: float, tails: float,
+    touch_gain: FloatArray,
     near_gain: float, near: float, horizon: float, clear: float, suspect: float, floor: float, bias_floor: float,
     still: float, memory: float, spread_memory: float, most_velocity: float, most_torque: float,
     residual: FloatArray, speed: FloatArray, force: FloatArray, bands: FloatArray,
@@ -185,7 +189,7 @@ def _take(
     away = np.zeros((most, 3))
     write_hypotheses(
         anchor, axis, position, rotation, moved_by, parts, middle, qd, link, body_point, direction, distance, closing,
-        near_gain, near, horizon, J, joints, weight, away,
+        touch_gain, near_gain, near, horizon, J, joints, weight, away,
     )  # fmt: skip
     log_r, window, which = judge(means, whole, S, doubt, J, joints, weight, away, gain, tails)
     evidence = max(0.0, log_r / level)

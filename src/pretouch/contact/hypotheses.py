@@ -13,19 +13,25 @@ def write_hypotheses(
     anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
     parts: IntArray, middle: FloatArray, qd: FloatArray,
     link: IntArray, body_point: FloatArray, direction: FloatArray, distance: FloatArray, closing: FloatArray,
-    gain: float, near: float, horizon: float,
+    touch_gain: FloatArray, gain: float, near: float, horizon: float,
     J: FloatArray, joints: IntArray, weight: FloatArray, away: FloatArray,
 ) -> None:  # fmt: skip
     """Write Jacobians (H, 3, n), joints (H,), prior weights (n + H,) and directions (H, 3) of the contacts looked for.
 
-    Each joint's weight, then each link's, then those of the nearest objects; see `sequential.judge`.
+    Each joint's weight, then each link's, then those of the nearest objects; see `sequential.judge`. The first two are
+    times `touch_gain` (L,) of the link; of several links behind one joint the largest counts.
     """
     n, count, full, point = len(anchor), len(parts), np.empty((6, len(anchor))), np.empty(3)
     order, k = nearest_of(distance, len(J) - count), 0
-    weight[:n] = 0.5 / n
+    weight[:n] = 0.0
+    for body in range(len(moved_by)):
+        before = moved_by[body].sum()
+        if before:
+            weight[before - 1] = max(weight[before - 1], 0.5 / n * touch_gain[body])
     for h in range(len(J)):
         if h < count:
-            touched, weight[n + h] = parts[h], 0.5 / count
+            touched = parts[h]
+            weight[n + h] = (0.5 / count) * touch_gain[touched]
             for a in range(3):
                 point[a] = position[touched, a]
                 for b in range(3):

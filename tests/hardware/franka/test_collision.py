@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.contact.cues import no_cues
 from pretouch.contact.felt import sequential_init, take_sample
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.collision import (
@@ -74,7 +75,7 @@ def evidence(model: RobotModel, force: np.ndarray) -> float:
     state = replace(state, model=replace(state.model, speed=speed))
     robot = RobotState(0.0, q, speed, q, speed, model.ee_jacobian(kin)[:3].T @ force, None)
     free = Obstacles(whole, rows, none, rows, whole, rows, none, none)
-    return take_sample(state, model, kin, robot, free, False, False, 0.01, p)[0].evidence
+    return take_sample(state, model, kin, robot, free, False, False, 0.01, p, no_cues(len(model.links)))[0].evidence
 
 
 def test_what_the_sequential_detector_may_miss_is_what_it_misses(panda_model: RobotModel) -> None:

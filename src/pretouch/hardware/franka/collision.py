@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pretouch.checks import Checked, Positive
+from pretouch.contact.cues import no_cues
 from pretouch.contact.felt import sequential_init, take_sample
 from pretouch.errors import ParameterError
 from pretouch.params import Profile
@@ -146,11 +147,11 @@ def felt_from_n(profile: Profile, model: RobotModel) -> float:
     p, period, J = profile.detection, profile.task.control_period_s, model.ee_jacobian(kin)[:3]
     fresh = sequential_init(model, p)
     state = replace(fresh, model=replace(fresh.model, speed=speed))
-    nothing = Obstacles(whole, rows, none, rows, whole, rows, none, none)
+    nothing, quiet = Obstacles(whole, rows, none, rows, whole, rows, none, none), no_cues(len(model.links))
 
     def is_felt(force: FloatArray) -> bool:
         robot = RobotState(0.0, q, speed, q, speed, J.T @ force, None)
-        return take_sample(state, model, kin, robot, nothing, False, False, period, p)[0].evidence >= 1.0
+        return take_sample(state, model, kin, robot, nothing, False, False, period, p, quiet)[0].evidence >= 1.0
 
     latest = 0.0
     for axis in np.eye(3):
