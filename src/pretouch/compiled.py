@@ -12,7 +12,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 _NOT_COMPILED = (
     "cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording", "calibration",
-    "importing", "session", "traces.py",
+    "importing", "coverage", "session", "traces.py",
 )  # fmt: skip
 
 

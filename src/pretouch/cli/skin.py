@@ -2,6 +2,7 @@
 
 from pretouch.cli.calibrate.options import Calibrate
 from pretouch.cli.skin_commands import Keys, Monitor, Provision, Simulate, SkinCommand
+from pretouch.cli.skin_coverage_options import Coverage
 
 
 def skin(command: SkinCommand) -> int:
@@ -15,6 +16,10 @@ def skin(command: SkinCommand) -> int:
             from pretouch.cli.calibrate.command import calibrate_skin
 
             return calibrate_skin(command)
+        case Coverage():
+            from pretouch.cli.skin_coverage import skin_coverage
+
+            skin_coverage(command)
         case Simulate():
             from pretouch.cli.skin_simulate import simulate_units
 

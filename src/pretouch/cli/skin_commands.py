@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import tyro
 
 from pretouch.cli.calibrate.options import Calibrate
+from pretouch.cli.skin_coverage_options import Coverage
 from pretouch.hardware.address import HOST, PORT
 
 
@@ -125,6 +126,7 @@ class Simulate:
 SkinCommand = (
     Annotated[Monitor, tyro.conf.subcommand("monitor")]
     | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
+    | Annotated[Coverage, tyro.conf.subcommand("coverage")]
     | Annotated[Simulate, tyro.conf.subcommand("simulate")]
     | Annotated[Provision, tyro.conf.subcommand("provision")]
     | Annotated[Keys, tyro.conf.subcommand("keys")]
@@ -133,6 +135,6 @@ SkinCommand = (
 
 @dataclass(frozen=True)
 class Skin:
-    """Sensor units: watch them, set them up, find where they sit, or simulate them."""
+    """Sensor units: watch them, set them up, find where they sit, what they see in time, or simulate them."""
 
     what: SkinCommand

@@ -1,0 +1,160 @@
+"""`pretouch skin coverage`: what a skin sees in time, its blind spots, and where more units help most."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from pretouch.cli.calibrate.outputs import check_free, same_file
+from pretouch.cli.skin_coverage_options import Coverage as Asked
+from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
+from pretouch.cli.tables import show
+from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.coverage.blind import BlindSpot, blind_spots
+from pretouch.coverage.measure import Coverage, Share, covered
+from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.suggest import Suggestions, suggest
+from pretouch.coverage.ways import Ways
+from pretouch.errors import ExperimentError, ParameterError, SkinError
+from pretouch.experiments.campaign import write_json
+from pretouch.experiments.coverage.measuring import Setting, coverage_of
+from pretouch.importing.folder import SKIN
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.description_file import load_description
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
+from pretouch.sim.scene import SceneSpec, fixtures
+
+_FORMATS = (".png", ".pdf", ".svg")
+_SPOTS = 8
+"""Blind spots that are printed; the file of numbers has all."""
+
+
+def skin_coverage(command: Asked) -> None:
+    """Measure, print and write what is asked for."""
+    model, skin, source = _arm_and_skin(command)
+    _check_outputs(command, source)
+    setting = Setting(
+        model, fixtures(SceneSpec(floor_height=command.floor)), _params(command), command.workspace,
+        command.postures, command.seed,
+    )  # fmt: skip
+    ways = setting.ways()
+    console = Console(highlight=False)
+    found, sees = coverage_of(ways, skin)
+    spots = blind_spots(ways, found)
+    show(console, [link_table(found, setting), unit_table(skin, ways, sees)])
+    for line in spot_lines(spots, _SPOTS):
+        console.print(line, markup=False, soft_wrap=True)
+    numbers = _numbers(command, setting, found, spots)
+    shown, new = skin, frozenset[str]()
+    if command.suggest:
+        suggested = suggest(ways, skin, command.suggest)
+        shown, new = Skin((*skin.units, *suggested.units), model), frozenset(unit.id for unit in suggested.units)
+        found, numbers["suggested"] = _suggested(console, setting, skin, shown, suggested)
+        if command.out:
+            save_skin(shown, Path(command.out))
+            console.print(f"Skin: {command.out}", markup=False, soft_wrap=True)
+    if command.figure:
+        _draw(command.figure, ways if not new else setting.ways(1), found, shown, new)
+        console.print(f"Figure: {command.figure}", markup=False, soft_wrap=True)
+    if command.json:
+        with unwritable_said("file", Path(command.json)):
+            write_json(numbers, Path(command.json))
+        console.print(f"Numbers: {command.json}", markup=False, soft_wrap=True)
+
+
+def _arm_and_skin(command: Asked) -> tuple[RobotModel, Skin, Path | None]:
+    """Return the arm, its skin, and the skin's file if one was named."""
+    folder = None if command.arm in ("panda", "fr3") else Path(command.arm)
+    if folder is None:
+        model = RobotModel(panda() if command.arm == "panda" else fr3())
+    else:
+        model = RobotModel(load_description(folder))
+    if command.skin:
+        return model, load_skin(command.skin, model), Path(command.skin)
+    if folder is None:
+        return model, paper_skin(model), None
+    own = (folder if folder.is_dir() else folder.parent) / SKIN
+    return model, load_skin(own, model), own
+
+
+def _params(command: Asked) -> CoverageParams:
+    return CoverageParams(
+        object_radius_m=command.object_radius, object_speed_m_s=command.speed, arm_speed_m_s=command.arm_speed,
+        deceleration_m_s2=command.deceleration, rate_hz=command.rate, latency_s=command.latency,
+        range_m=command.range, way_m=command.way, reflectance=command.reflectance,
+    )  # fmt: skip
+
+
+def _check_outputs(command: Asked, source: Path | None) -> None:
+    """Refuse, before anything is computed, what could not be done or would be lost."""
+    if command.suggest < 0:
+        raise SkinError(f"{command.suggest} more units are asked for: give 1 or more, or leave out --suggest.")
+    if command.out and not command.suggest:
+        raise SkinError(f"--out {command.out} is for the skin with more units: say how many with --suggest.")
+    if command.seed < 0:
+        raise ParameterError(f"The seed is {command.seed}: give 0 or more.")
+    if command.figure and Path(command.figure).suffix not in _FORMATS:
+        raise ExperimentError(f"The figure {command.figure} ends in none of {', '.join(_FORMATS)}: name it so.")
+    places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
+    given = [(what, Path(text)) for what, text in places if text]
+    for i, (what, place) in enumerate(given):
+        others = [other for _, other in given[:i]] + ([source] if source else [])
+        if any(same_file(other, place) for other in others):
+            raise ExperimentError(f"The {what} {place} would take the place of another file that is read or written.")
+        check_free(what, place, command.replace)
+        check_writable(what, place)
+
+
+def _suggested(
+    console: Console, setting: Setting, skin: Skin, more: Skin, suggested: Suggestions
+) -> tuple[Coverage, dict[str, Any]]:
+    """Print what the new units add, by ways that they were not chosen by."""
+    fresh = setting.ways(1)
+    after, sees = coverage_of(fresh, more)
+    before = covered(fresh, sees[: len(skin)].any(axis=0))
+    show(console, [suggestion_table(suggested, before, after)])
+    return after, {
+        "units": [
+            {"id": s.unit.id, "link": s.unit.link, "T_link_sensor": s.unit.T_link_sensor.tolist(), "gain": s.gain}
+            for s in suggested.chosen
+        ],
+        "places": suggested.candidates,
+        "most_any_could_add": suggested.most,
+        "before": _links(before),
+        "after": _links(after),
+    }  # fmt: skip
+
+
+def _draw(file: str, ways: Ways, found: Coverage, skin: Skin, new: frozenset[str]) -> None:
+    from pretouch.experiments.figures.coverage import coverage_figure
+
+    with unwritable_said("figure", Path(file)):
+        coverage_figure(ways, found, skin, new).savefig(file, dpi=110)
+
+
+def _numbers(command: Asked, setting: Setting, found: Coverage, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
+    return {
+        "asked": asdict(command),
+        "parameters": asdict(setting.params) | {"warning_m": setting.params.warning_m},
+        "links": _links(found),
+        "blind_spots": [
+            {
+                "name": s.sentence, "link": s.link, "facing": s.facing, "side": s.side, "area_m2": s.area_m2,
+                "center_m": s.center.tolist(), "share": s.share,
+            }
+            for s in spots
+        ],
+    }  # fmt: skip
+
+
+def _links(found: Coverage) -> list[dict[str, Any]]:
+    return [
+        {"link": one.name, "area_m2": one.area_m2, "ways": _share(one.ways), "surface": _share(one.surface)}
+        for one in (*found.links, found.arm)
+    ]
+
+
+def _share(share: Share) -> dict[str, float]:
+    return {"share": share.value, "low": share.low, "high": share.high}

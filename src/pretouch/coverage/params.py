@@ -1,0 +1,95 @@
+"""What comes at the arm, what the units can do, and how early is early enough."""
+
+import math
+from dataclasses import dataclass
+
+from pretouch.checks import Checked, Fraction, NonNegative, Positive
+from pretouch.errors import ParameterError
+from pretouch.perception.sighting import GRID_M
+
+
+@dataclass(frozen=True)
+class CoverageParams(Checked):
+    """A ball comes straight at the arm, which moves towards it; both speeds add up. Figures without a source are ours."""
+
+    object_radius_m: Positive = 0.05
+    """Radius of the ball [m]: a fist, as in the simulation."""
+    object_speed_m_s: NonNegative = 0.5
+    """Its speed v_o [m/s]."""
+    arm_speed_m_s: Positive = 0.3
+    """Speed v_a at which the arm moves towards it [m/s]: the task's."""
+    deceleration_m_s2: Positive = 0.6
+    """Deceleration a with which the arm brakes [m/s^2] (`AnticipationParams.deceleration_m_s2`)."""
+    rate_hz: Positive = 50.0
+    """Readings of a unit a second [Hz]: VL53L1X, short mode."""
+    latency_s: NonNegative = 0.04
+    """Time from a measurement to a motion [s]: `AnticipationParams.latency_s` less the period of a reading."""
+    range_m: Positive = 1.3
+    """Farthest target that fills the cone [m]: VL53L1X, short mode."""
+    way_m: Positive = 0.8
+    """Length of the straight way that is looked at, and has to be free [m]: about a person's reach."""
+    reflectance: Fraction = 0.5
+    """Diffuse reflectance at 940 nm: skin and light cloth reach 0.5 and more."""
+    reflectance_limit: Positive = 0.17
+    """Reflectance of a target that fills the cone and is just seen at `range_m` (data sheet: grey)."""
+    self_margin_m: NonNegative = 0.06
+    """What is seen from this much before the arm's or the room's own return on is taken for these [m]
+    (`PerceptionParams.self_margin_m`)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.first + self.run > self.last:
+            raise ParameterError(
+                f"At these speeds a thing has to be seen {self.warning_m:.2f} m before it touches, but ways are"
+                f" {self.way_m:g} m long: give slower speeds, a greater deceleration, or longer ways."
+            )
+
+    @property
+    def closing_m_s(self) -> float:
+        """Speed at which both come together [m/s]."""
+        return self.object_speed_m_s + self.arm_speed_m_s
+
+    @property
+    def braking_m(self) -> float:
+        """Way that closes while the arm comes to rest [m]: v_a^2 / (2 a) of the arm, v_o v_a / a of the object."""
+        v_a, v_o = self.arm_speed_m_s, self.object_speed_m_s
+        return v_a * (v_a / 2 + v_o) / self.deceleration_m_s2
+
+    @property
+    def reading_m(self) -> float:
+        """Way that closes in the period of a reading [m]."""
+        return self.closing_m_s / self.rate_hz
+
+    @property
+    def last_reading_m(self) -> float:
+        """Way left at the last measurement that comes in time [m]."""
+        return self.closing_m_s * self.latency_s + self.braking_m
+
+    @property
+    def warning_m(self) -> float:
+        """Way left at which a thing has to come into view [m], so that a reading surely comes in time."""
+        return self.last_reading_m + self.reading_m
+
+    @property
+    def light_m2(self) -> float:
+        """Square of the distance at which a ball that fills the cone is just seen [m^2]; a ball's mean slant is 2/3."""
+        return 2.0 / 3.0 * self.reflectance / self.reflectance_limit * self.range_m**2
+
+    @property
+    def first(self) -> int:
+        """Number of the nearest place on a way's grid that counts."""
+        return _steps(self.last_reading_m)
+
+    @property
+    def last(self) -> int:
+        """Number of the farthest place on it."""
+        return int(self.way_m / GRID_M + 1e-9)
+
+    @property
+    def run(self) -> int:
+        """Steps of the grid that make a reading sure."""
+        return _steps(self.reading_m)
+
+
+def _steps(way: float) -> int:
+    return math.ceil(way / GRID_M - 1e-9)

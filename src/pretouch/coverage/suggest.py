@@ -1,0 +1,141 @@
+"""Where more units help most: one after the other, each where it adds most to what is seen in time.
+
+What a set of units sees grows with each unit, and by less the more there are (it is submodular), so N units chosen this
+way see at least 1 - 1/e, 63 %, of what the best N of the same places could add (Nemhauser, Wolsey and Fisher 1978).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.control.braking import tangents_of
+from pretouch.coverage.surface import surface_of
+from pretouch.coverage.ways import Ways, seen_by
+from pretouch.errors import SkinError
+from pretouch.perception.obstacles import poses
+from pretouch.perception.scene_filter import expected_range
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
+from pretouch.types import BoolArray, FloatArray
+
+HEIGHT_M = 0.008
+"""Height of a range finder above the surface [m]."""
+_CLEAR_M = 0.4
+"""How far the beam of a place has to leave the arm and the room, in the ready posture [m]."""
+PLACES = 320
+"""Places that are looked at, less those from which a unit would see its own arm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suggestion:
+    """A place for one more unit."""
+
+    unit: SensorUnit
+    gain: float
+    """By how much it raises the whole arm's share, after those before it, where it was chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suggestions:
+    """Places for N more units, the best first."""
+
+    chosen: tuple[Suggestion, ...]
+    most: float
+    """No N of these places can raise the share by more: the least of two bounds, (1) what the chosen ones add by
+    1 - 1/e, (2) what they add and the N largest gains that are left."""
+    candidates: int
+
+    @property
+    def units(self) -> tuple[SensorUnit, ...]:
+        """The units alone."""
+        return tuple(one.unit for one in self.chosen)
+
+
+def candidates(ways: Ways, skin: Skin) -> tuple[SensorUnit, ...]:
+    """Places all over the arm, looking outwards along the normal, whose beams leave the arm in the ready posture."""
+    model = ways.model
+    kin = model.kinematics(model.description.q_ready)
+    at = surface_of(model, PLACES)
+    units = [
+        SensorUnit(f"place {i}", model.links[at.link[i]], _looking(at.point[i], at.normal[i])) for i in range(len(at))
+    ]
+    T = np.array([unit.T_link_sensor for unit in units])
+    position, rotation = poses(kin.position, kin.rotation, at.link, T)
+    view = expected_range(kin, position, rotation, np.full(len(at), -1, np.int64), model.capsules, ways.room)
+    taken = [(unit.link, unit.T_link_sensor[:3, 3]) for unit in skin.units]
+    return tuple(
+        unit
+        for unit, free in zip(units, view, strict=True)
+        if free > _CLEAR_M and _fits(unit, model) and not _beside(unit, taken)
+    )
+
+
+def suggest(ways: Ways, skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None) -> Suggestions:
+    """Choose so many places for more units. Raises SkinError if there are not as many."""
+    places = candidates(ways, skin) if places is None else places
+    if not 1 <= count <= len(places):
+        raise SkinError(f"{count} more units are asked for, and {len(places)} places found: ask for 1 to {len(places)}.")
+    weight = (ways.surface.area[ways.point] * ways.free).ravel()
+    weight /= max(float(weight.sum()), 1e-12)
+    by_skin = seen_by(ways, skin.link, skin.T_link_sensor).any(axis=0).ravel()
+    offered = Skin(places, ways.model)
+    by_place = seen_by(ways, offered.link, offered.T_link_sensor).reshape(len(places), -1)
+    order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), count)
+    ids = _free_ids(skin, count)
+    chosen = tuple(
+        Suggestion(SensorUnit(name, places[i].link, places[i].T_link_sensor), gain)
+        for name, i, gain in zip(ids, order, gains, strict=True)
+    )
+    added = sum(gains)
+    most = min(added / (1 - 1 / np.e), added + left, float(weight[~by_skin].sum()))
+    return Suggestions(chosen, float(most), len(places))
+
+
+def greedy(sees: BoolArray, weight: FloatArray, count: int) -> tuple[list[int], list[float], float]:
+    """Choose `count` of C sets (C, W) of weighted elements (W,), each that which adds most to those before.
+
+    Returns:
+        Their indices, what each added, and the sum of the `count` largest gains that are left.
+    """
+    rest, order, gains = weight.copy(), list[int](), list[float]()
+    for _ in range(count):
+        gain = sees @ rest
+        gain[order] = -1.0
+        best = int(gain.argmax())
+        order.append(best)
+        gains.append(float(gain[best]))
+        rest[sees[best]] = 0.0
+    left = np.sort(sees @ rest)[::-1][:count]
+    return order, gains, float(left.sum())
+
+
+def _looking(point: FloatArray, normal: FloatArray) -> FloatArray:
+    """Pose (4, 4) of a unit above a surface point (3,) [m], its beam along the normal (3,); rounded to 10 um."""
+    across, T = np.empty((2, 3)), np.eye(4)
+    tangents_of(normal, across)
+    T[:3, :3] = np.column_stack([across[0], across[1], normal])
+    T[:3, 3] = np.round(point + HEIGHT_M * normal, 5)
+    return T
+
+
+def _fits(unit: SensorUnit, model: RobotModel) -> bool:
+    try:
+        Skin([unit], model)
+    except SkinError:
+        return False
+    return True
+
+
+def _beside(unit: SensorUnit, taken: list[tuple[str, FloatArray]]) -> bool:
+    """Whether another unit is where this one would be: a board has about 3 cm."""
+    return any(link == unit.link and np.linalg.norm(unit.T_link_sensor[:3, 3] - p) < 0.03 for link, p in taken)
+
+
+def _free_ids(skin: Skin, count: int) -> list[str]:
+    taken, ids, number = set(skin.ids), list[str](), 1
+    while len(ids) < count:
+        if (name := f"suggested_{number}") not in taken:
+            ids.append(name)
+        number += 1
+    return ids

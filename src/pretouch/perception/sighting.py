@@ -1,0 +1,142 @@
+"""Whether units would see a ball that comes straight at the arm, and whether it has room to come.
+
+A way is a straight line of the ball's centre: s metres before the contact it is at start + s u. It is looked at every
+`GRID_M`, at places that are the same at any speed, so that a faster ball never counts as seen where a slower one does not.
+"""
+
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.perception.scene_filter import ray_capsule
+from pretouch.sensing.unit import CONE_ANGLE
+from pretouch.types import BoolArray, FloatArray, IntArray
+
+GRID_M = 0.01
+"""Distance between two places of a way that are looked at [m]."""
+
+_TAN = float(np.tan(CONE_ANGLE / 2))
+_TOUCHING_M = 1e-6
+"""Depth to which rounding may put a ball into what it touches [m]."""
+
+
+@compiled
+def ways_free(
+    start: FloatArray, way: FloatArray, length: float, radius: float, own: IntArray, a: FloatArray, b: FloatArray,
+    thickness: FloatArray, planes: FloatArray, free: BoolArray,
+) -> None:  # fmt: skip
+    """Write whether (W,) a ball can come along each way without meeting anything before the contact.
+
+    Args:
+        start: (W, 3) centre of the ball at the contact [m].
+        way: (W, 3) unit vectors u from there to where it comes from.
+        length: of the ways [m].
+        radius: of the ball [m].
+        own: (W,) index of the capsule that each touches.
+        a: (C, 3) one end of each capsule's axis [m], base frame, as all else.
+        b: (C, 3) other end [m].
+        thickness: (C,) their radii [m].
+        planes: (P, 4) rows (normal, offset), the normal pointing into free space.
+        free: (W,) the answer.
+    """
+    for w in range(len(start)):
+        free[w] = True
+        for m in range(len(planes)):
+            height, rise = -planes[m, 3], 0.0
+            for i in range(3):
+                height += planes[m, i] * start[w, i]
+                rise += planes[m, i] * way[w, i]
+            free[w] &= height + min(0.0, length * rise) >= radius
+        for c in range(len(thickness)):
+            if free[w] and c != own[w]:
+                reach = max(thickness[c] + radius - _TOUCHING_M, 0.0)
+                free[w] = ray_capsule(start[w], way[w], a[c], b[c], reach) > length
+
+
+@compiled
+def ways_seen(
+    start: FloatArray, way: FloatArray, free: BoolArray, radius: float, first: int, last: int, run: int,
+    position: FloatArray, rotation: FloatArray, limit: FloatArray, light: float, seen: BoolArray,
+) -> None:  # fmt: skip
+    """Write whether (K, W) each unit has the ball in view at `run` + 1 places of the grid in a row.
+
+    Args:
+        start: (W, 3) as for `ways_free`.
+        way: (W, 3) likewise.
+        free: (W,) ways to look at; the others count as not seen.
+        radius: of the ball [m].
+        first: number of the nearest place that counts, s = first GRID_M.
+        last: number of the farthest.
+        run: so many steps of the grid the ball has to be in view.
+        position: (K, 3) of the units [m].
+        rotation: (K, 3, 3) of the units, z along the beam.
+        limit: (K,) farthest reading that shows the ball, and not the arm or the room [m].
+        light: of `in_view` [m^2].
+        seen: (K, W) the answer.
+    """
+    near, far = first * GRID_M, last * GRID_M
+    for k in range(len(position)):
+        ox, oy, oz = position[k, 0], position[k, 1], position[k, 2]
+        zx, zy, zz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
+        reach = limit[k] + radius
+        for w in range(len(start)):
+            seen[k, w] = False
+            if not free[w]:
+                continue
+            x, y, z = start[w, 0] - ox, start[w, 1] - oy, start[w, 2] - oz
+            ux, uy, uz = way[w, 0], way[w, 1], way[w, 2]
+            along, offset2 = x * ux + y * uy + z * uz, x * x + y * y + z * z
+            closest = min(max(-along, near), far)
+            if offset2 + closest * (2 * along + closest) > reach * reach:
+                continue
+            depth, rise = x * zx + y * zy + z * zz, ux * zx + uy * zy + uz * zz
+            in_row = 0
+            for i in range(first, last + 1):
+                s = i * GRID_M
+                if in_view(depth + s * rise, offset2 + s * (2 * along + s), radius, limit[k], light):
+                    in_row += 1
+                    if in_row > run:
+                        seen[k, w] = True
+                        break
+                else:
+                    in_row = 0
+                    if last - i <= run:
+                        break
+
+
+@compiled
+def in_view(depth: float, distance2: float, radius: float, limit: float, light: float) -> bool:
+    """Whether a unit sees a ball: enough of it in the cone, and nearer than `limit` [m].
+
+    A reading comes from the ball's surface, on average 2/3 of the radius before its centre, d. With A the part of the
+    cone's cross-section that the ball fills, there is light enough where light A / d^2 >= 1.
+
+    Args:
+        depth: of the ball's centre along the beam [m].
+        distance2: of the centre from the unit, squared [m^2].
+        radius: of the ball [m].
+        limit: farthest reading that counts [m].
+        light: square of the distance at which something that fills the cone, as slanted as a ball, is just seen [m^2].
+    """
+    if distance2 <= radius * radius:
+        return True
+    read = np.sqrt(distance2) - 2.0 / 3.0 * radius
+    if depth <= 0 or read > limit:
+        return False
+    cone, aside = depth * _TAN, np.sqrt(max(0.0, distance2 - depth * depth))
+    if aside >= cone + radius:
+        return False
+    return bool(light * common_area(radius, cone, aside) >= np.pi * cone * cone * read * read)
+
+
+@compiled
+def common_area(r: float, R: float, apart: float) -> float:
+    """Area [m^2] that two circles of radii r and R [m] share, whose centres are `apart` [m]."""
+    if apart >= r + R:
+        return 0.0
+    if apart <= abs(R - r):
+        least = min(r, R)
+        return np.pi * least * least
+    first = min(1.0, max(-1.0, (apart * apart + r * r - R * R) / (2 * apart * r)))
+    second = min(1.0, max(-1.0, (apart * apart + R * R - r * r) / (2 * apart * R)))
+    kite = (r + R - apart) * (apart + r - R) * (apart - r + R) * (apart + r + R)
+    return r * r * np.arccos(first) + R * R * np.arccos(second) - np.sqrt(max(0.0, kite)) / 2
