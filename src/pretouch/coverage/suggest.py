@@ -75,7 +75,9 @@ def suggest(ways: Ways, skin: Skin, count: int, places: tuple[SensorUnit, ...] |
     """Choose so many places for more units. Raises SkinError if there are not as many."""
     places = candidates(ways, skin) if places is None else places
     if not 1 <= count <= len(places):
-        raise SkinError(f"{count} more units are asked for, and {len(places)} places found: ask for 1 to {len(places)}.")
+        raise SkinError(
+            f"{count} more units are asked for, and {len(places)} places found: ask for 1 to {len(places)}."
+        )
     weight = (ways.surface.area[ways.point] * ways.free).ravel()
     weight /= max(float(weight.sum()), 1e-12)
     by_skin = seen_by(ways, skin.link, skin.T_link_sensor).any(axis=0).ravel()

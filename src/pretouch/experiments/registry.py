@@ -4,6 +4,7 @@ from typing import Any
 
 from pretouch.experiments import avoidance, clamp, dynamic, mounting, static, wire
 from pretouch.experiments.claims import anticipation, between, detectable, free_motion, noise
+from pretouch.experiments.coverage import study as coverage
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.tables import TextTable
 from pretouch.experiments.weaknesses import (
@@ -36,7 +37,7 @@ WEAKNESSES = (
     infeasible.EXPERIMENT,
 )
 HARDWARE = (wire.EXPERIMENT,)
-MOUNTING = (mounting.EXPERIMENT,)
+MOUNTING = (mounting.EXPERIMENT, coverage.EXPERIMENT)
 REACTION = (clamp.EXPERIMENT,)
 
 GROUPS = {

@@ -1,0 +1,101 @@
+"""Things that come at a simulated arm as coverage has them come: straight at random points, from random directions."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.surface import Surface
+from pretouch.coverage.ways import seen_by, ways_to
+from pretouch.errors import ExperimentError
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sim.ghost import Ghost
+from pretouch.sim.plant import Plant
+from pretouch.sim.scene import fixtures
+from pretouch.types import FloatArray
+
+START_S, EVERY_S = 2.0, 2.5
+"""When the first one sets out, and how long after it the next [s]."""
+PARKED = np.array([0.0, 0.0, -3.0])
+"""Where the ghost is in between: below the floor [m]."""
+_BATCH, _BATCHES = 16, 50
+
+
+@dataclass
+class Coming:
+    """One that comes: what was foreseen of it, where it was, and how it met the arm."""
+
+    link: int
+    center: FloatArray
+    """(3,) centre of the ball at the contact, link frame [m]."""
+    normal: FloatArray
+    """(3,) of the surface there, link frame."""
+    way: FloatArray
+    """(3,) unit vector to where it comes from, link frame."""
+    foreseen: bool
+    """Whether coverage says that it is seen in time, with the arm standing as it does when it sets out."""
+    track: dict[int, tuple[float, FloatArray]] = field(default_factory=dict)
+    """Way left [m] and centre (3,) [m] by the number of the physics step."""
+    touch_m_s: float | None = None
+    """Speed of the arm's surface towards it when they meet [m/s]; None if the trial ended before."""
+
+
+class Comers:
+    """Moves the ghost of a scene: it follows the link that it comes at, so that they meet whatever the arm does."""
+
+    def __init__(
+        self, model: RobotModel, skin: Skin, surface: Surface, params: CoverageParams, count: int, seed: int
+    ) -> None:
+        self._model, self._skin, self._surface, self._params = model, skin, surface, params
+        self._rng = np.random.default_rng([seed, 52])
+        self.came: list[Coming] = []
+        self.end = START_S + EVERY_S * count
+        """When the last one has come [s]."""
+        self._count = count
+
+    def attach(self, plant: Plant, _: object) -> None:
+        """Move the ghost before each physics step."""
+        self._plant, self._room = plant, fixtures(plant.scene)
+        Ghost(plant, self._place)
+
+    def _place(self, time: float) -> FloatArray:
+        number = int((time - START_S) // EVERY_S)
+        if not 0 <= number < self._count:
+            return PARKED
+        if number == len(self.came):
+            self.came.append(self._drawn())
+        coming = self.came[number]
+        left = self._params.way_m - self._params.closing_m_s * (time - START_S - number * EVERY_S)
+        R, p = self._plant.link_rotation[coming.link], self._plant.link_position[coming.link]
+        if left <= 0.0:
+            if coming.touch_m_s is None:
+                coming.touch_m_s = self._speed(coming, np.array(R), np.array(p))
+            return PARKED
+        center: FloatArray = p + R @ (coming.center + left * coming.way)
+        coming.track[round(time / self._plant.params.period_s)] = (left, center)
+        return center
+
+    def _drawn(self) -> Coming:
+        """Draw a free way to the arm as it stands."""
+        q = self._plant.mj_data.qpos[: self._model.n].copy()
+        surface, r = self._surface, self._params.object_radius_m
+        for _ in range(_BATCHES):
+            drawn = self._rng.choice(len(surface), _BATCH, p=surface.area / surface.area.sum())
+            ways = ways_to(self._model, self._room, self._params, surface.only(drawn), q[None], 1, self._rng)
+            if not ways.free.any():
+                continue
+            i = int(np.argmax(ways.free[0]))
+            sees = seen_by(ways, self._skin.link, self._skin.T_link_sensor)[:, 0, i]
+            link, normal = int(ways.surface.link[i]), ways.surface.normal[i]
+            along = ways.postures[0].rotation[link].T @ ways.way[0, i]
+            return Coming(link, ways.surface.point[i] + r * normal, normal, along, bool(sees.any()))
+        raise ExperimentError("Nothing can come at the arm where it stands: make the ways shorter.")
+
+    def _speed(self, coming: Coming, R: FloatArray, p: FloatArray) -> float:
+        """Speed [m/s] of the arm's surface towards the ball where they meet."""
+        data, n = self._plant.mj_data, self._model.n
+        kin = self._model.kinematics(data.qpos[:n].copy())
+        at = p + R @ (coming.center - self._params.object_radius_m * coming.normal)
+        velocity = self._model.jacobian(kin, coming.link, at)[:3] @ data.qvel[:n]
+        return float(velocity @ (R @ coming.normal))
