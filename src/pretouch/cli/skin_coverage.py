@@ -113,7 +113,7 @@ def _suggested(
     """Print what the new units add, by ways that they were not chosen by."""
     fresh = setting.ways(1)
     after, sees = coverage_of(fresh, more)
-    before = covered(fresh, sees[: len(skin)].any(axis=0))
+    before = covered(fresh, sees[: len(skin)])
     show(console, [suggestion_table(suggested, before, after)])
     return after, {
         "units": [

@@ -7,7 +7,7 @@ import tyro
 
 @dataclass(frozen=True)
 class Coverage:
-    """What share of all that could come at the arm a skin sees in time, link by link; its blind spots; better places."""
+    """What share of all that could come at the arm a skin sees in time, link by link; blind spots; better places."""
 
     skin: tyro.conf.Positional[str] = ""
     """Skin file; by default the seven units that come with the package, or the skin in the arm's folder."""

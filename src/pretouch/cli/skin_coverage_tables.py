@@ -23,9 +23,9 @@ def link_table(found: Coverage, setting: Setting) -> TextTable:
         f"Seen in time: {setting.model.description.name}, {setting.postures} postures of {setting.workspace}",
         ("link", "area\n[cm^2]", "ways\n[%]", "95 %", "surface\n[%]", "95 %"),
         rows,
-        f"A ball of {100 * p.object_radius_m:g} cm radius comes straight at a point at {p.object_speed_m_s:g} m/s, the arm"
-        f" at {p.arm_speed_m_s:g} m/s towards it: it has to come into view {p.warning_m:.2f} m before it touches. Ways: of"
-        " all ways to the surface that are free. Surface: points to which at least half of the ways are seen.",
+        f"A ball of {100 * p.object_radius_m:g} cm radius comes straight at a point at {p.object_speed_m_s:g} m/s, the"
+        f" arm at {p.arm_speed_m_s:g} m/s towards it: it has to come into view {p.warning_m:.2f} m before it touches."
+        " Ways: of all ways to the surface that are free. Surface: points to which at least half of them are seen.",
         names=1,
     )
 
@@ -68,8 +68,8 @@ def suggestion_table(suggested: Suggestions, before: Coverage, after: Coverage) 
         f"{len(suggested.chosen)} more units: {_said(before.arm.ways)} before, {_said(after.arm.ways)} after",
         ("unit", "link", "position\n[m]", "beam", "gain\n[%]"),
         rows,
-        f"Chosen one after the other of {suggested.candidates} places, each where it adds most; gains by the ways they were"
-        " chosen by, before and after by others. No choice of as many of these places could add more than"
+        f"Chosen one after the other of {suggested.candidates} places, each where it adds most; gains by the ways they"
+        " were chosen by, before and after by others. No choice of as many of these places could add more than"
         f" {100 * suggested.most:.1f} %; this way adds at least 63 % (1 - 1/e) of what the best would.",
     )
 

@@ -55,9 +55,9 @@ class Coverage:
         return np.where(free > 0, self.seen.sum(axis=0) / np.maximum(free, 1.0), np.nan)
 
 
-def covered(ways: Ways, seen: BoolArray) -> Coverage:
-    """Bring ways (S, W) that any unit sees in time together, by point and by link."""
-    count = len(ways.surface)
+def covered(ways: Ways, sees: BoolArray) -> Coverage:
+    """Bring together, by point and by link, what each of K units (K, S, W) sees in time."""
+    count, seen = len(ways.surface), np.logical_or.reduce(sees)
     free = np.array([np.bincount(ways.point, row, count) for row in ways.free])
     found = np.array([np.bincount(ways.point, row, count) for row in seen & ways.free])
     reached, link = free.sum(axis=0) > 0, ways.surface.link
@@ -80,9 +80,9 @@ def _of(name: str, surface: Surface, free: FloatArray, seen: FloatArray, points:
 def ratio(seen: FloatArray, free: FloatArray) -> Share:
     """Return sum(seen) / sum(free) of (S, P) with 95 % bounds, by the spread over postures and that over points, added.
 
-    The usual linearised variance of a ratio, once with postures and once with points as what was drawn: safe where they
-    vary together. Where all or none are seen nothing spreads, and the bound is that of as many trials as there are points
-    or postures, whichever are fewer (Clopper and Pearson); with one posture, of the points.
+    The usual linearised variance of a ratio, once with postures and once with points as what was drawn: safe where
+    they vary together. Where all or none are seen nothing spreads, and the bound is that of as many trials as there are
+    points or postures, whichever are fewer (Clopper and Pearson); with one posture, of the points.
     """
     total = float(free.sum())
     if total <= 0:

@@ -10,7 +10,7 @@ from pretouch.perception.sighting import GRID_M
 
 @dataclass(frozen=True)
 class CoverageParams(Checked):
-    """A ball comes straight at the arm, which moves towards it; both speeds add up. Figures without a source are ours."""
+    """A ball comes straight at the arm, which moves towards it. Figures without a source are ours."""
 
     object_radius_m: Positive = 0.05
     """Radius of the ball [m]: a fist, as in the simulation."""

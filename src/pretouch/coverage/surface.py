@@ -78,7 +78,7 @@ def on_capsule(
 
 def _inside(arm: Capsules, c: int, point: FloatArray) -> BoolArray:
     """Whether points (N, 3) of capsule c lie inside another one of its link."""
-    others = [i for i in np.flatnonzero(arm.link == arm.link[c]) if i != c]
+    others = [int(i) for i in np.flatnonzero(arm.link == arm.link[c]) if i != c]
     return np.array(
         [any(to_axis(point, n, arm.a, arm.b, i)[1] < arm.radius[i] for i in others) for n in range(len(point))],
         dtype=np.bool_,

@@ -1,7 +1,8 @@
 """Whether units would see a ball that comes straight at the arm, and whether it has room to come.
 
 A way is a straight line of the ball's centre: s metres before the contact it is at start + s u. It is looked at every
-`GRID_M`, at places that are the same at any speed, so that a faster ball never counts as seen where a slower one does not.
+`GRID_M`, at places that are the same at any speed, so that a faster ball never counts as seen where a slower one does
+not.
 """
 
 import numpy as np
@@ -139,4 +140,5 @@ def common_area(r: float, R: float, apart: float) -> float:
     first = min(1.0, max(-1.0, (apart * apart + r * r - R * R) / (2 * apart * r)))
     second = min(1.0, max(-1.0, (apart * apart + R * R - r * r) / (2 * apart * R)))
     kite = (r + R - apart) * (apart + r - R) * (apart - r + R) * (apart + r + R)
-    return r * r * np.arccos(first) + R * R * np.arccos(second) - np.sqrt(max(0.0, kite)) / 2
+    lens = r * r * np.arccos(first) + R * R * np.arccos(second) - np.sqrt(max(0.0, kite)) / 2
+    return max(0.0, lens)

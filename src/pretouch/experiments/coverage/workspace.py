@@ -1,4 +1,4 @@
-"""The postures that coverage is averaged over: along the paper's paths, in a box, or in the whole range of the joints."""
+"""The postures that coverage is averaged over: on the paper's paths, in a box, or in the joints' whole range."""
 
 import numpy as np
 
@@ -14,15 +14,15 @@ from pretouch.types import FloatArray
 
 KINDS = ("circle", "line", "paths", "joints")
 _DRAWN = 40
-"""Postures drawn at most for each that is wanted: most of a joint's whole range may be in the arm itself or the floor."""
+"""Postures drawn at most for each that is wanted: many meet the arm itself or the floor."""
 
 
 def postures(model: RobotModel, room: Fixtures, workspace: str, count: int, rng: np.random.Generator) -> FloatArray:
     """Draw postures (count, n) [rad] of a workspace.
 
-    `circle` and `line` are the paper's, `paths` both, the hand upright; `joints` is the whole range of the joints, where
-    the arm is clear of itself and of the room; six numbers with commas are opposite corners of a box of hand positions
-    [m], the hand upright. Raises ExperimentError for anything else, and where the arm cannot be.
+    `circle` and `line` are the paper's, `paths` both, the hand upright; `joints` is the whole range of the joints,
+    where the arm is clear of itself and of the room; six numbers with commas are opposite corners of a box of hand
+    positions [m], the hand upright. Raises ExperimentError for anything else, and where the arm cannot be.
     """
     if count < 2:
         raise ExperimentError(f"The number of postures is {count}: give at least 2.")

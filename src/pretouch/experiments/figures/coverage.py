@@ -47,10 +47,10 @@ def coverage_figure(ways: Ways, coverage: Coverage, skin: Skin, new: frozenset[s
         axes.set_title(title, fontsize="medium")
     bar = figure.colorbar(ScalarMappable(scale, colours), ax=panels, shrink=0.8, pad=0.02)
     bar.set_label("share of the ways to it seen in time")
-    share = coverage.arm.ways
+    seen = 100 * coverage.arm.ways.value
     figure.suptitle(
-        f"{ways.model.description.name}, {len(skin)} units: {100 * share.value:.0f} % of the ways to its surface are seen"
-        " in time (grey: nothing can come, or the base)",
+        f"{ways.model.description.name}, {len(skin)} units: {seen:.0f} % of the ways to its surface are seen in time"
+        " (grey: nothing can come, or the base)",
         fontsize="medium",
     )
     return figure

@@ -1,0 +1,147 @@
+"""Shares that can be worked out by hand, and what may never happen to one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pretouch.coverage.measure import covered, ratio
+from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.surface import surface_of
+from pretouch.coverage.ways import seen_by, ways_to
+from pretouch.sim.scene import SceneSpec, fixtures
+from tests.coverage.made import HEIGHT, ROOM, arm, below_it, skin, unit_at
+
+BRIGHT = CoverageParams(range_m=10.0, reflectance_limit=1e-3)
+HALF = np.deg2rad(13.5)
+READY = np.zeros((1, 2))
+
+
+def ways(model, params, surface=None, each=20_000, q=READY, room=ROOM):
+    rng = np.random.default_rng(5)
+    return ways_to(model, room, params, below_it(model) if surface is None else surface, q, each, rng)
+
+
+def share(model, params, units, each=20_000):
+    found, worn = ways(model, params, each=each), skin(model, *units)
+    return covered(found, seen_by(found, worn.link, worn.T_link_sensor)).arm.ways.value
+
+
+def test_directions_are_cosine_weighted(tmp_path):
+    found = ways(arm(tmp_path), BRIGHT)
+    cosine = found.way[0] @ np.array([1.0, 0.0, 0.0])
+    assert cosine.min() >= 0
+    # of a density 2 cos sin: cos^2 is uniform
+    assert np.histogram(cosine**2, 10, (0, 1))[0] / 20_000 == pytest.approx(0.1, abs=0.01)
+    assert found.free.all(), "nothing is in the way"
+
+
+def test_the_share_of_one_point_below_one_unit(tmp_path):
+    """A ball of radius r is in view up to s m away iff s sin(t - half) <= (r - h) sin(half) + r cos(half)."""
+    r, s = BRIGHT.object_radius_m, 0.01 * (BRIGHT.first + BRIGHT.run)
+    largest = HALF + np.arcsin(((r - HEIGHT) * np.sin(HALF) + r * np.cos(HALF)) / s)
+    expected = np.sin(largest) ** 2
+    assert expected == pytest.approx(0.1453, abs=1e-3)
+    found = share(arm(tmp_path), BRIGHT, [unit_at()])
+    assert found == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / 20_000))
+
+
+def test_range_latency_and_speed_end_it(tmp_path):
+    """On the axis a reading at s is s + r - h - 2 r / 3: within 0.5 m up to s = 0.491."""
+    model, within = arm(tmp_path), replace(BRIGHT, range_m=0.5)
+    assert share(model, replace(within, latency_s=0.17), [unit_at()], 2000) > 0.03, "first reading in time at 0.47 m"
+    assert share(model, replace(within, latency_s=0.2), [unit_at()], 2000) == 0.0, "at 0.49 m, and 0.02 m before"
+    assert share(model, replace(within, rate_hz=5.0), [unit_at()], 2000) == 0.0, "not for a whole reading"
+    assert share(model, replace(within, object_speed_m_s=0.8), [unit_at()], 2000) == 0.0
+    assert share(model, replace(within, deceleration_m_s2=0.4), [unit_at()], 2000) == 0.0
+
+
+def test_what_the_arm_hides_is_not_seen(tmp_path):
+    """A bar 0.2 m before the unit: it reads the bar, and what comes behind it is taken for the bar."""
+    (tmp_path / "clear").mkdir()
+    clear, hidden = arm(tmp_path / "clear"), arm(tmp_path, "0.25 -0.01 -0.2 0.25 0.01 -0.2")
+    assert share(clear, BRIGHT, [unit_at()], 4000) > 0.1
+    assert ways(hidden, BRIGHT).free.mean() > 0.5, "most ways pass the bar"
+    assert share(hidden, BRIGHT, [unit_at()], 4000) == 0.0
+
+
+def test_two_units_see_what_either_sees(tmp_path):
+    model = arm(tmp_path)
+    one, other = unit_at(), unit_at(0.35, "top")
+    both = share(model, BRIGHT, [one, other])
+    alone = share(model, BRIGHT, [one]), share(model, BRIGHT, [other])
+    assert max(alone) < both <= sum(alone)
+
+
+@pytest.fixture(scope="module")
+def few(panda_model):
+    q = panda_model.description.q_ready + 0.2 * np.random.default_rng(3).uniform(-1, 1, (2, 7))
+    return surface_of(panda_model, 400), q
+
+
+def found_by(model, worn, few, params):
+    made = ways_to(model, fixtures(SceneSpec()), params, few[0], q=few[1], each=2, rng=np.random.default_rng(4))
+    return made, seen_by(made, worn.link, worn.T_link_sensor)
+
+
+@settings(max_examples=25)
+@given(
+    st.floats(0.01, 0.6), st.floats(0.05, 0.4), st.floats(0.001, 0.08), st.floats(10.0, 60.0), st.floats(0.5, 2.0),
+    st.sampled_from(["object_speed_m_s", "arm_speed_m_s", "latency_s", "rate_hz", "range_m", "deceleration_m_s2"]),
+    st.floats(0.5, 1.0),
+)  # fmt: skip
+def test_what_is_seen_at_worse_is_seen_at_better(
+    panda_model, paper_skin, few, speed, own, latency, rate, reach, name, factor
+):
+    worse = CoverageParams(
+        object_speed_m_s=speed, arm_speed_m_s=own, latency_s=latency, rate_hz=rate, range_m=reach, way_m=2.0
+    )
+    up = name in ("rate_hz", "range_m", "deceleration_m_s2")
+    better = replace(worse, **{name: getattr(worse, name) * (1 / factor if up else factor)})
+    made, seen = found_by(panda_model, paper_skin, few, worse)
+    again, more = found_by(panda_model, paper_skin, few, better)
+    np.testing.assert_array_equal(made.free, again.free)
+    assert not np.any(seen & ~more)
+
+
+@given(st.sets(st.integers(0, 6), max_size=7), st.integers(0, 6))
+def test_one_more_unit_never_lowers_a_share(panda_model, paper_skin, few, some, one):
+    made, seen = found_by(panda_model, paper_skin, few, CoverageParams())
+    less, more = (covered(made, seen[sorted(units)]) for units in (some, some | {one}))
+    assert less.arm.ways.value <= more.arm.ways.value
+    assert less.arm.surface.value <= more.arm.surface.value
+    for a, b in zip(less.links, more.links, strict=True):
+        assert a.ways.value <= b.ways.value
+
+
+def test_what_is_not_free_counts_nowhere(panda_model, paper_skin, few):
+    made, seen = found_by(panda_model, paper_skin, few, CoverageParams())
+    assert 0.1 < made.free.mean() < 0.9
+    assert not np.any(seen & ~made.free)
+    found = covered(made, seen)
+    assert found.free.sum() == made.free.sum()
+    assert np.nansum(found.point_share * found.free.sum(axis=0)) == pytest.approx(seen.any(axis=0).sum())
+
+
+def test_bounds_of_a_share_by_hand():
+    seen = np.array([[2.0, 0.0], [1.0, 1.0]])
+    free = np.full((2, 2), 4.0)
+    # rests: rows 0 and 0, columns 1 and -1, doubled for two of them: variance 4 / 256
+    found = ratio(seen, free)
+    assert found.value == 0.25
+    assert found.high - found.value == pytest.approx(1.96 * 2 / 16)
+    none = ratio(np.zeros((5, 40)), np.ones((5, 40)))
+    assert (none.low, none.high) == (0.0, pytest.approx(1 - 0.025 ** (1 / 5)))
+    assert np.isnan(ratio(np.zeros((2, 2)), np.zeros((2, 2))).value)
+
+
+def test_the_bounds_hold_the_truth_as_often_as_they_say():
+    rng, truth, held = np.random.default_rng(8), 0.3, 0
+    for _ in range(300):
+        by_posture, by_point = rng.normal(0, 0.1, (30, 1)), rng.normal(0, 0.15, (1, 80))
+        chance = np.clip(truth + by_posture + by_point, 0, 1)
+        found = ratio(rng.binomial(4, chance).astype(float), np.full((30, 80), 4.0))
+        held += found.low <= truth <= found.high
+    assert 0.92 <= held / 300 <= 1.0

@@ -1,0 +1,29 @@
+"""How early is early enough."""
+
+import pytest
+
+from pretouch.coverage.params import CoverageParams
+from pretouch.errors import ParameterError
+
+
+def test_the_warning_by_hand():
+    # 0.8 m/s for 0.04 s and 0.02 s; 0.3^2 / 1.2 = 0.075 of the arm and 0.5 * 0.5 s of the object while it brakes
+    p = CoverageParams()
+    assert p.braking_m == pytest.approx(0.325)
+    assert p.last_reading_m == pytest.approx(0.357)
+    assert p.warning_m == pytest.approx(0.373)
+    assert (p.first, p.run, p.last) == (36, 2, 80)
+
+
+def test_steps_of_the_grid_are_not_lost_to_rounding():
+    p = CoverageParams(object_speed_m_s=0.0, arm_speed_m_s=0.5, rate_hz=50.0, latency_s=0.1, deceleration_m_s2=0.5)
+    assert p.last_reading_m == pytest.approx(0.3)
+    assert (p.first, p.run) == (30, 1)
+
+
+def test_a_warning_that_no_way_is_long_enough_for():
+    said = r"has to be seen 1\.10 m before it touches, but ways are 0\.8 m long: give"
+    with pytest.raises(ParameterError, match=said):
+        CoverageParams(object_speed_m_s=1.8)
+    with pytest.raises(ParameterError, match=r"CoverageParams\.range_m is -1"):
+        CoverageParams(range_m=-1.0)

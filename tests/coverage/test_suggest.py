@@ -1,0 +1,80 @@
+"""Places for more units: the best first, as good as greedy choices are bound to be, and written to a file."""
+
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pretouch.coverage.measure import covered
+from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.suggest import HEIGHT_M, candidates, greedy, suggest
+from pretouch.coverage.surface import surface_of
+from pretouch.coverage.ways import seen_by, ways_to
+from pretouch.errors import SkinError
+from pretouch.sensing.seat import seat
+from pretouch.sensing.skin import Skin, load_skin, save_skin
+from pretouch.sim.scene import SceneSpec, fixtures
+
+
+@pytest.fixture(scope="module")
+def made(panda_model):
+    q = panda_model.description.q_ready + 0.1 * np.random.default_rng(3).uniform(-1, 1, (3, 7))
+    surface = surface_of(panda_model, 500)
+    return ways_to(panda_model, fixtures(SceneSpec()), CoverageParams(), surface, q, 3, np.random.default_rng(4))
+
+
+@given(st.integers(0, 10_000), st.integers(1, 4))
+def test_a_greedy_choice_is_near_the_best(seed, count):
+    rng = np.random.default_rng(seed)
+    sees, weight = rng.uniform(size=(7, 30)) < 0.3, rng.uniform(size=30)
+    order, gains, left = greedy(sees, weight, count)
+    assert len(set(order)) == count
+    assert all(a >= b - 1e-12 for a, b in pairwise(gains))
+    assert sum(gains) == pytest.approx(weight[sees[order].any(axis=0)].sum())
+    best = max(weight[sees[list(some)].any(axis=0)].sum() for some in combinations(range(7), count))
+    assert (1 - 1 / np.e) * best <= sum(gains) + 1e-12
+    assert best <= sum(gains) + left + 1e-12
+
+
+def test_gains_fall_and_add_up_to_what_the_larger_skin_sees(made, panda_model, paper_skin):
+    found = suggest(made, paper_skin, 4)
+    gains = [one.gain for one in found.chosen]
+    assert gains == sorted(gains, reverse=True)
+    assert gains[-1] > 0
+    assert sum(gains) <= found.most
+    more = Skin((*paper_skin.units, *found.units), panda_model)
+    before, after = (
+        covered(made, seen_by(made, worn.link, worn.T_link_sensor)).arm.ways.value for worn in (paper_skin, more)
+    )
+    assert after - before == pytest.approx(sum(gains), rel=1e-6)
+
+
+def test_places_sit_on_the_surface_and_look_off_the_arm(made, panda_model, paper_skin):
+    places = candidates(made, paper_skin)
+    assert len(places) > 50
+    for unit in places:
+        below = seat(panda_model, panda_model.link_index(unit.link), unit.T_link_sensor[:3, 3])
+        assert 0 < below.height <= HEIGHT_M + 2e-5
+        if below.height > HEIGHT_M - 2e-5:  # elsewhere another capsule of the link is a little nearer
+            assert unit.T_link_sensor[:3, 2] @ below.normal > 0.999
+        for other in paper_skin.units:
+            apart = np.linalg.norm(other.T_link_sensor[:3, 3] - unit.T_link_sensor[:3, 3])
+            assert other.link != unit.link or apart >= 0.03
+
+
+def test_the_file_with_new_units_keeps_the_old_ones(made, panda_model, paper_skin, tmp_path):
+    found = suggest(made, paper_skin, 2)
+    save_skin(Skin((*paper_skin.units, *found.units), panda_model), tmp_path / "more.toml")
+    read = load_skin(tmp_path / "more.toml", panda_model)
+    assert read.ids == (*paper_skin.ids, "suggested_1", "suggested_2")
+    np.testing.assert_allclose(read.T_link_sensor[:7], paper_skin.T_link_sensor, atol=1e-12)
+    again = suggest(made, read, 1)
+    assert again.chosen[0].unit.id == "suggested_3"
+    assert again.chosen[0].gain <= found.chosen[1].gain + 1e-12
+
+
+def test_more_units_than_there_are_places(made, paper_skin):
+    with pytest.raises(SkinError, match=r"5 more units are asked for, and 3 places found: ask for 1 to 3"):
+        suggest(made, paper_skin, 5, candidates(made, paper_skin)[:3])

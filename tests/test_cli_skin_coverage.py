@@ -1,0 +1,70 @@
+"""`pretouch skin coverage`."""
+
+import json
+
+import pytest
+
+from pretouch.cli import main
+from pretouch.sensing.skin import PAPER_SKIN, load_skin
+
+
+def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model):
+    skin, figure, numbers = tmp_path / "more.toml", tmp_path / "arm.png", tmp_path / "coverage.json"
+    told = ["skin", "coverage", str(PAPER_SKIN), "--workspace", "circle", "--postures", "4", "--seed", "1000"]
+    told += ["--suggest", "2", "--out", str(skin), "--figure", str(figure), "--json", str(numbers)]
+    assert main(told) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    for part in ("Seen in time: panda, 4 postures of circle", "whole arm", "into view 0.37 m", "forearm_left",
+                 "Blind spots, less than 10 % of the ways seen:", "panda_link2, its back, ", " cm^2", "2 more units:",
+                 "suggested_2", f"Skin: {skin}", f"Figure: {figure}"):  # fmt: skip
+        assert part in printed
+    assert load_skin(skin, panda_model).ids[-2:] == ("suggested_1", "suggested_2")
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    found = json.loads(numbers.read_text())
+    assert found["parameters"]["warning_m"] == pytest.approx(0.373)
+    before, after = (found["suggested"][when][-1]["ways"]["share"] for when in ("before", "after"))
+    assert after > before
+    assert found["links"][-1]["link"] == "whole arm"
+    areas = [spot["area_m2"] for spot in found["blind_spots"]]
+    assert areas == sorted(areas, reverse=True)
+    assert main(told) == 2
+    assert "is there already: give another name, or --replace" in capsys.readouterr().err
+
+
+def test_an_imported_arm_has_its_own_skin(tmp_path, capsys):
+    from tests.importing.made import six_axis, written
+
+    told = ["robot", "import", str(written(tmp_path, six_axis())), "--capsules", "1", "--ready", "0,0.3,1.2,0,1.6,0"]
+    assert main([*told, "--out", str(tmp_path / "mine")]) == 0
+    capsys.readouterr()
+    assert main(["skin", "coverage", "--arm", str(tmp_path / "mine"), "--workspace", "joints", "--postures", "3"]) == 0
+    assert "Seen in time: sixer, 3 postures of joints" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--out", "x.toml"], "say how many with --suggest"),
+        (["--suggest", "-1"], "-1 more units are asked for: give 1 or more"),
+        (["--figure", "arm.gif"], "ends in none of .png, .pdf, .svg"),
+        (["--speed", "3"], "before it touches, but ways are 0.8 m long: give slower speeds"),
+        (["--seed", "-1"], "The seed is -1: give 0 or more"),
+        (["--workspace", "moon"], "The workspace is 'moon': give circle"),
+        (["--suggest", "400", "--postures", "2"], "400 more units are asked for, and"),
+        (["no-such.toml"], "The skin file no-such.toml cannot be read"),
+        (["--arm", "no-such-arm"], "no-such-arm"),
+        (["--json", "a.json", "--figure", "a.json/b.png"], "would take the place of another file"),
+    ],
+)
+def test_what_cannot_be_done_is_said(more, said, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["skin", "coverage", *more]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_skin_file_that_is_read_is_never_written(tmp_path, capsys):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(PAPER_SKIN.read_text())
+    assert main(["skin", "coverage", str(mine), "--suggest", "1", "--out", str(mine), "--replace"]) == 2
+    assert "would take the place of another file" in capsys.readouterr().err
+    assert mine.read_text() == PAPER_SKIN.read_text()
