@@ -101,8 +101,11 @@ def _check_outputs(command: Asked, source: Path | None) -> None:
     given = [(what, Path(text)) for what, text in places if text]
     for i, (what, place) in enumerate(given):
         others = [other for _, other in given[:i]] + ([source] if source else [])
-        if any(same_file(other, place) for other in others):
-            raise ExperimentError(f"The {what} {place} would take the place of another file that is read or written.")
+        if any(same_file(other, place) or same_file(place, other) for other in others):
+            raise ExperimentError(
+                f"The {what} {place} would take the place of another file that is read or written: give another."
+            )
+    for what, place in given:
         check_free(what, place, command.replace)
         check_writable(what, place)
 
