@@ -111,6 +111,7 @@ def _reproduce(command: Reproduce) -> None:
     from pretouch.experiments.campaign import Request
     from pretouch.experiments.paper import whole_paper
     from pretouch.experiments.registry import EXPERIMENTS
+    from pretouch.experiments.worlds import folder_part
 
     everything = command.experiment == "all"
     request = Request(
@@ -124,11 +125,12 @@ def _reproduce(command: Reproduce) -> None:
         record=command.record,
         arm=command.arm or None,
         first_seed=command.first_seed,
+        world=command.world or None,
     )
     if request.arm and not everything:
         context = request.context()
         print(context.placement.sentence(context.model.description.name))
-    out = Path(command.out or f"runs/reproduce-{command.experiment}")
+    out = Path(command.out or f"runs/reproduce-{command.experiment}{folder_part(command.world)}")
     runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
     run_all(runs, out, Path(command.json) if command.json else out / "results.json")
 

@@ -50,6 +50,9 @@ class Reproduce:
     arm: str = ""
     """Folder of an arm that `pretouch robot import` wrote, for the static experiment; by default the Panda. The paper's
     paths are scaled and moved into its reach, and the skin is the folder's own."""
+    world: str = ""
+    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
+    draws its own; by default the usual ones."""
     record: str = "first"
     """first: record the trials of the first seed of which figures are drawn; all: record every trial."""
     out: str = ""
@@ -134,6 +137,9 @@ class Live:
     """circle or line."""
     seed: int = 0
     """Simulated arm to take: each has other errors and noise."""
+    world: str = ""
+    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, as `pretouch identify`
+    writes one, of which the seed draws its own; by default the usual ones."""
     record: str = ""
     """Recording to write from the start; the page can begin and end recordings too."""
     host: str = "127.0.0.1"
