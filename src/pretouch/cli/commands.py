@@ -8,6 +8,7 @@ import tyro
 from pretouch.cli.bench_avoidance import Avoidance
 from pretouch.cli.bench_both import Both
 from pretouch.cli.bench_detection import Detection
+from pretouch.cli.identify import Identify
 from pretouch.cli.robot_commands import Robot
 from pretouch.cli.run.options import Run
 from pretouch.cli.serve_fci_command import ServeFci
@@ -236,6 +237,7 @@ Command = (
     | Annotated[Replay, tyro.conf.subcommand("replay")]
     | Annotated[Recover, tyro.conf.subcommand("recover")]
     | Annotated[Detect, tyro.conf.subcommand("detect")]
+    | Annotated[Identify, tyro.conf.subcommand("identify")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Skin, tyro.conf.subcommand("skin")]
     | Annotated[WarmUp, tyro.conf.subcommand("warm-up")]
