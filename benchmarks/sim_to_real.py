@@ -3,8 +3,8 @@
     python benchmarks/sim_to_real.py --seeds 1010 1011 --world realistic --out runs/sim-to-real.json
 
 A seed of a world makes the "real" arm. It is recorded in free motion by the usual recorder and identified from the file
-alone. Then the identified arm, another seed of the usual arm, and the real arm again with other noise are recorded along
-the same path, and what they say is compared: spread and autocorrelation of the torques, alarms of detectors.
+alone. Then the identified arm, and another seed of the usual arm, are recorded along the same path, and what they say
+is compared: mean, size and autocorrelation of the torques, evidence and alarms of detectors.
 """
 
 import argparse

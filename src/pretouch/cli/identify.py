@@ -99,11 +99,7 @@ def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     for joint in model.joints:
         table.add_column(joint, justify="right", no_wrap=True)
     for name, values, errors, told in rows:
-        shown = [
-            f"{'' if t else '('}{v:.3g} +- {e:.1g}{'' if t else ')'}"
-            for v, e, t in zip(values, errors, told, strict=True)
-        ]
-        table.add_row(name, *shown)
+        table.add_row(name, *(_shown(*each) for each in zip(values, errors, told, strict=True)))
     console.print(table)
     payload, error = float(found.fit.numbers[-2]), float(found.fit.errors[-2])
     console.print(f"Payload {payload:.3f} +- {error:.3f} kg.", markup=False)
@@ -111,17 +107,22 @@ def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     if noise.velocity_rad_s == noise.velocity_rad_s:
         console.print(
             f"Velocity noise {noise.velocity_rad_s:.4f} rad/s; observer gain {found.fit.gain:.1f} +-"
-            f" {found.fit.errors[-1]:.1f} 1/s, by the autocorrelation {noise.gain_1_s:.0f} +- {noise.gain_error_1_s:.0f}"
-            " 1/s.",
+            f" {found.fit.errors[-1]:.1f} 1/s, by the autocorrelation {noise.gain_1_s:.0f} +-"
+            f" {noise.gain_error_1_s:.0f} 1/s.",
             markup=False,
         )
     else:
         console.print("Without velocities neither their noise nor the observer's gain is told.", markup=False)
     console.print(
-        "In brackets: the recording hardly tells it, and it stays near what is usual. Errors are standard errors. Of the"
-        " friction only what the robot does not compensate shows.",
+        "In brackets: the recording hardly tells it, and it stays near what is usual. Errors are standard errors. Of"
+        " the friction only what the robot does not compensate shows.",
         markup=False,
     )
+
+
+def _shown(number: float, error: float, told: bool) -> str:
+    text = f"{number:.3g} +- {error:.1g}"
+    return text if told else f"({text})"
 
 
 def joint_rows(found: "Identified", model: "RobotModel") -> list[tuple[str, Any, Any, Any]]:
@@ -153,7 +154,10 @@ def _numbers(found: "Identified", model: "RobotModel", source: str) -> dict[str,
         "recording": source, "arm": model.description.name, "joints": list(model.joints), "used_s": found.seconds,
         "notes": list(found.notes), "contact_spans_s": [list(span) for span in found.spans],
         "of_joints": [
-            {"name": name, "values": values.tolist(), "standard_errors": errors.tolist(), "told": [bool(t) for t in told]}
+            {
+                "name": name, "values": values.tolist(), "standard_errors": errors.tolist(),
+                "told": [bool(t) for t in told],
+            }
             for name, values, errors, told in joint_rows(found, model)
         ],
         "payload_kg": [float(found.fit.numbers[-2]), float(found.fit.errors[-2])],

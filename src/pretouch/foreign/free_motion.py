@@ -9,7 +9,7 @@ import numpy as np
 from pretouch.contact.observer import observe, observer_init
 from pretouch.errors import RecordingError
 from pretouch.foreign.csv import listed, read_rows, read_table, relative_time
-from pretouch.foreign.joints import OUT_OF_RANGE_RAD
+from pretouch.foreign.samples import OUT_OF_RANGE_RAD
 from pretouch.identification.samples import ArmSamples
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda

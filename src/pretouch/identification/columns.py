@@ -71,10 +71,11 @@ def columns_of(found: Usable, model: RobotModel) -> Columns:
 
 def _calm(growth: FloatArray, period: float) -> BoolArray:
     """Say which samples (N,) of a segment are calm, and not among its first: there the low-pass still begins."""
-    quick = (np.abs(growth) > _QUICK_RAD_S2).any(axis=1)
+    quick: BoolArray = np.any(np.abs(growth) > _QUICK_RAD_S2, axis=1)
     quick[: round(_REMEMBERED_S / period)] = True
     before, after = round(_AHEAD_S / period), round(_REMEMBERED_S / period)
-    return ~(np.convolve(quick, np.ones(before + after + 1))[before : before + len(quick)] > 0.5)
+    near = np.convolve(quick, np.ones(before + after + 1))[before : before + len(quick)]
+    return np.asarray(near < 0.5)
 
 
 def _noise(measured: FloatArray, speed: FloatArray, growth: FloatArray, calm: BoolArray) -> FloatArray:

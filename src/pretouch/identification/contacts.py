@@ -21,7 +21,8 @@ def free_samples(found: Usable, fitted: Fit, p: IdentifyParams) -> tuple[BoolArr
     inside = np.zeros(len(s.time), np.bool_)
     for a, b in found.segments:
         inside[a:b] = True
-    far = (np.abs(means - np.median(means[inside], axis=0)) > p.contact_sigmas * joint_scale(means[inside])).any(axis=1)
+    off = np.abs(means - np.median(means[inside], axis=0))
+    far: BoolArray = np.any(off > p.contact_sigmas * joint_scale(means[inside]), axis=1)
     used, spans = inside.copy(), []
     for a, b in found.segments:
         times = s.time[a:b][far[a:b]]

@@ -108,6 +108,6 @@ def _check_arm(fitted: Fit, model: RobotModel) -> None:
     if len(far):
         raise CalibrationError(
             f"The links behind {model.joints[far[0]]} would have masses off by {100 * mass[far[0]]:.0f} %: the"
-            f" recording is of another arm than {model.description.name}, its torques have the other sign (--sign), or gravity is"
-            " still in them."
+            f" recording is of another arm than {model.description.name}, its torques have the other sign (--sign), or"
+            " gravity is still in them."
         )

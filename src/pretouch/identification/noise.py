@@ -65,7 +65,7 @@ def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usua
         total_nm=joint_scale(total[used]), torque_nm=torque, torque_errors_nm=_jackknife(again),
         velocity_rad_s=velocity, velocity_error_rad_s=1.17 * velocity / np.sqrt(2.0 * noise.size),
         gain_1_s=_gain_of(covariance, found.period, usual), gain_error_1_s=float(_jackknife(gains)),
-        correlation=np.corrcoef(total[used].T),
+        correlation=np.atleast_2d(np.corrcoef(total[used].T)),
         autocorrelation=_normalised(_blocks(found, total, used, p.block_s).mean(axis=0)),
         left_autocorrelation=_normalised(covariance), period_s=found.period,
     )  # fmt: skip
