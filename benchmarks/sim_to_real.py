@@ -128,6 +128,32 @@ def study(world: str, seed: int, seconds: float) -> dict[str, object]:
             "notes": list(found.notes), "compared": compared}  # fmt: skip
 
 
+def swung(seed: int, world: str, seconds: float) -> dict[str, object]:
+    """Swing an arm's joints along sines, identify it, and say how far the numbers are off."""
+    plant = Plant(MODEL, SceneSpec(), drawn(world_set(world), seed).plant, MODEL.description.q_ready, seed)
+    rate, rows = 2 * np.pi * np.array([0.11, 0.13, 0.17, 0.19, 0.23, 0.29, 0.31]), []
+    for _ in range(round(seconds / 0.01)):
+        plant.command(0.4 * rate * np.sin(rate * plant.time))
+        plant.advance(0.01)
+        plant.take_log()
+        state = plant.read()
+        rows.append((state.stamp, state.q, state.qd, state.tau_ext))
+    samples = ArmSamples(*(np.array(column) for column in zip(*rows, strict=True)))
+    found = identify(samples, MODEL, usual_of(PlantParams()))
+    return {"world": world, "seed": seed, "deviations": deviations(found, plant), "notes": list(found.notes)}
+
+
+def coverage(rows: list[dict[str, object]]) -> None:
+    """Say how many numbers lie within 95 % intervals, and how far they are off."""
+    for name in rows[0]["deviations"]:
+        all_of = np.array([each for row in rows for each in row["deviations"][name]])
+        inside, off = int((np.abs(all_of[:, 0]) < 1.96).sum()), np.median(np.abs(all_of[:, 1]))
+        spread = np.sqrt(np.mean(all_of[:, 0] ** 2))
+        print(
+            f"{name:16} {inside}/{len(all_of)} within 1.96 standard errors, rms {spread:.2f} of them, off by {off:.3g}"
+        )
+
+
 def main() -> None:
     """Study each seed and add a line to the file."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -135,7 +161,13 @@ def main() -> None:
     parser.add_argument("--world", default="realistic")
     parser.add_argument("--seconds", type=float, default=90.0)
     parser.add_argument("--out", type=Path, default=Path("sim-to-real.jsonl"))
+    parser.add_argument("--swung", action="store_true", help="only how far the numbers are off, of joints that swing")
     given = parser.parse_args()
+    if given.swung:
+        rows = [swung(seed, given.world, given.seconds) for seed in given.seeds]
+        given.out.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+        coverage(rows)
+        return
     for seed in given.seeds:
         row = study(given.world, seed, given.seconds)
         with given.out.open("a", encoding="utf-8") as file:

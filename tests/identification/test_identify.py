@@ -46,7 +46,9 @@ def test_offsets_friction_ripple_and_payload_come_out_within_their_errors(found)
 def test_the_observer_and_both_noises_come_out(found):
     assert found.fit.gain == pytest.approx(MADE.gain, rel=0.02)
     assert found.noise.velocity_rad_s == pytest.approx(MADE.velocity_noise, rel=0.03)
-    assert within(found.noise.torque_nm, found.noise.torque_errors_nm, MADE.torque_noise, floor=0.05 * MADE.torque_noise)
+    assert within(
+        found.noise.torque_nm, found.noise.torque_errors_nm, MADE.torque_noise, floor=0.05 * MADE.torque_noise
+    )
     assert found.noise.gain_1_s == pytest.approx(MADE.gain, rel=0.2)
 
 

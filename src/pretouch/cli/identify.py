@@ -89,7 +89,7 @@ def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, width=20 * (model.n + 2))
     console.print(f"{said}. {found.seconds:.0f} s of free motion are used.", markup=False)
     for note in found.notes:
         console.print(note, markup=False)
