@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 from pretouch.experiments import mounting
 from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.figures.mounting import mounting_figure
-from pretouch.experiments.mounting import EXACT, Misplacement, misplaced
+from pretouch.experiments.misplacement import Misplacement, misplaced
+from pretouch.experiments.mounting import EXACT
 from pretouch.experiments.mounting_tables import NAME, ROOM, summarise, tables
 from pretouch.experiments.trial import Setup, play
 from pretouch.params import profile

@@ -25,6 +25,7 @@ from pretouch.cli.commands import (
     WarmUp,
 )  # fmt: skip
 from pretouch.cli.ending import Terminated, ends_raise, exit_code
+from pretouch.cli.identify import Identify
 from pretouch.cli.robot_commands import Check, Import, Robot
 from pretouch.cli.run.options import Run
 from pretouch.cli.serve_fci_command import ServeFci
@@ -72,6 +73,8 @@ def main(args: list[str] | None = None) -> int:
                     _recover(command)
                 case Detect():
                     _detect(command)
+                case Identify():
+                    _identify(command)
                 case Report():
                     _report(command)
                 case Skin():
@@ -111,6 +114,7 @@ def _reproduce(command: Reproduce) -> None:
     from pretouch.experiments.campaign import Request
     from pretouch.experiments.paper import whole_paper
     from pretouch.experiments.registry import EXPERIMENTS
+    from pretouch.experiments.worlds import folder_part
 
     everything = command.experiment == "all"
     request = Request(
@@ -124,11 +128,12 @@ def _reproduce(command: Reproduce) -> None:
         record=command.record,
         arm=command.arm or None,
         first_seed=command.first_seed,
+        world=command.world or None,
     )
     if request.arm and not everything:
         context = request.context()
         print(context.placement.sentence(context.model.description.name))
-    out = Path(command.out or f"runs/reproduce-{command.experiment}")
+    out = Path(command.out or f"runs/reproduce-{command.experiment}{folder_part(command.world)}")
     runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
     run_all(runs, out, Path(command.json) if command.json else out / "results.json")
 
@@ -184,6 +189,12 @@ def _detect(command: Detect) -> None:
     choice = Choice(c.wrench, c.joints, c.sign, c.frame, c.zeros, c.arm, ranges=bool(c.skin))
     skin, out, json = (Path(text) if text else None for text in (c.skin, c.out, c.json))
     detect(Path(c.file), choice, words(c.profiles), skin, c.rate, out, json)
+
+
+def _identify(command: Identify) -> None:
+    from pretouch.cli.identify import identify_arm
+
+    identify_arm(command)
 
 
 def _replay(command: Replay) -> int:

@@ -35,14 +35,17 @@ def bench_avoidance(command: Avoidance) -> None:
     from pretouch.cli.writing import check_writable
     from pretouch.experiments.bench.avoidance.run import NAME, Request, open_run, run
     from pretouch.experiments.bench.documents import DOCUMENT, around
+    from pretouch.experiments.worlds import sentence
 
     c = command
-    request = Request(words(c.contenders), c.quick, c.seeds, words(c.scenarios))
+    request = Request(words(c.contenders), c.quick, c.seeds, words(c.scenarios), c.world)
     out, docs = c.folder("bench-avoidance"), c.documents
     json_file = Path(c.json) if c.json else out / "results.json"
     if docs:
         around(docs / DOCUMENT, NAME)  # half an hour later would be late
     open_run(request, out)
+    if c.world:
+        print(sentence(c.world))
     check_writable("file", json_file)
     try:
         worked(NAME, request.tasks(out), lambda progress: run(request, out, progress))
@@ -67,7 +70,7 @@ def _report(request: "Request", out: Path, json_file: Path, docs: Path | None) -
         return
     summary = summarise(rows)
     with unwritable_said("file", json_file):
-        write_json(results(summary, request.seeds, request.quick), json_file)
+        write_json(results(summary, request.seeds, request.quick, request.world), json_file)
     console = Console(highlight=False)
     show(console, tables(summary))
     with unwritable_said("folder", docs or out):

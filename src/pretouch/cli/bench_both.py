@@ -32,12 +32,14 @@ def bench_both(command: Both) -> None:
     from pretouch.experiments.bench.goals import goal_table
 
     out, docs = command.folder("bench"), command.documents
+    if command.readme:
+        command.check_published("--readme")
     readme = Path(command.readme) if command.readme else None
     parts = ("detection", "avoidance", "goals") if docs else ()
     places = [(docs / DOCUMENT, part) for part in parts if docs] + ([(readme, "front")] if readme else [])
     for document, part in places:
         around(document, part)  # an hour later would be late
-    given = {"quick": command.quick, "seeds": command.seeds, "docs": command.docs}
+    given = {"quick": command.quick, "seeds": command.seeds, "docs": command.docs, "world": command.world}
     bench_detection(Detection(out=str(out / "detection"), **given))  # type: ignore[arg-type]  # of both the same
     bench_avoidance(Avoidance(out=str(out / "avoidance"), **given))  # type: ignore[arg-type]
     detection, avoidance = (

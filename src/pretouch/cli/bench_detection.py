@@ -32,13 +32,16 @@ def bench_detection(command: Detection) -> None:
     from pretouch.experiments.bench.detection.published import summary_of
     from pretouch.experiments.bench.documents import DOCUMENT, around
     from pretouch.experiments.campaign import write_json
+    from pretouch.experiments.worlds import sentence
 
     out, docs = command.folder("bench-detection"), command.documents
     json_file = Path(command.json) if command.json else out / "results.json"
     if docs:
         around(docs / DOCUMENT, NAME)  # an hour later would be late
-    bench = Bench(out, command.quick, command.seeds)
+    bench = Bench(out, command.quick, command.seeds, command.world)
     bench.open()
+    if command.world:
+        print(sentence(command.world))
     check_writable("file", json_file)
     try:
         rows = worked(NAME, bench.every(), lambda progress: run_bench(bench, progress))

@@ -8,6 +8,7 @@ import tyro
 from pretouch.cli.bench_avoidance import Avoidance
 from pretouch.cli.bench_both import Both
 from pretouch.cli.bench_detection import Detection
+from pretouch.cli.identify import Identify
 from pretouch.cli.robot_commands import Robot
 from pretouch.cli.run.options import Run
 from pretouch.cli.serve_fci_command import ServeFci
@@ -50,6 +51,9 @@ class Reproduce:
     arm: str = ""
     """Folder of an arm that `pretouch robot import` wrote, for the static experiment; by default the Panda. The paper's
     paths are scaled and moved into its reach, and the skin is the folder's own."""
+    world: str = ""
+    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
+    draws its own; by default the usual ones."""
     record: str = "first"
     """first: record the trials of the first seed of which figures are drawn; all: record every trial."""
     out: str = ""
@@ -134,6 +138,9 @@ class Live:
     """circle or line."""
     seed: int = 0
     """Simulated arm to take: each has other errors and noise."""
+    world: str = ""
+    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, as `pretouch identify`
+    writes one, of which the seed draws its own; by default the usual ones."""
     record: str = ""
     """Recording to write from the start; the page can begin and end recordings too."""
     host: str = "127.0.0.1"
@@ -230,6 +237,7 @@ Command = (
     | Annotated[Replay, tyro.conf.subcommand("replay")]
     | Annotated[Recover, tyro.conf.subcommand("recover")]
     | Annotated[Detect, tyro.conf.subcommand("detect")]
+    | Annotated[Identify, tyro.conf.subcommand("identify")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Skin, tyro.conf.subcommand("skin")]
     | Annotated[WarmUp, tyro.conf.subcommand("warm-up")]

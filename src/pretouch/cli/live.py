@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -26,6 +27,11 @@ def live(command: Live) -> None:
         raise ParameterError(f"The path is {command.path!r}: choose circle or line.")
     path, profile = cast(PathName, command.path), find_profile(command.profile)
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
+    if command.world:
+        from pretouch.sim.randomisation import drawn, world_set
+
+        world = drawn(world_set(command.world), command.seed)
+        settings = replace(settings, plant=world.plant, ranging=world.ranging)
 
     from pretouch.robot.description import panda
     from pretouch.robot.model import RobotModel

@@ -23,6 +23,7 @@ from pretouch.robot.description import panda
 from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
+from pretouch.sim.randomisation import world_set
 
 Recorded = Literal["first", "all"]
 """Trials to record: those of the first seed of which figures are drawn, or all."""
@@ -51,6 +52,8 @@ class Request:
     arm: str | None = None
     """Folder of an imported arm, or its robot.toml; None for the Panda."""
     first_seed: int = 0
+    world: str | None = None
+    """Set of worlds of which each trial's seed draws its own (`sim.randomisation`), or None for the usual one."""
 
     def __post_init__(self) -> None:
         for name in self.experiments:
@@ -81,6 +84,8 @@ class Request:
         if not self.stiffness or len(set(self.stiffness)) < len(self.stiffness):
             listed = ", ".join(f"{k:g}" for k in self.stiffness) or "none"
             raise ExperimentError(f"The stiffnesses are {listed} N/m: name each wanted one once.")
+        if self.world:
+            world_set(self.world)
         if not self.tasks():
             raise ExperimentError(
                 f"There is nothing to run: {', '.join(self.experiments)} is about proximity, and none of the profiles"
@@ -91,7 +96,7 @@ class Request:
         """Load what all trials share."""
         model = RobotModel(load_description(self.arm) if self.arm else panda())
         skin = load_skin(self.skin_file, model) if self.skin or self.arm else paper_skin(model)
-        return Context(model, skin, cast(Orientation | None, self.orientation), placement_for(model))
+        return Context(model, skin, cast(Orientation | None, self.orientation), placement_for(model), self.world or "")
 
     @property
     def skin_file(self) -> Path:
@@ -141,6 +146,8 @@ def _fingerprints(request: Request) -> dict[str, str]:
         digests = {"the skin file has": sha256(path.read_bytes()).hexdigest()}
     except OSError as error:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
+    if request.world:
+        digests["the world's file has"] = world_set(request.world).digest
     if request.arm:
         digests["the arm's files have"] = sha256(_arm_files(request.arm)).hexdigest()
     for name in dict.fromkeys(cell.profile for cell, _ in request.tasks()):
@@ -306,6 +313,8 @@ def _work(request: Request, out: Path, cell: Cell, seed: int) -> None:
         row, _ = experiment.trial(cell, seed, context)
     except SystemExit as end:  # of a signal, the recording is closed; the pool would go on with the next trial
         os._exit(int(end.code or 1))
+    if context.world:
+        row = {**row, "world": context.world}
     if unfinished.exists():  # some trials play nothing
         os.replace(unfinished, place)
     write_json(row, trial_file(out, cell, seed))

@@ -72,6 +72,8 @@ class Context:
     """Whether the hand's orientation is free or held, or None for the profile's own."""
     placement: Placement = field(default_factory=Placement)
     """Where the paper's paths are for this arm: the static experiment's."""
+    world: str = ""
+    """Set of worlds of which each trial's seed draws its own, or none."""
     recording: Path | None = None
     """File to record the trial in, if it is to be recorded."""
 

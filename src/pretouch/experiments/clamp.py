@@ -90,6 +90,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         scene=SceneSpec(hand=HandSpec(), boxes=(board,)),
         path=Circle(start_angle=np.pi),
         seed=seed,
+        world=context.world,
         recording=context.recording,
         hand=person,
         prepare=gauge.attach,

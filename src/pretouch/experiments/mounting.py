@@ -1,16 +1,14 @@
 """The static experiment with units that sit elsewhere than the skin file says: how good is good enough."""
 
-from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from pretouch.errors import SkinError
 from pretouch.experiments import static
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.metrics import rounded
+from pretouch.experiments.misplacement import Misplacement, misplaced
 from pretouch.experiments.mounting_tables import NAME, ROOM, summarise, tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.experiments.weaknesses import views
@@ -19,8 +17,6 @@ from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import expected_range
 from pretouch.perception.vectors import placed
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import FloatArray
 
@@ -36,16 +32,6 @@ _STIFFNESS_N_PER_M = 25_000.0
 _ROOM_S = 20.0
 _EVERY = 5
 """Control steps between two at which the distance to the board is worked out."""
-
-
-@dataclass(frozen=True)
-class Misplacement:
-    """By how much each unit is elsewhere than the controller believes."""
-
-    position_mm: float = 0.0
-    orientation_deg: float = 0.0
-    told: bool = False
-    """Whether the skin file tells the error as standard deviations."""
 
 
 EXACT = Misplacement()
@@ -85,46 +71,6 @@ def _cell(name: str, mode: str, trajectory: str, side: str, error: Misplacement)
     })  # fmt: skip
 
 
-def misplaced(skin: Skin, model: RobotModel, error: Misplacement, seed: int) -> tuple[Skin, int]:
-    """Return what the controller believes of a skin, and how many drawn poses no skin file could hold.
-
-    Each unit's position is off in a random direction, its orientation about a random axis, both uniform on the sphere:
-    a turn about the beam changes nothing, and the beam itself tilts by 0.79 of the angle on average. Direction and axis
-    depend on the seed and the unit, not on the error's size. A pose that `Skin` refuses, inside the unit's own link, is
-    drawn again.
-    """
-    made = [_believed(unit, model, error, np.random.default_rng([seed, 13, k])) for k, unit in enumerate(skin.units)]
-    units = [_telling(unit, error) if error.told else unit for unit, _ in made]
-    return Skin(units, model), sum(refused for _, refused in made)
-
-
-def _telling(unit: SensorUnit, error: Misplacement) -> SensorUnit:
-    """Return a unit with the deviation along, and about, one axis of an error that may point anywhere."""
-    return replace(
-        unit,
-        position_sigma=error.position_mm / 1000 / np.sqrt(3.0),
-        orientation_sigma=float(np.radians(error.orientation_deg)) / np.sqrt(3.0),
-    )
-
-
-def _believed(
-    unit: SensorUnit, model: RobotModel, error: Misplacement, rng: np.random.Generator
-) -> tuple[SensorUnit, int]:
-    T, refused = unit.T_link_sensor.copy(), 0
-    while True:
-        off, axis = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
-        T[:3, 3] = unit.T_link_sensor[:3, 3] + error.position_mm / 1000 * off
-        turn = Rotation.from_rotvec(error.orientation_deg * axis, degrees=True)
-        T[:3, :3] = unit.T_link_sensor[:3, :3] @ turn.as_matrix()
-        believed = replace(unit, T_link_sensor=T)
-        try:
-            Skin([believed], model)
-        except SkinError:
-            refused += 1
-        else:
-            return believed, refused
-
-
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     trajectory, side = str(cell.where["trajectory"]), str(cell.where["side"])
@@ -142,6 +88,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         scene=scene,
         path=views.path(trajectory) if empty else static.path(trajectory, side),
         seed=seed,
+        world=context.world,
         recording=context.recording,
     )
     record = play(setup, (lambda step, _: step.stamp >= _ROOM_S) if empty else static.done_after_contact())

@@ -31,7 +31,7 @@ def whole_paper(asked: Request) -> list[tuple[str, Request]]:
     ]
     if not asked.restrictions and "paper" in profiles:
         runs.append(("restrictions", replace(asked, experiments=("static",), profiles=("paper",), restrictions=_MODES)))
-    study = Request(("static",), asked.seeds, orientation=asked.orientation, skin=asked.skin)
+    study = Request(("static",), asked.seeds, orientation=asked.orientation, skin=asked.skin, world=asked.world)
     return runs + [
         (name, replace(study, experiments=(name,), seeds=min(asked.seeds, seeds))) for name, seeds in _STUDIES.items()
     ]

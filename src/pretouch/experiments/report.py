@@ -13,6 +13,7 @@ from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.registry import GROUPS
 from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trace import Trace, read_trace
+from pretouch.experiments.worlds import sentence
 
 _PAGE = Template(
     """<!doctype html>
@@ -85,7 +86,8 @@ def _about(request: Request) -> str:
     profiles = dict.fromkeys(cell.profile for cell in cells)
     modes = dict.fromkeys(str(cell.where["restrictions"]) for cell in cells if "restrictions" in cell.where)
     said = f"{', '.join(request.experiments)}: {request.seeds} seeds, profiles {', '.join(profiles)}"
-    return said + (f", restrictions {', '.join(modes)}." if modes else ".")
+    said += f", restrictions {', '.join(modes)}." if modes else "."
+    return f"{said} {sentence(request.world)}" if request.world else said
 
 
 def _framework() -> Picture:

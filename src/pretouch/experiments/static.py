@@ -76,6 +76,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed, context.placement),
         path=path(trajectory, side, context.placement),
         seed=seed,
+        world=context.world,
         plant=plant_params_of(context.model.description),
         recording=context.recording,
     )

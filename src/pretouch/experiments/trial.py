@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path as FilePath
 
@@ -11,6 +11,7 @@ import numpy as np
 from pretouch.control.path import Path
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
+from pretouch.experiments.worlds import Parts, in_world
 from pretouch.hardware.traffic import UnitTraffic
 from pretouch.loop import Cycle, run
 from pretouch.params import Profile
@@ -58,6 +59,8 @@ class Setup:
     """Units and network for readings that come over UDP sockets; none, and they come within the process."""
     recording: FilePath | None = None
     """File to record it in; none, and it is not recorded."""
+    world: str = ""
+    """Set of worlds of which the seed draws one (`sim.randomisation`); none: plant, ranging and skin as they are."""
     prepare: Callable[[Plant, RangeFinders], None] | None = None
     """What else is to happen: may have things done before each physics step, to the arm or to its units."""
 
@@ -161,7 +164,8 @@ def _recording(setup: Setup, controller: Controller) -> Iterator[Recording | Non
     if setup.recording is None:
         yield None
         return
-    with Recording(setup.recording, controller, {"seed": setup.seed, "scene": described(setup.scene)}) as recording:
+    about = {"seed": setup.seed, "scene": described(setup.scene), **({"world": setup.world} if setup.world else {})}
+    with Recording(setup.recording, controller, about) as recording:
         yield recording
     if recording.trouble:
         raise RecordingError(recording.trouble)
@@ -169,6 +173,10 @@ def _recording(setup: Setup, controller: Controller) -> Iterator[Recording | Non
 
 def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     """Run a trial until `done` says so of a step."""
+    parts = in_world(
+        setup.world, setup.seed, setup.model, Parts(setup.plant, setup.ranging, setup.skin, setup.believed)
+    )
+    setup = replace(setup, plant=parts.plant, ranging=parts.ranging, believed=parts.believed)
     model, scene, profile = setup.model, setup.scene, setup.profile
     plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
     with _mounted(setup, plant) as units:

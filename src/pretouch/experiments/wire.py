@@ -51,6 +51,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         scene=static.scene(trajectory, side, _STIFFNESS_N_PER_M, seed),
         path=static.path(trajectory, side),
         seed=seed,
+        world=context.world,
         wire=None if loss is None else FleetParams(network(loss)),
         recording=context.recording,
     )

@@ -1,7 +1,8 @@
 """The simulated arm behind its joint velocity interface: 1 kHz physics, joint impedance, sensors, observer."""
 
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -16,6 +17,8 @@ from pretouch.sim.scene import ArmError, SceneSpec, build, stiffen
 from pretouch.types import FloatArray, RobotState
 
 _NO_FORCE = np.zeros(3)
+_Past = tuple[float, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+"""Time, q, qd, q_d, qd_d and external torques of an instant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +42,7 @@ class Plant:
 
     def __init__(self, model: RobotModel, scene: SceneSpec, params: PlantParams, q: FloatArray, seed: int) -> None:
         """Build an arm at rest at q (n,) [rad]; the seed decides its errors and its noise."""
-        params.check_joints(model.n)
+        params.check_joints(model.n, len(model.links))
         self.model, self.scene, self.params, self._n = model, scene, params, model.n
         rng = np.random.default_rng([seed, 1])
         self._rng = np.random.default_rng([seed, 2])
@@ -50,6 +53,7 @@ class Plant:
         )
         self._offset = np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n)
         self._ripple_phase = rng.uniform(0, 2 * np.pi, self._n)
+        self._know(params)
         self.mj_model = build(model, scene, self.error)
         self.mj_data = mujoco.MjData(self.mj_model)
         self._k = np.array(params.stiffness_nm_rad)
@@ -58,6 +62,22 @@ class Plant:
         self._arm_geoms = {g for g in range(self.mj_model.ngeom) if self._on_arm(g)}
         self._before_step: list[Callable[[float], None]] = []
         self._reset(q)
+
+    def _know(self, params: PlantParams) -> None:
+        """Put what is known of one arm in the place of what was drawn; the draws are the same either way."""
+        if params.offsets_nm:
+            self._offset = np.array(params.offsets_nm)
+        if params.ripple_phases_rad:
+            self._ripple_phase = np.array(params.ripple_phases_rad)
+        if params.mass_factors:
+            self.error = replace(self.error, mass_factor=np.array(params.mass_factors))
+        if params.payloads_kg:
+            self.error = replace(self.error, payload=params.payloads_kg[0])
+
+    @property
+    def offset_nm(self) -> FloatArray:
+        """Constant errors (n,) of the torque sensors [Nm], which a real arm's owner cannot know."""
+        return self._offset
 
     def _on_arm(self, geom: int) -> bool:
         body = int(self.mj_model.geom_bodyid[geom])
@@ -83,6 +103,10 @@ class Plant:
         self._bias = bias
         self._observer: ObserverState = observer_init(mass, self._qd_meas)
         self.time = 0.0
+        dt = self.params.period_s
+        self._states: deque[_Past] = deque(maxlen=1 + round(self.params.state_delay_s / dt))
+        self._late_commands: deque[tuple[float, FloatArray]] = deque()
+        self._remember()
         self.true_force = _NO_FORCE
         """(3,) sum of the contact forces on the arm by everything else, base frame [N], at the last physics step."""
         self.true_log: list[tuple[float, FloatArray]] = []
@@ -118,16 +142,30 @@ class Plant:
     def read(self) -> RobotState:
         """Return what the arm's interface reports now."""
         p = self.params
-        kin = self.model.kinematics(self._q_meas)
-        tau_ext = self._observer.residual
+        time, q, qd, q_d, qd_set, tau_ext = self._states[0] if p.state_delay_s else self._now()
+        kin = self.model.kinematics(q)
         wrench = wrench_from_torques(self.model.ee_jacobian(kin), tau_ext, p.wrench_damping, p.singular_value_min)
-        return RobotState(
-            self.time, self._q_meas, self._qd_meas, self._q_d.copy(), self._qd_set.copy(), tau_ext, wrench
-        )
+        return RobotState(time, q, qd, q_d, qd_set, tau_ext, wrench)
 
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point."""
-        self._qd_set = np.array(qd, dtype=np.float64)
+        wanted = np.array(qd, dtype=np.float64)
+        if self.params.command_delay_s:
+            self._late_commands.append((self.time + self.params.command_delay_s, wanted))
+        else:
+            self._qd_set = wanted
+
+    def _now(self) -> _Past:
+        return self.time, self._q_meas, self._qd_meas, self._q_d.copy(), self._qd_set.copy(), self._observer.residual
+
+    def _remember(self) -> None:
+        if self.params.state_delay_s:
+            self._states.append(self._now())
+
+    def _take_late_commands(self) -> None:
+        """Let what was commanded long enough ago be the set-point."""
+        while self._late_commands and self._late_commands[0][0] <= self.time + 1e-9:
+            self._qd_set = self._late_commands.popleft()[1]
 
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""
@@ -142,6 +180,7 @@ class Plant:
         for i in range(steps):
             for call in self._before_step:
                 call(self.time)
+            self._take_late_commands()
             tau, friction = _drive(
                 self._q, self._qd, self._q_d, self._qd_d, self._qd_set, dt, follow, self._bias, self._k, self._d,
                 tau_max, self._friction, self._applied,
@@ -158,6 +197,7 @@ class Plant:
             self._observer = observe(self._observer, mass, self._bias, qd, sensed, p.observer_gain_1_s, dt)
             self.time += dt
             self._q_meas, self._qd_meas = q, qd
+            self._remember()
             touched = self.true_force is not _NO_FORCE
             self.true_force = self._contact_force() if self.mj_data.ncon else _NO_FORCE
             self.true_log.append((self.time, self.true_force))

@@ -1,5 +1,6 @@
 """How far the simulated arm is from its model, and how its sensors err: figures of real Pandas."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -56,19 +57,51 @@ class PlantParams(Checked):
     """Smallest singular value of the Jacobian at which the robot still gives a wrench."""
     set_point_hz: Annotated[float, Check(low=0.0, open_low=True)] = 100.0
     """Low-pass on the velocity set-points, the vendor's default cut-off [Hz]."""
+    state_delay_s: NonNegative = 0.0
+    """Age of the state that the interface reports [s], in whole physics steps; its stamp says so."""
+    command_delay_s: NonNegative = 0.0
+    """Time from a command to when the arm takes it [s], in whole physics steps."""
+    offsets_nm: Joints = ()
+    """Constant error of each torque sensor of one known arm [Nm]; none: drawn up to `torque_offset_nm`."""
+    ripple_phases_rad: Joints = ()
+    """Phase of each joint's ripple, of one known arm [rad]; none: drawn."""
+    mass_factors: Joints = ()
+    """Factor on mass and inertia of each link, of one known arm, in the order of `RobotModel.links`; none: drawn."""
+    payloads_kg: Joints = ()
+    """The unknown mass at the TCP of one known arm, one value [kg]; none: drawn up to `payload_max_kg`."""
 
-    def check_joints(self, n: int) -> None:
-        """Raise ParameterError unless there is one value for each of n joints."""
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in (*_SCALED, *_KEPT, *_KNOWN):
+            values = getattr(self, name)
+            if not all(math.isfinite(value) for value in values):
+                raise ParameterError(f"PlantParams.{name} is {values}: give finite numbers.")
+        for name in ("mass_factors", "payloads_kg", "stiffness_nm_rad", "torque_noise_nm"):
+            if any(value < 0.0 for value in getattr(self, name)):
+                raise ParameterError(f"PlantParams.{name} is {getattr(self, name)}: none may be below 0.")
+
+    def check_joints(self, n: int, links: int | None = None) -> None:
+        """Raise ParameterError unless there is one value for each of n joints, and of what is known of each link."""
         for name in (*_SCALED, *_KEPT):
             count = len(getattr(self, name))
             if count != n:
                 raise ParameterError(
                     f"PlantParams.{name} has {count} values, the arm {n} joints: take plant_params_of(description)."
                 )
+        wanted = {"offsets_nm": n, "ripple_phases_rad": n, "payloads_kg": 1, "mass_factors": links}
+        for name, number in wanted.items():
+            count = len(getattr(self, name))
+            if count and number is not None and count != number:
+                raise ParameterError(
+                    f"PlantParams.{name} has {count} values, and {number} are needed: it is of another arm, so identify"
+                    " this one, or leave it out."
+                )
 
 
 _SCALED = ("friction_f1_nm", "torque_noise_nm", "torque_offset_nm", "ripple_nm")
 """Torques: they grow with the size of a drive."""
+_KNOWN = ("offsets_nm", "ripple_phases_rad", "mass_factors", "payloads_kg")
+"""Of one known arm, or empty."""
 _KEPT = ("stiffness_nm_rad", "friction_f2_s_rad", "friction_f3_rad_s", "ripple_cycles")
 
 

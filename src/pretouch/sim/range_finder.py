@@ -3,12 +3,12 @@
 import heapq
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import mujoco
 import numpy as np
 
-from pretouch.checks import Checked, Fraction, NonNegative, Positive
+from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled
 from pretouch.errors import ParameterError
 from pretouch.sensing.skin import Skin
@@ -65,6 +65,8 @@ class RangeFinderParams(Checked):
     """Mean of the exponential addition to it [s]."""
     period_jitter: Fraction = 0.02
     """Standard deviation of the period as a fraction of it."""
+    period_factor: Annotated[float, Check(low=1.0)] = 1.0
+    """Times longer than the mode's own the period is: units that share a channel, or a processor."""
     dropout: Fraction = 0.005
     """Probability that a reading is lost on its way."""
 
@@ -116,7 +118,7 @@ class RangeFinders:
         self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
         count = len(skin)
         self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
-        self._due: list[float] = self._rng.uniform(0, self._mode.period_s, count).tolist()
+        self._due: list[float] = self._rng.uniform(0, params.period_factor * self._mode.period_s, count).tolist()
         self._arriving: list[tuple[float, int, float, float, int]] = []
         self._stamp = np.full(count, -np.inf)
         self._distance = np.zeros(count)
@@ -153,7 +155,9 @@ class RangeFinders:
         for unit, due in enumerate(self._due):
             if due > time:
                 continue
-            self._due[unit] = due + self._mode.period_s * (1.0 + p.period_jitter * rng.standard_normal())
+            self._due[unit] = due + p.period_factor * self._mode.period_s * (
+                1.0 + p.period_jitter * rng.standard_normal()
+            )
             distance, status, sigma, strength = self._measure(unit)
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
             lost = rng.random() < p.dropout

@@ -13,9 +13,8 @@ from pretouch.sensing.skin import Skin
 from pretouch.sim.board import Side, board_beside
 from pretouch.sim.hand import Hand
 from pretouch.sim.plant import Plant, PlantClock
-from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.posture import brought_to
-from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import FloatArray
 from pretouch.viewer.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
@@ -54,13 +53,13 @@ class Room:
         start = clear_place(model, q, scene, self.mouse.target, hand.radius + GAP_M)
         self.mouse.move(start)
         self.scene = replace(scene, hand=replace(hand, start=tuple(start.tolist())))
-        self.plant = Plant(model, self.scene, PlantParams(), q, settings.seed)
-        self._simulated = None if real else RangeFinders(self.plant, skin, RangeFinderParams(), settings.seed)
+        self.plant = Plant(model, self.scene, settings.plant, q, settings.seed)
+        self._simulated = None if real else RangeFinders(self.plant, skin, settings.ranging, settings.seed)
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
         self.hand = Hand(self.plant, self.mouse, speed_max=HAND_SPEED_M_S)
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._wanted = settings.stiffness
-        self._skin = skin
+        self._skin, self._sound = skin, settings.ranging
         self._moving = np.flatnonzero(model.moved_by.any(axis=1))
         self.fail(settings.faults)
         self.plant.advance(_SETTLE_S)
@@ -80,7 +79,7 @@ class Room:
         if unknown:
             known = ", ".join(self._skin.ids)
             raise ParameterError(f"There is no unit {', '.join(unknown)} to be silenced: choose from {known}.")
-        sound = RangeFinderParams()
+        sound = self._sound
         self._simulated.silenced = {i for i, name in enumerate(self._skin.ids) if name in faults.silenced}
         self._simulated.change(replace(
             sound, noise_floor_m=sound.noise_floor_m * faults.noise_factor,

@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 
 from pretouch.checks import Check, Checked
 from pretouch.params import PROFILES, Profile
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import HandSpec
 
 PathName = Literal["circle", "line"]
@@ -46,6 +48,10 @@ class LiveSettings(Checked):
     """What is wrong with the sensor units."""
     seed: Annotated[int, Check(low=0)] = 0
     """Decides the arm's errors and all noise."""
+    plant: PlantParams = field(default_factory=PlantParams)
+    """The kind of simulated arm."""
+    ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    """How simulated units err without faults."""
     hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
     """Where the person's hand begins [m], base frame: in view, and clear of both paths; moved aside if that is inside
     something."""

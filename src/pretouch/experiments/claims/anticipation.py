@@ -41,6 +41,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=SceneSpec(hand=HandSpec(start=start)),
         path=line((x, y, z), (x, y + 0.001, z)),
         seed=seed,
+        world=context.world,
         recording=context.recording,
         hand=way,
     )

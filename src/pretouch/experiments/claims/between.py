@@ -77,6 +77,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=SceneSpec(boxes=(body,), hand=HandSpec()),
         path=Circle(),
         seed=seed,
+        world=context.world,
         recording=context.recording,
         hand=person,
     )

@@ -116,6 +116,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
         scene=SceneSpec(),
         path=path(str(cell.where["motion"]), seed),
         seed=seed,
+        world=context.world,
         recording=context.recording,
         prepare=lambda plant, _: apply(plant, events),
     )

@@ -66,6 +66,7 @@ def leave_alone(what: Solitude, cell: Cell, seed: int, context: Context) -> Reco
         scene=SceneSpec(),
         path=what.path,
         seed=seed,
+        world=context.world,
         recording=context.recording,
         plant=what.plant,
     )

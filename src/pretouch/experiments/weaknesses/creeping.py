@@ -67,6 +67,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=SceneSpec(hand=hand),
         path=path(),
         seed=seed,
+        world=context.world,
         recording=context.recording,
         hand=Visitor(context.model, (visit(seed),)),
     )

@@ -132,6 +132,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         scene=scene,
         path=_path(sign, abs(board.center[1]) - board.half_size[1] - _HAND_HALF_WIDTH_M - gap),
         seed=seed,
+        world=context.world,
         recording=context.recording,
         prepare=loss.attach,
     )

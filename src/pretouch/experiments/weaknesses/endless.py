@@ -44,6 +44,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         scene=static.scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
         path=static.path(trajectory, side),
         seed=seed,
+        world=context.world,
         recording=context.recording,
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)

@@ -76,6 +76,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         scene=SceneSpec(hand=HandSpec()),
         path=Circle(),
         seed=seed,
+        world=context.world,
         recording=context.recording,
         hand=person,
     )

@@ -64,6 +64,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=scene(seed),
         path=path(),
         seed=seed,
+        world=context.world,
         recording=context.recording,
     )
     record = play(setup, lambda step, _: step.path_phase >= _CYCLE_M[1] or step.stamp >= _TIME_LIMIT_S)

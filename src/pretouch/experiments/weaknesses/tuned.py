@@ -100,6 +100,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=static.scene(where, side, _STIFFNESS_N_PER_M, seed) if still else SceneSpec(hand=HandSpec()),
         path=static.path(where, side) if still else standing(),
         seed=seed,
+        world=context.world,
         recording=context.recording,
         hand=None if still else person(seed, context.model),
     )

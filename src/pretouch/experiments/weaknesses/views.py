@@ -85,6 +85,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=scene(where),
         path=path(where),
         seed=seed,
+        world=context.world,
         recording=context.recording,
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)

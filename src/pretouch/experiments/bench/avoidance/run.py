@@ -13,6 +13,7 @@ from pretouch.experiments.bench.avoidance.scenario import Scenario, scenarios
 from pretouch.experiments.bench.avoidance.trial import keep_trial
 from pretouch.experiments.bench.scenario_files import SeedRange
 from pretouch.experiments.bench.store import Row, Task, fingerprint, open_bench, read_rows, run_tasks
+from pretouch.experiments.worlds import told
 from pretouch.params import profile
 
 NAME = "avoidance"
@@ -37,6 +38,8 @@ class Request:
     seeds: SeedRange = "published"
     names: tuple[str, ...] = ()
     """Scenarios; none: all."""
+    world: str = ""
+    """Set of worlds of which each trial's seed draws its own, or none: the arms of the published tables."""
 
     def __post_init__(self) -> None:
         if len(set(self.contenders)) < len(self.contenders):
@@ -66,15 +69,15 @@ class Request:
             for contender in (() if self.contenders else ABLATED)
             for seed in (scene.seeds(self.seeds, self.quick)[:ABLATED_SEEDS] if scene.name in ABLATED_IN else ())
         ]
-        return [_task(out, *trial) for trial in (*played, *ablated)]
+        return [_task(out, *trial, self.world) for trial in (*played, *ablated)]
 
 
-def _task(out: Path, scene: Scenario, contender: str, seed: int) -> Task:
+def _task(out: Path, scene: Scenario, contender: str, seed: int, world: str) -> Task:
     text = profile_text(contender)
     digest = sha256(f"{contender} {scene.name}".encode()).hexdigest()[:6]
     plain = re.sub(r"[^A-Za-z0-9.-]+", "-", f"{scene.name}_{contender}")[:60]
     file = out / "trials" / f"{plain}_{digest}_{_code(text)}_{seed:04d}.json"
-    return Task(file, partial(keep_trial, scene.name, contender, seed), _cost(scene, contender))
+    return Task(file, partial(keep_trial, scene.name, contender, seed, world), _cost(scene, contender))
 
 
 def _cost(scene: Scenario, contender: str) -> float:
@@ -100,7 +103,7 @@ def _code(text: str) -> str:
 
 def open_run(request: Request, out: Path) -> None:
     """Make a folder for the results, or take one up that another run with such seeds began."""
-    open_bench(out, NAME, {"seeds": request.seeds})
+    open_bench(out, NAME, {"seeds": request.seeds, **told(request.world)})
 
 
 def run(request: Request, out: Path, progress: Callable[[float], None], processes: int | None = None) -> None:

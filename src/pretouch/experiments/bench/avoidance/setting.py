@@ -11,7 +11,7 @@ from pretouch.experiments import static
 from pretouch.experiments.bench.avoidance.obstacle import Ball, Cuboid, Shape, Walker
 from pretouch.experiments.bench.avoidance.scenario import Scenario, Table
 from pretouch.experiments.bench.scenario_files import scenario_path
-from pretouch.experiments.mounting import Misplacement, misplaced
+from pretouch.experiments.misplacement import Misplacement, misplaced
 from pretouch.experiments.pushes import Visit, Visitor
 from pretouch.experiments.trial import Setup
 from pretouch.params import Profile

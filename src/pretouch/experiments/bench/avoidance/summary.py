@@ -113,9 +113,11 @@ _MEDIANS = ("peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_tim
 """Keys all benchmarks share, of which the rows have the median over the seeds."""
 
 
-def results(summary: Row, seeds: str, quick: bool) -> Row:
+def results(summary: Row, seeds: str, quick: bool, world: str = "") -> Row:
     """Return what the JSON file holds: what was run, a row for each contender and scenario, and ratios to some."""
-    about = {"bench": "avoidance", "version": __version__, "quick": quick, "seeds": seeds}
+    about: Row = {"bench": "avoidance", "version": __version__, "quick": quick, "seeds": seeds}
+    if world:
+        about["world"] = world
     kept = {key: summary[key] for key in ("families", "ablations", "ratios", "paired")}
     return {"about": about, "rows": json_rows(summary), **kept}
 

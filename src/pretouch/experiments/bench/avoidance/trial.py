@@ -1,5 +1,6 @@
 """One trial of the avoidance benchmark: played, measured, and kept as a row."""
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -54,14 +55,16 @@ def course(record: Record, truth: Truth) -> dict[str, list[float]]:
     }
 
 
-def play_trial(scenario: Scenario, contender: str, seed: int) -> Row:
-    """Play a trial of a contender and return its row."""
+def play_trial(scenario: Scenario, contender: str, seed: int, world: str = "") -> Row:
+    """Play a trial of a contender, in the world that its seed draws of a set if one is named, and return its row."""
     made = setting(scenario, profile(profile_text(contender)), seed)
-    record = play(made.setup, made.done)
-    names = {"contender": contender, "scenario": scenario.name, "family": scenario.family, "seed": seed}
+    record = play(replace(made.setup, world=world), made.done)
+    names: Row = {"contender": contender, "scenario": scenario.name, "family": scenario.family, "seed": seed}
+    if world:
+        names["world"] = world
     return {**names, **measured(record, made, scenario.says)}
 
 
-def keep_trial(name: str, contender: str, seed: int, file: Path) -> None:
+def keep_trial(name: str, contender: str, seed: int, world: str, file: Path) -> None:
     """Play a trial of the scenario of a name, and write its row to a file."""
-    write_json(play_trial(scenarios()[name], contender, seed), file)
+    write_json(play_trial(scenarios()[name], contender, seed, world), file)

@@ -12,8 +12,9 @@ from pretouch.controller import Controller
 from pretouch.experiments.bench.detection.stream import PROFILE, Stream, StreamRecorder
 from pretouch.experiments.bench.scenario_files import scenario, scenario_path
 from pretouch.experiments.claims.free_run import Standing
-from pretouch.experiments.mounting import Misplacement, misplaced
+from pretouch.experiments.misplacement import Misplacement, misplaced
 from pretouch.experiments.trial import SETTLE_S
+from pretouch.experiments.worlds import Parts, in_world
 from pretouch.loop import Cycle, run
 from pretouch.params import profile
 from pretouch.robot.description import panda
@@ -89,6 +90,8 @@ class Alone:
     seed: int
     end_s: float
     """When it ends [s]."""
+    world: str = ""
+    """Set of worlds of which the seed draws one, or none."""
 
 
 Prepare = Callable[[Plant], Callable[[float], FloatArray]]
@@ -99,15 +102,18 @@ def record(
     what: Alone, prepare: Prepare, look: Callable[[Plant, Ghost, Cycle], None] = lambda plant, ghost, cycle: None
 ) -> Stream:
     """Let an arm run until its end and return its stream; `look(plant, ghost, cycle)` sees each cycle."""
-    found = profile(PROFILE)
+    found, sensing = profile(PROFILE), what.sensing
+    known = None if sensing.believed is sensing.skin else sensing.believed
+    parts = in_world(what.world, what.seed, model(), Parts(what.plant, sensing.ranging, sensing.skin, known))
     task = replace(found.task, speed_m_s=what.speed_m_s or _RETURN_M_S)
     start = (float(AWAY[0]), float(AWAY[1]), float(AWAY[2]))
     scene = SceneSpec(ghost=GhostSpec(what.ghost_radius, start))
-    plant = Plant(model(), scene, what.plant, brought_to(model(), what.path.point(0.0)), what.seed)
-    finders = RangeFinders(plant, what.sensing.skin, what.sensing.ranging, what.seed)
+    plant = Plant(model(), scene, parts.plant, brought_to(model(), what.path.point(0.0)), what.seed)
+    finders = RangeFinders(plant, parts.skin, parts.ranging, what.seed)
     ghost = Ghost(plant, prepare(plant))
     controller = Controller(
-        model(), what.sensing.believed, fixtures(scene), what.path, replace(found, task=task)
+        model(), parts.skin if parts.believed is None else parts.believed, fixtures(scene), what.path,
+        replace(found, task=task),
     )  # fmt: skip
     plant.advance(SETTLE_S)
     recorder = StreamRecorder(plant, lambda cycle: look(plant, ghost, cycle))

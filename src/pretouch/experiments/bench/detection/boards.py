@@ -28,6 +28,8 @@ class BoardCell:
     stiffness_n_per_m: float
     sensing: str
     seed: int
+    world: str = ""
+    """Set of worlds of which the seed draws one, or none."""
 
     @property
     def name(self) -> str:
@@ -59,17 +61,18 @@ def meet_board(cell: BoardCell, contender: Contender, file: Path) -> None:
     setup = Setup(
         model=model(),
         skin=sensing.skin,
-        believed=sensing.believed,
+        believed=None if sensing.believed is sensing.skin else sensing.believed,
         profile=replace(found, restriction=replace(found.restriction, mode="off")),
         scene=static.scene(cell.trajectory, cell.side, cell.stiffness_n_per_m, cell.seed),
         path=static.path(cell.trajectory, cell.side),
         seed=cell.seed,
+        world=cell.world,
         ranging=sensing.ranging,
     )
     record = play(setup, static.done_after_contact())
     push = -1.0 if cell.side == "+y" else 1.0
     row = {
-        **asdict(cell),
+        **{name: value for name, value in asdict(cell).items() if name != "world" or value},
         "contender": contender.name,
         **static.results(record, push, model().links),
         "clamping_n": clamping_n(record),

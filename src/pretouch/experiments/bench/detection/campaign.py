@@ -1,7 +1,7 @@
 """All work of the detection benchmark: streams to record, detectors to replay on them, boards to meet."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from pretouch.experiments.bench.detection.judge import judge_contacts, judge_fre
 from pretouch.experiments.bench.detection.stream import PROFILE
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario
 from pretouch.experiments.bench.store import Row, Task, fingerprint, open_bench, read_rows, run_tasks
+from pretouch.experiments.worlds import told
 from pretouch.params import profile
 
 NAME = "detection"
@@ -43,10 +44,12 @@ class Bench:
     """Folder for everything that is kept."""
     quick: bool = False
     seeds: SeedRange = "published"
+    world: str = ""
+    """Set of worlds of which each arm's seed draws its own, or none: the arms of the published tables."""
 
     def open(self) -> None:
         """Make the folder or take it up."""
-        open_bench(self.out, NAME, {"quick": self.quick, "seeds": self.seeds})
+        open_bench(self.out, NAME, {"quick": self.quick, "seeds": self.seeds, **told(self.world)})
 
     def streams(self) -> list[Task]:
         """Return the streams to record."""
@@ -107,13 +110,13 @@ class Bench:
         return (*CONTENDERS, *ablated()) if wanted else CONTENDERS
 
     def _free(self) -> list[FreeCell]:
-        return free_cells(self.seeds, self.quick)
+        return [replace(cell, world=self.world) for cell in free_cells(self.seeds, self.quick)]
 
     def _contacts(self) -> list[ContactCell]:
-        return contact_cells(self.seeds, self.quick)
+        return [replace(cell, world=self.world) for cell in contact_cells(self.seeds, self.quick)]
 
     def _boards(self) -> list[BoardCell]:
-        return board_cells(self.seeds, self.quick)
+        return [replace(cell, world=self.world) for cell in board_cells(self.seeds, self.quick)]
 
     def _stream(self, cell: FreeCell | ContactCell) -> Path:
         family = "free" if isinstance(cell, FreeCell) else "contacts"

@@ -67,6 +67,8 @@ class ContactCell:
     seed: int
     count: int
     """Contacts."""
+    world: str = ""
+    """Set of worlds of which the seed draws one, or none."""
 
     @property
     def name(self) -> str:
@@ -178,7 +180,9 @@ def record_contacts(cell: ContactCell, file: FilePath) -> None:
     touches = plan(cell, sensing.hand_radius)
     path = path_of("circle" if cell.speed_m_s > 0 else "rest")
     end = touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1
-    what = Alone(path, cell.speed_m_s, plant_of(cell.kind), sensing, sensing.hand_radius, cell.seed, end)
+    what = Alone(
+        path, cell.speed_m_s, plant_of(cell.kind), sensing, sensing.hand_radius, cell.seed, end, cell.world
+    )  # fmt: skip
     stream = record(what, lambda plant: Toucher(plant, touches, sensing.hand_radius).hand)
     save_stream(replace(stream, truth=described(touches, sensing.hand_radius)), file)
 

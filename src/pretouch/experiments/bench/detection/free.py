@@ -34,6 +34,8 @@ class FreeCell:
     seed: int
     counted_s: float
     """Time that counts [s], after the warm-up."""
+    world: str = ""
+    """Set of worlds of which the seed draws one, or none."""
 
     @property
     def name(self) -> str:
@@ -64,7 +66,7 @@ def record_free(cell: FreeCell, file: FilePath) -> None:
     near = scenario("free")["near"]
     what = Alone(
         path_of(cell.path), cell.speed_m_s, plant_of(cell.kind), sensing_of("seven", cell.seed), near["radius_m"],
-        cell.seed, warm_up_s() + cell.counted_s,
+        cell.seed, warm_up_s() + cell.counted_s, cell.world,
     )  # fmt: skip
     nearest, steps = [np.inf], [0]
 

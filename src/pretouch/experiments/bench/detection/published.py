@@ -29,7 +29,13 @@ def summary_of(bench: Bench, rows: Rows) -> Row:
     """Return what the JSON file holds: what was run, a row for each detector and scenario, and the curves."""
     known = CONTENDERS
     return {
-        "about": {"bench": NAME, "version": __version__, "quick": bench.quick, "seeds": bench.seeds},
+        "about": {
+            "bench": NAME,
+            "version": __version__,
+            "quick": bench.quick,
+            "seeds": bench.seeds,
+            **({"world": bench.world} if bench.world else {}),
+        },
         "resolution": resolution(rows),
         "rows": [*free_rows(rows, known), *contact_rows(rows, known), *board_rows(rows, known), *ablation_rows(rows)],
         "curves": curves(rows, known),

@@ -1,0 +1,94 @@
+from dataclasses import fields, replace
+
+import pytest
+
+from pretouch.errors import ParameterError
+from pretouch.robot.description import panda
+from pretouch.sim.plant_params import PlantParams, plant_params_of
+from pretouch.sim.randomisation import SETS, World, drawn, world_set
+from pretouch.sim.range_finder import RangeFinderParams
+
+
+def test_the_nominal_world_is_the_usual_one():
+    assert drawn(world_set("nominal"), 5) == World(PlantParams(), RangeFinderParams())
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_one_seed_is_one_world(name):
+    chosen = world_set(name)
+    assert drawn(chosen, 1001) == drawn(world_set(name), 1001)
+    assert name == "nominal" or drawn(chosen, 1001) != drawn(chosen, 1002)
+
+
+@pytest.mark.parametrize("name", ["realistic", "stress"])
+def test_every_draw_is_within_its_range_and_has_a_source(name):
+    chosen = world_set(name)
+    assert chosen.about
+    for spread in chosen.spreads:
+        assert spread.source, spread.field
+    by_name = {spread.field: spread for spread in chosen.spreads}
+    for seed in range(1000, 1040):
+        world = drawn(chosen, seed)
+        low, high = by_name["plant.observer_gain_1_s"].numbers
+        assert low <= world.plant.observer_gain_1_s <= high
+        low, high = by_name["plant.ripple_nm"].numbers
+        for value, usual in zip(world.plant.ripple_nm, PlantParams().ripple_nm, strict=True):
+            assert low * usual <= value <= high * usual
+        assert 0.0 <= world.position_mm <= by_name["misplaced.position_mm"].numbers[1]
+
+
+def test_stress_reaches_farther_than_realistic():
+    wide, narrow = ({s.field: s.numbers for s in world_set(name).spreads} for name in ("stress", "realistic"))
+    assert set(wide) == set(narrow)
+    for name in narrow:
+        assert wide[name][0] <= narrow[name][0] or wide[name][1] > narrow[name][1], name
+
+
+def test_a_field_is_drawn_alike_whatever_else_is(tmp_path):
+    one, both = tmp_path / "one.toml", tmp_path / "both.toml"
+    one.write_text("[plant.mass_error]\nuniform = [0.0, 0.1]\n")
+    both.write_text("[plant.damping_ratio]\nnormal = [0.9, 0.01]\n" + one.read_text())
+    a, b = (drawn(world_set(str(place)), 7).plant for place in (one, both))
+    assert a.mass_error == b.mass_error
+    assert a.damping_ratio == 1.0 != b.damping_ratio
+
+
+def test_what_an_experiment_varies_stays():
+    world, usual = drawn(world_set("stress"), 1003), plant_params_of(panda())
+    own = replace(usual, payload_max_kg=0.33)
+    merged = world.plant_with(own, usual)
+    assert merged == replace(world.plant, payload_max_kg=0.33)
+    assert world.ranging_with(RangeFinderParams(dropout=0.9)) == replace(world.ranging, dropout=0.9)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[plant.mas]\nvalue = 1.0\n", "has plant.mas: choose from period_s"),
+        ("[plants.mass_error]\nvalue = 1.0\n", "has 'plants': its tables are about, plant, ranging, misplaced"),
+        ("[plant.mass_error]\nuniform = [0.2, 0.1]\n", "give two numbers, the lower first"),
+        ("[plant.mass_error]\nlog_uniform = [0.0, 0.1]\n", "and above 0"),
+        ("[plant.mass_error]\nuniform = [0.0, 0.1]\nvalue = 3\n", "give one of value, uniform"),
+        ("[plant.mass_error]\nvalue = 1.5\n", "PlantParams.mass_error is 1.5: it must be at most 1"),
+        ("[plant.mass_error]\nvalue = 'much'\n", "give a number"),
+        ("[plant.ripple_nm]\nvalue = 0.1\n", "give a list of numbers"),
+        ("[plant.offsets_nm]\nvalue = [nan]\n", "give a list of numbers"),
+        ("[ranging.mode]\nvalue = 'wide'\n", "choose one of short, long"),
+        ("nothing", "no TOML file"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused_with_the_field(tmp_path, text, said):
+    place = tmp_path / "world.toml"
+    place.write_text(text)
+    with pytest.raises(ParameterError, match=said):
+        world_set(str(place))
+
+
+def test_a_name_that_is_none_says_which_there_are():
+    with pytest.raises(ParameterError, match="none of nominal, realistic, stress"):
+        world_set("real")
+
+
+def test_all_fields_of_a_plant_can_be_set():
+    names = {f.name for f in fields(PlantParams)}
+    assert {"state_delay_s", "command_delay_s", "offsets_nm", "payloads_kg"} <= names
