@@ -3,6 +3,7 @@
 import numpy as np
 
 from pretouch.contact import reaction
+from pretouch.contact.clamp import ClampState
 from pretouch.contact.detect import Detection
 from pretouch.contact.place import given_up
 from pretouch.contact.response import Doing, ResponseState, moves, presses_on, waits
@@ -49,12 +50,19 @@ def events_of(
     return events
 
 
+def _caught(clamp: ClampState) -> str:
+    """Say what the arm is caught between, or how that shows."""
+    if clamp.between:
+        return f"{clamp.between}, pushed apart with {clamp.force:.0f} N"
+    return f"{clamp.torque:.1f} Nm against the way it yielded"
+
+
 def _of_yielding(answer: ResponseState, near: bool, lasting: bool, before: Doing, p: Profile) -> dict[Event, str]:
     """Name what the admittance is at, and what it gave up."""
     events: dict[Event, str] = {}
     r, clamp, place = p.reaction, answer.clamp, answer.place
     if clamp.torque:
-        events[Event.CLAMPED if clamp.open else Event.OPENING] = f"{clamp.torque:.1f} Nm against its way"
+        events[Event.CLAMPED if clamp.open else Event.OPENING] = _caught(clamp)
     elif before == "react" and waits(answer, near, lasting, r):
         clear = ", once nothing is seen near it" if near and not given_up(place, r) else ""
         events[Event.YIELDING] = f"{r.quiet_s:g} s after the last push{clear}"

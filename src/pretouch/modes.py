@@ -79,13 +79,12 @@ TABLE: tuple[Transition, ...] = (
     Transition(Event.REACTING, frozenset({Mode.REACT}), Mode.REACT, "Moving with a contact: {} left."),
     Transition(
         Event.CLAMPED, frozenset({Mode.REACT}), Mode.HOLD,
-        "The arm was caught between two things while it yielded ({}) and has opened the way it came: free it, then"
-        " resume.",
+        "The arm was caught between two things ({}) and has opened the way it came: free it, then resume.",
         latches=True, soft=True,
     ),
     Transition(
         Event.OPENING, frozenset({Mode.REACT}), Mode.REACT,
-        "Caught between two things while yielding ({}): opening the way it came.",
+        "Caught between two things ({}): opening the way it came.",
     ),
     Transition(
         Event.YIELDING, frozenset({Mode.REACT}), Mode.REACT, "Yielding to a contact: the task goes on {}.",

@@ -1,4 +1,9 @@
-"""Caught between two things while yielding: what opposes the way the arm yields, and the way out (design 7.5)."""
+"""Caught between two things: what opposes the way the arm yields, or pushes two of its links apart; and the way out.
+
+Design 7.5.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,11 +41,41 @@ class ClampState:
     """Time for which the arm has opened [s]."""
     open: bool
     """Whether it has."""
+    path: FloatArray
+    """(M, n) as `trail`, of the way before the contact [rad]."""
+    came: FloatArray
+    """(n,) joint velocities with which the arm came to the contact [rad/s]."""
+    between: str
+    """The links between which something is caught, in words; '' for none."""
+    force: float
+    """Force with which it pushes them apart [N]."""
 
 
 def clamp_init(q: FloatArray) -> ClampState:
-    """Return the state at the onset of a contact, at joint positions (n,) [rad]."""
-    return ClampState(np.zeros(len(q)), np.inf, 0.0, 0, np.inf, np.tile(q, (_MARKS, 1)), 0.0, 0.0, 0.0, False)
+    """Return the state of an arm that has met nothing, at joint positions (n,) [rad]."""
+    there, none = np.tile(q, (_MARKS, 1)), np.zeros(len(q))
+    return ClampState(
+        none, np.inf, 0.0, 0, np.inf, there, 0.0, 0.0, 0.0, False, there, none, "", 0.0
+    )  # fmt: skip
+
+
+def clamp_begun(before: ClampState, q: FloatArray, came: FloatArray) -> ClampState:
+    """Return the state at the onset of a contact, to which the arm came with joint velocities (n,) [rad/s]."""
+    return replace(clamp_init(q), path=before.path, came=came)
+
+
+def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
+    """Note the way of an arm that follows its task, at commanded joint positions (n,) [rad]."""
+    if state.marked + dt < _APART_S:
+        return replace(state, marked=state.marked + dt)
+    return replace(state, marked=0.0, path=np.vstack((q[None], state.path[:-1])))
+
+
+def caught_between(state: ClampState, between: str, force: float, torque: FloatArray) -> ClampState:
+    """Take what is caught between two links, and turns the joints (n,) [Nm], for a clamp: out of it the arm opens."""
+    return replace(
+        state, torque=float(np.abs(torque).max()), trail=state.path, between=between, force=force, opposed=0.0
+    )  # fmt: skip
 
 
 def clamped(
@@ -77,7 +112,7 @@ def clamped(
         trail, marked = np.vstack((q[None], trail[:-1])), 0.0
     return ClampState(
         course, pushed, opposed, turns, turned, trail, marked,
-        max(abs(along), p.clamp_nm) if caught else 0.0, 0.0, False,
+        max(abs(along), p.clamp_nm) if caught else 0.0, 0.0, False, state.path, state.came, state.between, state.force,
     )  # fmt: skip
 
 
@@ -87,7 +122,8 @@ def opened(
     """Return the joint velocities (n,) [rad/s] back to the next place of the way the arm came, of any length.
 
     It ends after its time, at the end of the way, and where something opposes it as a clamp does: the arm is then not
-    pushed into what pushes it.
+    pushed into what pushes it. What of the way to something caught between two links has been opened already is left
+    out.
 
     Args:
         state: memory, of a clamp.
@@ -97,9 +133,10 @@ def opened(
         params: parameters.
     """
     trail = state.trail
-    while len(trail) > 1 and np.abs(trail[0] - q).max() < _NEAR_RAD:
+    while len(trail) > 1 and (np.abs(trail[0] - q).max() < _NEAR_RAD or _closes(state, trail[0] - q)):
         trail = trail[1:]
     way = trail[0] - q
+    way = np.zeros(len(q)) if _closes(state, way) else way
     length = float(np.sqrt(way @ way))
     against = length > 0 and float(torque @ way) < -params.clamp_nm * length
     opposed = state.opposed + dt if against else 0.0
@@ -108,8 +145,13 @@ def opened(
     )
     return way / dt, ClampState(
         state.course, state.pushed, opposed, state.turns, state.turned, trail, state.marked, state.torque,
-        state.opening + dt, state.open or over,
+        state.opening + dt, state.open or over, state.path, state.came, state.between, state.force,
     )  # fmt: skip
+
+
+def _closes(state: ClampState, way: FloatArray) -> bool:
+    """Whether a way (n,) [rad] leads back to something caught between two links."""
+    return state.between != "" and float(way @ state.came) > 0.0
 
 
 _NEAR_RAD = 0.002

@@ -27,6 +27,10 @@ class Detection:
     """Whether the sample is to be learnt as free motion."""
     lasting: bool = False
     """Whether it is being found out if what is felt is a load or an error of the estimate: the arm waits for that."""
+    torque: FloatArray | None = None
+    """(n,) residual, averaged over the time that says most of a contact [Nm]; of the method sequential."""
+    covariance: FloatArray | None = None
+    """(n, n) covariance that it has in free motion [Nm^2]."""
 
 
 def detect(

@@ -79,7 +79,17 @@ def feel(
     )  # fmt: skip
     bands = Thresholds(felt.bands)
     contact = _contact(felt.force, bands) if felt.sure and found.armed else None
-    made = Detection(bands, contact, found.armed, felt.residual, felt.evidence, felt.learning, felt.lasting)
+    made = Detection(
+        bands,
+        contact,
+        found.armed,
+        felt.residual,
+        felt.evidence,
+        felt.learning,
+        felt.lasting,
+        felt.torque,
+        felt.covariance,
+    )
     return made, FeelState(window, (after,))
 
 

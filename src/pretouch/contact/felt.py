@@ -80,6 +80,10 @@ class Felt:
     """Whether the sample is to be learnt as free motion."""
     lasting: bool
     """Whether it is being found out if what is felt is a load or a step of an estimate."""
+    torque: FloatArray
+    """(n,) mean residual of the window that says most [Nm]."""
+    covariance: FloatArray
+    """(n, n) covariance that it has in free motion [Nm^2]."""
 
 
 def sequential_init(model: RobotModel, p: DetectionParams, learnt: ResidualModel | None = None) -> SequentialState:
@@ -110,6 +114,7 @@ def take_sample(
     """
     m, o, n = state.model, obstacles, model.n
     residual, speed, force, bands = np.empty(n), np.empty(n), np.empty(3), np.empty((6, 3))
+    mean, spread_of_mean = np.empty(n), np.empty((n, n))
     ring, block, queue, prior = state.ring.copy(), m.block.copy(), m.queue, _NONE
     weights, covariance, spread, seen = m.weights, m.covariance, m.spread, m.seen
     settle = round(p.relearn_after_s / period) if p.learn else 0
@@ -132,15 +137,16 @@ def take_sample(
         cues.gain,
         p.near_gain, p.near_m, p.near_horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm, p.still_rad_s,
         p.memory_s, p.spread_memory_s, (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2,
-        residual, speed, force, bands,
+        residual, speed, force, bands, mean, spread_of_mean,
     )  # fmt: skip
     at, count = (state.at + 1) % LONGEST, min(state.count + 1, LONGEST)
     if steady < 0:  # learnt: what was felt before is no contact
-        felt = Felt(residual, 0.0, np.zeros(3), bands, False, True, False)
+        felt = Felt(residual, 0.0, np.zeros(3), bands, False, True, False, mean, spread_of_mean)
         after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, 0, 0)
         return felt, SequentialState(after, ring, at, 0, 0, 0, lasting, 0, turning)
     confirmed = state.confirmed + 1 if evidence >= 1.0 else 0
-    felt = Felt(residual, evidence, force, bands, confirmed >= p.confirm_samples, calm == _CALM, steady > 0)
+    sure, learning = confirmed >= p.confirm_samples, calm == _CALM
+    felt = Felt(residual, evidence, force, bands, sure, learning, steady > 0, mean, spread_of_mean)
     after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, filled, waiting)
     return felt, SequentialState(after, ring, at, count, calm, confirmed, lasting, steady, turning)
 
@@ -162,7 +168,8 @@ def _take(
     touch_gain: FloatArray,
     near_gain: float, near: float, horizon: float, clear: float, suspect: float, floor: float, bias_floor: float,
     still: float, memory: float, spread_memory: float, most_velocity: float, most_torque: float,
-    residual: FloatArray, speed: FloatArray, force: FloatArray, bands: FloatArray,
+    residual: FloatArray, speed: FloatArray, force: FloatArray, bands: FloatArray, mean_of_window: FloatArray,
+    spread_of_mean: FloatArray,
 ) -> tuple[float, int, int, int, int]:  # fmt: skip
     """Write the last line of arguments and what is learnt; return evidence, calm samples, and what waits for that."""
     n, growth = len(qd), np.empty(len(qd))
@@ -216,6 +223,10 @@ def _take(
     else:
         steady = 0
     for j in range(n):
+        mean_of_window[j] = means[window, j]
+        for k in range(n):
+            spread_of_mean[j, k] = S[j, k] / LENGTHS[window]
+        spread_of_mean[j, j] += doubt[j]
         S[j, j] += doubt[j]
     _write_force(
         J_ee, means[window], mean, S, away[max(which - n, 0)] if which >= n else np.zeros(3), math.sqrt(2.0 * level),

@@ -15,8 +15,9 @@ from pretouch.contact.admittance import (
     learnt,
     yielded,
 )
-from pretouch.contact.clamp import ClampState, clamp_init, clamped, opened
+from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
 from pretouch.contact.detect import Detection
+from pretouch.contact.pinch import pinched
 from pretouch.contact.place import PlaceState, given_up, met, passed, place_init, pushed, waited
 from pretouch.params import Profile, ReactionParams
 from pretouch.robot.model import Kinematics, RobotModel
@@ -108,7 +109,11 @@ def noticed(state: ResponseState, doing: Doing, felt: Felt, phase: float, resume
         # out of the clamp it may be moved, not back into it
         yielding = replace(yielding, velocity=np.where(yielding.velocity * clamp.course > 0, 0.0, yielding.velocity))
     if doing == "react" and p.clamps and not clamp.torque:
-        clamp = clamped(clamp, yielding.torque, yielding.velocity, felt.robot.q_commanded, _COURSE_RAD_S, dt, p)
+        clamp = _pinch(
+            clamped(clamp, yielding.torque, yielding.velocity, felt.robot.q_commanded, _COURSE_RAD_S, dt, p), felt
+        )  # fmt: skip
+    elif doing == "task" and p.pinches:
+        clamp = gone(clamp, felt.robot.q_commanded, dt)
     if doing == "react":
         place = pushed(place, yielding.tank - p.start_energy_j)
     if resume:
@@ -118,6 +123,18 @@ def noticed(state: ResponseState, doing: Doing, felt: Felt, phase: float, resume
     elif doing == "task":
         place = passed(place, phase, p)
     return ResponseState(state.decay, yielding, clamp, place)
+
+
+def _pinch(clamp: ClampState, felt: Felt) -> ClampState:
+    """Look for something caught between two links, as long as a contact is felt."""
+    p, found = felt.profile.reaction, felt.found
+    if not p.pinches or clamp.torque or found.evidence < 1.0 or found.torque is None or found.covariance is None:
+        return clamp
+    pinch = pinched(felt.model, felt.kin, found.torque, found.covariance, clamp.came, p)
+    if pinch is None:
+        return clamp
+    one, other = (felt.model.links[link] for link in pinch.link)
+    return caught_between(clamp, f"{one} and {other}", pinch.force, found.torque)
 
 
 def _residual(state: AdmittanceState, felt: Felt) -> FloatArray:
@@ -157,7 +174,9 @@ def began(state: ResponseState, doing: Doing, felt: Felt, phase: float, point: F
     if mine:
         kinetic = 0.5 * float(felt.command @ felt.model.mass_matrix(felt.robot.q) @ felt.command)
         place = met(state.place, phase, point, felt.near, kinetic, p)
-    return ResponseState(state.decay, yielding, clamp_init(felt.robot.q_commanded), place)
+    came = felt.command if doing == "task" else np.zeros(len(torque))
+    clamp = _pinch(clamp_begun(state.clamp, felt.robot.q_commanded, came), felt)
+    return ResponseState(state.decay, yielding, clamp, place)
 
 
 def answered(state: ResponseState, doing: Doing, felt: Felt) -> tuple[Answer | None, ResponseState]:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pretouch.experiments import avoidance, clamp, dynamic, mounting, static, wire
+from pretouch.experiments import avoidance, clamp, dynamic, mounting, pinch, static, wire
 from pretouch.experiments.claims import anticipation, between, detectable, free_motion, noise
 from pretouch.experiments.coverage import study as coverage
 from pretouch.experiments.experiment import Experiment, Row
@@ -38,7 +38,7 @@ WEAKNESSES = (
 )
 HARDWARE = (wire.EXPERIMENT,)
 MOUNTING = (mounting.EXPERIMENT, coverage.EXPERIMENT)
-REACTION = (clamp.EXPERIMENT,)
+REACTION = (clamp.EXPERIMENT, pinch.EXPERIMENT)
 
 GROUPS = {
     "The paper's experiments": PAPER,

@@ -72,6 +72,26 @@ class ReactionParams(Checked):
     """Speed of the fastest point of the body while the arm opens along the way it came [m/s]."""
     open_s: Positive = 0.5
     """Longest that it opens [s]."""
+    pinches: bool = False
+    """Switch: whether something caught between two of the arm's links is told from a push, so that the arm opens and
+    holds (ours). It needs the torques' covariance, which the sequential detector knows."""
+    pinch_gap_m: Positive = 0.2
+    """Gap between two links in which something can be caught [m]: a thigh fits in no larger one."""
+    pinch_closing_m_s: Positive = 0.02
+    """Speed from which a gap counts as closing [m/s]: two links with a single link between them come nearer to each
+    other by less, whatever the arm does."""
+    pinch_thickness_m: Positive = 0.06
+    """Mean thickness of what may be caught, between finger and forearm [m]: of two gaps that explain the torques as
+    well, the narrower one is taken."""
+    pinch_n: Positive = 10.0
+    """Force from which something is caught [N]."""
+    pinch_along: Annotated[float, Check(low=0.0, high=1.0)] = 0.85
+    """Cosine of the largest angle between that force and the shortest way across the gap: friction."""
+    pinch_rest: Positive = 9.0
+    """Square of the torques that a caught thing may leave unexplained, in deviations of free motion [1]: 94 % of the
+    chi-square distribution of the four that a force does not explain."""
+    pinch_explained: Positive = 27.0
+    """Least square of the torques that it has to explain [1]. Of 217 contacts from outside one met both bounds."""
     give_up_contacts: PositiveCount = 3
     """Contacts at one place of the path after which it gives up."""
     place_m: Positive = 0.1

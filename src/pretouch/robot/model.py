@@ -75,6 +75,8 @@ class RobotModel:
         """The part of the body that any joint moves."""
         if not len(self.body):
             raise RobotModelError(f"{description.name}: no joint moves a capsule: give the links capsule geoms.")
+        self.apart: IntArray = self._pairs_apart()
+        """(P, 2) pairs of capsules that two joints or more part, by their index; see `robot.self_distance`."""
         self.mass: FloatArray = self._model.body_mass.copy()
         """(L,) mass of each link [kg]."""
         self.com: FloatArray = self._model.body_ipos.copy()
@@ -115,6 +117,11 @@ class RobotModel:
             start, count = self._model.body_jntadr[body], self._model.body_jntnum[body]
             moved[body, start : start + count] = True
         return moved
+
+    def _pairs_apart(self) -> IntArray:
+        moved = self.moved_by[self.capsules.link]
+        between = (moved[:, None] != moved[None]).sum(axis=2)
+        return np.argwhere(np.triu(between >= 2))
 
     def _inertia(self) -> FloatArray:
         principal, turned = np.empty((self._model.nbody, 3, 3)), np.empty(9)

@@ -32,9 +32,7 @@ def capsule_ends(model: RobotModel, kin: Kinematics) -> FloatArray:
 
 def pairs_apart(model: RobotModel) -> IntArray:
     """Pairs of capsules (P, 2) that two joints or more part, by their index."""
-    moved = model.moved_by[model.capsules.link]
-    between = (moved[:, None] != moved[None]).sum(axis=2)
-    return np.argwhere(np.triu(between >= 2))
+    return model.apart
 
 
 def self_distances(model: RobotModel, ends: FloatArray) -> FloatArray:
@@ -50,11 +48,17 @@ def self_distances(model: RobotModel, ends: FloatArray) -> FloatArray:
 
 
 def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
-    """Distances (...) [m] from segments a to b to segments c to d, each (..., 3); a segment may be a point.
+    """Distances (...) [m] from segments a to b to segments c to d, each (..., 3); see `nearest_points`."""
+    on_first, on_second = nearest_points(a, b, c, d)
+    return np.linalg.norm(on_first - on_second, axis=-1)
 
-    The nearest point of the one is that nearest to the line of the other, moved into its segment; then each is once
-    brought to where it is nearest to the other (Ericson, Real-Time Collision Detection, 5.1.9). Of parallel segments
-    any nearest pair will do.
+
+def nearest_points(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Where segments a to b and c to d, each (..., 3), are nearest to each other, on each (..., 3) [m].
+
+    A segment may be a point. The nearest point of the one is that nearest to the line of the other, moved into its
+    segment; then each is once brought to where it is nearest to the other (Ericson, Real-Time Collision Detection,
+    5.1.9). Of parallel segments any nearest pair will do.
     """
     u, v, w = b - a, d - c, a - c
     uu, uv, vv, uw, vw = (_dot(*pair) for pair in ((u, u), (u, v), (v, v), (u, w), (v, w)))
@@ -62,7 +66,7 @@ def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray)
     on_first = _within(uv * vw - uw * vv, np.where(area > 1e-12 * uu * vv, area, 0.0))
     on_second = _within(uv * on_first + vw, vv)
     on_first = _within(uv * on_second - uw, uu)
-    return np.linalg.norm(w + on_first[..., None] * u - on_second[..., None] * v, axis=-1)
+    return a + on_first[..., None] * u, c + on_second[..., None] * v
 
 
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -25,6 +25,7 @@ OFF = {
     "detection.widen_at_turns": "no",
     "reaction.method": "decay",
     "reaction.clamps": "no",
+    "reaction.pinches": "no",
     "reaction.gives_up": "no",
     "reaction.soft_hold": "no",
     "reaction.static_friction_nm": "0",
