@@ -21,6 +21,7 @@ from pretouch.types import (
     RangeReadings,
     RobotState,
     Thresholds,
+    Touched,
 )
 
 INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE}/msg/Truth"
@@ -111,7 +112,7 @@ def decode_inputs(data: bytes) -> tuple[int, Inputs | None, str]:
 
 def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = None) -> bytes:
     """Return a step as CDR, with the path's unit tangent (3,) where the path can only be kept so."""
-    o, qp, contact = step.obstacles, step.qp, step.contact
+    o, qp, contact, touched = step.obstacles, step.qp, step.contact, step.touched
     obstacles = make(
         _OBSTACLES, o.unit, _flat(o.point), o.ee_distance, _flat(o.body_point), o.link, _flat(o.direction),
         o.body_distance, o.closing_speed,
@@ -127,7 +128,8 @@ def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = N
         make(_THRESHOLDS, *np.ascontiguousarray(step.thresholds.parts)), step.armed, contact is not None, felt,
         _row(step.reaction_velocity), step.restricted, step.approach_limit,
         make(_QP, qp.qd, qp.slack, qp.multipliers, qp.outcome.value, plain_text(qp.status)), step.command,
-        step.residual, step.evidence,
+        step.residual, step.evidence, touched.link, _flat(touched.point), _flat(touched.force), touched.sigma,
+        touched.probability,
     ))  # fmt: skip
 
 
@@ -156,6 +158,10 @@ def _step(m: Any) -> ControlStep:
         reaction_velocity=m.reaction_velocity, restricted=m.restricted, approach_limit=m.approach_limit,
         qp=QpSolution(qp.qd, qp.slack, qp.multipliers, QpOutcome(qp.outcome), qp.status), command=m.command,
         residual=m.residual, evidence=m.evidence,
+        touched=Touched(
+            m.touched_link, m.touched_point.reshape(-1, 3), m.touched_force.reshape(-1, 3), m.touched_sigma,
+            m.touched_probability,
+        ),
     )  # fmt: skip
 
 
