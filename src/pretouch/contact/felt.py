@@ -147,7 +147,9 @@ def take_sample(
         after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, 0, 0)
         return felt, SequentialState(after, ring, at, 0, 0, 0, lasting, 0, turning)
     confirmed = state.confirmed + 1 if evidence >= 1.0 else 0
-    felt = Felt(residual, means, S, doubt, evidence, force, bands, confirmed >= p.confirm_samples, calm == _CALM, steady > 0)
+    felt = Felt(
+        residual, means, S, doubt, evidence, force, bands, confirmed >= p.confirm_samples, calm == _CALM, steady > 0
+    )
     after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, filled, waiting)
     return felt, SequentialState(after, ring, at, count, calm, confirmed, lasting, steady, turning)
 
@@ -172,7 +174,7 @@ def _take(
     residual: FloatArray, speed: FloatArray, force: FloatArray, bands: FloatArray,
     means: FloatArray, S: FloatArray, doubt: FloatArray,
 ) -> tuple[float, int, int, int, int]:  # fmt: skip
-    """Write the last two lines of arguments and what is learnt; return evidence, calm samples, and what waits for that."""
+    """Write the last two lines of arguments and what is learnt; return evidence, calm samples, and what waits."""
     n, growth = len(qd), np.empty(len(qd))
     moving = _velocities(qd_commanded, speed_before, late, period, still, speed, growth)
     x, mean = np.empty((n, weights.shape[1])), np.empty(n)

@@ -102,10 +102,10 @@ def best_pair(
     if place < 0:
         for j in range(behind):
             D[j, j] += _LEFT_OUT
-        if 0.0 > evidence_under(
+        if evidence_under(
             D, mean, anchor, axis, position, rotation, moved_by, link, point, normal, first, prior, mu, largest, tails,
             ln[0], force[0],
-        ):  # fmt: skip
+        ) < 0.0:  # fmt: skip
             return -np.inf
         for c in range(count):
             if c < first[min(behind, len(first) - 1)]:
@@ -116,10 +116,10 @@ def best_pair(
     for turn in range(turns):
         k = 1 - turn % 2
         held(C, anchor, axis, moved_by[link[place]], at[place], outwards[place], size, mu, largest, D)
-        if 0.0 > evidence_under(
+        if evidence_under(
             D, mean, anchor, axis, position, rotation, moved_by, link, point, normal, first, prior, mu, largest, tails,
             ln[k], force[k],
-        ):  # fmt: skip
+        ) < 0.0:  # fmt: skip
             return -np.inf
         for c in range(count):
             if body[c] == body[place]:

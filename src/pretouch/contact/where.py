@@ -67,7 +67,8 @@ _NOTHING = WhereState(np.zeros(0), 0.0, np.full(2, -1, np.int64), 0.0, False, 0,
 
 def locate(
     state: WhereState, model: RobotModel, kin: Kinematics, means: FloatArray, samples: int, spread: FloatArray,
-    doubt: FloatArray, evidence: float, qd: FloatArray, obstacles: Obstacles, cues: Cues, period: float, p: LocalisationParams,
+    doubt: FloatArray, evidence: float, qd: FloatArray, obstacles: Obstacles, cues: Cues, period: float,
+    p: LocalisationParams,
 ) -> tuple[Touched, WhereState]:  # fmt: skip
     """Say where the arm is touched in one step, if it is.
 

@@ -31,6 +31,8 @@ _CONTACT, _QP = f"{PACKAGE}/msg/Contact", f"{PACKAGE}/msg/QpSolution"
 
 _NONE = np.zeros(0)
 _NO_WHOLE = np.zeros(0, dtype=np.int64)
+_NO_PLACES = bytes(20)
+"""Lengths of the five empty rows of places that are touched: steps recorded by versions without them end before."""
 _SENSIBLE_S = 1e12
 """A time stamp from here on [s] is shown in a sentence, as it was given."""
 _SHOWN = 500
@@ -135,7 +137,10 @@ def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = N
 
 def decode_step(data: bytes) -> tuple[int, ControlStep, FloatArray]:
     """Return the number of a step, the step, and the path's tangent there, (0,) unless it was kept."""
-    m = decoded(STEP, data)
+    try:
+        m = decoded(STEP, data)
+    except RecordingError:
+        m = decoded(STEP, data + _NO_PLACES)
     try:
         return m.sequence, _step(m), m.path_tangent
     except ValueError as error:
