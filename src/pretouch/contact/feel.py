@@ -69,8 +69,7 @@ def feel(
         return Detection(found.thresholds, found.contact, found.armed, robot.tau_ext, evidence), FeelState(window, ())
     if math.isnan(robot.tau_ext.sum()):
         nothing = Detection(_no_bands(), None, False, np.full(model.n, np.nan), 0.0)
-        where = (where_init(),) if state.sequential and p.localise else ()
-        return nothing, FeelState(window, state.sequential, where)
+        return nothing, FeelState(window, state.sequential, (where_init(),) if state.where else ())
     if p.method == "fixed":
         felt_force = force_map(model.ee_jacobian(kin)) @ robot.tau_ext if force is None else force
         share = share_of_bounds(robot.tau_ext, force, p)

@@ -17,10 +17,10 @@ from pretouch.contact.one_place import covariance_of_mean
 from pretouch.contact.sequential import LENGTHS
 from pretouch.contact.two_places import best_pair, evidence_under, total_of
 from pretouch.contact.where_prior import hidden_places, place_surface, prior_of_places
+from pretouch.contact.where_summary import exchange, summarise
 from pretouch.params import LocalisationParams
 from pretouch.perception.vectors import placed_ends
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.robot.surface import SPACING_M
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Obstacles, Touched
 from pretouch.values import value
 
@@ -31,8 +31,6 @@ _LEFT = 6.0
 """What the best single contact has to leave unexplained before two are looked for [1]: less cannot earn the odds."""
 _TURNS = 2
 """Times that one of two contacts is moved in a step."""
-_NEGLIGIBLE = 12.0
-"""Nats below the most likely place from which on a place is left out."""
 
 
 @value
@@ -95,8 +93,7 @@ def locate(
             state.ln, state.weight, state.pair, state.size, state.two, state.steps, since, state.touched
         )  # fmt: skip
     s, body, o = model.surface, model.capsules, obstacles
-    n, count = len(doubt), len(s)
-    ln = np.zeros(count) if state.steps == 0 else state.ln.copy()
+    ln = np.zeros(len(s)) if state.steps == 0 else state.ln.copy()
     pair, link = state.pair.copy(), np.empty(2, np.int64)
     point, force, sigma, probability = np.empty((2, 3)), np.empty((2, 3)), np.empty(2), np.empty(2)
     weight, size, found = _infer(
@@ -107,7 +104,7 @@ def locate(
         o.point, o.body_distance, cues.gain, cues.link, cues.point, cues.sigma,
         p.friction, p.force_n, p.relative, p.tails, p.seen_share, p.seen_m, p.near_m, p.unit_share, p.unit_m,
         -math.log(p.two_odds), math.exp(-max(since, period) / p.memory_s) if p.memory_s > 0.0 else 0.0,
-        1 + state.steps % max(1, n - 2), state.weight, state.size, state.two,
+        state.steps, state.weight, state.size, state.two,
         ln, pair, link, point, force, sigma, probability,
     )  # fmt: skip
     if not found:
@@ -134,7 +131,7 @@ def _infer(
     seen: FloatArray, distance: FloatArray, gain: FloatArray,
     told_link: IntArray, told: FloatArray, told_sigma: FloatArray,
     mu: float, largest: float, relative: float, tails: float, seen_share: float, seen_m: float, near: float,
-    unit_share: float, unit_m: float, margin: float, keep: float, behind: int, weight: float, size: float, two: bool,
+    unit_share: float, unit_m: float, margin: float, keep: float, steps: int, weight: float, size: float, two: bool,
     average: FloatArray, pair: IntArray, on: IntArray, point: FloatArray, force: FloatArray, sigma: FloatArray,
     probability: FloatArray,
 ) -> tuple[float, float, int]:  # fmt: skip
@@ -167,7 +164,8 @@ def _infer(
     if left > _LEFT or two:
         lns, forces, other = np.empty((2, count)), np.empty((2, count, 3)), np.empty(2, np.int64)
         # a pair that is believed is followed; else it is improved, and another one tried, in turns
-        again = pair[0] >= 0 and (two or behind % 2 == 0)
+        again = pair[0] >= 0 and (two or steps % 2 == 1)
+        behind = 2 + steps // 2 % max(1, n - 3)
         best = best_pair(
             C, means[window], anchor, axis, position, rotation, moved_by, link, place, normal, first, body, prior, at,
             outwards, mu, largest, tails, pair[0] if again else -1, size, behind, _TURNS, other, lns, forces,
@@ -179,13 +177,13 @@ def _infer(
                 size -= forces[0, pair[0], i] * outwards[pair[0], i]
         if best - one > (0.0 if two else margin):
             for k in range(2):
-                _summarise(lns[k], at, outwards, link, first, forces[k], on, point, force, sigma, probability, k)
+                summarise(lns[k], at, outwards, link, first, forces[k], on, point, force, sigma, probability, k)
             if probability[1] > probability[0]:
-                _swap(on, point, force, sigma, probability)
+                exchange(on, point, force, sigma, probability)
             return total, size, 2
     for c in range(count):
         ln[c] = average[c] + prior[c]
-    _summarise(ln, at, outwards, link, first, there, on, point, force, sigma, probability, 0)
+    summarise(ln, at, outwards, link, first, there, on, point, force, sigma, probability, 0)
     return total, size, 1
 
 
@@ -210,69 +208,3 @@ def _clearest(
             means[window], spread, doubt, max(1.0, independent * _LENGTHS[window]), relative, C
         )  # fmt: skip
     return window, best
-
-
-@compiled
-def _summarise(
-    ln: FloatArray, at: FloatArray, outwards: FloatArray, link: IntArray, first: IntArray, there: FloatArray,
-    on: IntArray, point: FloatArray, force: FloatArray, sigma: FloatArray, probability: FloatArray, k: int,
-) -> None:  # fmt: skip
-    """Write contact k: the likeliest rigid body, the mean place on it brought to the surface, force, spread."""
-    most, total, best, body = ln.max(), 0.0, -1.0, 0
-    for d in range(len(first) - 1):
-        here = 0.0
-        for c in range(first[d], first[d + 1]):
-            here += math.exp(ln[c] - most)
-        total += here
-        if here > best:
-            best, body = here, d
-    mean = np.zeros(3)
-    top = -np.inf
-    for c in range(first[body], first[body + 1]):
-        top = max(top, ln[c])
-        for i in range(3):
-            mean[i] += math.exp(ln[c] - most) / best * at[c, i]
-    nearest, least = first[body], np.inf
-    for c in range(first[body], first[body + 1]):
-        gap = (at[c, 0] - mean[0]) ** 2 + (at[c, 1] - mean[1]) ** 2 + (at[c, 2] - mean[2]) ** 2
-        if gap < least and ln[c] > top - _NEGLIGIBLE:
-            nearest, least = c, gap
-    above = 0.0
-    for i in range(3):
-        above += (mean[i] - at[nearest, i]) * outwards[nearest, i]
-    for i in range(3):
-        point[k, i] = mean[i] - above * outwards[nearest, i]
-        force[k, i] = there[nearest, i]
-    V = np.zeros((3, 3))
-    for c in range(first[body], first[body + 1]):
-        part = math.exp(ln[c] - most) / best
-        for i in range(3):
-            for j in range(3):
-                V[i, j] += part * (at[c, i] - point[k, i]) * (at[c, j] - point[k, j])
-    on[k], probability[k], sigma[k] = link[nearest], best / total, math.sqrt(_largest(V) + SPACING_M**2 / 12.0)
-
-
-@compiled
-def _largest(V: FloatArray) -> float:
-    """Largest eigenvalue of a covariance (3, 3): the root of its characteristic polynomial in closed form."""
-    q = (V[0, 0] + V[1, 1] + V[2, 2]) / 3.0
-    off = V[0, 1] ** 2 + V[0, 2] ** 2 + V[1, 2] ** 2
-    spread = (V[0, 0] - q) ** 2 + (V[1, 1] - q) ** 2 + (V[2, 2] - q) ** 2 + 2.0 * off
-    if not spread > 0.0:
-        return q
-    r = math.sqrt(spread / 6.0)
-    x, y, z = (V[0, 0] - q) / r, (V[1, 1] - q) / r, (V[2, 2] - q) / r
-    u, v, w = V[0, 1] / r, V[0, 2] / r, V[1, 2] / r
-    half = 0.5 * (x * (y * z - w * w) - u * (u * z - w * v) + v * (u * w - y * v))
-    return q + 2.0 * r * math.cos(math.acos(min(1.0, max(-1.0, half))) / 3.0)
-
-
-@compiled
-def _swap(on: IntArray, point: FloatArray, force: FloatArray, sigma: FloatArray, probability: FloatArray) -> None:
-    """Exchange both contacts."""
-    on[0], on[1] = on[1], on[0]
-    sigma[0], sigma[1] = sigma[1], sigma[0]
-    probability[0], probability[1] = probability[1], probability[0]
-    for i in range(3):
-        point[0, i], point[1, i] = point[1, i], point[0, i]
-        force[0, i], force[1, i] = force[1, i], force[0, i]

@@ -34,7 +34,8 @@ class Surface:
 
 def bodies_of(moved_by: BoolArray) -> IntArray:
     """Return the rigid body (L,) of each link, given the joints (L, n) that move it; -1 of links that none moves."""
-    patterns, found = [tuple(row) for row in moved_by.tolist()], {}
+    patterns = [tuple(row) for row in moved_by.tolist()]
+    found: dict[tuple[bool, ...], int] = {}
     for pattern in patterns:
         if any(pattern):
             found.setdefault(pattern, len(found))

@@ -70,7 +70,7 @@ def _free(q: FloatArray) -> bool:
     chosen, arm = scenario("localization")["motion"], model()
     body = arm.capsules
     a, b = placed(body, arm.kinematics(q))
-    moves = arm.moved_by.any(axis=1)[body.link]
+    moves = np.asarray(arm.rigid >= 0)[body.link]
     lowest = np.minimum(a[:, 2], b[:, 2]) - body.radius
     order = arm.moved_by.sum(axis=1)[body.link]
     if lowest[moves & (order > 2)].min() < chosen["floor_m"]:
