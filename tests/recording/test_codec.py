@@ -113,14 +113,14 @@ def test_a_step_comes_back_to_the_bit(step):
 @given(steps())
 def test_a_step_of_a_version_that_knew_no_touched_places_comes_back_without_any(step):
     kind = f"{PACKAGE}/msg/StepBefore"
-    text = "\n".join(line for line in own_definition("Step").splitlines() if " touched_" not in line)
+    text = "\n".join(line for line in own_definition("Step").splitlines() if not line.startswith("Touched "))
     store = get_typestore(Stores.ROS2_JAZZY)
     for name in OWN:
         store.register(get_types_from_msg(own_definition(name), f"{PACKAGE}/msg/{name}"))
     store.register(get_types_from_msg(text, kind))
     message = decoded(STEP, encode_step(7, step))
     names = [name for name in type(message).__dataclass_fields__ if name != "__msgtype__"]
-    known = [getattr(message, name) for name in names if not name.startswith("touched_")]
+    known = [getattr(message, name) for name in names if name != "touched"]
     before = bytes(store.serialize_cdr(store.types[kind](*known), kind, little_endian=True))
     number, back, _ = decode_step(before)
     assert number == 7
@@ -217,7 +217,7 @@ def test_inputs_of_other_types_are_kept_as_the_controller_takes_them(spoil, want
 
 
 def test_messages_mirror_the_types_field_by_field():
-    mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, ControlStep, Inputs)
+    mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, Touched, ControlStep, Inputs)
     own = {"sequence", "unreadable", "has_wrench", "has_contact", "path_tangent"}
     for kind in mirrored:
         name = {"ControlStep": "Step"}.get(kind.__name__, kind.__name__)

@@ -28,6 +28,7 @@ INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE
 _ROBOT, _READINGS = f"{PACKAGE}/msg/RobotState", f"{PACKAGE}/msg/RangeReadings"
 _OBSTACLES, _THRESHOLDS = f"{PACKAGE}/msg/Obstacles", f"{PACKAGE}/msg/Thresholds"
 _CONTACT, _QP = f"{PACKAGE}/msg/Contact", f"{PACKAGE}/msg/QpSolution"
+_TOUCHED = f"{PACKAGE}/msg/Touched"
 
 _NONE = np.zeros(0)
 _NO_WHOLE = np.zeros(0, dtype=np.int64)
@@ -130,8 +131,8 @@ def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = N
         make(_THRESHOLDS, *np.ascontiguousarray(step.thresholds.parts)), step.armed, contact is not None, felt,
         _row(step.reaction_velocity), step.restricted, step.approach_limit,
         make(_QP, qp.qd, qp.slack, qp.multipliers, qp.outcome.value, plain_text(qp.status)), step.command,
-        step.residual, step.evidence, touched.link, _flat(touched.point), _flat(touched.force), touched.sigma,
-        touched.probability,
+        step.residual, step.evidence,
+        make(_TOUCHED, touched.link, _flat(touched.point), _flat(touched.force), touched.sigma, touched.probability),
     ))  # fmt: skip
 
 
@@ -164,8 +165,8 @@ def _step(m: Any) -> ControlStep:
         qp=QpSolution(qp.qd, qp.slack, qp.multipliers, QpOutcome(qp.outcome), qp.status), command=m.command,
         residual=m.residual, evidence=m.evidence,
         touched=Touched(
-            m.touched_link, m.touched_point.reshape(-1, 3), m.touched_force.reshape(-1, 3), m.touched_sigma,
-            m.touched_probability,
+            m.touched.link, m.touched.point.reshape(-1, 3), m.touched.force.reshape(-1, 3), m.touched.sigma,
+            m.touched.probability,
         ),
     )  # fmt: skip
 
