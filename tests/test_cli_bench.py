@@ -75,3 +75,18 @@ def test_bench_both_refuses_a_first_page_without_a_place_for_the_table(capsys, t
     assert cli.main(["bench", "both", "--out", str(tmp_path / "run"), "--readme", str(readme)]) == 2
     assert "has no place for front" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
+
+
+def test_bench_localization_writes_numbers_and_its_document(monkeypatch, capsys, tmp_path):
+    from pretouch.experiments.bench.localization import campaign as localization
+
+    monkeypatch.setattr(localization, "run_bench", lambda bench, progress: [])
+    docs, out = tmp_path / "docs", tmp_path / "run"
+    docs.mkdir()
+    (docs / "localization.md").write_text(f"# Title\n{begin_mark('localization')}\n{end_mark('localization')}\n")
+    given = ["bench", "localization", "--quick", "--seeds", "development", "--out", str(out), "--docs", str(docs)]
+    assert cli.main(given) == 0
+    assert (out / "results.json").exists()
+    assert "development seeds, quick run" in (docs / "localization.md").read_text()
+    (docs / "localization.md").write_text("# Title\n")
+    assert cli.main(given) == 2

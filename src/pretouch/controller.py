@@ -187,7 +187,7 @@ class Controller:
             filtered_force=feeling.window.newest, thresholds=felt.thresholds, armed=felt.armed, contact=contact,
             reaction_velocity=desired if reacting else np.zeros(3), restricted=motion.restricted,
             approach_limit=motion.approach_limit,
-            qp=qp, command=qp.qd, residual=felt.residual, evidence=felt.evidence,
+            qp=qp, command=qp.qd, residual=felt.residual, evidence=felt.evidence, touched=felt.touched,
         )  # fmt: skip
         after = ControllerState(
             watch=watch, tracks=tracks, feel=feeling, reduction=reduction, reaction=react,

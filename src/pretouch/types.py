@@ -4,6 +4,7 @@ Everything here is a value, set once when it is made; its arrays are to be read 
 `docs/conventions.md`.
 """
 
+from dataclasses import field
 from enum import Enum, IntEnum
 from typing import TypeVar
 
@@ -176,6 +177,31 @@ class Contact:
     """(3,) axes whose threshold was crossed."""
 
 
+@value
+class Touched:
+    """Where the arm is touched: C contacts, the surest first; none where nothing is felt. Base frame."""
+
+    link: IntArray
+    """(C,) index of the link that carries each place; links that the same joints move are told apart by place only."""
+    point: FloatArray
+    """(C, 3) on the surface of the body [m]."""
+    force: FloatArray
+    """(C, 3) on the arm [N]."""
+    sigma: FloatArray
+    """(C,) standard deviation of each place on its body in the worst direction [m]."""
+    probability: FloatArray
+    """(C,) that it is this rigid body that is touched, from 0 to 1."""
+
+
+def untouched() -> Touched:
+    """Return that nothing is felt."""
+    return Touched(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+
+
+NOT_TOUCHED = untouched()
+"""One of these for all steps: its arrays are not written to either."""
+
+
 class QpOutcome(Enum):
     """How a quadratic program ended."""
 
@@ -255,3 +281,5 @@ class ControlStep:
     """(n,) external joint torques less what the detector takes for free motion [Nm], NaN where there are none."""
     evidence: float
     """How far the detector is on the way to a contact: one from 1 on, while armed."""
+    touched: Touched = field(default_factory=untouched)
+    """Where the arm is touched; empty where nothing is felt or the profile does not localise."""

@@ -183,3 +183,33 @@ def test_bounds_are_read_from_a_profiles_text_and_bad_ones_refused():
         DetectionParams(joint_torques_nm=(1.0, -1.0))
     with pytest.raises(ParameterError, match="numbers with commas"):
         profile("fixed:detection.joint_torques_nm=many")
+
+
+def test_the_place_of_a_push_is_told_and_changes_nothing_else_that_is_felt():
+    off = profile("pretouch:threshold.window_samples=10:detection.localise=no")
+    push = 0.3 + torques(np.array([0.0, 25.0, 0.0]))
+    one, two, said = SETTLED, settled(p=off), []
+    for _ in range(8):
+        found, one = feel(one, MODEL, KIN, robot(push), NOTHING, False, PRETOUCH)
+        other, two = feel(two, MODEL, KIN, robot(push), NOTHING, False, off)
+        assert_array_equal(found.thresholds.parts, other.thresholds.parts)
+        assert found.evidence == other.evidence
+        assert not len(other.touched.link)
+        said.append(found.touched)
+    assert len(said[-1].link) == 1
+    assert MODEL.rigid[said[-1].link[0]] == MODEL.rigid[MODEL.ee]
+    assert said[-1].force[0, 1] > 15.0
+    # the state without a switch holds nothing of it; without an estimate of torques the contact is over
+    assert two.where == ()
+    found, one = feel(one, MODEL, KIN, robot(np.full(7, np.nan)), NOTHING, False, PRETOUCH)
+    assert not len(found.touched.link)
+    assert one.where[0].steps == 0
+
+
+@pytest.mark.parametrize("name", ["paper", "blind", "fixed"])
+def test_profiles_that_do_not_localise_say_nothing_of_places(name):
+    found, state = feel(
+        feel_init(MODEL, profile(name)), MODEL, KIN, robot(np.full(7, 30.0)), NOTHING, False, profile(name)
+    )
+    assert not len(found.touched.link)
+    assert state.where == ()

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pretouch.errors import RecordingError
 from pretouch.recording.codec import (
@@ -32,6 +33,8 @@ from pretouch.types import (
     RangeReadings,
     RobotState,
     Thresholds,
+    Touched,
+    untouched,
 )
 from tests.fuzz.invariants import same
 
@@ -79,8 +82,14 @@ def steps(draw: st.DrawFn) -> ControlStep:
         range_distance=draw(rows(units)), obstacles=obstacles, force=draw(row), filtered_force=draw(row),
         thresholds=Thresholds(draw(rows(6, 3))), armed=draw(st.booleans()), contact=draw(st.none() | contact),
         reaction_velocity=draw(row), restricted=draw(wholes(m)), approach_limit=draw(rows(m)), qp=qp,
-        command=draw(rows(n)), residual=draw(rows(n)), evidence=draw(NAN_TOO),
+        command=draw(rows(n)), residual=draw(rows(n)), evidence=draw(NAN_TOO), touched=draw(places()),
     )  # fmt: skip
+
+
+@st.composite
+def places(draw: st.DrawFn) -> Touched:
+    c = draw(st.integers(0, 2))
+    return Touched(draw(wholes(c)), draw(rows(c, 3)), draw(rows(c, 3)), draw(rows(c)), draw(rows(c)))
 
 
 @given(all_inputs(), st.integers(0, 2**63))
@@ -99,6 +108,23 @@ def test_a_step_comes_back_to_the_bit(step):
     assert number == 7
     assert not len(tangent)
     assert same(back, step)
+
+
+@given(steps())
+def test_a_step_of_a_version_that_knew_no_touched_places_comes_back_without_any(step):
+    kind = f"{PACKAGE}/msg/StepBefore"
+    text = "\n".join(line for line in own_definition("Step").splitlines() if not line.startswith("Touched "))
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name in OWN:
+        store.register(get_types_from_msg(own_definition(name), f"{PACKAGE}/msg/{name}"))
+    store.register(get_types_from_msg(text, kind))
+    message = decoded(STEP, encode_step(7, step))
+    names = [name for name in type(message).__dataclass_fields__ if name != "__msgtype__"]
+    known = [getattr(message, name) for name in names if name != "touched"]
+    before = bytes(store.serialize_cdr(store.types[kind](*known), kind, little_endian=True))
+    number, back, _ = decode_step(before)
+    assert number == 7
+    assert same(back, replace(step, touched=untouched()))
 
 
 @given(steps())
@@ -191,7 +217,7 @@ def test_inputs_of_other_types_are_kept_as_the_controller_takes_them(spoil, want
 
 
 def test_messages_mirror_the_types_field_by_field():
-    mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, ControlStep, Inputs)
+    mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, Touched, ControlStep, Inputs)
     own = {"sequence", "unreadable", "has_wrench", "has_contact", "path_tangent"}
     for kind in mirrored:
         name = {"ControlStep": "Step"}.get(kind.__name__, kind.__name__)

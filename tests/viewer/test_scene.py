@@ -6,7 +6,7 @@ import pytest
 from tests.viewer.fake_scene import FakeScene
 
 from pretouch.params import PROFILES
-from pretouch.types import ControlStep, Obstacles
+from pretouch.types import ControlStep, Obstacles, Touched, untouched
 from pretouch.viewer import palette
 from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.scene import ARROW_MOST_M, PARTS, Scene
@@ -145,6 +145,20 @@ def test_the_true_force_is_drawn_where_it_acts_if_that_is_known(
     scene.draw(frame(some_step, true_force=np.array([0.0, 0.0, 20.0]), true_point=elbow), 0.0)
     np.testing.assert_array_equal(nodes.nodes["/touched"].position, elbow)
     np.testing.assert_allclose(nodes.nodes["/ee"].position, some_step.ee_position, atol=1e-9)
+
+
+def test_a_touched_place_is_an_arrow_that_ends_there(
+    scene: Scene, nodes: FakeScene, some_step: ControlStep
+) -> None:  # fmt: skip
+    at, force = np.array([[0.3, 0.1, 0.6]]), np.array([[0.0, 0.0, -20.0]])
+    touched = Touched(np.array([5]), at, force, np.array([0.02]), np.array([0.9]))
+    scene.draw(frame(replace(some_step, touched=touched)), 0.0)
+    (begin, end) = nodes.nodes["/place/0"].points[0]
+    np.testing.assert_allclose(end, at[0], atol=1e-6)
+    np.testing.assert_allclose(end - begin, [0.0, 0.0, -0.24], atol=1e-6)
+    assert not nodes.nodes["/place/1"].visible
+    scene.draw(frame(replace(some_step, touched=untouched())), 0.0)
+    assert not nodes.nodes["/place/0"].visible
 
 
 @pytest.mark.parametrize("force", [np.zeros(3), np.array([0.0, 5.0, 0.0]), np.full(3, np.nan), None])

@@ -9,6 +9,7 @@ from rich.console import Console
 from pretouch.cli.bench_avoidance import Avoidance
 from pretouch.cli.bench_both import Both
 from pretouch.cli.bench_detection import Detection
+from pretouch.cli.bench_localization import Localization
 from pretouch.cli.commands import (
     Bench,
     Command,
@@ -59,6 +60,8 @@ def main(args: list[str] | None = None) -> int:
                     _bench_detection(what)
                 case Bench(Avoidance() as what):
                     _avoidance(what)
+                case Bench(Localization() as what):
+                    _localization(what)
                 case Bench(Both() as what):
                     _both(what)
                 case Bench(FreeMotion() as what):
@@ -156,6 +159,12 @@ def _both(command: Both) -> None:
     from pretouch.cli.bench_both import bench_both
 
     bench_both(command)
+
+
+def _localization(command: Localization) -> None:
+    from pretouch.cli.bench_localization import bench_localization
+
+    bench_localization(command)
 
 
 def _avoidance(command: Avoidance) -> None:

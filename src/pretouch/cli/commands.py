@@ -9,6 +9,7 @@ from pretouch.cli.bench_avoidance import Avoidance
 from pretouch.cli.bench_both import Both
 from pretouch.cli.bench_detection import Detection
 from pretouch.cli.identify import Identify
+from pretouch.cli.bench_localization import Localization
 from pretouch.cli.robot_commands import Robot
 from pretouch.cli.run.options import Run
 from pretouch.cli.serve_fci_command import ServeFci
@@ -112,11 +113,12 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure something: detectors, ways to avoid people, the force estimate of many arms, or a control step's time."""
+    """Measure something: detectors, ways to avoid people, places of contacts, force estimates, or a step's time."""
 
     what: (
         Annotated[Detection, tyro.conf.subcommand("detection")]
         | Annotated[Avoidance, tyro.conf.subcommand("avoidance")]
+        | Annotated[Localization, tyro.conf.subcommand("localization")]
         | Annotated[Both, tyro.conf.subcommand("both")]
         | Annotated[FreeMotion, tyro.conf.subcommand("free-motion")]
         | Annotated[Cycle, tyro.conf.subcommand("cycle")]

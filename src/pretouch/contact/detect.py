@@ -1,5 +1,7 @@
 """Contact detection in one call: force in, thresholds and perhaps a contact out."""
 
+from dataclasses import field
+
 import numpy as np
 
 from pretouch.compiled import compiled
@@ -7,7 +9,7 @@ from pretouch.contact.reaction import external_force
 from pretouch.contact.thresholds import crossed, side_distances, threshold_parts
 from pretouch.contact.window import WindowState, add_to, added, place, window_mean, window_std
 from pretouch.params import ThresholdParams
-from pretouch.types import Contact, FloatArray, Obstacles, Thresholds
+from pretouch.types import Contact, FloatArray, Obstacles, Thresholds, Touched, untouched
 from pretouch.values import value
 
 
@@ -27,10 +29,11 @@ class Detection:
     """Whether the sample is to be learnt as free motion."""
     lasting: bool = False
     """Whether it is being found out if what is felt is a load or an error of the estimate: the arm waits for that."""
-    torque: FloatArray | None = None
-    """(n,) residual, averaged over the time that says most of a contact [Nm]; of the method sequential."""
-    covariance: FloatArray | None = None
-    """(n, n) covariance that it has in free motion [Nm^2]."""
+    touched: Touched = field(default_factory=untouched)
+    """Where the arm is touched; empty where nothing is felt or the profile does not localise."""
+    clear: tuple[FloatArray, FloatArray] | None = None
+    """Residual (n,), averaged over the time in which it stands out most [Nm], and the covariance (n, n) that it has in
+    free motion [Nm^2]; where something caught is looked for and something is felt."""
 
 
 def detect(

@@ -9,10 +9,11 @@ from pretouch.contact.detect import Detection, detect
 from pretouch.contact.felt import SequentialState, sequential_init, take_sample
 from pretouch.contact.fixed import force_map, share_of_band, share_of_bounds
 from pretouch.contact.residual_model import ResidualModel
+from pretouch.contact.where import WhereState, clearest_mean, locate, where_init
 from pretouch.contact.window import WindowState, window_init
 from pretouch.params import Profile
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.types import Contact, FloatArray, Obstacles, RobotState, Thresholds
+from pretouch.types import NOT_TOUCHED, Contact, FloatArray, Obstacles, RobotState, Thresholds, Touched
 from pretouch.values import value
 
 
@@ -24,13 +25,16 @@ class FeelState:
     """Of the force, eq. 8."""
     sequential: tuple[SequentialState, ...]
     """Of that detector, one; none unless the profile's method is that."""
+    where: tuple[WhereState, ...] = ()
+    """Of the place of a contact, one; none unless the profile localises."""
 
 
 def feel_init(model: RobotModel, profile: Profile, learnt: ResidualModel | None = None) -> FeelState:
     """Return the state before the first sample of an arm; `learnt` is its free motion as an earlier session left it."""
     p = profile.detection
     sequential = (sequential_init(model, p, learnt),) if p.method == "sequential" else ()
-    return FeelState(window_init(profile.threshold.window_samples), sequential)
+    where = (where_init(),) if sequential and p.localise else ()
+    return FeelState(window_init(profile.threshold.window_samples), sequential, where)
 
 
 def learnt(state: FeelState) -> ResidualModel | None:
@@ -65,7 +69,7 @@ def feel(
         return Detection(found.thresholds, found.contact, found.armed, robot.tau_ext, evidence), FeelState(window, ())
     if math.isnan(robot.tau_ext.sum()):
         nothing = Detection(_no_bands(), None, False, np.full(model.n, np.nan), 0.0)
-        return nothing, FeelState(window, state.sequential)
+        return nothing, FeelState(window, state.sequential, (where_init(),) if state.where else ())
     if p.method == "fixed":
         felt_force = force_map(model.ee_jacobian(kin)) @ robot.tau_ext if force is None else force
         share = share_of_bounds(robot.tau_ext, force, p)
@@ -73,24 +77,25 @@ def feel(
         contact = _contact(felt_force, bands) if share >= 1.0 and found.armed else None
         return Detection(bands, contact, found.armed, robot.tau_ext, share), FeelState(window, ())
     before = state.sequential[0] if state.sequential else sequential_init(model, p)
-    felt, after = take_sample(
-        before, model, kin, robot, obstacles, reacting, watched, profile.task.control_period_s, p,
-        no_cues(len(model.links)) if cues is None else cues,
-    )  # fmt: skip
+    told, period = no_cues(len(model.links)) if cues is None else cues, profile.task.control_period_s
+    felt, after = take_sample(before, model, kin, robot, obstacles, reacting, watched, period, p, told)
     bands = Thresholds(felt.bands)
     contact = _contact(felt.force, bands) if felt.sure and found.armed else None
+    touched: Touched = NOT_TOUCHED
+    where: tuple[WhereState, ...] = ()
+    if p.localise:
+        touched, following = locate(
+            state.where[0] if state.where else where_init(), model, kin, felt.means, after.count, felt.spread,
+            felt.doubt, felt.evidence, robot.qd_commanded, obstacles, told, period, profile.localisation,
+        )  # fmt: skip
+        where = (following,)
+    clear = None
+    if profile.reaction.pinches and felt.evidence >= 1.0:
+        clear = clearest_mean(felt.means, after.count, felt.spread, felt.doubt, period, profile.localisation)
     made = Detection(
-        bands,
-        contact,
-        found.armed,
-        felt.residual,
-        felt.evidence,
-        felt.learning,
-        felt.lasting,
-        felt.torque,
-        felt.covariance,
-    )
-    return made, FeelState(window, (after,))
+        bands, contact, found.armed, felt.residual, felt.evidence, felt.learning, felt.lasting, touched, clear
+    )  # fmt: skip
+    return made, FeelState(window, (after,), where)
 
 
 def _contact(force: FloatArray, bands: Thresholds) -> Contact:

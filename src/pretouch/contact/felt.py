@@ -67,6 +67,12 @@ class Felt:
 
     residual: FloatArray
     """(n,) torques less their mean [Nm]."""
+    means: FloatArray
+    """(6, n) means of the newest residuals, of each of `sequential.LENGTHS` [Nm]."""
+    spread: FloatArray
+    """(n, n) of one of them, with the doubt on its diagonal [Nm^2]."""
+    doubt: FloatArray
+    """(n,) variance of the error of the mean of free motion, which does not average out [Nm^2]."""
     evidence: float
     """ln R / ln A: a contact from 1 on."""
     force: FloatArray
@@ -80,10 +86,6 @@ class Felt:
     """Whether the sample is to be learnt as free motion."""
     lasting: bool
     """Whether it is being found out if what is felt is a load or a step of an estimate."""
-    torque: FloatArray
-    """(n,) mean residual of the window that says most [Nm]."""
-    covariance: FloatArray
-    """(n, n) covariance that it has in free motion [Nm^2]."""
 
 
 def sequential_init(model: RobotModel, p: DetectionParams, learnt: ResidualModel | None = None) -> SequentialState:
@@ -114,7 +116,7 @@ def take_sample(
     """
     m, o, n = state.model, obstacles, model.n
     residual, speed, force, bands = np.empty(n), np.empty(n), np.empty(3), np.empty((6, 3))
-    mean, spread_of_mean = np.empty(n), np.empty((n, n))
+    means, S, doubt = np.zeros((len(LENGTHS), n)), np.empty((n, n)), np.empty(n)
     ring, block, queue, prior = state.ring.copy(), m.block.copy(), m.queue, _NONE
     weights, covariance, spread, seen = m.weights, m.covariance, m.spread, m.seen
     settle = round(p.relearn_after_s / period) if p.learn else 0
@@ -137,16 +139,17 @@ def take_sample(
         cues.gain,
         p.near_gain, p.near_m, p.near_horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm, p.still_rad_s,
         p.memory_s, p.spread_memory_s, (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2,
-        residual, speed, force, bands, mean, spread_of_mean,
+        residual, speed, force, bands, means, S, doubt,
     )  # fmt: skip
     at, count = (state.at + 1) % LONGEST, min(state.count + 1, LONGEST)
     if steady < 0:  # learnt: what was felt before is no contact
-        felt = Felt(residual, 0.0, np.zeros(3), bands, False, True, False, mean, spread_of_mean)
+        felt = Felt(residual, means, S, doubt, 0.0, np.zeros(3), bands, False, True, False)
         after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, 0, 0)
         return felt, SequentialState(after, ring, at, 0, 0, 0, lasting, 0, turning)
     confirmed = state.confirmed + 1 if evidence >= 1.0 else 0
-    sure, learning = confirmed >= p.confirm_samples, calm == _CALM
-    felt = Felt(residual, evidence, force, bands, sure, learning, steady > 0, mean, spread_of_mean)
+    felt = Felt(
+        residual, means, S, doubt, evidence, force, bands, confirmed >= p.confirm_samples, calm == _CALM, steady > 0
+    )
     after = ResidualModel(weights, covariance, spread, seen, speed, queue, block, filled, waiting)
     return felt, SequentialState(after, ring, at, count, calm, confirmed, lasting, steady, turning)
 
@@ -168,14 +171,14 @@ def _take(
     touch_gain: FloatArray,
     near_gain: float, near: float, horizon: float, clear: float, suspect: float, floor: float, bias_floor: float,
     still: float, memory: float, spread_memory: float, most_velocity: float, most_torque: float,
-    residual: FloatArray, speed: FloatArray, force: FloatArray, bands: FloatArray, mean_of_window: FloatArray,
-    spread_of_mean: FloatArray,
+    residual: FloatArray, speed: FloatArray, force: FloatArray, bands: FloatArray,
+    means: FloatArray, S: FloatArray, doubt: FloatArray,
 ) -> tuple[float, int, int, int, int]:  # fmt: skip
-    """Write the last line of arguments and what is learnt; return evidence, calm samples, and what waits for that."""
+    """Write the last two lines of arguments and what is learnt; return evidence, calm samples, and what waits."""
     n, growth = len(qd), np.empty(len(qd))
     moving = _velocities(qd_commanded, speed_before, late, period, still, speed, growth)
-    x, mean, doubt = np.empty((n, weights.shape[1])), np.empty(n), np.empty(n)
-    M, S, J_ee = np.empty((n, n)), np.empty((n, n)), np.empty((6, n))
+    x, mean = np.empty((n, weights.shape[1])), np.empty(n)
+    M, J_ee = np.empty((n, n)), np.empty((6, n))
     features_into(
         anchor, axis, position, rotation, moved_by, mass, com, ee, speed, growth if inertial else np.zeros(n), x
     )
@@ -189,7 +192,6 @@ def _take(
     if widened:
         turning_doubt(M, growth, turning, doubt)
 
-    means = np.zeros((len(LENGTHS), n))
     whole = window_means(ring, (at + 1) % LONGEST, count, means)
     most = len(parts) + (min(MOST, len(distance)) if use_proximity else 0)
     J, joints, weight = np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most)
@@ -223,10 +225,6 @@ def _take(
     else:
         steady = 0
     for j in range(n):
-        mean_of_window[j] = means[window, j]
-        for k in range(n):
-            spread_of_mean[j, k] = S[j, k] / LENGTHS[window]
-        spread_of_mean[j, j] += doubt[j]
         S[j, j] += doubt[j]
     _write_force(
         J_ee, means[window], mean, S, away[max(which - n, 0)] if which >= n else np.zeros(3), math.sqrt(2.0 * level),

@@ -128,13 +128,14 @@ def noticed(state: ResponseState, doing: Doing, felt: Felt, phase: float, resume
 def _pinch(clamp: ClampState, felt: Felt) -> ClampState:
     """Look for something caught between two links, as long as a contact is felt."""
     p, found = felt.profile.reaction, felt.found
-    if not p.pinches or clamp.torque or found.evidence < 1.0 or found.torque is None or found.covariance is None:
+    if not p.pinches or clamp.torque or found.clear is None:
         return clamp
-    pinch = pinched(felt.model, felt.kin, found.torque, found.covariance, clamp.came, p)
+    torque, covariance = found.clear
+    pinch = pinched(felt.model, felt.kin, torque, covariance, clamp.came, p)
     if pinch is None:
         return clamp
     one, other = (felt.model.links[link] for link in pinch.link)
-    return caught_between(clamp, f"{one} and {other}", pinch.force, found.torque)
+    return caught_between(clamp, f"{one} and {other}", pinch.force, torque)
 
 
 def _residual(state: AdmittanceState, felt: Felt) -> FloatArray:

@@ -8,6 +8,7 @@ from pretouch.params.anticipation import BodyRegion as BodyRegion
 from pretouch.params.baselines import BaselineParams as BaselineParams
 from pretouch.params.detection import DetectionParams as DetectionParams
 from pretouch.params.failure import FailureParams as FailureParams
+from pretouch.params.localisation import LocalisationParams as LocalisationParams
 from pretouch.params.near import ReductionParams as ReductionParams
 from pretouch.params.near import RestrictionMode as RestrictionMode
 from pretouch.params.near import RestrictionParams as RestrictionParams

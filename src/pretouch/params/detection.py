@@ -95,6 +95,8 @@ class DetectionParams(Checked):
     """Joint speed below which the arm counts as standing, with a spread of its own [rad/s]."""
     confirm_samples: PositiveCount = 1
     """Samples in a row with the evidence of a contact that make one."""
+    localise: bool = False
+    """Method sequential: whether the place of a contact is inferred too (docs/localization.md)."""
 
     def __post_init__(self) -> None:
         # a recording holds a list

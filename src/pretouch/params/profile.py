@@ -10,6 +10,7 @@ from pretouch.params.anticipation import AnticipationParams
 from pretouch.params.baselines import BaselineParams
 from pretouch.params.detection import DetectionParams
 from pretouch.params.failure import FailureParams
+from pretouch.params.localisation import LocalisationParams
 from pretouch.params.near import ReductionParams, RestrictionMode, RestrictionParams
 from pretouch.params.perception import PerceptionParams
 from pretouch.params.reaction import ReactionParams
@@ -32,6 +33,7 @@ class Profile(Checked):
     reaction: ReactionParams = field(default_factory=ReactionParams)
     failure: FailureParams = field(default_factory=FailureParams)
     detection: DetectionParams = field(default_factory=DetectionParams)
+    localisation: LocalisationParams = field(default_factory=LocalisationParams)
     baselines: BaselineParams = field(default_factory=BaselineParams)
 
 
@@ -81,7 +83,7 @@ PROFILES: dict[str, Profile] = {
         reduction=ReductionParams(enabled=False),
         restriction=RestrictionParams(mode="braking"),
         anticipation=AnticipationParams(effective_mass=True, closing_speed=True, tangential=True, null_space=True),
-        detection=DetectionParams(method="sequential", freeze_while_reacting=True),
+        detection=DetectionParams(method="sequential", freeze_while_reacting=True, localise=True),
         reaction=ReactionParams(
             method="admittance", clamps=True, gives_up=True, soft_hold=True, static_friction_nm=3.0, pinches=True
         ),

@@ -21,15 +21,19 @@ from pretouch.types import (
     RangeReadings,
     RobotState,
     Thresholds,
+    Touched,
 )
 
 INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE}/msg/Truth"
 _ROBOT, _READINGS = f"{PACKAGE}/msg/RobotState", f"{PACKAGE}/msg/RangeReadings"
 _OBSTACLES, _THRESHOLDS = f"{PACKAGE}/msg/Obstacles", f"{PACKAGE}/msg/Thresholds"
 _CONTACT, _QP = f"{PACKAGE}/msg/Contact", f"{PACKAGE}/msg/QpSolution"
+_TOUCHED = f"{PACKAGE}/msg/Touched"
 
 _NONE = np.zeros(0)
 _NO_WHOLE = np.zeros(0, dtype=np.int64)
+_NO_PLACES = bytes(20)
+"""Lengths of the five empty rows of places that are touched: steps recorded by versions without them end before."""
 _SENSIBLE_S = 1e12
 """A time stamp from here on [s] is shown in a sentence, as it was given."""
 _SHOWN = 500
@@ -111,7 +115,7 @@ def decode_inputs(data: bytes) -> tuple[int, Inputs | None, str]:
 
 def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = None) -> bytes:
     """Return a step as CDR, with the path's unit tangent (3,) where the path can only be kept so."""
-    o, qp, contact = step.obstacles, step.qp, step.contact
+    o, qp, contact, touched = step.obstacles, step.qp, step.contact, step.touched
     obstacles = make(
         _OBSTACLES, o.unit, _flat(o.point), o.ee_distance, _flat(o.body_point), o.link, _flat(o.direction),
         o.body_distance, o.closing_speed,
@@ -128,12 +132,16 @@ def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = N
         _row(step.reaction_velocity), step.restricted, step.approach_limit,
         make(_QP, qp.qd, qp.slack, qp.multipliers, qp.outcome.value, plain_text(qp.status)), step.command,
         step.residual, step.evidence,
+        make(_TOUCHED, touched.link, _flat(touched.point), _flat(touched.force), touched.sigma, touched.probability),
     ))  # fmt: skip
 
 
 def decode_step(data: bytes) -> tuple[int, ControlStep, FloatArray]:
     """Return the number of a step, the step, and the path's tangent there, (0,) unless it was kept."""
-    m = decoded(STEP, data)
+    try:
+        m = decoded(STEP, data)
+    except RecordingError:
+        m = decoded(STEP, data + _NO_PLACES)
     try:
         return m.sequence, _step(m), m.path_tangent
     except ValueError as error:
@@ -156,6 +164,10 @@ def _step(m: Any) -> ControlStep:
         reaction_velocity=m.reaction_velocity, restricted=m.restricted, approach_limit=m.approach_limit,
         qp=QpSolution(qp.qd, qp.slack, qp.multipliers, QpOutcome(qp.outcome), qp.status), command=m.command,
         residual=m.residual, evidence=m.evidence,
+        touched=Touched(
+            m.touched.link, m.touched.point.reshape(-1, 3), m.touched.force.reshape(-1, 3), m.touched.sigma,
+            m.touched.probability,
+        ),
     )  # fmt: skip
 
 

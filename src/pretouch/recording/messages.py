@@ -22,8 +22,8 @@ LIBRARY = f"pretouch {pretouch.__version__}"
 
 PACKAGE = "pretouch_msgs"
 OWN = (
-    "RobotState", "RangeReadings", "Inputs", "Obstacles", "Thresholds", "Contact", "QpSolution", "Step", "Run", "State",
-    "Truth", "UnitSample",
+    "RobotState", "RangeReadings", "Inputs", "Obstacles", "Thresholds", "Contact", "QpSolution", "Touched", "Step",
+    "Run", "State", "Truth", "UnitSample",
 )  # fmt: skip
 """Our types; each has a file in `msg/`."""
 TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in ("Run", "Inputs", "Step", "State", "Truth")}
@@ -31,7 +31,10 @@ TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in ("Run
 
 _HEAD = 4
 """Bytes of the encapsulation header before a CDR message."""
-_PARTS = {"Inputs": ("RobotState", "RangeReadings"), "Step": ("Obstacles", "Thresholds", "Contact", "QpSolution")}
+_PARTS = {
+    "Inputs": ("RobotState", "RangeReadings"),
+    "Step": ("Obstacles", "Thresholds", "Contact", "QpSolution", "Touched"),
+}
 
 
 class Item(NamedTuple):

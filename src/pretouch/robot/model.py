@@ -9,6 +9,7 @@ from pretouch.compiled import compiled
 from pretouch.errors import RobotModelError
 from pretouch.robot.body import Capsules, capsules_of
 from pretouch.robot.description import RobotDescription
+from pretouch.robot.surface import Surface, bodies_of, surface_of
 from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value
 
@@ -88,6 +89,11 @@ class RobotModel:
         centers = (self.body.a + self.body.b) / 2
         self.middle: FloatArray = np.array([centers[self.body.link == part].mean(axis=0) for part in self.parts])
         """(P, 3) the middle of each one's capsules, link frame [m]."""
+        rest = self.kinematics(np.zeros(self.n))
+        self.surface: Surface = surface_of(self.body, self.moved_by, rest.position, rest.rotation)
+        """Places where the arm may be touched."""
+        self.rigid: IntArray = bodies_of(self.moved_by)
+        """(L,) the rigid body each link belongs to, from 0; -1 of links that no joint moves."""
         self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
         self.q_max: FloatArray = self._model.jnt_range[:, 1].copy()
         self.q_mid: FloatArray = (self.q_min + self.q_max) / 2

@@ -24,6 +24,8 @@ PAIR_BINDING: Colour = (214, 40, 57)
 """Of a pair that keeps the arm from what it would do."""
 FORCE: Colour = (232, 119, 34)
 TRUE_FORCE: Colour = (38, 44, 54)
+PLACE: Colour = (190, 24, 120)
+"""Of the forces at the places where the arm is said to be touched."""
 HAND: Colour = (232, 190, 160)
 BOARD: Colour = (201, 176, 140)
 

@@ -68,6 +68,7 @@ class Scene:
         self._force = self._arrow("/ee/force", palette.FORCE)
         self._touched = scene.add_frame("/touched", show_axes=False)
         self._true_force = self._arrow("/touched/true_force", palette.TRUE_FORCE)
+        self._places = [self._arrow(f"/place/{number}", palette.PLACE) for number in range(2)]
         self._hand, self._target = self._person(world)
         self._dragged = False
 
@@ -167,6 +168,14 @@ class Scene:
             if handle.visible and force is not None:
                 tip = force * (min(ARROW_M_PER_N * size, ARROW_MOST_M) / size)
                 handle.points = np.array([[np.zeros(3), tip]], dtype=np.float32)
+        touched = frame.step.touched
+        for number, handle in enumerate(self._places):
+            handle.visible = self._shows_forces and number < len(touched.link)
+            if handle.visible:
+                force, size = touched.force[number], float(np.linalg.norm(touched.force[number]))
+                shaft = force * (min(ARROW_M_PER_N * size, ARROW_MOST_M) / max(size, 1e-9))
+                # it ends at the place, for a contact pushes
+                handle.points = np.array([[touched.point[number] - shaft, touched.point[number]]], dtype=np.float32)
 
     def _draw_hand(self, frame: Frame) -> None:
         if self._hand is None or self._target is None:

@@ -23,6 +23,7 @@ OFF = {
     "detection.use_proximity": "no",
     "detection.learn": "no",
     "detection.widen_at_turns": "no",
+    "detection.localise": "no",
     "reaction.method": "decay",
     "reaction.clamps": "no",
     "reaction.pinches": "no",

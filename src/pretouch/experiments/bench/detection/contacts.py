@@ -95,11 +95,12 @@ def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
     chosen, kinds = family["contact"], family["contact"]["kind"]
     every = [(k, duration) for k, kind in enumerate(kinds) for duration in kind["durations_s"]]
     at, found = float(family["duration"]["warm_up_s"]), []
+    q = brought_to(model(), path_of("rest").point(0.0))
     for _ in range(cell.count):
         k, duration = every[int(rng.integers(len(every)))]
         name = chosen["links"][int(rng.integers(len(chosen["links"])))]
         link = model().link_index(f"{model().description.name}_{name}")
-        point, normal = _place(link, hand_radius, rng, family["hand"]["from_m"])
+        point, normal = place_on(link, q, hand_radius, rng, family["hand"]["from_m"])
         inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
         force = float(rng.choice(chosen["forces_n"]))
         touch = Touching(
@@ -110,12 +111,13 @@ def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
     return found
 
 
-def _place(link: int, radius: float, rng: np.random.Generator, from_m: float) -> tuple[FloatArray, FloatArray]:
+def place_on(
+    link: int, q: FloatArray, radius: float, rng: np.random.Generator, from_m: float
+) -> tuple[FloatArray, FloatArray]:
     """Draw a point and normal (3,) of a link's surface that a hand can come to along the normal, link frame.
 
-    That is judged in the posture in which the paths begin. Where no free place is found, the last one drawn is taken.
+    That is judged in one posture (n,) [rad]. Where no free place is found, the last one drawn is taken.
     """
-    q = brought_to(model(), path_of("rest").point(0.0))
     kin, arm = model().kinematics(q), model().capsules
     a, b = placed(arm, kin)
     own = arm.of_links(np.array([link]))

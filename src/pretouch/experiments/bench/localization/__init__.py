@@ -1,0 +1,1 @@
+"""The localisation benchmark: where contacts are said to be, held against where they are."""
