@@ -151,7 +151,7 @@ class Controller:
         cues, touched = feel_touch(state.touch, self._touching, touches, kin, now, self.limits.period, p.detection)
         felt, feeling = feel(
             state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p,
-            watched and cues is None, cues,
+            watched, cues,
         )  # fmt: skip
         mark("contact")
 

@@ -21,6 +21,8 @@ class TouchSensorParams(Checked):
 
     period_s: Positive = 0.02
     """Time between readings [s]: a unit sends 50 times a second."""
+    shortest_s: Positive = 0.01
+    """Least time from one reading to the next: a touch that begins or ends is told as soon as it has passed [s]."""
     period_jitter: Fraction = 0.02
     """Standard deviation of the period as a fraction of it: as of the range finders."""
     rise_s: Positive = 0.005
@@ -104,6 +106,7 @@ class TouchSensors:
         count = len(units)
         self._gain = 1.0 + params.gain_error * self._rng.uniform(-1, 1, count)
         self._due: list[float] = self._rng.uniform(0, params.period_s, count).tolist()
+        self._last = np.full(count, -np.inf)
         self._false_until, self._false_n = np.full(count, -np.inf), np.zeros(count)
         self._next_false = self._draw_next(np.zeros(count))
         self._passed, self._before, self._on = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
@@ -139,7 +142,9 @@ class TouchSensors:
         for i, (unit, patch) in enumerate(self._patches):
             pressed = sum(self._pressing(unit, patch, force) for force in forces)
             self._passed[i] += follow * (pressed - self._passed[i])
-            if time >= self._due[i]:
+            level = patch.force_min * (self._params.release if self._on[i] else 1.0)
+            changed = (self._passed[i] * self._gain[i] >= level) != self._on[i]
+            if time >= self._due[i] or (changed and time - self._last[i] >= self._params.shortest_s):
                 self._measure(i, unit, patch, time)
 
     def _pressing(self, unit: int, patch: TouchPatch, force: PointForce) -> float:
@@ -156,7 +161,7 @@ class TouchSensors:
 
     def _measure(self, i: int, unit: int, patch: TouchPatch, time: float) -> None:
         p, rng = self._params, self._rng
-        self._due[i] += p.period_s * (1.0 + p.period_jitter * rng.standard_normal())
+        self._last[i], self._due[i] = time, time + p.period_s * (1.0 + p.period_jitter * rng.standard_normal())
         if time >= self._next_false[i]:
             self._false_until[i] = time + p.false_s * rng.standard_exponential()
             self._false_n[i] = patch.force_min + p.false_n * rng.standard_exponential()
