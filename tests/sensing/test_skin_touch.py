@@ -55,7 +55,7 @@ def test_a_touch_sensor_is_read(panda_model, tmp_path, line, patch):
     ],
 )
 def test_what_is_wrong_with_a_touch_sensor_is_said(panda_model, tmp_path, line, message):
-    with pytest.raises(SkinError, match="skin.toml") as caught:
+    with pytest.raises(SkinError, match=r"skin\.toml") as caught:
         load_skin(written(tmp_path, line), panda_model)
     assert message in str(caught.value)
 

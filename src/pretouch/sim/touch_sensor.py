@@ -73,7 +73,8 @@ Forces = Callable[[float], list[PointForce]]
 """Gives the forces that act on the arm at a time."""
 
 
-def _none(_time: float) -> list[PointForce]:
+def no_forces(_time: float) -> list[PointForce]:
+    """Lay no force on the arm."""
     return []
 
 
@@ -85,7 +86,7 @@ class TouchSensors:
     """
 
     def __init__(
-        self, plant: Plant, skin: Skin, params: TouchSensorParams, seed: int, laid: Forces = _none,
+        self, plant: Plant, skin: Skin, params: TouchSensorParams, seed: int, laid: Forces = no_forces,
         send: Callable[[TouchSample], None] | None = None,
     ) -> None:  # fmt: skip
         """Mount the sensors on a simulated arm; the seed decides their errors, phases, noise, losses, false touches.
