@@ -31,7 +31,7 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.types import TouchStatus
 
 SESSION = Mac(bytes(range(32)))
-PLAIN = Sample(*[7, 0, 1, 5_000_000], *[0] * 14, 2, *[0] * 4, imu=bytes(24))
+PLAIN = Sample(*[7, 0, 1, 5_000_000], *[0] * 13, 2, *[0] * 4, imu=bytes(24))
 PART = TouchPart(1, 0, 400, 2500, 1200)
 
 
