@@ -7,13 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pretouch.contact.cues import no_cues
+from pretouch.contact.feel import feel, feel_init
+from pretouch.contact.sequential import alarm_level
 from pretouch.contact.tactile import feel_touch, gain_of, surface_area, touch_init, touch_settings
 from pretouch.params import DetectionParams, profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.types import TouchReadings, TouchStatus
+from pretouch.types import Obstacles, RobotState, TouchReadings, TouchStatus
 
 P = profile("pretouch").detection
 PERIOD = 0.01
@@ -141,3 +144,26 @@ def test_a_sensor_that_is_stuck_is_believed_for_ten_seconds_and_comes_back_slowl
     cues, _ = feel_touch(state, settings, said(7, 0, 3), kin, NOW, PERIOD, P)
     assert cues is not None
     assert len(cues.link) == 1
+
+
+def test_a_touch_counts_for_an_object_that_is_seen_at_its_link_as_well(panda_model, paper_skin):
+    q, still = panda_model.description.q_ready, np.zeros(panda_model.n)
+    kin, link = panda_model.kinematics(q), panda_model.link_index("panda_link5")
+    at, away = kin.position[link], np.array([0.0, 1.0, 0.0])
+    seen = Obstacles(
+        np.array([0]), (at + 0.01 * away)[None], np.array([0.5]), at[None], np.array([link]), away[None],
+        np.array([0.01]), np.zeros(1),
+    )  # fmt: skip
+    torque = np.asarray(panda_model.jacobian(kin, link, at)[:3].T @ (-9.0 * away))
+    gain = np.ones(len(panda_model.links))
+    gain[link] = 50.0
+    ours, evidence = profile("pretouch"), []
+    for cues in (None, replace(no_cues(len(gain)), gain=gain)):
+        state = feel_init(panda_model, ours)
+        for k in range(5):
+            robot = RobotState(0.02 * k, q, still, q, still, torque, np.zeros(6))
+            felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, cues)
+        evidence.append(felt.evidence)
+    # fifty times the prior of what says most: ln 50 in units of ln A, but for what the other hypotheses add
+    gained = np.log(50.0) / alarm_level(ours.detection, ours.task.control_period_s)
+    assert 0.8 * gained < evidence[1] - evidence[0] <= gained * (1 + 1e-9)
