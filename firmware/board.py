@@ -21,9 +21,9 @@ _CAUSES = ("PWRON_RESET", "HARD_RESET", "WDT_RESET", "DEEPSLEEP_RESET", "SOFT_RE
 
 
 class Board:
-    """What both boards do alike. GPIO numbers: `SDA`, `SCL`, `BATTERY`."""
+    """What both boards do alike. GPIO numbers: `SDA`, `SCL`, `BATTERY`, `TOUCH`; -1 where there is none."""
 
-    SDA = SCL = BATTERY = -1
+    SDA = SCL = BATTERY = TOUCH = -1
 
     def open_bus(self):
         """Return the I2C bus, freed from a sensor that was cut off in the middle of a byte."""
@@ -50,6 +50,11 @@ class Board:
         if not full_mv:
             return lambda: 0
         return self._battery(full_mv)
+
+    def open_touch(self):
+        """Return what tells the voltage at the touch sensor's pin [mV], on a board that has one."""
+        adc = machine.ADC(machine.Pin(self.TOUCH), atten=machine.ADC.ATTN_11DB)
+        return lambda: adc.read_uv() // 1000
 
     def reset_cause(self):
         """Why the unit began anew, as on the wire."""
@@ -84,9 +89,9 @@ class Board:
 
 
 class Esp32C3(Board):
-    """SDA is GPIO 6, SCL is GPIO 7, the battery is GPIO 3."""
+    """SDA is GPIO 6, SCL is GPIO 7, the battery is GPIO 3, the touch sensor is GPIO 4."""
 
-    SDA, SCL, BATTERY = 6, 7, 3
+    SDA, SCL, BATTERY, TOUCH = 6, 7, 3, 4
 
     def _i2c(self, scl, sda):
         return machine.I2C(0, scl=scl, sda=sda, freq=_BUS_HZ)
@@ -104,7 +109,7 @@ class Esp32C3(Board):
 
 
 class Esp8266(Board):
-    """SDA is D2, SCL is D1, the battery is A0."""
+    """SDA is D2, SCL is D1, the battery is A0, the only pin that measures: there is none for a touch sensor."""
 
     SDA, SCL = 4, 5
 

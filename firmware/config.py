@@ -11,6 +11,9 @@ from binascii import hexlify, unhexlify
 
 PATH = "config.json"
 KEY_SIZE = 32
+_KEPT = ("unit", "ssid", "password", "host", "port", "battery_full_mv")
+_TOUCH = ("touch_ohm", "touch_least_mn", "touch_mn_per_us")
+"""Of a unit with a touch sensor: see docs/hardware/wiring.md."""
 
 
 class ConfigError(Exception):
@@ -67,6 +70,11 @@ class Config:
         self.host = _host(line)
         self.port = _whole(line, "port", 1, 65535)
         self.battery_full_mv = _whole(line, "battery_full_mv", 0, 20000) if "battery_full_mv" in line else 0
+        self.touch_ohm = _whole(line, "touch_ohm", 0, 1_000_000) if "touch_ohm" in line else 0
+        self.touch_least_mn = self.touch_mn_per_us = 0
+        if self.touch_ohm:
+            self.touch_least_mn = _whole(line, "touch_least_mn", 1, 100_000)
+            self.touch_mn_per_us = _whole(line, "touch_mn_per_us", 1, 10_000)
 
     @property
     def key(self):
@@ -80,7 +88,9 @@ class Config:
 
     def save(self, path=PATH):
         """Replace the stored configuration."""
-        fields = {name: getattr(self, name) for name in ("unit", "ssid", "password", "host", "port", "battery_full_mv")}
+        fields = {name: getattr(self, name) for name in _KEPT}
+        if self.touch_ohm:
+            fields.update({name: getattr(self, name) for name in _TOUCH})
         fields["key"] = self._hex
         text = json.dumps(fields)
         with open(path + ".new", "w") as file:

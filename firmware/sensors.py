@@ -1,4 +1,4 @@
-"""The two sensors of a unit, watched: what fails is counted and told.
+"""The sensors of a unit, watched: what fails is counted and told.
 
 A sensor that fails or falls silent is begun anew, after pauses that grow, while the other goes on.
 """
@@ -28,7 +28,7 @@ class Bus:
 
 
 class Watched:
-    """What both have in common. `begin()` starts the sensor; an OSError is a fault of the bus."""
+    """What the two on the bus have in common. `begin()` starts the sensor; an OSError is a fault of the bus."""
 
     ERROR = RESTARTED = 0
 
@@ -245,3 +245,30 @@ class Imu(Watched):
             half_periods = 2 * device.waiting + 1
             sample.imu_age_us = self._clock.diff(now, self._read_at) + half_periods * 500_000 // device.rate_hz
         sample.flags |= self.take_flags()
+
+
+class Touch:
+    """The touch sensor of a unit, looked at in each pass. `new`: a touch that began or ended waits to be told."""
+
+    def __init__(self, device, clock):
+        self._device = device
+        self._clock = clock
+        self._looked = clock.ticks()
+        self.new = False
+
+    def step(self, now):
+        """Look at it."""
+        self._looked = now
+        if self._device.look():
+            self.new = True
+
+    def put(self, sample, now):
+        """Tell what it showed last in a sample as of now."""
+        device = self._device
+        sample.flags |= wire.TOUCH
+        sample.touch_contact = int(device.touched)
+        sample.touch_status = wire.TOUCH_FAILED if device.failed else wire.TOUCH_OK
+        sample.touch_raw_mv = device.mv
+        sample.touch_force_mn = wire.NO_FORCE if device.failed else device.mn
+        sample.touch_age_us = self._clock.diff(now, self._looked)
+        self.new = False

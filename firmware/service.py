@@ -8,11 +8,12 @@ from board import address, open_socket, this_board
 from clock import Clock
 from config import ConfigError, load
 from console import Console
+from fsr import ForceResistor
 from link import Link
 from lsm6ds3 import LSM6DS3
 from micropython import const
 from provisioning import Provisioning
-from sensors import Bus, Imu, RangeFinder
+from sensors import Bus, Imu, RangeFinder, Touch
 from unit import Unit
 from vl53l1x import VL53L1X
 from wifi import Datagrams, Station
@@ -66,7 +67,19 @@ def build(board, clock, config):
     link = Link(config.unit, config.key, port, clock, board.draw, _VERSION_ON_WIRE, board.reset_cause())
     i2c, bus = board.open_bus(), Bus()
     range_finder, imu = RangeFinder(VL53L1X(i2c), clock, bus), Imu(LSM6DS3(i2c), clock, bus)
-    return Unit(config.unit, link, range_finder, imu, bus, clock, board.open_battery(config.battery_full_mv))
+    battery = board.open_battery(config.battery_full_mv)
+    return Unit(config.unit, link, range_finder, imu, bus, clock, battery, touch_of(board, clock, config))
+
+
+def touch_of(board, clock, config):
+    """Return the touch sensor of a configuration; None of one without, and where the board has no pin for it."""
+    if not config.touch_ohm:
+        return None
+    if board.TOUCH < 0:
+        board.note("this board has no pin for a touch sensor")
+        return None
+    device = ForceResistor(board.open_touch(), config.touch_ohm, config.touch_mn_per_us, config.touch_least_mn)
+    return Touch(device, clock)
 
 
 def trace(error):

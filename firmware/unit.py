@@ -14,16 +14,18 @@ _COLLECT = const(5)
 class Unit:
     """Call `step` as often as possible. Samples keep pace with the range finder; without it one comes every 25 ms.
 
-    `battery_mv()` returns the battery's voltage [mV], 0 if it cannot be told.
+    `battery_mv()` returns the battery's voltage [mV], 0 if it cannot be told. `touch` is its touch sensor, if it has
+    one: a touch that begins or ends is told as soon as a sample may follow the last one.
     """
 
-    def __init__(self, number, link, range_finder, imu, bus, clock, battery_mv):
+    def __init__(self, number, link, range_finder, imu, bus, clock, battery_mv, touch=None):
         self._link = link
         self._range_finder = range_finder
         self._imu = imu
         self._bus = bus
         self._clock = clock
         self._battery_mv = battery_mv
+        self._touch = touch
         self._sample = Sample(number)
         self._cycles = 0
         self._last = clock.ticks()
@@ -33,13 +35,16 @@ class Unit:
         now = self._clock.ticks()
         self._link.step(now)
         self._range_finder.step(now)
+        if self._touch is not None:
+            self._touch.step(now)
         if self._due(now):
             self._last = now
             self._cycle(now)
 
     def _due(self, now):
         waited = self._clock.diff(now, self._last)
-        return waited >= _LONGEST_US or (waited >= _SHORTEST_US and self._range_finder.new)
+        soon = self._range_finder.new or (self._touch is not None and self._touch.new)
+        return waited >= _LONGEST_US or (waited >= _SHORTEST_US and soon)
 
     def _cycle(self, now):
         sample = self._sample
@@ -53,6 +58,8 @@ class Unit:
         sample.flags = 0
         self._range_finder.put(sample, now)
         self._imu.put(sample, now)
+        if self._touch is not None and self._link.takes_touch:
+            self._touch.put(sample, now)
         sample.bus_errors = self._bus.errors
         if self._link.live:
             self._link.send(sample, now)

@@ -17,6 +17,12 @@ IMU_LOST = const(8)
 RANGE_RESTARTED = const(16)
 IMU_RESTARTED = const(32)
 RANGE_LATE = const(64)
+TOUCH = const(128)
+
+TAKES_TOUCH = const(1)
+"""In a beacon: a sample may carry a touch reading."""
+TOUCH_OK, TOUCH_FAILED = const(0), const(1)
+NO_FORCE = const(0xFFFFFFFF)
 
 NO_RANGE = const(255)
 NO_TEMPERATURE = const(-32768)
@@ -29,6 +35,8 @@ _HELLO = "<2sBBHHBB8sQ"
 _BEACON = "<2sBBHHI8s"
 _SAMPLE = "<2sBBHHIQIIHhHBBHIHHHHBBHII"
 _SAMPLE_HEAD = const(62)
+_TOUCH = "<BBHII"
+_TOUCH_SIZE = const(12)
 _BLOCK = const(64)
 
 
@@ -62,17 +70,17 @@ def hello(unit, firmware, reset, challenge, uptime_us, mac):
 
 
 def open_beacon(datagram, unit, challenge, mac):
-    """Return number and nonce of a beacon to this unit for this challenge; None of anything else."""
+    """Return number, nonce and what the receiver takes of a beacon to this unit for this challenge, else None."""
     if len(datagram) != BEACON_SIZE:
         return None
-    magic, version, kind, number_of_unit, _, number, nonce = struct.unpack_from(_BEACON, datagram)
+    magic, version, kind, number_of_unit, takes, number, nonce = struct.unpack_from(_BEACON, datagram)
     if (magic, version, kind, number_of_unit) != (_MAGIC, _VERSION, _KIND_BEACON, unit):
         return None
     tag = mac.whole(b"PT1BEACN", challenge, datagram[:-TAG_SIZE])
     wrong = 0
     for index in range(TAG_SIZE):
         wrong |= tag[index] ^ datagram[BEACON_SIZE - TAG_SIZE + index]
-    return None if wrong else (number, nonce)
+    return None if wrong else (number, nonce, takes)
 
 
 class Sample:
@@ -80,8 +88,8 @@ class Sample:
 
     def __init__(self, unit):
         self._unit = unit
-        self._datagram = memoryview(bytearray(_SAMPLE_HEAD + IMU_MOST * IMU_SAMPLE_SIZE + TAG_SIZE))
-        self.imu = self._datagram[_SAMPLE_HEAD:-TAG_SIZE]
+        self._datagram = memoryview(bytearray(_SAMPLE_HEAD + IMU_MOST * IMU_SAMPLE_SIZE + _TOUCH_SIZE + TAG_SIZE))
+        self.imu = self._datagram[_SAMPLE_HEAD : _SAMPLE_HEAD + IMU_MOST * IMU_SAMPLE_SIZE]
         self.flags = self.sequence = self.time_us = self.beacon = self.beacon_hold_us = 0
         self.battery_mv = self.bus_errors = 0
         self.temperature_cdeg = NO_TEMPERATURE
@@ -90,6 +98,8 @@ class Sample:
         self.range_status = NO_RANGE
         self.range_age_us = self.imu_age_us = LONGEST_US
         self.imu_count = self.imu_scale = self.imu_rate_hz = self.imu_index = 0
+        self.touch_contact = self.touch_status = self.touch_raw_mv = 0
+        self.touch_force_mn, self.touch_age_us = NO_FORCE, LONGEST_US
 
     def seal(self, mac):
         """Return the datagram, good until the next one is made."""
@@ -101,5 +111,11 @@ class Sample:
             self.imu_rate_hz, self.imu_index, self.imu_age_us,
         )  # fmt: skip
         end = _SAMPLE_HEAD + self.imu_count * IMU_SAMPLE_SIZE
+        if self.flags & TOUCH:
+            struct.pack_into(
+                _TOUCH, self._datagram, end, self.touch_contact, self.touch_status, self.touch_raw_mv,
+                self.touch_force_mn, self.touch_age_us,
+            )  # fmt: skip
+            end += _TOUCH_SIZE
         self._datagram[end : end + TAG_SIZE] = mac.whole(self._datagram[:end])[:TAG_SIZE]
         return self._datagram[: end + TAG_SIZE]

@@ -11,13 +11,14 @@ import numpy as np
 from pretouch.contact import response
 from pretouch.contact.feel import FeelState, feel, feel_init
 from pretouch.contact.residual_model import ResidualModel
+from pretouch.contact.tactile import TouchState, feel_touch, touch_init, touch_settings
 from pretouch.control import path as paths
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.near import NearState, near_init, near_motion, near_settings
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import doing, events_of
-from pretouch.faults import Watch, examine, sound_readings, sound_robot, watch_init
+from pretouch.faults import Watch, examine, sound_readings, sound_robot, sound_touch, watch_init
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.params import Profile
 from pretouch.perception.obstacles import TrackState, track_init
@@ -45,6 +46,8 @@ class ControllerState:
     """(n,) last joint velocity command [rad/s]."""
     rotation_goal: FloatArray
     """(3, 3) R_O_ee at the start, held if the task asks for it."""
+    touch: tuple[TouchState, ...] = ()
+    """Of the units with a touch sensor, one; none unless there are such units and the profile uses them."""
 
 
 STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motion", "record")
@@ -67,6 +70,7 @@ class Controller:
                 raise SkinError(f"The skin was made for another arm than {model.description.name}: make one for it.")
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
         self._nearness = near_settings(profile)
+        self._touching = touch_settings(model, skin, profile.detection)
         self._mark = mark
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
@@ -88,6 +92,7 @@ class Controller:
             mode=mode_init(),
             command=sound.qd_commanded,
             rotation_goal=self.model.kinematics(sound.q).rotation[self.model.ee],
+            touch=touch_init(self._touching),
         )
 
     def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
@@ -110,6 +115,7 @@ class Controller:
             reaction=response.adopted(state.reaction, mine.reaction, theirs.reaction),
             path=way,
             near=near_init(self.model, len(self.skin)) if mine.anticipation != theirs.anticipation else state.near,
+            touch=state.touch if mine.detection == theirs.detection else touch_init(self._touching),
         )
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
@@ -127,7 +133,8 @@ class Controller:
             p.detection.method != "thresholds",
         )
         readings, unfit = sound_readings(inputs.readings, len(self.skin))
-        now = watch.stamp
+        touches, wrong = sound_touch(inputs.touch, len(self.skin)) if self._touching else (None, "")
+        unfit, now = unfit or wrong, watch.stamp
         mark("state")
         kin = model.kinematics(robot.q)
         x = kin.position[model.ee]
@@ -141,7 +148,11 @@ class Controller:
 
         # what is felt: eqs. 8-11
         watched = p.perception.enabled and len(self.skin) > 0 and heard >= 1.0 and not silent
-        felt, feeling = feel(state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p, watched)
+        cues, touched = feel_touch(state.touch, self._touching, touches, kin, now, self.limits.period, p.detection)
+        felt, feeling = feel(
+            state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p,
+            watched, cues,
+        )  # fmt: skip
         mark("contact")
 
         # what to do
@@ -193,7 +204,7 @@ class Controller:
             watch=watch, tracks=tracks, feel=feeling, reduction=reduction, reaction=react,
             path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
-            near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal,
+            near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal, touch=touched,
         )  # fmt: skip
         mark("record")
         return step, after

@@ -7,7 +7,15 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.types import WHOLE, FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.types import (
+    WHOLE,
+    FloatArray,
+    Inputs,
+    RangeReadings,
+    RangeStatus,
+    RobotState,
+    TouchReadings,
+)
 from pretouch.values import value
 
 _LARGEST = 1e3
@@ -207,6 +215,31 @@ def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, 
 def _nothing(units: int) -> RangeReadings:
     """Return what units report that were never heard."""
     return RangeReadings(np.full(units, -np.inf), np.zeros(units), np.full(units, int(RangeStatus.NONE)))
+
+
+def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings | None, str]:
+    """Copy touch readings as arrays of known types; of those that do not fit so many units, take none and say why.
+
+    A stamp that is no number is that of a unit that was never heard; a force that is no number, or below 0, is not
+    measured. None stays None: a skin without touch sensors.
+    """
+    if touch is None:
+        return None, ""
+    try:
+        stamp, force = np.array(touch.stamp, dtype=np.float64), np.array(touch.force, dtype=np.float64)
+        contact, status = np.array(touch.contact), np.array(touch.status)
+    except AttributeError:
+        return None, f"touch readings are {touch!r}"
+    except (TypeError, ValueError, OverflowError):
+        return None, "touch readings are no arrays of numbers"
+    if not stamp.shape == force.shape == contact.shape == status.shape == (units,):
+        shapes = f"{stamp.shape}, {contact.shape}, {force.shape} and {status.shape}"
+        return None, f"stamps, contacts, forces and statuses of touch have the shapes {shapes}, not ({units},)"
+    if contact.dtype.kind not in "biu" or status.dtype.kind not in "iu":
+        return None, f"contacts and statuses of touch are of types {contact.dtype} and {status.dtype}"
+    stamp[np.isnan(stamp)] = -np.inf
+    force[~((force >= 0.0) & (force < _STRONGEST))] = np.nan
+    return TouchReadings(stamp, contact != 0, force, status.astype(np.int64)), ""
 
 
 @compiled

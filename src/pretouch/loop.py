@@ -16,8 +16,8 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
-from pretouch.ports import Clock, Robot, Skin
-from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState
+from pretouch.ports import Clock, Robot, Skin, touch_of
+from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, TouchReadings
 from pretouch.values import value
 
 _FINEST = 1e-7
@@ -204,19 +204,22 @@ def turn(
     controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float, resume: bool = False
 ) -> Cycle:
     """Turn the controller once, at a tick [s]: read, step, command."""
-    report, readings = robot.read(), skin.read()
-    inputs = Inputs(_instant(tick, controller.limits.period, report, readings), report, readings, resume)
+    report, readings, touch = robot.read(), skin.read(), touch_of(skin)
+    stamp = _instant(tick, controller.limits.period, report, readings, touch)
+    inputs = Inputs(stamp, report, readings, resume, touch)
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)
 
 
-def _instant(tick: float, period: float, report: RobotState, readings: RangeReadings) -> float:
+def _instant(
+    tick: float, period: float, report: RobotState, readings: RangeReadings, touch: TouchReadings | None
+) -> float:
     """Instant of a step [s]: a port that stamps what it reads as it reads it is a little later than the tick."""
     latest = tick
-    for given in (getattr(report, "stamp", tick), getattr(readings, "stamp", tick)):
+    for stamp in (getattr(given, "stamp", tick) for given in (report, readings, touch)):
         with suppress(TypeError, ValueError):  # the controller names what is wrong
-            stamps = np.asarray(given, dtype=np.float64)
+            stamps = np.asarray(stamp, dtype=np.float64)
             latest = max(latest, float(stamps[(stamps > tick) & (stamps <= tick + period)].max(initial=tick)))
     return latest
 

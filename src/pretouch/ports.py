@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from pretouch.types import FloatArray, RangeReadings, RobotState
+from pretouch.types import FloatArray, RangeReadings, RobotState, TouchReadings
 
 
 class Robot(Protocol):
@@ -23,6 +23,20 @@ class Skin(Protocol):
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit."""
         ...
+
+
+class TouchSkin(Skin, Protocol):
+    """Sensor units of which some have a touch sensor. A `Skin` without the method has none."""
+
+    def touch(self) -> TouchReadings | None:
+        """Return the newest touch reading of each unit; None while none is known."""
+        ...
+
+
+def touch_of(skin: object) -> TouchReadings | None:
+    """Return what units say of being touched, None of a skin that has no touch sensors."""
+    touch = getattr(skin, "touch", None)
+    return None if touch is None else touch()
 
 
 class Clock(Protocol):

@@ -60,6 +60,33 @@ class RangeReadings:
     """(K,) `RangeStatus` codes."""
 
 
+class TouchStatus(IntEnum):
+    """What a unit says of its touch sensor."""
+
+    OK = 0
+    FAILED = 1
+    """It measures, and what it measures can be no reading: a broken lead."""
+    NONE = 255
+    """It has none, or none was heard of."""
+
+
+@value
+class TouchReadings:
+    """The newest touch reading of each of K sensor units, in the order of the skin.
+
+    A unit without a touch sensor, and one that has never been heard, has stamp -inf and status NONE.
+    """
+
+    stamp: FloatArray
+    """(K,) instant of each measurement [s]."""
+    contact: BoolArray
+    """(K,) whether the unit is touched; meaningless unless the status is OK."""
+    force: FloatArray
+    """(K,) size of the force on it [N], NaN where it is not measured."""
+    status: IntArray
+    """(K,) `TouchStatus` codes."""
+
+
 @value
 class RobotState:
     """What the robot's own interface reports at one instant, n joints."""
@@ -93,6 +120,8 @@ class Inputs:
     readings: RangeReadings
     resume: bool = False
     """A person asks to leave a latched HOLD."""
+    touch: TouchReadings | None = None
+    """What units say of being touched; None of a skin that has no touch sensors."""
 
 
 class Mode(Enum):

@@ -1,5 +1,7 @@
 """From a calibration to a skin file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from pretouch.calibration.skin_of import skin_of
 from pretouch.errors import CalibrationError
 from pretouch.sensing.seat import seat
 from pretouch.sensing.skin import Skin, load_skin, save_skin
+from pretouch.sensing.unit import TouchPatch
 from tests.calibration.faulty import on_the_table
 from tests.calibration.made import turned
 
@@ -36,6 +39,13 @@ def test_a_unit_that_is_refused_stays_where_the_skin_had_it_or_is_left_out(panda
     kept = skin_of(found, panda_model, pair)
     assert (kept.skin.ids, kept.kept, kept.located) == (pair.ids, ("on_panda_link4",), ("on_panda_hand",))
     assert kept.skin.units[0] is pair.units[0]
+
+
+def test_a_unit_that_is_calibrated_keeps_its_touch_sensor(panda_model, found, pair):
+    before = Skin([replace(pair.units[0], touch=TouchPatch(radius=0.03)), pair.units[1]], panda_model)
+    made = skin_of(found, panda_model, before)
+    assert made.located == pair.ids
+    assert [unit.touch for unit in made.skin.units] == [TouchPatch(radius=0.03), None]
 
 
 def test_units_that_were_not_calibrated_stay(panda_model, found, whole_skin):

@@ -11,7 +11,7 @@ from tests.firmware.harness import Run
 KEY, CHALLENGE, NONCE = bytes(range(32)), b"challeng", b"nonce678"
 SESSION = wire.session_mac(wire.Mac(KEY), CHALLENGE, NONCE)
 START = f"""
-import json, wire
+import json, struct, wire
 from binascii import hexlify, unhexlify
 mac = wire.Mac({KEY!r})
 session = wire.session_mac(mac, {CHALLENGE!r}, {NONCE!r})
@@ -20,10 +20,14 @@ SAY_SAMPLES = """
 for fields in json.load(open(FILE)):
     sample = wire.Sample(fields["unit"])
     for name in fields:
-        if name not in ("unit", "imu"):
+        if name not in ("unit", "imu", "touch"):
             setattr(sample, name, fields[name])
     imu = unhexlify(fields["imu"])
     sample.imu[:len(imu)] = imu
+    if fields["touch"]:
+        part = struct.unpack("<BBHII", unhexlify(fields["touch"]))
+        sample.touch_contact, sample.touch_status, sample.touch_raw_mv = part[:3]
+        sample.touch_force_mn, sample.touch_age_us = part[3:]
     print(hexlify(sample.seal(session)).decode())
 """
 OPEN_BEACONS = f"""
@@ -49,13 +53,17 @@ def samples() -> list[wire.Sample]:
         sample = wire.Sample(int(rng.integers(1, 65536)), *row)
         sample.imu_count = int(rng.integers(0, wire.IMU_MOST + 1))
         sample.imu = rng.bytes(sample.imu_count * wire.IMU_SAMPLE.size)
+        if sample.flags & wire.Flag.TOUCH:
+            sample.touch = rng.bytes(wire.TOUCH.size)
         made.append(sample)
     return made
 
 
 def test_samples_are_the_bytes_the_receiver_encodes(unit_python: Run) -> None:
     made = samples()
-    content = json.dumps([dataclasses.asdict(sample) | {"imu": sample.imu.hex()} for sample in made])
+    content = json.dumps(
+        [dataclasses.asdict(sample) | {"imu": sample.imu.hex(), "touch": sample.touch.hex()} for sample in made]
+    )
     said = [bytes.fromhex(line) for line in in_unit(unit_python, content, SAY_SAMPLES)]
     assert said == [sample.encode(SESSION) for sample in made]
     assert [wire.decode_sample(datagram, SESSION) for datagram in said] == made
@@ -70,14 +78,14 @@ def test_a_hello_is_what_the_receiver_decodes(unit_python: Run) -> None:
 
 
 def test_a_beacon_opens_only_whole_for_its_unit_challenge_and_key(unit_python: Run) -> None:
-    beacon = wire.Beacon(unit=7, number=0xF1234567, nonce=NONCE)
+    beacon = wire.Beacon(unit=7, number=0xF1234567, nonce=NONCE, takes=wire.TAKES_TOUCH)
     good = beacon.encode(wire.Mac(KEY), CHALLENGE)
     bad = [bytes(b ^ (1 << bit % 8) * (at == bit // 8) for at, b in enumerate(good)) for bit in range(8 * len(good))]
     bad += [good[:size] for size in range(1, len(good))] + [good + b"\0"]
     bad += [dataclasses.replace(beacon, unit=8).encode(wire.Mac(KEY), CHALLENGE)]
     bad += [beacon.encode(wire.Mac(KEY), b"another1"), beacon.encode(wire.Mac(bytes(32)), CHALLENGE)]
     lines = in_unit(unit_python, "\n".join(each.hex() for each in [good, *bad]), OPEN_BEACONS)
-    assert lines == [str((0xF1234567, NONCE))] + ["None"] * len(bad)
+    assert lines == [str((0xF1234567, NONCE, 1))] + ["None"] * len(bad)
 
 
 def test_keys_of_any_length_up_to_a_block_make_the_same_mac(unit_python: Run) -> None:

@@ -10,7 +10,7 @@ from pretouch.errors import ParameterError
 from pretouch.hardware.findings import findings
 from pretouch.hardware.health import Counts, Standing, unit_health
 from pretouch.hardware.health_params import HealthParams
-from pretouch.hardware.wire import Flag
+from pretouch.hardware.wire import NO_FORCE, Flag, TouchPart
 from tests.hardware.traffic import NOW, heard, traffic
 
 LIMITS = HealthParams()
@@ -66,6 +66,18 @@ CASES = {
     "unknown statuses": (
         lambda: found(heard(range_status=lambda n: (77, 254, 0, 0)[n % 4])), "warning", "status",
         "fails in 50% of its readings (125 77, 125 STUCK; limit 10%)",
+    ),
+    "touched for long": (
+        lambda: found(heard(flags=WELL | 128, touch=TouchPart(1, 0, 900, 2000, 0).encode())), "warning", "touch held",
+        "has said for 10 s that it is touched (limit 9 s)",
+    ),
+    "touched now and then": (
+        lambda: found(heard(flags=WELL | 128, touch=lambda n: TouchPart(n % 50 > 0, 0, 900, 2000, 0).encode())), None,
+        "", "",
+    ),
+    "touch sensor broken": (
+        lambda: found(heard(flags=WELL | 128, touch=lambda n: TouchPart(0, n % 4 == 0, 2, NO_FORCE, 0).encode())),
+        "warning", "touch failed", "touch sensor fails in 25% of its readings (limit 10%)",
     ),
     "range late": (
         lambda: found(heard(flags=lambda n: WELL | (64 if n % 100 == 0 else 0))), "warning", "range late",

@@ -8,8 +8,8 @@ import tyro
 from pretouch.cli.bench_avoidance import Avoidance
 from pretouch.cli.bench_both import Both
 from pretouch.cli.bench_detection import Detection
-from pretouch.cli.identify import Identify
 from pretouch.cli.bench_localization import Localization
+from pretouch.cli.identify import Identify
 from pretouch.cli.robot_commands import Robot
 from pretouch.cli.run.options import Run
 from pretouch.cli.serve_fci_command import ServeFci

@@ -57,7 +57,8 @@ def feel(
         reacting: whether the arm moves with a contact.
         profile: parameters.
         watched: whether a skin watches, all of its units heard: else nothing is learnt of free motion.
-        cues: what units say of a touch, for the method sequential; None for nothing.
+        cues: what units say of a touch, for the method sequential; None for nothing. While a place is said to be
+            touched, nothing is learnt of free motion.
     """
     p, force = profile.detection, None if robot.wrench is None else robot.wrench[:3]
     found, window = detect(state.window, force, kin.position[model.ee], obstacles, profile.threshold)
@@ -78,7 +79,8 @@ def feel(
         return Detection(bands, contact, found.armed, robot.tau_ext, share), FeelState(window, ())
     before = state.sequential[0] if state.sequential else sequential_init(model, p)
     told, period = no_cues(len(model.links)) if cues is None else cues, profile.task.control_period_s
-    felt, after = take_sample(before, model, kin, robot, obstacles, reacting, watched, period, p, told)
+    alone = watched and not len(told.link)
+    felt, after = take_sample(before, model, kin, robot, obstacles, reacting, alone, period, p, told)
     bands = Thresholds(felt.bands)
     contact = _contact(felt.force, bands) if felt.sure and found.armed else None
     touched: Touched = NOT_TOUCHED

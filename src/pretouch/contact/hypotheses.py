@@ -18,8 +18,8 @@ def write_hypotheses(
 ) -> None:  # fmt: skip
     """Write Jacobians (H, 3, n), joints (H,), prior weights (n + H,) and directions (H, 3) of the contacts looked for.
 
-    Each joint's weight, then each link's, then those of the nearest objects; see `sequential.judge`. The first two are
-    times `touch_gain` (L,) of the link; of several links behind one joint the largest counts.
+    Each joint's weight, then each link's, then those of the nearest objects; see `sequential.judge`. All are times
+    `touch_gain` (L,) of the link; of several links behind one joint the largest counts.
     """
     n, count, full, point = len(anchor), len(parts), np.empty((6, len(anchor))), np.empty(3)
     order, k = nearest_of(distance, len(J) - count), 0
@@ -47,4 +47,4 @@ def write_hypotheses(
                 away[h, a] = -direction[k, a]
                 for j in range(n):
                     speed += direction[k, a] * J[h, a, j] * qd[j]
-            weight[n + h] = gain * nearness(distance[k], speed, near, horizon)
+            weight[n + h] = gain * nearness(distance[k], speed, near, horizon) * touch_gain[touched]

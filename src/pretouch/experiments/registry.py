@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pretouch.experiments import avoidance, clamp, dynamic, mounting, pinch, static, wire
+from pretouch.experiments import avoidance, clamp, dynamic, mounting, pinch, static, tactile, wire
 from pretouch.experiments.claims import anticipation, between, detectable, free_motion, noise
 from pretouch.experiments.coverage import study as coverage
 from pretouch.experiments.experiment import Experiment, Row
@@ -39,6 +39,7 @@ WEAKNESSES = (
 HARDWARE = (wire.EXPERIMENT,)
 MOUNTING = (mounting.EXPERIMENT, coverage.EXPERIMENT)
 REACTION = (clamp.EXPERIMENT, pinch.EXPERIMENT)
+TOUCH = (tactile.EXPERIMENT,)
 
 GROUPS = {
     "The paper's experiments": PAPER,
@@ -47,6 +48,7 @@ GROUPS = {
     "Readings over the wire": HARDWARE,
     "Where units sit": MOUNTING,
     "Caught between two things": REACTION,
+    "Touch sensors of units": TOUCH,
 }
 """All experiments by what they are for, in the order of the page."""
 EXPERIMENTS: dict[str, Experiment] = {e.name: e for group in GROUPS.values() for e in group}

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from pretouch import ports
 from pretouch.control.path import Path
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
@@ -28,6 +29,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, described, fixtures
+from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
 
 TOUCH_N = 1.0
@@ -188,10 +190,11 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         known = setup.skin if setup.believed is None else setup.believed
         controller = Controller(model, known, fixtures(scene), setup.path, profile)
         clock = PlantClock(plant, profile.task.control_period_s)
+        felt = _feeling(setup, plant, units)
         plant.advance(SETTLE_S)
         with _recording(setup, controller) as recording:
             recorder = _Recorder(plant, hand, recording)
-            run(controller, plant, units, clock, recorder, lambda step: done(step, plant))
+            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant))
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),
@@ -208,3 +211,10 @@ def _mounted(setup: Setup, plant: Plant) -> AbstractContextManager[RangeFinders 
     if setup.wire is None:
         return nullcontext(RangeFinders(plant, setup.skin, setup.ranging, setup.seed))
     return WireSkin(plant, setup.skin, setup.ranging, setup.wire, setup.seed)
+
+
+def _feeling(setup: Setup, plant: Plant, units: RangeFinders | WireSkin) -> ports.Skin:
+    """Return the units with their touch sensors, where the skin has such; over the wire they have them already."""
+    if isinstance(units, WireSkin) or not len(setup.skin.touching):
+        return units
+    return FeelingSkin(units, TouchSensors(plant, setup.skin, TouchSensorParams(), setup.seed))

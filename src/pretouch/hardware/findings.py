@@ -48,6 +48,7 @@ def _of(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
         yield Finding(unit.unit, "fault", "silent", silence)
     else:
         yield from _range_finder(unit, params)
+        yield from _touch_sensor(unit, params)
         if unit.heard_s >= params.settle_s:
             yield from _rates(unit, params)
             yield from _clock(unit, params)
@@ -100,6 +101,20 @@ def _range_finder(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
         unit, "noise", 1000 * unit.noise_m, (1000 * params.noise_m,),
         " scatters by {value} mm from reading to reading (limit {limit} mm): clean its window, and see that nothing"
         " shiny or moving is before it.",
+    )  # fmt: skip
+
+
+def _touch_sensor(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
+    if unit.touched == 1.0 and unit.heard_s >= params.touch_held_s:
+        yield Finding(
+            unit.unit, "warning", "touch held",
+            f"{unit.unit} has said for {unit.heard_s:.0f} s that it is touched (limit {params.touch_held_s:g} s), and"
+            " is not believed for longer: see that no cable or case presses on it, and calibrate its touch sensor.",
+        )  # fmt: skip
+    yield from _beyond(
+        unit, "touch failed", 100 * unit.touch_failed, (100 * params.touch_failed,),
+        "'s touch sensor fails in {value}% of its readings (limit {limit}%): see to its leads and to the resistor"
+        " across it.",
     )  # fmt: skip
 
 

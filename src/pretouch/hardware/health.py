@@ -10,8 +10,8 @@ from typing import Self
 import numpy as np
 
 from pretouch.hardware.traffic import Received, UnitState, UnitTraffic
-from pretouch.hardware.wire import NO_TEMPERATURE, Flag, Reset, Sample
-from pretouch.types import FloatArray, RangeStatus
+from pretouch.hardware.wire import NO_TEMPERATURE, Flag, Reset, Sample, touch_part
+from pretouch.types import FloatArray, RangeStatus, TouchStatus
 
 _MAD_TO_SIGMA = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
@@ -118,6 +118,10 @@ class UnitHealth:
     """Within the window."""
     clock_jumps: int
     """Within the window."""
+    touched: float = math.nan
+    """Share of its touch readings that said it is touched; NaN of a unit that tells of no touch sensor."""
+    touch_failed: float = 0.0
+    """Share of its touch readings that said the sensor has failed."""
 
 
 class UnitWindow:
@@ -167,6 +171,7 @@ def unit_health(
     imu_rate_hz, imu_loss = _imu(boot)
     sent = counted.accepted + counted.lost
     flags = [s.flags for s in boot]
+    touch = [part for s in boot if (part := touch_part(s)) is not None]
     return UnitHealth(
         unit=unit,
         standing=standing,
@@ -195,6 +200,8 @@ def unit_health(
         imu_loss=imu_loss,
         reboots=counted.reboots,
         clock_jumps=counted.clock_jumps,
+        touched=float(np.mean([p.contact != 0 for p in touch])) if touch else math.nan,
+        touch_failed=float(np.mean([p.status != TouchStatus.OK for p in touch])) if touch else 0.0,
     )
 
 

@@ -43,6 +43,10 @@ class HealthParams(Checked):
     """Largest share of readings whose status says that the sensor failed, rather than that nothing is there."""
     failed_fault: Fraction = 0.5
     """The same share, from which most readings tell nothing."""
+    touch_held_s: Positive = 9.0
+    """Time for which a unit may say without a break that it is touched [s]: the controller believes it for 10 s."""
+    touch_failed: Fraction = 0.1
+    """Largest share of touch readings that say the sensor has failed: a lead that works loose."""
     range_late: PositiveCount = 3
     """Samples without a range in time from which the range finder is warned of, within the window."""
     battery_v: Positive = 3.5

@@ -16,6 +16,7 @@ from pretouch.hardware.wire import (
     CHALLENGE_SIZE,
     NONCE_SIZE,
     PREFIX,
+    TAKES_TOUCH,
     Beacon,
     Hello,
     Mac,
@@ -179,7 +180,7 @@ class Session:
         self.number += 1
         self.sent[self.number] = now
         self.sent.pop(self.number - _REMEMBERED, None)
-        return Beacon(self.hello.unit, self.number, self.nonce).encode(key, self.hello.challenge)
+        return Beacon(self.hello.unit, self.number, self.nonce, TAKES_TOUCH).encode(key, self.hello.challenge)
 
 
 class Link:

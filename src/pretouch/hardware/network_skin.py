@@ -17,11 +17,11 @@ import numpy as np
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys
 from pretouch.hardware.link import LinkParams
-from pretouch.hardware.receiver import keys_of
+from pretouch.hardware.receiver import keys_of, touch_readings
 from pretouch.hardware.receiver_process import Outlets, Traffic, serve
 from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch
 from pretouch.hardware.udp import demand_port
-from pretouch.types import RangeReadings, RangeStatus
+from pretouch.types import RangeReadings, RangeStatus, TouchReadings
 
 _START_S = 60.0
 """Longest time a process may take to start [s]: it imports everything anew."""
@@ -109,6 +109,11 @@ class NetworkSkin:
             return self._nothing
         table = np.frombuffer(value).reshape(3, -1)
         return RangeReadings(table[0].copy(), table[1].copy(), table[2].astype(np.int64))
+
+    def touch(self) -> TouchReadings | None:
+        """Return the newest touch reading of each unit; None while no unit has told one."""
+        value = self._outlets.touch()
+        return None if value is None else touch_readings(np.frombuffer(value).reshape(4, -1))
 
     def take_samples(self) -> list[Received]:
         """Return the samples accepted since the last call, in their order of arrival."""

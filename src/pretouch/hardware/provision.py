@@ -53,6 +53,12 @@ class Network:
     port: int
     battery_full_mv: int = 0
     """Voltage of the unit's battery that fills its converter [mV] (docs/hardware/wiring.md); 0: none is wired to it."""
+    touch_ohm: int = 0
+    """Resistor from the touch sensor's pin to ground [ohm] (docs/hardware/wiring.md); 0: it has no such sensor."""
+    touch_least_mn: int = 500
+    """Smallest force that is a touch [mN]."""
+    touch_mn_per_us: int = 10
+    """Force by the touch sensor's conductance [mN/uS]: of the FSR 402 about 10, to be calibrated."""
 
     def __post_init__(self) -> None:
         if not 1 <= _size(self.ssid, "network's name") <= _SSID_MOST or "\0" in self.ssid:
@@ -76,6 +82,11 @@ class Network:
             raise HardwareError(
                 f"The battery fills the converter at {self.battery_full_mv} mV: give 0 to {_FULL_MOST_MV}, as 5000."
             )
+
+        limits = {"touch_ohm": (0, 1_000_000), "touch_least_mn": (1, 100_000), "touch_mn_per_us": (1, 10_000)}
+        for name, (least, most) in limits.items():
+            if not least <= getattr(self, name) <= most:
+                raise HardwareError(f"The unit's {name} is {getattr(self, name)}: give {least} to {most}.")
 
     def __repr__(self) -> str:
         """Without the password."""
@@ -122,11 +133,13 @@ def greet(line: Line, timeout: float = GREET_S) -> Peer:
 
 def provision(line: Line, key: UnitKey, network: Network, timeout: float = ANSWER_S) -> Peer:
     """Tell a unit who it is; return what it then says it is. Refusals and wrong answers are a HardwareError."""
-    told = {
+    told: dict[str, int | str] = {
         "pretouch": _PROTOCOL, "unit": key.number, "key": key.key.hex(), "ssid": network.ssid,
         "password": network.password, "host": network.host, "port": network.port,
         "battery_full_mv": network.battery_full_mv,
     }  # fmt: skip
+    if network.touch_ohm:
+        told |= {name: getattr(network, name) for name in ("touch_ohm", "touch_least_mn", "touch_mn_per_us")}
     data = json.dumps(told, ensure_ascii=False).encode() + b"\n"  # units join no halves of \u escapes
     for start in range(0, len(data), _PIECE):
         line.write(data[start : start + _PIECE], timeout)

@@ -15,7 +15,7 @@ import numpy as np
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
-from pretouch.hardware.station import NO_READING, Address, Station
+from pretouch.hardware.station import NO_READING, NO_TOUCH, Address, Station
 from pretouch.hardware.traffic import REASONS, ImuBatch, Received, UnitTraffic, imu_batch
 from pretouch.hardware.udp import attach_filter, bind
 from pretouch.hardware.wire import (
@@ -27,16 +27,18 @@ from pretouch.hardware.wire import (
     SAMPLE,
     SAMPLE_LEAST,
     VERSION,
+    Flag,
     Kind,
 )
-from pretouch.types import RangeReadings
+from pretouch.types import FloatArray, RangeReadings, TouchReadings
 
 _HEAD = struct.Struct("<4sHHI")
 """Magic, version and kind as one; number of the unit; and, of a sample, flags and sequence."""
 _SAMPLE = MAGIC + bytes([VERSION, Kind.SAMPLE])
 _HELLO = MAGIC + bytes([VERSION, Kind.HELLO])
-_COUNTS = {SAMPLE_LEAST + n * IMU_SAMPLE.size: n for n in range(IMU_MOST + 1)}
-"""IMU samples in a sample datagram of each size."""
+_COUNTS = {SAMPLE_LEAST + n * IMU_SAMPLE.size: n for n in range(IMU_MOST + 2)}
+"""IMU samples in a sample datagram of each size; a touch reading is as long as one of them."""
+_TOUCH = int(Flag.TOUCH)
 _COUNT_AT = PREFIX.size + SAMPLE.size - struct.calcsize("<BBHII")
 """Where a sample says how many."""
 _LEAST = min(HELLO_SIZE, SAMPLE_LEAST)
@@ -57,6 +59,14 @@ def keys_of(ids: Sequence[str], keys: Keys) -> tuple[UnitKey, ...]:
     if len(set(ids)) != len(ids):
         raise HardwareError(f"A unit stands twice in {', '.join(ids)}: name each once.")
     return tuple(keys[id] for id in ids)
+
+
+def touch_readings(table: FloatArray) -> TouchReadings | None:
+    """Return the touch readings of a table (4, K) as `SkinReceiver.touch_table` has them; None of one without any."""
+    stamp, contact, force, status = table
+    if not np.isfinite(stamp).any():
+        return None
+    return TouchReadings(stamp.copy(), contact != 0.0, force.copy(), status.astype(np.int64))
 
 
 class SkinReceiver:
@@ -94,7 +104,12 @@ class SkinReceiver:
         units = keys_of(ids, keys)
         self.table = np.array([NO_READING]).T.repeat(len(units), axis=1)
         """Stamps [s], distances [m] and statuses of the newest readings, (3, K); not to be written to."""
-        self._stations = [Station(i, unit, self._params, draw, self.table[:, i]) for i, unit in enumerate(units)]
+        self.touch_table = np.array([NO_TOUCH]).T.repeat(len(units), axis=1)
+        """Stamps [s], contacts, forces [N] and statuses of the newest touch readings, (4, K); as that."""
+        self._stations = [
+            Station(i, unit, self._params, draw, self.table[:, i], self.touch_table[:, i])
+            for i, unit in enumerate(units)
+        ]
         self._by_number = {unit.number: station for unit, station in zip(units, self._stations, strict=True)}
         self.units: tuple[UnitTraffic, ...] = tuple(station.traffic for station in self._stations)
         self.rejected: dict[str, int] = dict.fromkeys(REASONS, 0)
@@ -174,6 +189,10 @@ class SkinReceiver:
         stamp, distance, status = self.table
         return RangeReadings(stamp.copy(), distance.copy(), status.astype(np.int64))
 
+    def touch(self) -> TouchReadings | None:
+        """Return the newest touch reading of each unit; None while no unit has told one."""
+        return touch_readings(self.touch_table)
+
     def take_samples(self) -> list[Received]:
         """Return the samples accepted since the last call, in their order of arrival."""
         taken = list(self._samples)
@@ -214,10 +233,10 @@ class SkinReceiver:
         """Take in one datagram: return None for a sample, "" for a hello, or why it is thrown away."""
         if size < _LEAST:
             return "size"
-        head, number, _, sequence = _HEAD.unpack_from(datagram)
+        head, number, flags, sequence = _HEAD.unpack_from(datagram)
         if head == _SAMPLE:
             count = _COUNTS.get(size)
-            if count is None or datagram[_COUNT_AT] != count:
+            if count is None or datagram[_COUNT_AT] + bool(flags & _TOUCH) != count:
                 return "size"
         elif head != _HELLO:
             return "format"

@@ -18,7 +18,7 @@ from pretouch.hardware.mailbox import Mailbox
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.ring import Ring
 from pretouch.hardware.traffic import Received, UnitTraffic
-from pretouch.hardware.wire import PREFIX, SAMPLE, SAMPLE_MOST, TAG_SIZE, Sample
+from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, sample_of
 
 _PAUSE_S = 0.008
 """Pause after each look at the socket [s]: what arrives meanwhile is taken in at once. Waking up for each sample would
@@ -35,8 +35,6 @@ _SUSPENDED_S = 0.02
 
 _RECORD = struct.Struct("<Hdddd")
 """Index of the unit; arrival, stamp, offset, bound; then the datagram without its tag."""
-_SAMPLE_AT = _RECORD.size + PREFIX.size
-_IMU_AT = _SAMPLE_AT + SAMPLE.size
 _RECORD_MOST = _RECORD.size + SAMPLE_MOST - TAG_SIZE
 
 
@@ -56,12 +54,22 @@ class Outlets:
 
     def __init__(self, ids: tuple[str, ...], samples_most: int) -> None:
         self._readings = Mailbox(24 * len(ids))
+        self._touch = Mailbox(32 * len(ids))
         self._traffic = Mailbox(4096 + sum(2048 + len(id.encode()) for id in ids))
         self._samples = Ring(samples_most, _RECORD_MOST)
 
     def put_readings(self, table: bytes) -> None:
         """Give stamps, distances and statuses, (3, K) float64."""
         self._readings.write(table)
+
+    def put_touch(self, table: bytes) -> None:
+        """Give stamps, contacts, forces and statuses of touch, (4, K) float64."""
+        self._touch.write(table)
+
+    def touch(self) -> bytes | None:
+        """Return the newest stamps, contacts, forces and statuses of touch, (4, K) float64; None before the first."""
+        number, value = self._touch.read()
+        return value if number else None
 
     def put_samples(self, records: list[bytes]) -> None:
         """Give samples, as `packed` made them."""
@@ -102,9 +110,10 @@ def packed(received: Received, datagram: memoryview) -> bytes:
 
 def _unpack(record: bytes) -> Received:
     index, arrival, stamp, offset, bound = _RECORD.unpack_from(record)
-    number = PREFIX.unpack_from(record, _RECORD.size)[3]
-    fields = *SAMPLE.unpack_from(record, _SAMPLE_AT), record[_IMU_AT:]
-    return Received(index, arrival, stamp, offset, bound, Sample(number, *fields))
+    sample = sample_of(record[_RECORD.size :])
+    if sample is None:
+        raise RuntimeError("a sample that was taken in has another length than it says")
+    return Received(index, arrival, stamp, offset, bound, sample)
 
 
 def suspended() -> float:
@@ -166,6 +175,7 @@ class Service:
         elif not accepted:
             return
         self._outlets.put_readings(self.receiver.table.tobytes())
+        self._outlets.put_touch(self.receiver.touch_table.tobytes())
         self._outlets.put_samples(self._records)
         self._records.clear()
 

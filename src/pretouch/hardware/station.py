@@ -8,14 +8,17 @@ from pretouch.hardware.link import Link, LinkParams, Session
 from pretouch.hardware.stuck import StuckDetector
 from pretouch.hardware.traffic import Latency, Received, UnitTraffic
 from pretouch.hardware.unit_clock import UnitClock
-from pretouch.hardware.wire import Flag, Sample
-from pretouch.types import FloatArray, RangeStatus
+from pretouch.hardware.wire import NO_FORCE, Flag, Sample, touch_part
+from pretouch.types import FloatArray, RangeStatus, TouchStatus
 
 _RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
 NO_READING = (-math.inf, 0.0, float(RangeStatus.NONE))
 """Stamp [s], distance [m] and status of a unit that has measured nothing."""
 _GREETING_S = 1.0
 """Time without a hello after which a unit no longer asks for a session [s]; it would ask ten times in it."""
+
+NO_TOUCH = (-math.inf, 0.0, math.nan, float(TouchStatus.NONE))
+"""Stamp [s], contact, force [N] and status of a unit that has told of no touch sensor."""
 
 Address = tuple[str, int]
 
@@ -24,10 +27,14 @@ class Station:
     """What is known of one unit. Times in seconds of the host's clock."""
 
     def __init__(
-        self, index: int, unit: UnitKey, params: LinkParams, draw: Callable[[int], bytes], reading: FloatArray
-    ) -> None:
-        """Know nothing yet of the unit with this index in the skin; its stamp, distance and status go to `reading`."""
-        self._reading = reading
+        self, index: int, unit: UnitKey, params: LinkParams, draw: Callable[[int], bytes], reading: FloatArray,
+        touch: FloatArray,
+    ) -> None:  # fmt: skip
+        """Know nothing yet of the unit with this index in the skin.
+
+        Stamp, distance and status of its range go to `reading`, those of `NO_TOUCH` to `touch`.
+        """
+        self._reading, self._touch = reading, touch
         self.traffic = UnitTraffic(unit.id, unit.number)
         self.address: Address | None = None
         """Where its last sample came from, as the socket knows it."""
@@ -72,6 +79,8 @@ class Station:
         if address != self.address:
             self.address, traffic.address = address, address[:2]
         self._tell_time(session, sample, now)
+        if sample.touch:
+            self._take_touch(sample)
         stamp = self._take_reading(sample, now) if sample.flags & _RANGE_NEW else math.nan
         return Received(self._index, now, stamp, traffic.offset, traffic.bound, sample)
 
@@ -107,7 +116,7 @@ class Station:
         self._distrust_beacons(now)
         traffic = self.traffic
         traffic.offset, traffic.bound, traffic.last_reading_stamp = math.nan, math.inf, -math.inf
-        self._reading[:] = NO_READING
+        self._reading[:], self._touch[:] = NO_READING, NO_TOUCH
 
     def _distrust_beacons(self, now: float) -> None:
         """Take the time from no beacon that was sent already, and send another soon."""
@@ -144,3 +153,13 @@ class Station:
             traffic.last_reading_stamp = stamp
             self._reading[:] = stamp, 1e-3 * sample.range_mm, _STUCK if traffic.stuck else sample.range_status
         return stamp
+
+    def _take_touch(self, sample: Sample) -> None:
+        """Keep a touch reading if it is the newest whose instant is known."""
+        part = touch_part(sample)
+        if part is None or not self._clock.known:
+            return
+        stamp = self._clock.earliest(1e-6 * (sample.time_us - part.age_us))
+        if stamp > self._touch[0]:
+            force = math.nan if part.force_mn == NO_FORCE else 1e-3 * part.force_mn
+            self._touch[:] = stamp, float(part.contact != 0), force, part.status

@@ -31,11 +31,17 @@ PREFIX = struct.Struct("<2sBBH")
 HELLO = struct.Struct("<HBB8sQ")
 """After the prefix: firmware version, cause of the last reset, 0, challenge, time since it began to serve [us]."""
 BEACON = struct.Struct("<HI8s")
-"""After the prefix: 0, number of the beacon, nonce of the session."""
+"""After the prefix: what the receiver takes besides (`TAKES_TOUCH`), number of the beacon, nonce of the session."""
 SAMPLE = struct.Struct("<HIQIIHhHBBHIHHHHBBHII")
 """After the prefix: the fields of `Sample` in their order, to `imu_age_us`; `imu_count` IMU samples follow."""
 IMU_SAMPLE = struct.Struct("<6h")
 """Gyroscope x, y, z, accelerometer x, y, z, as the sensor's FIFO has them."""
+TOUCH = struct.Struct("<BBHII")
+"""Behind the IMU samples of a sample with `Flag.TOUCH`: the fields of `TouchPart` in their order."""
+NO_FORCE = 0xFFFFFFFF
+"""In place of a force [mN] that is not measured."""
+TAKES_TOUCH = 1
+"""In a beacon: a sample may carry a touch reading. A unit that is not told so sends none."""
 IMU_MOST = 32
 """Most IMU samples in a datagram."""
 
@@ -43,7 +49,7 @@ HELLO_SIZE = PREFIX.size + HELLO.size + TAG_SIZE
 BEACON_SIZE = PREFIX.size + BEACON.size + TAG_SIZE
 SAMPLE_LEAST = PREFIX.size + SAMPLE.size + TAG_SIZE
 """Size of a sample without any of the IMU [B]."""
-SAMPLE_MOST = SAMPLE_LEAST + IMU_MOST * IMU_SAMPLE.size
+SAMPLE_MOST = SAMPLE_LEAST + IMU_MOST * IMU_SAMPLE.size + TOUCH.size
 
 NO_TEMPERATURE = -32768
 LONGEST_US = 0xFFFFFFFF
@@ -78,6 +84,8 @@ class Flag(IntFlag):
     """The IMU was initialised anew in this cycle."""
     RANGE_LATE = 64
     """The range finder has had nothing new for more than two of its periods."""
+    TOUCH = 128
+    """It holds a touch reading."""
 
 
 class Reset(IntEnum):
@@ -154,10 +162,12 @@ class Beacon:
     number: int
     """Grows with each beacon of a session, from 1."""
     nonce: bytes
+    takes: int = 0
+    """What samples may carry besides: `TAKES_TOUCH`, or 0."""
 
     def encode(self, key: Mac, challenge: bytes) -> bytes:
         """As a datagram under the unit's key, for the unit that sent this challenge."""
-        body = PREFIX.pack(MAGIC, VERSION, Kind.BEACON, self.unit) + BEACON.pack(0, self.number, self.nonce)
+        body = PREFIX.pack(MAGIC, VERSION, Kind.BEACON, self.unit) + BEACON.pack(self.takes, self.number, self.nonce)
         return body + key.tag(_BEACON_LABEL, challenge, body)
 
 
@@ -171,8 +181,8 @@ def decode_beacon(datagram: bytes, key: Mac, challenge: bytes) -> Beacon | None:
         return None
     if not compare_digest(key.tag(_BEACON_LABEL, challenge, body), datagram[-TAG_SIZE:]):
         return None
-    _, number, nonce = BEACON.unpack_from(body, PREFIX.size)
-    return Beacon(unit, number, nonce)
+    takes, number, nonce = BEACON.unpack_from(body, PREFIX.size)
+    return Beacon(unit, number, nonce, takes)
 
 
 @dataclass(slots=True)
@@ -225,6 +235,8 @@ class Sample:
     """From the newest IMU sample to `time_us` [us]."""
     imu: bytes = b""
     """`imu_count` times `IMU_SAMPLE`."""
+    touch: bytes = b""
+    """One `TOUCH` with `Flag.TOUCH`, else nothing."""
 
     def encode(self, session: Mac) -> bytes:
         """As a datagram of a session."""
@@ -234,19 +246,52 @@ class Sample:
             self.range_age_us, self.range_sigma, self.range_signal, self.range_ambient, self.range_spads,
             self.imu_count, self.imu_scale, self.imu_rate_hz, self.imu_index, self.imu_age_us,
         )  # fmt: skip
-        body += self.imu
+        body += self.imu + self.touch
         return body + session.tag(body)
 
 
 def decode_sample(datagram: bytes | memoryview, session: Mac) -> Sample | None:
-    """Return what a datagram of the right size, magic, version and kind says; None if its tag or its count is wrong."""
+    """Return what a datagram of the right size, magic, version and kind says; None if tag or length is wrong."""
     body = datagram[:-TAG_SIZE]
     if not compare_digest(session.tag(body), datagram[-TAG_SIZE:]):
         return None
+    return sample_of(body)
+
+
+def sample_of(body: bytes | memoryview) -> Sample | None:
+    """Return what the bytes of a sample before its tag say; None if its count does not go with its length."""
     unit: int = PREFIX.unpack_from(body)[3]
-    fields = *SAMPLE.unpack_from(body, PREFIX.size), bytes(body[PREFIX.size + SAMPLE.size :])
-    sample = Sample(unit, *fields)
-    return sample if len(sample.imu) == sample.imu_count * IMU_SAMPLE.size else None
+    sample = Sample(unit, *SAMPLE.unpack_from(body, PREFIX.size))
+    rest = bytes(body[PREFIX.size + SAMPLE.size :])
+    end = sample.imu_count * IMU_SAMPLE.size
+    sample.imu, sample.touch = rest[:end], rest[end:]
+    wanted = TOUCH.size if sample.flags & Flag.TOUCH else 0
+    return sample if len(sample.imu) == end and len(sample.touch) == wanted else None
+
+
+@dataclass(frozen=True, slots=True)
+class TouchPart:
+    """What a sample says of being touched. Integers as on the wire."""
+
+    contact: int
+    """1 if the unit is touched, 0 if not."""
+    status: int
+    """A `TouchStatus`."""
+    raw: int
+    """What the sensor's converter measured [mV], for calibration; 0 of another sensor."""
+    force_mn: int
+    """Size of the force [mN]; `NO_FORCE` where it is not measured."""
+    age_us: int
+    """From the measurement to `Sample.time_us` [us]."""
+
+    def encode(self) -> bytes:
+        """As it stands in a sample."""
+        return TOUCH.pack(self.contact, self.status, self.raw, self.force_mn, self.age_us)
+
+
+def touch_part(sample: Sample) -> TouchPart | None:
+    """Return the touch reading of a sample, None of one without."""
+    return TouchPart(*TOUCH.unpack(sample.touch)) if sample.touch else None
 
 
 def imu_values(imu: bytes, scale: int) -> tuple[FloatArray, FloatArray]:

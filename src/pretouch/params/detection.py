@@ -50,6 +50,22 @@ class DetectionParams(Checked):
     near_horizon_s: Positive = 0.2
     """Time for which the closing speed counts [s]."""
 
+    use_touch: bool = False
+    """Whether a unit's touch sensor raises the prior of a contact on its link while it is touched: by so much that
+    false touches at the rate below make the false alarms of the whole arm no more than twice as many."""
+    false_touches_per_hour: Positive = 1.0
+    """How often a unit says that it is touched while it is not [1/h]: an assumption, on the cautious side. The fewer,
+    the more a touch counts."""
+    false_touch_s: Positive = 0.5
+    """How long it then says so [s]: an assumption."""
+    touch_fresh_s: Positive = 0.06
+    """Age up to which a touch reading counts [s]: two missed ones at 50 Hz."""
+    touch_patience_s: Positive = 10.0
+    """Time for which a unit is believed to be touched [s]: from then on it is taken to be stuck."""
+    touch_forgiveness: Annotated[float, Check(low=0.001, high=1.0)] = 0.1
+    """Seconds of that time that a second untouched gives back [1]: in the long run a unit is believed to be touched
+    for at most about so large a part of the time."""
+
     learn: bool = True
     """Whether mean and spread of free motion are learnt; off, they stay as they began."""
     learn_unseen: bool = False

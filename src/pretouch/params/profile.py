@@ -83,7 +83,7 @@ PROFILES: dict[str, Profile] = {
         reduction=ReductionParams(enabled=False),
         restriction=RestrictionParams(mode="braking"),
         anticipation=AnticipationParams(effective_mass=True, closing_speed=True, tangential=True, null_space=True),
-        detection=DetectionParams(method="sequential", freeze_while_reacting=True, localise=True),
+        detection=DetectionParams(method="sequential", freeze_while_reacting=True, localise=True, use_touch=True),
         reaction=ReactionParams(
             method="admittance", clamps=True, gives_up=True, soft_hold=True, static_friction_nm=3.0, pinches=True
         ),

@@ -9,6 +9,7 @@ from pretouch.errors import RecordingError
 from pretouch.recording.messages import PACKAGE, decoded, encoded, make, plain_text
 from pretouch.recording.truth import Truth
 from pretouch.types import (
+    BoolArray,
     Contact,
     ControlStep,
     FloatArray,
@@ -22,9 +23,11 @@ from pretouch.types import (
     RobotState,
     Thresholds,
     Touched,
+    TouchReadings,
 )
 
 INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE}/msg/Truth"
+TOUCH = f"{PACKAGE}/msg/Touch"
 _ROBOT, _READINGS = f"{PACKAGE}/msg/RobotState", f"{PACKAGE}/msg/RangeReadings"
 _OBSTACLES, _THRESHOLDS = f"{PACKAGE}/msg/Obstacles", f"{PACKAGE}/msg/Thresholds"
 _CONTACT, _QP = f"{PACKAGE}/msg/Contact", f"{PACKAGE}/msg/QpSolution"
@@ -48,6 +51,8 @@ def encode_inputs(sequence: int, inputs: Inputs) -> tuple[bytes, bool]:
     """Return inputs as CDR, and whether all a step goes by is in it; if not, it says what was given instead."""
     try:
         fields = (_number(inputs.stamp), _robot(inputs.robot), _readings(inputs.readings), bool(inputs.resume))
+        if inputs.touch is not None:
+            _touch(inputs.touch)  # has a message of its own
         return encoded(INPUTS, make(INPUTS, sequence, *fields, "")), True
     except Exception as error:  # inputs may be anything, with any behaviour
         nothing = make(_ROBOT, 0.0, _NONE, _NONE, _NONE, _NONE, _NONE, False, _NONE)
@@ -169,6 +174,26 @@ def _step(m: Any) -> ControlStep:
             m.touched.probability,
         ),
     )  # fmt: skip
+
+
+def encode_touch(sequence: int, inputs: Inputs) -> bytes | None:
+    """Return what units said of a touch as CDR, of inputs that `encode_inputs` found to be whole; None for nothing."""
+    if inputs.touch is None:
+        return None
+    return encoded(TOUCH, make(TOUCH, sequence, _number(inputs.stamp), *_touch(inputs.touch)))
+
+
+def _touch(touch: TouchReadings) -> tuple[FloatArray, BoolArray, FloatArray, IntArray]:
+    contact = np.array(touch.contact)
+    if contact.ndim != 1 or contact.dtype.kind not in "biu":
+        raise UnreadableError("contacts are no row of truths")
+    return _numbers(touch.stamp), contact != 0, _numbers(touch.force), _wholes(touch.status)
+
+
+def decode_touch(data: bytes) -> TouchReadings:
+    """Return what units said of a touch."""
+    m = decoded(TOUCH, data)
+    return TouchReadings(m.stamp, m.contact, m.force, m.status)
 
 
 def encode_truth(sequence: int, truth: Truth) -> bytes:

@@ -3,13 +3,14 @@
 import struct
 from bisect import bisect_right
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
-from pretouch.recording.codec import decode_inputs, decode_step, decode_truth
+from pretouch.recording.codec import decode_inputs, decode_step, decode_touch, decode_truth
 from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.recorded_path import Tangents
@@ -72,13 +73,16 @@ class Recorded:
     def __getitem__(self, i: int) -> Kept:
         number = self._numbers[i]
         raw = self._raw
-        inputs = raw["/pretouch/inputs"].get(number)
+        inputs, touch = raw["/pretouch/inputs"].get(number), raw["/pretouch/touch"].get(number)
+        given = None if inputs is None else decode_inputs(inputs)[1]
+        if given is not None and touch is not None:
+            given = replace(given, touch=decode_touch(touch))
         truth = raw["/pretouch/truth"].get(number)
         state = raw["/pretouch/state"].get(number)
         anew, snapshot = (False, None) if state is None else decode_state(state)
         return Kept(
             run=max(0, bisect_right(self._begins, number) - 1),
-            inputs=None if inputs is None else decode_inputs(inputs)[1],
+            inputs=given,
             step=decode_step(raw["/pretouch/step"][number])[1],
             truth=None if truth is None else decode_truth(truth)[1],
             snapshot=snapshot,

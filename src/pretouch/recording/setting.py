@@ -25,7 +25,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit
+from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.types import FloatArray
 
 RUN = f"{PACKAGE}/msg/Run"
@@ -88,7 +88,7 @@ def encode_run(sequence: int, controller: Controller, about: Mapping[str, JSON])
     kind, numbers = _path_numbers(controller.path)
     return encoded(RUN, make(
         RUN, sequence, FORMAT, time.time(), as_json(versions()), as_json(dict(about)),
-        as_json(asdict(controller.profile)), as_json(_description(model.description) | _sigmas(skin)),
+        as_json(asdict(controller.profile)), as_json(_description(model.description) | _sigmas(skin) | _touch(skin)),
         _mjcf(model.description),
         list(skin.ids),
         [unit.link for unit in skin.units], skin.T_link_sensor.reshape(-1).copy(),
@@ -163,11 +163,26 @@ def _sigmas(skin: Skin) -> dict[str, JSON]:
     return {} if skin.exact else {_SIGMAS: [[unit.position_sigma, unit.orientation_sigma] for unit in skin.units]}
 
 
+_TOUCH = "unit_touch"
+
+
+def _touch(skin: Skin) -> dict[str, JSON]:
+    """Describe the touch sensors of a skin, None for each unit without one; nothing where no unit has one."""
+    return {_TOUCH: [None if u.touch is None else asdict(u.touch) for u in skin.units]} if len(skin.touching) else {}
+
+
 def _skin(m: Any, model: RobotModel) -> Skin:
     poses = m.unit_pose.reshape(-1, 4, 4)
     sigmas = from_json(m.robot).get(_SIGMAS, [[0.0, 0.0]] * len(poses))
-    units = zip(m.unit_id, m.unit_link, poses, sigmas, strict=True)
-    return Skin([SensorUnit(name, link, pose, at, turn) for name, link, pose, (at, turn) in units], model)
+    patches = from_json(m.robot).get(_TOUCH, [None] * len(poses))
+    units = zip(m.unit_id, m.unit_link, poses, sigmas, patches, strict=True)
+    return Skin(
+        [
+            SensorUnit(name, link, pose, at, turn, None if patch is None else TouchPatch(**patch))
+            for name, link, pose, (at, turn), patch in units
+        ],
+        model,
+    )
 
 
 def _fixtures(m: Any) -> Fixtures:

@@ -4,7 +4,7 @@ Both ways follow the annotations of `ControllerState`, so a field added there is
 """
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
 from functools import cache
 from types import NoneType, UnionType
@@ -26,6 +26,12 @@ _UNREAD = "watch.robot.tau_ext"
 def _hints(kind: type) -> tuple[tuple[str, Any], ...]:
     hints = get_type_hints(kind)
     return tuple((f.name, hints[f.name]) for f in fields(kind))
+
+
+@cache
+def _with_default(kind: type) -> frozenset[str]:
+    """Names of the fields that need not be given."""
+    return frozenset(f.name for f in fields(kind) if f.default is not MISSING)
 
 
 class _Parts:
@@ -118,16 +124,25 @@ class _Reading:
     """The parts of a State message, to be taken in turn."""
 
     def __init__(self, message: Any) -> None:
-        self._parts = zip(message.name, message.kind, message.shape, strict=True)
+        self._parts = list(zip(message.name, message.kind, message.shape, strict=True))
+        self._at = 0
         self._numbers, self._used = message.numbers, 0
         self._wholes = iter(message.wholes.tolist())
         self._texts = iter(message.texts)
 
     def next(self, name: str) -> tuple[str, str]:
-        found, kind, shape = next(self._parts)
+        if self._at == len(self._parts):
+            raise ValueError(f"nothing where {name!r} belongs")
+        found, kind, shape = self._parts[self._at]
+        self._at += 1
         if found != name:
             raise ValueError(f"{found!r} where {name!r} belongs")
         return kind, shape
+
+    def holds(self, name: str) -> bool:
+        """Whether the next part is one of this name, or in it."""
+        found = self._parts[self._at][0] if self._at < len(self._parts) else ""
+        return found == name or found.startswith(f"{name}.")
 
     def numbers(self, shape: tuple[int, ...]) -> Any:
         count = int(np.prod(shape))
@@ -163,7 +178,12 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
         hint = _without_none(hint)
     if is_dataclass(hint):
         kind = hint if isinstance(hint, type) else type(hint)
-        return kind(**{f: _give(parts, f"{name}.{f}" if name else f, inner) for f, inner in _hints(kind)})
+        given, may_lack = {}, _with_default(kind)
+        for field, inner in _hints(kind):
+            whole = f"{name}.{field}" if name else field
+            if field not in may_lack or parts.holds(whole):  # what an older version did not know is as it began
+                given[field] = _give(parts, whole, inner)
+        return kind(**given)
     kind_name, shape = parts.next(name)
     if optional and kind_name == "none":
         return None

@@ -16,7 +16,16 @@ import numpy as np
 
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.recording.codec import INPUTS, STEP, TRUTH, encode_inputs, encode_step, encode_truth
+from pretouch.recording.codec import (
+    INPUTS,
+    STEP,
+    TOUCH,
+    TRUTH,
+    encode_inputs,
+    encode_step,
+    encode_touch,
+    encode_truth,
+)
 from pretouch.recording.disk import Disk
 from pretouch.recording.messages import TOPICS, Item, prepare
 from pretouch.recording.plain import JSON
@@ -109,6 +118,9 @@ class Recording:
             items.append(Item("/pretouch/state", STATE, number, time, encode_state(number, cycle.before, anew)))
             self._snapshot_due = step.stamp + SNAPSHOT_S
         data, whole = encode_inputs(number, cycle.inputs)
+        touch = encode_touch(number, cycle.inputs) if whole else None
+        if touch is not None:
+            items.append(Item("/pretouch/touch", TOUCH, number, time, touch))
         self._command = step.command if whole else None
         items.append(Item("/pretouch/inputs", INPUTS, number, time, data))
         tangent = self._tangent(step.path_phase)

@@ -18,6 +18,7 @@ from pretouch.sensing.unit import (
     LARGEST_ORIENTATION_SIGMA,
     LARGEST_POSITION_SIGMA,
     SensorUnit,
+    TouchPatch,
 )
 from pretouch.types import FloatArray, IntArray
 from pretouch.whole_file import write_whole
@@ -57,6 +58,8 @@ class Skin:
         """(K,) standard deviation of each unit's orientation [rad]."""
         self.exact = not (self.position_sigma.any() or self.orientation_sigma.any())
         """Whether the place of every unit is taken as exact."""
+        self.touching: IntArray = np.array([k for k, u in enumerate(self.units) if u.touch is not None], dtype=np.int64)
+        """(M,) indices of the units with a touch sensor."""
 
     def __len__(self) -> int:
         return len(self.units)
@@ -128,19 +131,26 @@ def paper_skin(model: RobotModel) -> Skin:
     return load_skin(path, model)
 
 
-_KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad")
+_KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad", "touch")
+_TOUCH_KEYS = {"radius_m": "radius", "force_min_n": "force_min", "measures_force": "measures_force"}
 
 
 def _entry(unit: SensorUnit) -> dict[str, Any]:
     """Return the table of a unit in a skin file."""
-    entry = {
+    entry: dict[str, Any] = {
         "id": unit.id,
         "link": unit.link,
         "position_m": [float(v) for v in unit.T_link_sensor[:3, 3]],
         "quaternion_wxyz": _quaternion(unit.T_link_sensor[:3, :3]),
     }
     sigmas = {"position_sigma_m": unit.position_sigma, "orientation_sigma_rad": unit.orientation_sigma}
-    return entry | {key: sigma for key, sigma in sigmas.items() if sigma}
+    entry |= {key: sigma for key, sigma in sigmas.items() if sigma}
+    return entry if unit.touch is None else entry | {"touch": _touch_entry(unit.touch)}
+
+
+def _touch_entry(touch: TouchPatch) -> bool | dict[str, float | bool]:
+    """Return what stands of a touch sensor in a skin file: true for the usual one."""
+    return touch == TouchPatch() or {key: getattr(touch, name) for key, name in _TOUCH_KEYS.items()}
 
 
 def _unit_from(entry: Any) -> SensorUnit:
@@ -165,7 +175,26 @@ def _unit_from(entry: Any) -> SensorUnit:
     T[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
     position_sigma = _sigma(entry, "position_sigma_m", LARGEST_POSITION_SIGMA)
     orientation_sigma = _sigma(entry, "orientation_sigma_rad", LARGEST_ORIENTATION_SIGMA)
-    return SensorUnit(name, entry["link"], T, position_sigma, orientation_sigma)
+    return SensorUnit(name, entry["link"], T, position_sigma, orientation_sigma, _touch(entry))
+
+
+def _touch(entry: dict[str, Any]) -> TouchPatch | None:
+    """Read a unit's touch sensor: true or false, or a table."""
+    value = entry.get("touch", False)
+    if isinstance(value, bool):
+        return TouchPatch() if value else None
+    if not isinstance(value, dict):
+        raise SkinError(f"Unit {entry['id']}: touch is {_shown(value)}: write true, or a table of {_TOUCH_TABLE}.")
+    unknown = sorted(set(value) - set(_TOUCH_KEYS))
+    if unknown:
+        raise SkinError(f"Unit {entry['id']}: touch has the unknown key {unknown[0]!r}: use {_TOUCH_TABLE}.")
+    try:
+        return TouchPatch(**{_TOUCH_KEYS[key]: item for key, item in value.items()})
+    except SkinError as error:
+        raise SkinError(f"Unit {entry['id']}: {error}") from error
+
+
+_TOUCH_TABLE = ", ".join(_TOUCH_KEYS)
 
 
 def _numbers(entry: dict[str, Any], key: str, count: int, largest: float) -> FloatArray:

@@ -26,6 +26,40 @@ LARGEST_ORIENTATION_SIGMA = np.pi / 2
 """Largest standard deviation of a unit's orientation [rad]: beyond it nothing is known of where it looks."""
 
 
+LARGEST_PATCH = 0.2
+"""Largest radius of the patch a unit feels a touch in [m]: a larger one says nothing of where."""
+
+LARGEST_FORCE = 100.0
+"""Largest force [N] a touch sensor may need to feel anything: beyond it a person is hurt before."""
+
+
+@dataclass(frozen=True)
+class TouchPatch:
+    """The touch sensor of a unit: a round patch about the unit, on its link's surface.
+
+    The values are those of a unit whose case, 40 mm wide, rests on a force-sensing resistor of Interlink's 400 series
+    (data sheet: it feels from 0.1 N on; a case held by foam so that it does not press by itself takes more).
+    """
+
+    radius: float = 0.02
+    """Radius of the patch [m]."""
+    force_min: float = 0.5
+    """Smallest force that counts as a touch [N]."""
+    measures_force: bool = True
+    """Whether it tells the size of the force, or contact only."""
+
+    def __post_init__(self) -> None:
+        for name, largest, si in (("radius", LARGEST_PATCH, "m"), ("force_min", LARGEST_FORCE, "N")):
+            number = getattr(self, name)
+            if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number <= largest:
+                raise SkinError(
+                    f"The {name} of a touch patch is {number!r}: give more than 0, at most {largest:g} {si}."
+                )
+            object.__setattr__(self, name, float(number))
+        if not isinstance(self.measures_force, bool):
+            raise SkinError(f"measures_force of a touch patch is {self.measures_force!r}: give true or false.")
+
+
 @dataclass(frozen=True, eq=False)
 class SensorUnit:
     """A unit named `id` on a link, with its pose. The sensor's z axis points outwards along the beam.
@@ -41,6 +75,8 @@ class SensorUnit:
     """Standard deviation of its position in the worst direction [m]; 0 takes it as exact."""
     orientation_sigma: float = 0.0
     """Standard deviation of its orientation about the worst axis [rad]; 0 takes it as exact."""
+    touch: TouchPatch | None = None
+    """Its touch sensor, if it has one."""
 
     def __post_init__(self) -> None:
         if not self.id:

@@ -14,6 +14,7 @@ from pretouch.serving.network import NetworkParams, Way
 from pretouch.serving.unit import SimulatedUnit, UnitParams
 from pretouch.sim.imu import ImuParams, ImuSample
 from pretouch.sim.range_finder import RangeSample
+from pretouch.sim.touch_sensor import TouchSample, TouchSensorParams
 
 _LARGEST = 2048
 _LAST_PORT = 0xFFFF
@@ -29,6 +30,8 @@ class FleetParams(Checked):
     """How units keep their time and their sessions."""
     imu: ImuParams | None = None
     """How their IMUs err; None, and they have none."""
+    touch: TouchSensorParams = field(default_factory=TouchSensorParams)
+    """How the touch sensors err of units that have one by the skin file."""
     reboot_every_s: NonNegative = 0.0
     """Time from each reboot of a unit to its next one, the first at a random part of it [s]; 0: none."""
 
@@ -70,6 +73,10 @@ class Fleet:
     def take_range(self, sample: RangeSample) -> None:
         """Let a unit's range finder measure."""
         self.units[sample.unit].take_range(sample)
+
+    def take_touch(self, sample: TouchSample) -> None:
+        """Let a unit's touch sensor measure."""
+        self.units[sample.unit].take_touch(sample)
 
     def take_imu(self, sample: ImuSample) -> None:
         """Let a unit's IMU take a sample."""

@@ -7,13 +7,14 @@ from pretouch.serving.fleet import Fleet
 from pretouch.sim.imu import ImuSample
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeSample
+from pretouch.sim.touch_sensor import TouchSample
 
 _SLICE_S = 0.002
 """The simulation moves on by so much at once [s]: how late a datagram may leave."""
 LATE_S = 0.1
 """A machine that is later than this leaves the time out [s], unless told otherwise."""
 
-Measured = TypeVar("Measured", RangeSample, ImuSample)
+Measured = TypeVar("Measured", RangeSample, ImuSample, TouchSample)
 
 
 class RealTime:

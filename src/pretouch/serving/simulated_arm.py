@@ -17,6 +17,7 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec
+from pretouch.sim.touch_sensor import TouchSensors
 from pretouch.types import FloatArray, RobotState
 
 SETTLE_S = 0.2
@@ -93,6 +94,10 @@ class SimulatedArm:
             self.clock = RealTime(self.plant, period, late)
             real, fleet = self.clock.real, self.fleet
             RangeFinders(self.plant, skin, RangeFinderParams(), seed, lambda sample: fleet.take_range(real(sample)))
+            if len(skin.touching):
+                TouchSensors(
+                    self.plant, skin, options.fleet.touch, seed, send=lambda sample: fleet.take_touch(real(sample))
+                )
             if options.fleet.imu is not None:
                 Imus(self.plant, skin, options.fleet.imu, seed, lambda sample: fleet.take_imu(real(sample)))
         except BaseException:

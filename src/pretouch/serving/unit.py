@@ -13,18 +13,22 @@ from pretouch.hardware.wire import (
     IMU_MOST,
     IMU_SAMPLE,
     LONGEST_US,
+    NO_FORCE,
+    TAKES_TOUCH,
     Flag,
     Hello,
     Mac,
     Reset,
     Sample,
+    TouchPart,
     decode_beacon,
     session_mac,
 )
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB
 from pretouch.sim.imu import ImuParams, ImuSample
 from pretouch.sim.range_finder import RangeSample
-from pretouch.types import RangeStatus
+from pretouch.sim.touch_sensor import TouchSample
+from pretouch.types import RangeStatus, TouchStatus
 
 FIRMWARE = 0x0001
 """Version that a simulated unit reports: 0.1, that of `firmware/`."""
@@ -96,6 +100,8 @@ class SimulatedUnit:
         self._measuring: deque[RangeSample] = deque()
         self._range: RangeSample | None = None
         self._range_new, self._stream = False, 0
+        self._touch: TouchSample | None = None
+        self._touch_new = False
         self._fifo: deque[ImuSample] = deque()
         self._fifo_first, self._fifo_lost = 0, False
         self._next_hello = self._up + self._params.hello_s * float(self._rng.uniform())
@@ -106,7 +112,7 @@ class SimulatedUnit:
         """Leave the session; what it was under is never used again."""
         self._session: Mac | None = None
         self._challenge, self._nonce = self._rng.bytes(CHALLENGE_SIZE), b""
-        self._sequence = self._beacon = 0
+        self._sequence = self._beacon = self._takes = 0
         self._heard = -np.inf
 
     @property
@@ -123,6 +129,20 @@ class SimulatedUnit:
         """Let its range finder measure; it has the reading `UnitParams.ready_s` later."""
         if sample.time >= self._up:
             self._measuring.append(sample)
+
+    def take_touch(self, sample: TouchSample) -> None:
+        """Let its touch sensor measure: a pin that its loop looks at in each pass."""
+        if sample.time >= self._up:
+            self._touch_new = self._touch is None or sample.contact != self._touch.contact
+            self._touch = sample
+
+    def _touch_part(self, now: float) -> bytes:
+        """Return its touch reading for a receiver that takes one, else nothing."""
+        seen = self._touch
+        if seen is None or not self._takes & TAKES_TOUCH:
+            return b""
+        force = NO_FORCE if np.isnan(seen.force) else round(1e3 * seen.force)
+        return TouchPart(int(seen.contact), TouchStatus.OK, 0, force, self._since(seen.time, now)).encode()
 
     def _look_at_range(self, now: float) -> None:
         """Take the readings that are ready."""
@@ -155,7 +175,7 @@ class SimulatedUnit:
             self._session, self._nonce = session_mac(self._mac, self._challenge, beacon.nonce), beacon.nonce
         elif beacon.nonce != self._nonce or beacon.number <= self._beacon:
             return
-        self._beacon, self._heard = beacon.number, now
+        self._beacon, self._heard, self._takes = beacon.number, now, beacon.takes
 
     def tick(self, now: float) -> list[bytes]:
         """Do what is due at a time [s], and return the datagrams to send."""
@@ -192,7 +212,8 @@ class SimulatedUnit:
     def _cycle(self, now: float) -> Sample | None:
         """Make the sample that is due, if one is. What it tells is not told again, whether it is sent or not."""
         self._look_at_range(now)
-        if now < self._sampled + (self._params.shortest_s if self._range_new else self._params.longest_s):
+        soon = self._range_new or self._touch_new
+        if now < self._sampled + (self._params.shortest_s if soon else self._params.longest_s):
             return None
         self._sampled = now
         flags = Flag.RANGE_NEW if self._range_new else Flag(0)
@@ -200,7 +221,10 @@ class SimulatedUnit:
             flags |= Flag.RANGE_LATE
         if self._fifo_lost:
             flags |= Flag.IMU_LOST
-        self._range_new, self._fifo_lost = False, False
+        touch = self._touch_part(now)
+        if touch:
+            flags |= Flag.TOUCH
+        self._range_new, self._touch_new, self._fifo_lost = False, False, False
         first, count = self._fifo_first, min(len(self._fifo), IMU_MOST)
         imu = [self._fifo.popleft() for _ in range(count)]
         self._fifo_first += count
@@ -213,7 +237,7 @@ class SimulatedUnit:
             range_ambient=_field(seen.ambient, 128.0), range_spads=_field(seen.spads, 256.0),
             imu_count=count, imu_scale=self._imu_scale, imu_rate_hz=self._imu_rate, imu_index=first,
             imu_age_us=self._since(imu[-1].time, now) if imu else 0,
-            imu=b"".join(IMU_SAMPLE.pack(*sample.counts) for sample in imu),
+            imu=b"".join(IMU_SAMPLE.pack(*sample.counts) for sample in imu), touch=touch,
         )  # fmt: skip
 
     def _sealed(self, sample: Sample, now: float, session: Mac) -> bytes:

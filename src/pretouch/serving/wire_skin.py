@@ -14,7 +14,8 @@ from pretouch.serving.fleet import Fleet, FleetParams
 from pretouch.sim.imu import Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
-from pretouch.types import RangeReadings
+from pretouch.sim.touch_sensor import Forces, TouchSensors, no_forces
+from pretouch.types import RangeReadings, TouchReadings
 
 _PATIENCE_S = 5.0
 """The machine's own loopback may take this long to hand a datagram over [s]."""
@@ -29,9 +30,13 @@ class WireSkin:
 
     def __init__(
         self, plant: Plant, skin: Skin, ranging: RangeFinderParams, params: FleetParams, seed: int,
-        link: LinkParams | None = None,
+        link: LinkParams | None = None, laid: Forces = no_forces,
     ) -> None:  # fmt: skip
-        """Mount the units on an arm and switch them on; measurements are those of `RangeFinders` with this seed."""
+        """Mount the units on an arm and switch them on; measurements are those of `RangeFinders` with this seed.
+
+        Units that have one by the skin file feel touches, as `TouchSensors` do: of contacts, and of forces `laid` on
+        the arm.
+        """
         self._plant = plant
         keys, rng = made_keys(skin.ids, seed), np.random.default_rng([seed, 8])
         self.receiver = SkinReceiver(skin.ids, keys, clock=lambda: plant.time, draw=rng.bytes, params=link)
@@ -46,6 +51,8 @@ class WireSkin:
         plant.before_each_step(self._step)
         self.range_finders = RangeFinders(plant, skin, ranging, seed, self.fleet.take_range)
         """What measures; `silenced` ones do not, while their units go on sending."""
+        if len(skin.touching):
+            TouchSensors(plant, skin, params.touch, seed, laid, self.fleet.take_touch)
         if params.imu is not None:
             Imus(plant, skin, params.imu, seed, self.fleet.take_imu)
 
@@ -63,6 +70,10 @@ class WireSkin:
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit."""
         return self.receiver.readings()
+
+    def touch(self) -> TouchReadings | None:
+        """Return the newest touch reading of each unit; None while no unit has told one."""
+        return self.receiver.touch()
 
     def _step(self, now: float) -> None:
         self._taken_in += self.fleet.step(lambda: now)

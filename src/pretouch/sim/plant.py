@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -31,6 +31,17 @@ class Touch:
     """Index of the link that touches."""
     velocity: FloatArray
     """(3,) velocity of the touching point of the link before the contact [m/s], base frame."""
+
+
+class PointForce(NamedTuple):
+    """A force on the arm at a point of it, base frame."""
+
+    link: int
+    """Index of the link it acts on."""
+    point: FloatArray
+    """(3,) where [m]."""
+    force: FloatArray
+    """(3,) on the arm [N]."""
 
 
 class Plant:
@@ -212,14 +223,23 @@ class Plant:
         kin = self.model.kinematics(self._q)
         return Touch(self.time, link, self.model.jacobian(kin, link, contact.pos.copy())[:3] @ qd)
 
-    def _contact_force(self) -> FloatArray:
-        """Sum of contact forces on the arm (3,) [N], base frame; `_NO_FORCE` itself if nothing touches it."""
-        total, wrench = _NO_FORCE, np.zeros(6)
+    def contact_forces(self) -> list[PointForce]:
+        """Return the forces of all contacts of the arm with anything else, at the last physics step."""
+        found, wrench = [], np.zeros(6)
         for i in range(self.mj_data.ncon):
             contact, sign = self._on_the_arm(i)
             if sign:
                 mujoco.mj_contactForce(self.mj_model, self.mj_data, i, wrench)
-                total = total + sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
+                geom = int(contact.geom2) if sign > 0 else int(contact.geom1)
+                force = sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
+                found.append(PointForce(int(self.mj_model.geom_bodyid[geom]), contact.pos.copy(), force))
+        return found
+
+    def _contact_force(self) -> FloatArray:
+        """Sum of contact forces on the arm (3,) [N], base frame; `_NO_FORCE` itself if nothing touches it."""
+        total = _NO_FORCE
+        for one in self.contact_forces():
+            total = total + one.force
         return total
 
     def _on_the_arm(self, number: int) -> tuple[Any, int]:

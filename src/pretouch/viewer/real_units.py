@@ -9,7 +9,8 @@ import numpy as np
 
 from pretouch.hardware.receiver_process import Traffic
 from pretouch.hardware.traffic import ImuBatch, Received
-from pretouch.types import RangeReadings
+from pretouch.ports import touch_of
+from pretouch.types import RangeReadings, TouchReadings
 
 _STEADY_S = 0.05
 """Difference between the two clocks up to which IMU samples keep their spacing [s]: a page advances in steps."""
@@ -54,11 +55,13 @@ class RealUnits:
         first = source.read()
         self._seen = np.full(len(first.stamp), -np.inf)
         self._stamp, self._last_imu = self._seen.copy(), self._seen.copy()
+        self._touch_seen, self._touch_stamp = self._seen.copy(), self._seen.copy()
 
     def begin(self, simulated: Callable[[], float]) -> None:
         """Go by another simulation's time [s]; what was measured before stays as old as it is."""
         self._simulated = simulated
         self._seen[:] = self._stamp[:] = self._last_imu[:] = -np.inf
+        self._touch_seen[:] = self._touch_stamp[:] = -np.inf
         self._imu_ahead = self._ahead()
 
     def read(self) -> RangeReadings:
@@ -68,6 +71,16 @@ class RealUnits:
         self._seen[fresh] = readings.stamp[fresh]
         self._stamp[fresh] = np.maximum(self._stamp[fresh], readings.stamp[fresh] + self._ahead())
         return RangeReadings(self._stamp.copy(), readings.distance, readings.status)
+
+    def touch(self) -> TouchReadings | None:
+        """Return the newest touch reading of each unit, stamped as ranges are; None while none is known."""
+        told = touch_of(self.source)
+        if told is None:
+            return None
+        fresh = told.stamp > self._touch_seen
+        self._touch_seen[fresh] = told.stamp[fresh]
+        self._touch_stamp[fresh] = np.maximum(self._touch_stamp[fresh], told.stamp[fresh] + self._ahead())
+        return replace(told, stamp=self._touch_stamp.copy())
 
     def take_imu(self) -> list[ImuBatch]:
         """Return what the units' IMUs measured since the last call, stamped in the simulation's time.

@@ -16,6 +16,7 @@ from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
 from pretouch.types import FloatArray
 from pretouch.viewer.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
 from pretouch.viewer.real_units import RealUnits
@@ -56,6 +57,9 @@ class Room:
         self.plant = Plant(model, self.scene, settings.plant, q, settings.seed)
         self._simulated = None if real else RangeFinders(self.plant, skin, settings.ranging, settings.seed)
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
+        if self._simulated and len(skin.touching):
+            felt = TouchSensors(self.plant, skin, TouchSensorParams(), settings.seed)
+            self.units = FeelingSkin(self._simulated, felt)
         self.hand = Hand(self.plant, self.mouse, speed_max=HAND_SPEED_M_S)
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._wanted = settings.stiffness

@@ -42,6 +42,19 @@ def is_read_back_as_it_was_stored():
     assert config.key == bytes([0, 17, 34, 51, 68, 85, 102, 119, 136, 153, 170, 187, 204, 221, 238, 255] * 2)
 
 
+def a_touch_sensor_is_kept_where_there_is_one():
+    Config(dict(LINE, touch_ohm=3300, touch_least_mn=500, touch_mn_per_us=10)).save()
+    config = load()
+    assert (config.touch_ohm, config.touch_least_mn, config.touch_mn_per_us) == (3300, 500, 10)
+    Config(LINE).save()
+    with open(PATH) as file:
+        assert "touch" not in file.read()
+    assert load().touch_ohm == 0
+    assert _refused(touch_ohm=-1) == "touch_ohm must be a whole number from 0 to 1000000"
+    assert _refused(touch_ohm=3300) == "touch_least_mn must be a whole number from 1 to 100000"
+    assert _refused(touch_ohm=3300, touch_least_mn=1).startswith("touch_mn_per_us must be")
+
+
 def the_fingerprint_is_of_the_key():
     assert Config(LINE).fingerprint == "4773d12e"
 

@@ -106,6 +106,19 @@ def _set_there(there):
     return change
 
 
+def a_touch_sensor_is_looked_at_on_a_board_that_has_a_pin_for_it():
+    told = dict(CONFIG, touch_ohm=3300, touch_least_mn=500, touch_mn_per_us=10)
+    machine.state.__init__()
+    clock = Clock(FakeTime(FakeClock()))
+    touch = service.touch_of(Esp32C3(), clock, Config(told))
+    touch.step(clock.ticks())
+    assert touch.new, "1250 mV at the pin"
+    assert service.touch_of(Esp32C3(), clock, Config(CONFIG)) is None
+    board = _Draw()
+    assert service.touch_of(board, clock, Config(told)) is None
+    assert board.noted() == "this board has no pin for a touch sensor"
+
+
 def it_joins_and_says_50_samples_a_second():
     chip = _Chip()
     samples = chip.serve(5 * SECOND)

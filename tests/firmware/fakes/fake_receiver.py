@@ -55,6 +55,7 @@ class FakeReceiver:
         self.samples = []
         self.session = None
         self.number = 0
+        self.takes = 0
 
     def send(self, datagram):
         datagram = bytes(datagram)
@@ -72,7 +73,7 @@ class FakeReceiver:
         return self.hellos[-1][3]
 
     def beacon(self, number, nonce, challenge, unit=None):
-        body = struct.pack("<2sBBHHI8s", b"PT", 1, 2, unit or self.unit, 0, number, nonce)
+        body = struct.pack("<2sBBHHI8s", b"PT", 1, 2, unit or self.unit, self.takes, number, nonce)
         datagram = body + self.mac.whole(b"PT1BEACN", challenge, body)[:16]
         assert len(datagram) == BEACON_SIZE
         return datagram
@@ -101,6 +102,11 @@ class FakeReceiver:
         assert datagram[-16:] == self.session.whole(body)[:16], "a sample of another session"
         values = struct.unpack_from(SAMPLE, body)
         sample = {FIELDS[i]: values[i] for i in range(len(FIELDS))}
-        sample["imu"] = body[struct.calcsize(SAMPLE) :]
+        rest = body[struct.calcsize(SAMPLE) :]
+        sample["imu"], sample["touch"] = rest[: 12 * sample["count"]], None
+        if sample["flags"] & 128:
+            sample["touch"] = struct.unpack("<BBHII", rest[12 * sample["count"] :])
+        else:
+            assert len(rest) == 12 * sample["count"]
         assert len(sample["imu"]) == 12 * sample["count"]
         self.samples.append(sample)

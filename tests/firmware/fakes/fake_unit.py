@@ -8,7 +8,7 @@ from fake_receiver import Draw, FakeReceiver, FakeTime
 from fake_vl53l1x import FakeVl53l1x
 from link import Link
 from lsm6ds3 import LSM6DS3
-from sensors import Bus, Imu, RangeFinder
+from sensors import Bus, Imu, RangeFinder, Touch
 from unit import Unit
 from vl53l1x import VL53L1X
 
@@ -16,7 +16,8 @@ KEY = bytes(range(32))
 
 
 class FakeUnit:
-    def __init__(self, start_us=0):
+    def __init__(self, start_us=0, touch=None):
+        """`touch` is the device of its touch sensor, if it has one."""
         self.now = FakeClock(start_us)
         time = FakeTime(self.now)
         self.bus = FakeBus(self.now)
@@ -37,6 +38,7 @@ class FakeUnit:
             self.errors,
             clock,
             lambda: self.battery_mv,
+            None if touch is None else Touch(touch, clock),
         )
         self._next_beacon = 0
 

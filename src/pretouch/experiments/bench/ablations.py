@@ -21,6 +21,7 @@ OFF = {
     "detection.method": "thresholds",
     "detection.freeze_while_reacting": "no",
     "detection.use_proximity": "no",
+    "detection.use_touch": "no",
     "detection.learn": "no",
     "detection.widen_at_turns": "no",
     "detection.localise": "no",

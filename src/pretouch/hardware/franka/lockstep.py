@@ -19,6 +19,7 @@ from pretouch.hardware.franka.limiter import PERIOD_S, SetPointLimiter
 from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.state import JOINTS, FrankaState, robot_state
 from pretouch.loop import Cycle, Recorder
+from pretouch.ports import touch_of
 from pretouch.realtime import warm_up
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings
 
@@ -114,7 +115,7 @@ class _Turning:
         stamp = state.time
         robot = robot_state(state, stamp)
         before = self._controller.init(robot, self._learnt) if self._state is None else self._state
-        inputs = Inputs(stamp, robot, readings, self._resume())
+        inputs = Inputs(stamp, robot, readings, self._resume(), touch_of(self._skin_at))
         step, self._state = self._controller.step(before, inputs)
         self._recorder.record(Cycle(inputs, before, step, self._state))
         self._wanted = step.command.tolist()

@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.hardware.keys import Keys
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.sensing.skin import Skin
-from pretouch.types import RangeReadings
+from pretouch.types import RangeReadings, TouchReadings
 
 
 class LockstepSkin:
@@ -27,6 +27,10 @@ class LockstepSkin:
         self._now = time
         self.receiver.receive()
         return self.receiver.readings()
+
+    def touch(self) -> TouchReadings | None:
+        """Return the newest touch reading of each unit, as of the last time asked for."""
+        return self.receiver.touch()
 
     def __enter__(self) -> Self:
         return self

@@ -11,7 +11,7 @@ from pretouch.experiments.bench.detection.arm import AWAY, Alone, model, path_of
 from pretouch.experiments.bench.detection.stream import Stream, save_stream
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_of
 from pretouch.perception.vectors import placed
-from pretouch.sim.plant import Plant
+from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.posture import brought_to
 from pretouch.types import FloatArray
 
@@ -159,12 +159,21 @@ class Toucher:
         data.xfrc_applied[self._pushed] = 0.0
         if touch is None or touch.size_n(time) <= 0.0:
             return
-        rotation, self._pushed = self._plant.link_rotation[touch.link], touch.link
-        at = self._plant.link_position[touch.link] + rotation @ touch.point
-        force = touch.size_n(time) * (rotation @ touch.inwards)
+        self._pushed = touch.link
+        (laid,) = self.forces(time)
+        at, force = laid.point, laid.force
         wrench = data.xfrc_applied[touch.link]
         wrench[:3] = force
         wrench[3:] = np.cross(at - data.xipos[touch.link], force)
+
+    def forces(self, time: float) -> list[PointForce]:
+        """Return the force that acts at a time, for sensors that feel forces without a contact of the simulation."""
+        touch = self._current(time)
+        if touch is None or touch.size_n(time) <= 0.0:
+            return []
+        rotation = self._plant.link_rotation[touch.link]
+        at = self._plant.link_position[touch.link] + rotation @ touch.point
+        return [PointForce(touch.link, at, touch.size_n(time) * (rotation @ touch.inwards))]
 
     def hand(self, time: float) -> FloatArray:
         """Where the hand's centre is at a time (3,) [m], base frame."""

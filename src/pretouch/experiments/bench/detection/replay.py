@@ -1,21 +1,27 @@
 """A detector given a recorded stream: what it would have taken for contacts."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from pretouch.contact.cues import Cues
 from pretouch.contact.feel import feel, feel_init
 from pretouch.experiments.bench.detection.contenders import Contender
 from pretouch.experiments.bench.detection.stream import Stream
 from pretouch.params import ReactionParams
 from pretouch.perception.closest import no_obstacles
-from pretouch.robot.model import RobotModel
+from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import BoolArray, FloatArray
 
 NOTHING = no_obstacles()
 """What a profile without proximity is shown."""
 REST = ReactionParams().decay_cycles
 """Control cycles for which an alarm is answered, and no other is looked for."""
+
+
+Said = Callable[[int, Kinematics], Cues | None]
+"""Gives what units said of a touch, by the number of a step and the arm's posture in it."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +51,8 @@ def begun(alarm: BoolArray) -> list[int]:
     return found
 
 
-def replay(stream: Stream, contender: Contender, model: RobotModel) -> Replayed:
-    """Give a detector each step of a stream, from its beginning."""
+def replay(stream: Stream, contender: Contender, model: RobotModel, said: Said = lambda step, kin: None) -> Replayed:
+    """Give a detector each step of a stream, from its beginning, and what units said of a touch."""
     params = contender.profile
     sees = params.perception.enabled
     state, steps = feel_init(model, params), len(stream.count)
@@ -55,7 +61,7 @@ def replay(stream: Stream, contender: Contender, model: RobotModel) -> Replayed:
     for i, (robot, obstacles, reacting, watched) in enumerate(stream.steps()):
         near = obstacles if sees else NOTHING
         kin = model.kinematics(robot.q)
-        found, state = feel(state, model, kin, robot, near, reacting, params, sees and watched)
+        found, state = feel(state, model, kin, robot, near, reacting, params, sees and watched, said(i, kin))
         statistic[i] = contender.statistic(found, state, robot.wrench, params.threshold)
         if found.contact is not None:
             alarm[i], force[i] = True, found.contact.force

@@ -1,0 +1,128 @@
+"""What touch sensors of units say of a contact: a gain on the prior of their links, and the place that is touched.
+
+By how much a touch raises the prior follows from how often one is false. Let s be the share of a link's surface that
+a unit's patch covers, and p the share of the time in which it says that it is touched while it is not. If the link is
+touched somewhere, and nothing else is known of where, the unit says so with the probability s + (1 - s) p; if it is
+not, with p. The ratio is the gain:
+
+    G = s / p + 1 - s
+
+In free motion the mean of the gain is 1 - p + p G <= 1 + s, so that the expectation of the test's statistic, and with
+it the bound on its false alarms, at most doubles however many links have such a unit. A unit that is not touched takes
+nothing away: a contact beside a patch keeps the prior it has without one.
+
+A sensor that is stuck breaks the assumption on p. So each unit has an account of the time it was said to be touched,
+which fills while it is and empties more slowly while it is not; a unit whose account is full is not believed. It then
+neither raises a prior nor keeps free motion from being learnt, and contacts are found as without it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.contact.cues import Cues
+from pretouch.params import DetectionParams
+from pretouch.robot.body import Capsules
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import FloatArray, IntArray, TouchReadings, TouchStatus
+from pretouch.values import value
+
+_TOLERANCE_S = 1e-9
+"""A reading stamped later than the step by more than this is of a wrong clock, and not believed [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class TouchSettings:
+    """What is fixed of the M units with a touch sensor."""
+
+    unit: IntArray
+    """(M,) index of each in the skin."""
+    link: IntArray
+    """(M,) index of the link of each."""
+    place: FloatArray
+    """(M, 3) where each is, link frame [m]."""
+    sigma: FloatArray
+    """(M,) standard deviation of the touched place in the worst direction [m]: half the radius of the patch, as of an
+    even distribution over it, and the uncertainty of where the unit is."""
+    gain: FloatArray
+    """(M,) G: times the prior of a contact on the link is larger while it is touched [1]."""
+
+
+@value
+class TouchState:
+    """What is remembered of M touch sensors."""
+
+    account: FloatArray
+    """(M,) time for which each was said to be touched, less what was given back [s]."""
+
+
+def touch_settings(model: RobotModel, skin: Skin, p: DetectionParams) -> TouchSettings | None:
+    """Return what is fixed of the units that have a touch sensor; None where none has, or they are not to be used."""
+    if not p.use_touch or p.method != "sequential" or not len(skin.touching):
+        return None
+    patches = [(k, touch) for k, unit in enumerate(skin.units) if (touch := unit.touch) is not None]
+    unit, link = skin.touching, skin.link[skin.touching]
+    radius = np.array([touch.radius for _, touch in patches])
+    area = np.array([surface_area(model.capsules, int(i)) for i in link])
+    share = np.minimum(np.pi * radius**2 / area, 1.0)
+    return TouchSettings(
+        unit, link, skin.T_link_sensor[unit, :3, 3].copy(), np.hypot(radius / 2, skin.position_sigma[unit]),
+        gain_of(share, p),
+    )  # fmt: skip
+
+
+def gain_of(share: FloatArray, p: DetectionParams) -> FloatArray:
+    """Return G (M,) of units whose patches cover these shares (M,) of their links."""
+    false = min(1.0, p.false_touches_per_hour * p.false_touch_s / 3600.0)
+    return np.asarray(share / false + 1.0 - share)
+
+
+def surface_area(capsules: Capsules, link: int) -> float:
+    """Surface of a link [m^2]: of its capsules, what lies in another one counted too; infinite of one without any."""
+    own = capsules.of_links(np.array([link]))
+    length = np.linalg.norm(own.b - own.a, axis=1)
+    area = float((2 * np.pi * own.radius * length + 4 * np.pi * own.radius**2).sum())
+    return area if area > 0.0 else np.inf
+
+
+def touch_init(settings: TouchSettings | None) -> tuple[TouchState, ...]:
+    """Return what is remembered before the first step: one state, none where nothing can be touched."""
+    return () if settings is None else (TouchState(np.zeros(len(settings.unit))),)
+
+
+def feel_touch(
+    state: tuple[TouchState, ...], settings: TouchSettings | None, readings: TouchReadings | None, kin: Kinematics,
+    now: float, period: float, p: DetectionParams,
+) -> tuple[Cues | None, tuple[TouchState, ...]]:  # fmt: skip
+    """Return what units say of a touch in one step, None where none is believed to be touched.
+
+    Args:
+        state: memory.
+        settings: see `touch_settings`.
+        readings: of all K units, of known shapes (`faults.sound_touch`); None of a skin that gave none.
+        kin: the arm's posture.
+        now: instant of the step [s].
+        period: of control [s].
+        p: parameters.
+    """
+    if settings is None:
+        return None, state
+    account = (state or touch_init(settings))[0].account
+    if readings is None:
+        said = np.zeros(len(account), np.bool_)
+    else:
+        age = now - readings.stamp[settings.unit]
+        fresh = (age <= p.touch_fresh_s) & (age >= -_TOLERANCE_S) & (readings.status[settings.unit] == TouchStatus.OK)
+        said = fresh & readings.contact[settings.unit]
+    believed = np.flatnonzero(said & (account < p.touch_patience_s))
+    if said.any() or account.any():
+        filled = np.where(said, account + period, account - p.touch_forgiveness * period)
+        state = (TouchState(np.clip(filled, 0.0, p.touch_patience_s)),)
+    if readings is None or not len(believed):
+        return None, state
+    link, gain = settings.link[believed], np.ones(len(kin.position))
+    np.maximum.at(gain, link, settings.gain[believed])
+    point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], settings.place[believed])
+    force = readings.force[settings.unit[believed]]
+    return Cues(gain, link, point, settings.sigma[believed], force), state

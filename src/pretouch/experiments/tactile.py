@@ -1,0 +1,41 @@
+"""What touch sensors of units add to the detection of contacts: the same recorded arms, felt with them and without."""
+
+from itertools import product
+
+from pretouch.experiments.cell import Cell, Context, Grid
+from pretouch.experiments.experiment import Experiment, Row
+from pretouch.experiments.tactile_tables import summarise, tables
+
+NAME = "tactile"
+PROFILE = "pretouch"
+PLACES = ("on patch", "beside", "nowhere")
+"""Where contacts are: on a unit's patch, on the same link off all patches, or none at all."""
+WARM_UP_S = 60.0
+"""Time before the first contact, in which free motion is learnt [s]: as in the benchmark of detection."""
+FREE_S = 180.0
+"""Time in which alarms are counted where there are no contacts [s]."""
+COUNT = 30
+"""Contacts of a trial."""
+
+
+def cells(_grid: Grid) -> list[Cell]:
+    """Contacts on patches and beside them, by a hand that units see or do not; and free motion with false touches.
+
+    The profile is the experiment's own, for what is compared are its two ways to feel the same arm.
+    """
+    wanted = [(place, sight) for place, sight in product(PLACES[:2], ("seen", "unseen"))]
+    return [Cell(NAME, PROFILE, {"place": place, "hand": sight}) for place, sight in (*wanted, (PLACES[2], "none"))]
+
+
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
+    """Run one trial; return its row of results. Its course is of no use to a figure."""
+    from pretouch.experiments.tactile_trial import played  # stands on the benchmark, and that on all experiments
+
+    return played(cell, seed, context)
+
+
+def _cost(cell: Cell) -> float:
+    return WARM_UP_S + (FREE_S if cell.where["place"] == PLACES[2] else 3.1 * COUNT)
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, tables, recorded=False)

@@ -1,0 +1,200 @@
+"""Touch sensors of a simulated skin: force-sensing resistors under the cases of units, with the faults they have."""
+
+import heapq
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pretouch.checks import Checked, Fraction, NonNegative, Positive
+from pretouch.ports import Skin as SkinPort
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import TouchPatch
+from pretouch.sim.plant import Plant, PointForce
+from pretouch.types import FloatArray, RangeReadings, TouchReadings, TouchStatus
+
+
+@dataclass(frozen=True)
+class TouchSensorParams(Checked):
+    """How touch sensors err. Figures of the FSR 402 (Interlink, data sheet of the 400 series) where it has them."""
+
+    period_s: Positive = 0.02
+    """Time between readings [s]: a unit sends 50 times a second."""
+    shortest_s: Positive = 0.01
+    """Least time from one reading to the next: a touch that begins or ends is told as soon as it has passed [s]."""
+    period_jitter: Fraction = 0.02
+    """Standard deviation of the period as a fraction of it: as of the range finders."""
+    rise_s: Positive = 0.005
+    """Time constant with which the foam under the case passes a force on [s]: an assumption; the resistor itself
+    follows within 3 us."""
+    gain_error: Fraction = 0.06
+    """Error of each sensor's force as a fraction of it, uniform up to this: 6 % from part to part."""
+    noise: Fraction = 0.02
+    """Standard deviation of a reading as a fraction of the force: 2 % of one part."""
+    noise_floor_n: NonNegative = 0.03
+    """Standard deviation without a force [N]: an assumption."""
+    hysteresis: Fraction = 0.1
+    """By what fraction a force that falls reads too high: 10 %."""
+    release: Fraction = 0.7
+    """Part of the smallest force below which a touch is over, so that noise does not make it begin again and again:
+    as in the firmware."""
+    step_n: Positive = 0.02
+    """Resolution of the reading [N]: 12 bit over about 9 N, the few lowest bits of which are noise."""
+    most_n: Positive = 10.0
+    """Force from which on the reading stays the same [N]: the end of its range."""
+    latency_s: NonNegative = 0.008
+    """Least time from measurement to arrival [s]: as of the range finders."""
+    jitter_s: NonNegative = 0.004
+    """Mean of the exponential addition to it [s]."""
+    dropout: Fraction = 0.005
+    """Probability that a reading is lost on its way."""
+    false_per_hour: NonNegative = 0.0
+    """Rate of false touches of each unit [1/h]: a cable or a bent link presses on it, or water."""
+    false_s: Positive = 0.5
+    """Mean length of one, exponential [s]."""
+    false_n: Positive = 2.0
+    """Mean force that one reads above the smallest one, exponential [N]: an assumption."""
+
+
+class TouchSample(NamedTuple):
+    """What a sensor says of one measurement."""
+
+    unit: int
+    """Index of the unit in the skin."""
+    time: float
+    """When it was measured [s]."""
+    contact: bool
+    force: float
+    """[N], NaN of a sensor that tells contact only."""
+
+
+Forces = Callable[[float], list[PointForce]]
+"""Gives the forces that act on the arm at a time."""
+
+
+def no_forces(_time: float) -> list[PointForce]:
+    """Lay no force on the arm."""
+    return []
+
+
+class TouchSensors:
+    """The touch sensors of a skin's units, which feel contacts of the simulated arm and forces laid on it.
+
+    A force is felt by a unit that sits on its link if it acts within the patch: no farther from the unit's axis than
+    its radius, and on the unit's side of the link. What is felt is the part of it that presses on the unit.
+    """
+
+    def __init__(
+        self, plant: Plant, skin: Skin, params: TouchSensorParams, seed: int, laid: Forces = no_forces,
+        send: Callable[[TouchSample], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Mount the sensors on a simulated arm; the seed decides their errors, phases, noise, losses, false touches.
+
+        Args:
+            plant: the arm; forces of its contacts are felt.
+            skin: the units; those with a `touch` have a sensor.
+            params: how they err.
+            seed: of what chance decides.
+            laid: forces that act on the arm without a contact of the simulation, base frame.
+            send: handed each measurement as it is made, to bring it to where it is read: `touch` then tells nothing.
+        """
+        self._plant, self._params, self._laid, self._send = plant, params, laid, send
+        self._rng = np.random.default_rng([seed, 5])
+        units = [(int(k), touch) for k in skin.touching if (touch := skin.units[k].touch) is not None]
+        self._patches: list[tuple[int, TouchPatch]] = units
+        self._link, self._T = skin.link, skin.T_link_sensor
+        count = len(units)
+        self._gain = 1.0 + params.gain_error * self._rng.uniform(-1, 1, count)
+        self._due: list[float] = self._rng.uniform(0, params.period_s, count).tolist()
+        self._last = np.full(count, -np.inf)
+        self._false_until, self._false_n = np.full(count, -np.inf), np.zeros(count)
+        self._next_false = self._draw_next(np.zeros(count))
+        self._passed, self._before, self._on = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
+        self._time = plant.time
+        self._arriving: list[tuple[float, int, float, bool, float]] = []
+        self._stamp, self._contact = np.full(len(skin), -np.inf), np.zeros(len(skin), np.bool_)
+        self._force = np.full(len(skin), np.nan)
+        self._status = np.full(len(skin), int(TouchStatus.NONE), dtype=np.int64)
+        self.silenced: set[int] = set()
+        """Indices of units that no longer send."""
+        self.stuck: set[int] = set()
+        """Indices of units that say they are touched, whatever touches them."""
+        plant.before_each_step(self._sample)
+
+    def touch(self) -> TouchReadings:
+        """Return the newest reading of each unit that has arrived by now."""
+        while self._arriving and self._arriving[0][0] <= self._plant.time + 1e-9:
+            _, unit, stamp, contact, force = heapq.heappop(self._arriving)
+            if stamp > self._stamp[unit]:
+                self._stamp[unit], self._contact[unit], self._force[unit] = stamp, contact, force
+                self._status[unit] = TouchStatus.OK
+        return TouchReadings(self._stamp.copy(), self._contact.copy(), self._force.copy(), self._status.copy())
+
+    def _draw_next(self, after: FloatArray) -> FloatArray:
+        rate = self._params.false_per_hour / 3600.0
+        draws = self._rng.standard_exponential(len(after))
+        return after + draws / rate if rate > 0 else np.full(len(after), np.inf)
+
+    def _sample(self, time: float) -> None:
+        forces = self._plant.contact_forces() + self._laid(time)
+        follow = 1.0 - np.exp(-max(time - self._time, 0.0) / self._params.rise_s)
+        self._time = time
+        for i, (unit, patch) in enumerate(self._patches):
+            pressed = sum(self._pressing(unit, patch, force) for force in forces)
+            self._passed[i] += follow * (pressed - self._passed[i])
+            level = patch.force_min * (self._params.release if self._on[i] else 1.0)
+            changed = (self._passed[i] * self._gain[i] >= level) != self._on[i]
+            if time >= self._due[i] or (changed and time - self._last[i] >= self._params.shortest_s):
+                self._measure(i, unit, patch, time)
+
+    def _pressing(self, unit: int, patch: TouchPatch, force: PointForce) -> float:
+        """Return how much of a force presses on a unit [N]."""
+        link = int(self._link[unit])
+        if force.link != link:
+            return 0.0
+        rotation = self._plant.link_rotation[link] @ self._T[unit, :3, :3]
+        origin = self._plant.link_position[link] + self._plant.link_rotation[link] @ self._T[unit, :3, 3]
+        x, y, z = rotation.T @ (force.point - origin)
+        if x * x + y * y > patch.radius**2 or abs(z) > patch.radius:
+            return 0.0
+        return max(0.0, -float(force.force @ rotation[:, 2]))
+
+    def _measure(self, i: int, unit: int, patch: TouchPatch, time: float) -> None:
+        p, rng = self._params, self._rng
+        self._last[i], self._due[i] = time, time + p.period_s * (1.0 + p.period_jitter * rng.standard_normal())
+        if time >= self._next_false[i]:
+            self._false_until[i] = time + p.false_s * rng.standard_exponential()
+            self._false_n[i] = patch.force_min + p.false_n * rng.standard_exponential()
+            self._next_false[i] = self._draw_next(self._false_until[i : i + 1])[0]
+        felt = float(self._passed[i])
+        falling, self._before[i] = felt < self._before[i], felt
+        felt *= self._gain[i] * (1.0 + (p.hysteresis if falling else 0.0))
+        felt += (p.noise_floor_n + p.noise * felt) * rng.standard_normal()
+        if time < self._false_until[i] or unit in self.stuck:
+            felt = max(felt, float(self._false_n[i]), 2.0 * patch.force_min)
+        felt = round(min(max(felt, 0.0), p.most_n) / p.step_n) * p.step_n
+        self._on[i] = felt >= patch.force_min * (p.release if self._on[i] else 1.0)
+        arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout
+        if unit in self.silenced:
+            return
+        told = felt if patch.measures_force else np.nan
+        if self._send:
+            self._send(TouchSample(unit, time, bool(self._on[i]), told))
+        elif not lost:
+            heapq.heappush(self._arriving, (arrival, unit, time, bool(self._on[i]), told))
+
+
+class FeelingSkin:
+    """The port `TouchSkin` of a simulated arm: range finders, or any other skin, and touch sensors beside them."""
+
+    def __init__(self, ranges: SkinPort, sensors: TouchSensors) -> None:
+        self._ranges, self._sensors = ranges, sensors
+
+    def read(self) -> RangeReadings:
+        """Return the newest range of each unit."""
+        return self._ranges.read()
+
+    def touch(self) -> TouchReadings:
+        """Return the newest touch reading of each unit."""
+        return self._sensors.touch()

@@ -1,0 +1,169 @@
+"""What touch sensors say of a contact: the gain by hand, places, and what is not believed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pretouch.contact.cues import no_cues
+from pretouch.contact.feel import feel, feel_init
+from pretouch.contact.sequential import alarm_level
+from pretouch.contact.tactile import feel_touch, gain_of, surface_area, touch_init, touch_settings
+from pretouch.params import DetectionParams, profile
+from pretouch.robot.body import Capsules
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import TouchPatch
+from pretouch.types import Obstacles, RobotState, TouchReadings, TouchStatus
+
+P = profile("pretouch").detection
+PERIOD = 0.01
+NOW = 5.0
+
+
+def touching(skin: Skin, model: RobotModel, units: tuple[int, ...] = (0, 3), sigma: float = 0.0) -> Skin:
+    """The skin with touch sensors at some units."""
+    patch = TouchPatch(radius=0.02, force_min=0.5)
+    return Skin(
+        [replace(u, touch=patch, position_sigma=sigma) if k in units else u for k, u in enumerate(skin.units)], model
+    )
+
+
+def said(units: int, *touched: int, stamp: float = NOW, force: float = np.nan) -> TouchReadings:
+    contact = np.zeros(units, np.bool_)
+    contact[list(touched)] = True
+    return TouchReadings(np.full(units, stamp), contact, np.full(units, force), np.zeros(units, np.int64))
+
+
+def test_the_gain_by_hand():
+    # false for 0.5 s once an hour: p = 1 / 7200; a patch on a hundredth of its link: 0.01 * 7200 + 0.99
+    assert gain_of(np.array([0.01, 1.0]), P) == pytest.approx([72.99, 7200.0])
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.001, 3600.0), st.floats(0.01, 10.0))
+def test_false_touches_at_the_rate_assumed_at_most_double_the_expectation(share, rate, length):
+    p = replace(P, false_touches_per_hour=rate, false_touch_s=length)
+    false = min(1.0, rate * length / 3600)
+    gain = float(gain_of(np.array([share]), p)[0])
+    assert gain >= 1.0 - 1e-12
+    assert 1 - false + false * gain <= 1 + share + 1e-9
+
+
+def test_the_surface_of_a_link_is_that_of_its_capsules():
+    two = Capsules(np.array([1, 1, 2]), np.zeros((3, 3)), np.eye(3) * [0.1, 0.1, 0.1], np.array([0.05, 0.02, 0.5]))
+    # 2 pi r l + 4 pi r^2: 0.0314159 + 0.0314159 + 0.0125664 + 0.0050265
+    assert surface_area(two, 1) == pytest.approx(0.0804248, rel=1e-5)
+    assert surface_area(two, 3) == np.inf
+
+
+def test_units_that_say_nothing_and_skins_without_sensors_say_nothing(panda_model, paper_skin):
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    assert touch_settings(panda_model, paper_skin, P) is None
+    skin = touching(paper_skin, panda_model)
+    for off in (replace(P, use_touch=False), DetectionParams(use_touch=True)):  # the second is the paper's method
+        assert touch_settings(panda_model, skin, off) is None
+    settings = touch_settings(panda_model, skin, P)
+    state = touch_init(settings)
+    for nothing in (None, said(len(skin)), said(len(skin), 1, 2, 4, 5, 6)):
+        cues, after = feel_touch(state, settings, nothing, kin, NOW, PERIOD, P)
+        assert cues is None
+        assert after is state
+
+
+def test_a_touch_raises_the_prior_of_its_link_alone_and_tells_where_it_is(panda_model, paper_skin):
+    skin = touching(paper_skin, panda_model, sigma=0.004)
+    settings = touch_settings(panda_model, skin, P)
+    assert settings is not None
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    cues, _ = feel_touch(touch_init(settings), settings, said(7, 3, force=2.5), kin, NOW, PERIOD, P)
+    assert cues is not None
+    link = int(skin.link[3])
+    share = np.pi * 0.02**2 / surface_area(panda_model.capsules, link)
+    assert cues.gain[link] == pytest.approx(7200 * share + 1 - share)
+    assert np.delete(cues.gain, link) == pytest.approx(1.0)
+    assert cues.link.tolist() == [link]
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = kin.rotation[link], kin.position[link]
+    assert cues.point[0] == pytest.approx((T @ skin.T_link_sensor[3])[:3, 3])
+    assert cues.sigma == pytest.approx([np.hypot(0.01, 0.004)])
+    assert cues.force.tolist() == [2.5]
+
+
+def test_two_units_on_one_link_count_once(panda_model, paper_skin):
+    skin = touching(paper_skin, panda_model, (0, 1))
+    settings = touch_settings(panda_model, skin, P)
+    assert settings is not None
+    assert skin.link[0] == skin.link[1]
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    one, _ = feel_touch(touch_init(settings), settings, said(7, 0), kin, NOW, PERIOD, P)
+    both, _ = feel_touch(touch_init(settings), settings, said(7, 0, 1), kin, NOW, PERIOD, P)
+    assert one is not None
+    assert both is not None
+    assert both.gain.tolist() == one.gain.tolist()
+    assert len(both.link) == 2
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"stamp": np.full(7, NOW - 0.07)},  # older than 60 ms
+        {"stamp": np.full(7, NOW + 0.01)},  # a clock that is ahead
+        {"stamp": np.full(7, -np.inf)},
+        {"status": np.full(7, int(TouchStatus.FAILED))},
+        {"status": np.full(7, int(TouchStatus.NONE))},
+    ],
+)
+def test_what_is_old_early_or_of_a_failed_sensor_is_not_believed(panda_model, paper_skin, change):
+    settings = touch_settings(panda_model, touching(paper_skin, panda_model), P)
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    cues, _ = feel_touch(touch_init(settings), settings, replace(said(7, 0), **change), kin, NOW, PERIOD, P)
+    assert cues is None
+
+
+def test_a_sensor_that_is_stuck_is_believed_for_ten_seconds_and_comes_back_slowly(panda_model, paper_skin):
+    settings = touch_settings(panda_model, touching(paper_skin, panda_model), P)
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    state, believed = touch_init(settings), []
+
+    def turns(seconds: float, readings: TouchReadings) -> None:
+        nonlocal state
+        for _ in range(round(seconds / PERIOD)):
+            cues, state = feel_touch(state, settings, readings, kin, NOW, PERIOD, P)
+            believed.append(cues is not None)
+
+    turns(60.0, said(7, 0))
+    assert abs(sum(believed) * PERIOD - 10.0) < 2 * PERIOD
+    assert not any(believed[-1000:])
+    turns(20.0, said(7))  # gives back 2 s
+    believed.clear()
+    turns(10.0, said(7, 0))
+    assert abs(sum(believed) * PERIOD - 2.0) < 3 * PERIOD
+    # the other unit has an account of its own
+    cues, _ = feel_touch(state, settings, said(7, 0, 3), kin, NOW, PERIOD, P)
+    assert cues is not None
+    assert len(cues.link) == 1
+
+
+def test_a_touch_counts_for_an_object_that_is_seen_at_its_link_as_well(panda_model, paper_skin):
+    q, still = panda_model.description.q_ready, np.zeros(panda_model.n)
+    kin, link = panda_model.kinematics(q), panda_model.link_index("panda_link5")
+    at, away = kin.position[link], np.array([0.0, 1.0, 0.0])
+    seen = Obstacles(
+        np.array([0]), (at + 0.01 * away)[None], np.array([0.5]), at[None], np.array([link]), away[None],
+        np.array([0.01]), np.zeros(1),
+    )  # fmt: skip
+    torque = np.asarray(panda_model.jacobian(kin, link, at)[:3].T @ (-9.0 * away))
+    gain = np.ones(len(panda_model.links))
+    gain[link] = 50.0
+    ours, evidence = profile("pretouch"), []
+    for cues in (None, replace(no_cues(len(gain)), gain=gain)):
+        state = feel_init(panda_model, ours)
+        for k in range(5):
+            robot = RobotState(0.02 * k, q, still, q, still, torque, np.zeros(6))
+            felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, cues)
+        evidence.append(felt.evidence)
+    # fifty times the prior of what says most: ln 50 in units of ln A, but for what the other hypotheses add
+    gained = np.log(50.0) / alarm_level(ours.detection, ours.task.control_period_s)
+    assert 0.8 * gained < evidence[1] - evidence[0] <= gained * (1 + 1e-9)
