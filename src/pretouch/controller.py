@@ -10,6 +10,7 @@ import numpy as np
 
 from pretouch.contact import response
 from pretouch.contact.feel import FeelState, feel, feel_init
+from pretouch.contact.impact import ImpactState, impact_init, listen
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.control import path as paths
 from pretouch.control.joint_box import joint_limits
@@ -17,7 +18,7 @@ from pretouch.control.near import NearState, near_init, near_motion, near_settin
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import doing, events_of
-from pretouch.faults import Watch, examine, sound_readings, sound_robot, watch_init
+from pretouch.faults import Watch, examine, sound_imu, sound_readings, sound_robot, watch_init
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.params import Profile
 from pretouch.perception.obstacles import TrackState, track_init
@@ -45,6 +46,8 @@ class ControllerState:
     """(n,) last joint velocity command [rad/s]."""
     rotation_goal: FloatArray
     """(3, 3) R_O_ee at the start, held if the task asks for it."""
+    impact: tuple[ImpactState, ...] = ()
+    """Of the units' accelerometers, one; none before IMU samples came, or if the profile does not use them."""
 
 
 STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motion", "record")
@@ -141,7 +144,14 @@ class Controller:
 
         # what is felt: eqs. 8-11
         watched = p.perception.enabled and len(self.skin) > 0 and heard >= 1.0 and not silent
-        felt, feeling = feel(state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p, watched)
+        cues, impact = None, state.impact
+        if p.detection.use_imu and (imu := sound_imu(inputs.imu, len(self.skin))) is not None:
+            before_it = impact[0] if impact else impact_init(model, len(self.skin))
+            cues, heard_impact = listen(before_it, model, self.skin, kin, robot, imu, now, p)
+            impact = (heard_impact,)
+        felt, feeling = feel(
+            state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p, watched, cues
+        )  # fmt: skip
         mark("contact")
 
         # what to do
@@ -193,7 +203,7 @@ class Controller:
             watch=watch, tracks=tracks, feel=feeling, reduction=reduction, reaction=react,
             path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
-            near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal,
+            near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal, impact=impact,
         )  # fmt: skip
         mark("record")
         return step, after

@@ -17,7 +17,7 @@ from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
 from pretouch.ports import Clock, Robot, Skin
-from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState
+from pretouch.types import ControlStep, FloatArray, ImuReadings, Inputs, RangeReadings, RobotState
 from pretouch.values import value
 
 _FINEST = 1e-7
@@ -205,10 +205,19 @@ def turn(
 ) -> Cycle:
     """Turn the controller once, at a tick [s]: read, step, command."""
     report, readings = robot.read(), skin.read()
-    inputs = Inputs(_instant(tick, controller.limits.period, report, readings), report, readings, resume)
+    imu = imu_of(controller, skin)
+    inputs = Inputs(_instant(tick, controller.limits.period, report, readings), report, readings, resume, imu)
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)
+
+
+def imu_of(controller: Controller, skin: object) -> ImuReadings | None:
+    """Return the IMU samples of a skin, if the controller's profile uses them and the skin has any."""
+    if not controller.profile.detection.use_imu:
+        return None
+    ask: Callable[[], ImuReadings] | None = getattr(skin, "imu", None)
+    return None if ask is None else ask()
 
 
 def _instant(tick: float, period: float, report: RobotState, readings: RangeReadings) -> float:

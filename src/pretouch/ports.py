@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from pretouch.types import FloatArray, RangeReadings, RobotState
+from pretouch.types import FloatArray, ImuReadings, RangeReadings, RobotState
 
 
 class Robot(Protocol):
@@ -22,6 +22,14 @@ class Skin(Protocol):
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit."""
+        ...
+
+
+class ImuSkin(Skin, Protocol):
+    """Sensor units that have IMUs too. A `Skin` without this method has none."""
+
+    def imu(self) -> ImuReadings:
+        """Return the IMU samples that came since the last call."""
         ...
 
 

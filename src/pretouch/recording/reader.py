@@ -3,13 +3,14 @@
 import struct
 from bisect import bisect_right
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
-from pretouch.recording.codec import decode_inputs, decode_step, decode_truth
+from pretouch.recording.codec import decode_imu, decode_inputs, decode_step, decode_truth
 from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.recorded_path import Tangents
@@ -75,10 +76,14 @@ class Recorded:
         inputs = raw["/pretouch/inputs"].get(number)
         truth = raw["/pretouch/truth"].get(number)
         state = raw["/pretouch/state"].get(number)
+        imu = raw["/pretouch/imu"].get(number)
+        given = None if inputs is None else decode_inputs(inputs)[1]
+        if given is not None and imu is not None:
+            given = replace(given, imu=decode_imu(imu))
         anew, snapshot = (False, None) if state is None else decode_state(state)
         return Kept(
             run=max(0, bisect_right(self._begins, number) - 1),
-            inputs=None if inputs is None else decode_inputs(inputs)[1],
+            inputs=given,
             step=decode_step(raw["/pretouch/step"][number])[1],
             truth=None if truth is None else decode_truth(truth)[1],
             snapshot=snapshot,

@@ -118,13 +118,17 @@ class _Reading:
     """The parts of a State message, to be taken in turn."""
 
     def __init__(self, message: Any) -> None:
-        self._parts = zip(message.name, message.kind, message.shape, strict=True)
+        self._parts = list(zip(message.name, message.kind, message.shape, strict=True))[::-1]
         self._numbers, self._used = message.numbers, 0
         self._wholes = iter(message.wholes.tolist())
         self._texts = iter(message.texts)
 
+    def holds(self, name: str) -> bool:
+        """Whether a value of this name comes next."""
+        return bool(self._parts) and self._parts[-1][0] == name
+
     def next(self, name: str) -> tuple[str, str]:
-        found, kind, shape = next(self._parts)
+        found, kind, shape = self._parts.pop()
         if found != name:
             raise ValueError(f"{found!r} where {name!r} belongs")
         return kind, shape
@@ -149,7 +153,7 @@ def decode_state(data: bytes) -> tuple[bool, ControllerState]:
     message = decoded(STATE, data)
     try:
         return message.anew, _give(_Reading(message), "", ControllerState)
-    except (ValueError, KeyError, StopIteration) as error:
+    except (ValueError, KeyError, IndexError, StopIteration) as error:
         raise RecordingError(
             f"The controller's state in the recording is that of another version ({error}): open it with the version"
             " that made it."
@@ -163,7 +167,12 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
         hint = _without_none(hint)
     if is_dataclass(hint):
         kind = hint if isinstance(hint, type) else type(hint)
-        return kind(**{f: _give(parts, f"{name}.{f}" if name else f, inner) for f, inner in _hints(kind)})
+        given = {f: f"{name}.{f}" if name else f for f, _ in _hints(kind)}
+        later = {f.name for f in fields(kind) if f.default == ()}
+        # what an older recording lacks was added with nothing as its default
+        return kind(**{
+            f: _give(parts, given[f], inner) for f, inner in _hints(kind) if f not in later or parts.holds(given[f])
+        })  # fmt: skip
     kind_name, shape = parts.next(name)
     if optional and kind_name == "none":
         return None

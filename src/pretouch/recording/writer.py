@@ -16,7 +16,7 @@ import numpy as np
 
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.recording.codec import INPUTS, STEP, TRUTH, encode_inputs, encode_step, encode_truth
+from pretouch.recording.codec import IMU, INPUTS, STEP, TRUTH, encode_imu, encode_inputs, encode_step, encode_truth
 from pretouch.recording.disk import Disk
 from pretouch.recording.messages import TOPICS, Item, prepare
 from pretouch.recording.plain import JSON
@@ -111,6 +111,10 @@ class Recording:
         data, whole = encode_inputs(number, cycle.inputs)
         self._command = step.command if whole else None
         items.append(Item("/pretouch/inputs", INPUTS, number, time, data))
+        imu = getattr(cycle.inputs, "imu", None)
+        samples = None if imu is None else encode_imu(number, step.stamp, imu)
+        if samples is not None:
+            items.append(Item("/pretouch/imu", IMU, number, time, samples))
         tangent = self._tangent(step.path_phase)
         items.append(Item("/pretouch/step", STEP, number, time, encode_step(number, step, tangent)))
         if truth is not None:

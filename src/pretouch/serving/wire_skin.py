@@ -8,13 +8,14 @@ from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver import SkinReceiver
+from pretouch.hardware.traffic import imu_readings
 from pretouch.hardware.wire import KEY_SIZE
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import Fleet, FleetParams
 from pretouch.sim.imu import Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
-from pretouch.types import RangeReadings
+from pretouch.types import ImuReadings, RangeReadings
 
 _PATIENCE_S = 5.0
 """The machine's own loopback may take this long to hand a datagram over [s]."""
@@ -63,6 +64,10 @@ class WireSkin:
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit."""
         return self.receiver.readings()
+
+    def imu(self) -> ImuReadings:
+        """Return the IMU samples that came since the last call."""
+        return imu_readings(self.receiver.take_imu())
 
     def _step(self, now: float) -> None:
         self._taken_in += self.fleet.step(lambda: now)

@@ -97,7 +97,7 @@ def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
         k, duration = every[int(rng.integers(len(every)))]
         name = chosen["links"][int(rng.integers(len(chosen["links"])))]
         link = model().link_index(f"{model().description.name}_{name}")
-        point, normal = _place(link, hand_radius, rng, family["hand"]["from_m"])
+        point, normal = surface_place(link, hand_radius, rng, family["hand"]["from_m"])
         inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
         force = float(rng.choice(chosen["forces_n"]))
         touch = Touching(
@@ -108,7 +108,7 @@ def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
     return found
 
 
-def _place(link: int, radius: float, rng: np.random.Generator, from_m: float) -> tuple[FloatArray, FloatArray]:
+def surface_place(link: int, radius: float, rng: np.random.Generator, from_m: float) -> tuple[FloatArray, FloatArray]:
     """Draw a point and normal (3,) of a link's surface that a hand can come to along the normal, link frame.
 
     That is judged in the posture in which the paths begin. Where no free place is found, the last one drawn is taken.
