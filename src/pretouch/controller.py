@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.contact import response
+from pretouch.contact.cues import together
 from pretouch.contact.feel import FeelState, feel, feel_init
+from pretouch.contact.impact import ImpactState, impact_init, listen
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.tactile import TouchState, feel_touch, touch_init, touch_settings
 from pretouch.control import path as paths
@@ -18,7 +20,7 @@ from pretouch.control.near import NearState, near_init, near_motion, near_settin
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import doing, events_of
-from pretouch.faults import Watch, examine, sound_readings, sound_robot, sound_touch, watch_init
+from pretouch.faults import Watch, examine, sound_imu, sound_readings, sound_robot, sound_touch, watch_init
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.params import Profile
 from pretouch.perception.obstacles import TrackState, track_init
@@ -48,6 +50,8 @@ class ControllerState:
     """(3, 3) R_O_ee at the start, held if the task asks for it."""
     touch: tuple[TouchState, ...] = ()
     """Of the units with a touch sensor, one; none unless there are such units and the profile uses them."""
+    impact: tuple[ImpactState, ...] = ()
+    """Of the units' accelerometers, one; none before IMU samples came, or if the profile does not use them."""
 
 
 STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motion", "record")
@@ -149,9 +153,13 @@ class Controller:
         # what is felt: eqs. 8-11
         watched = p.perception.enabled and len(self.skin) > 0 and heard >= 1.0 and not silent
         cues, touched = feel_touch(state.touch, self._touching, touches, kin, now, self.limits.period, p.detection)
+        impact = state.impact
+        if p.detection.use_imu and (imu := sound_imu(inputs.imu, len(self.skin))) is not None:
+            before_it = impact[0] if impact else impact_init(model, len(self.skin))
+            jolts, heard_impact = listen(before_it, model, self.skin, kin, robot, imu, now, p)
+            cues, impact = jolts if cues is None else together(cues, jolts), (heard_impact,)
         felt, feeling = feel(
-            state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p,
-            watched, cues,
+            state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p, watched, cues
         )  # fmt: skip
         mark("contact")
 
@@ -205,6 +213,7 @@ class Controller:
             path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
             near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal, touch=touched,
+            impact=impact,
         )  # fmt: skip
         mark("record")
         return step, after

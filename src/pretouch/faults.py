@@ -10,6 +10,7 @@ from pretouch.params import FailureParams
 from pretouch.types import (
     WHOLE,
     FloatArray,
+    ImuReadings,
     Inputs,
     RangeReadings,
     RangeStatus,
@@ -29,6 +30,9 @@ _STRONGEST = 1e4
 
 _LATEST = 1e12
 """A time stamp [s] from here on is none, whatever the clock began with."""
+
+MOST_IMU = 64
+"""IMU samples of a unit that one step takes in: two of the longest datagrams."""
 
 _PARTS = ("joint positions", "joint velocities", "commanded joint positions", "commanded joint velocities")
 
@@ -210,6 +214,27 @@ def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, 
             return _nothing(units), f"statuses are of type {status.dtype}, not whole numbers"
         status = status.astype(np.int64)
     return RangeReadings(stamp, distance, status), ""
+
+
+def sound_imu(imu: ImuReadings | None, units: int) -> ImuReadings | None:
+    """Copy what of IMU samples can be some of so many units; None where nothing can.
+
+    No fault is told: they only add to what the torques say, so that without them an arm feels as one that has none.
+    """
+    if imu is None:
+        return None
+    try:
+        unit, stamp = np.array(imu.unit), np.array(imu.stamp, dtype=np.float64)
+        motion = np.array((imu.acceleration, imu.angular_velocity), dtype=np.float64)
+    except (AttributeError, TypeError, ValueError, OverflowError):
+        return None
+    count = len(stamp) if stamp.ndim == 1 else -1
+    if unit.shape != (count,) or unit.dtype.kind not in "iu" or motion.shape != (2, count, 3):
+        return None
+    sound = (unit >= 0) & (unit < units) & (np.abs(stamp) < _LATEST) & (np.abs(motion) < _LARGEST).all(axis=(0, 2))
+    # no more than a bounded step can take in: the newest
+    kept = np.flatnonzero(sound)[-MOST_IMU * units :] if units else np.zeros(0, np.int64)
+    return ImuReadings(unit[kept].astype(np.int64), stamp[kept], motion[0, kept], motion[1, kept])
 
 
 def _nothing(units: int) -> RangeReadings:

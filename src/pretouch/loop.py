@@ -16,7 +16,7 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
-from pretouch.ports import Clock, Robot, Skin, touch_of
+from pretouch.ports import Clock, Robot, Skin, imu_of, touch_of
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, TouchReadings
 from pretouch.values import value
 
@@ -205,8 +205,9 @@ def turn(
 ) -> Cycle:
     """Turn the controller once, at a tick [s]: read, step, command."""
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
+    imu = imu_of(skin) if controller.profile.detection.use_imu else None
     stamp = _instant(tick, controller.limits.period, report, readings, touch)
-    inputs = Inputs(stamp, report, readings, resume, touch)
+    inputs = Inputs(stamp, report, readings, resume, touch, imu)
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)

@@ -19,7 +19,7 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.ports import Robot, Skin
-from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.types import ControlStep, FloatArray, ImuReadings, Inputs, RangeReadings, RangeStatus, RobotState
 
 _PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
 """Of Linux' `prctl`."""
@@ -226,5 +226,9 @@ class _Rehearsal:
         stamp = np.full(units, -np.inf if seen is None else self._now)
         status = np.full(units, int(RangeStatus.NONE if seen is None else seen))
         robot = replace(self._robot, stamp=self._now, wrench=wrench, q=self._robot.q if q is None else q)
-        inputs = Inputs(self._now, robot, RangeReadings(stamp, np.linspace(0.0, 1.0, units), status), resume)
+        readings = RangeReadings(stamp, np.linspace(0.0, 1.0, units), status)
+        # of each unit one sample, so that nothing of what they are used for is compiled in the loop
+        imu = ImuReadings(np.arange(units), np.full(units, self._now - self._controller.limits.period),
+                          np.zeros((units, 3)), np.zeros((units, 3)))  # fmt: skip
+        inputs = Inputs(self._now, robot, readings, resume, imu=imu)
         _, self._state = self._controller.step(self._state, inputs)

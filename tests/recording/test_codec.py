@@ -25,6 +25,7 @@ from pretouch.recording.truth import Truth
 from pretouch.types import (
     Contact,
     ControlStep,
+    ImuReadings,
     Inputs,
     Mode,
     Obstacles,
@@ -218,13 +219,13 @@ def test_inputs_of_other_types_are_kept_as_the_controller_takes_them(spoil, want
 
 
 def test_messages_mirror_the_types_field_by_field():
-    mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, Touched, ControlStep, Inputs)
-    own = {"sequence", "unreadable", "has_wrench", "has_contact", "path_tangent"}
+    mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, Touched, ControlStep, Inputs, ImuReadings)
+    own = {"sequence", "time", "unreadable", "has_wrench", "has_contact", "path_tangent"}
+    beside = {"touch", "imu"}  # of Inputs: in messages of their own, so that older recordings open
     for kind in mirrored:
         name = {"ControlStep": "Step"}.get(kind.__name__, kind.__name__)
         there = {field for field, _ in typestore().get_msgdef(f"{PACKAGE}/msg/{name}").fields}
-        # touch has a message of its own, so that recordings without it are those of before
-        assert there - own == {f.name for f in fields(kind)} - {"touch"}
+        assert there - own == {f.name for f in fields(kind)} - beside
     touch = {field for field, _ in typestore().get_msgdef(f"{PACKAGE}/msg/Touch").fields}
     assert touch - {"sequence", "step_stamp"} == {f.name for f in fields(TouchReadings)}
 

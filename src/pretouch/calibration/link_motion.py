@@ -1,5 +1,6 @@
 """How each link moved: what an IMU at its origin, with its axes, would have measured."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.signals import HALF_S, gaps, outside, rate_of_change, smooth, times
+from pretouch.robot.link_motion import chain_motion, lever_acceleration
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
 from pretouch.types import BoolArray, FloatArray
@@ -64,34 +66,24 @@ class ArmMotion:
         postures = [model.kinematics(row) for row in self.q]
         self._position = np.array([k.position for k in postures])
         self._rotation = np.array([k.rotation for k in postures])
-        self._chain = self._joint_motions(np.array([k.anchor for k in postures]), np.array([k.axis for k in postures]))
+        motions = [chain_motion(k.anchor, k.axis, *row) for k, *row in zip(postures, self.qd, self._qdd, strict=True)]
+        self._chain = tuple(np.array(part).reshape(len(self.q), model.n + 1, 3) for part in _turned(motions))
+        """Of what moves with the first 0, 1, ... n joints: what `chain_motion` returns, (N, n + 1, 3) each."""
         self._links: dict[int, LinkMotion] = {}
-
-    def _joint_motions(self, anchor: FloatArray, axis: FloatArray) -> list[tuple[FloatArray, ...]]:
-        """Motion, base frame, of what moves with the first 0, 1, ... n joints: (N, 3) each.
-
-        Angular velocity, angular acceleration, acceleration of a point, and that point.
-        """
-        w, alpha, a, point = np.zeros((4, *anchor[:, 0].shape))
-        motions: list[tuple[FloatArray, ...]] = [(w, alpha, a, point)]
-        for j in range(self.model.n):
-            a, point = a + _lever_acceleration(w, alpha, anchor[:, j] - point), anchor[:, j]
-            turn = axis[:, j] * self.qd[:, j, None]
-            alpha = alpha + np.cross(w, turn) + axis[:, j] * self._qdd[:, j, None]
-            w = w + turn
-            motions.append((w, alpha, a, point))
-        return motions
 
     def link(self, index: int) -> LinkMotion:
         """Return the motion of a link."""
         if index not in self._links:
-            w, alpha, a, point = self._chain[int(self.model.moved_by[index].sum())]
-            a = a + _lever_acceleration(w, alpha, self._position[:, index] - point)
+            joints = int(self.model.moved_by[index].sum())
+            w, alpha, a, point = (part[:, joints] for part in self._chain)
+            arm = self._position[:, index] - point
+            a = a + np.array([lever_acceleration(*row) for row in zip(w, alpha, arm, strict=True)]).reshape(-1, 3)
             R = self._rotation[:, index].swapaxes(1, 2)
             w, a, alpha = (np.einsum("nij,nj->ni", R, v) for v in (w, a, alpha))
             self._links[index] = LinkMotion(w, a, R, alpha)
         return self._links[index]
 
 
-def _lever_acceleration(w: FloatArray, alpha: FloatArray, r: FloatArray) -> FloatArray:
-    return np.cross(alpha, r) + np.cross(w, np.cross(w, r))
+def _turned(motions: Sequence[tuple[FloatArray, ...]]) -> list[list[FloatArray]]:
+    """Return each part of all motions in place of all parts of each."""
+    return [[motion[part] for motion in motions] for part in range(4)]

@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.contact.cues import Cues
 from pretouch.contact.tactile import feel_touch, touch_init, touch_settings
 from pretouch.experiments.bench.detection.arm import AWAY, Alone, model, path_of, plant_of, record, sensing_of
-from pretouch.experiments.bench.detection.contacts import Toucher, Touching, place_on
+from pretouch.experiments.bench.detection.contacts import Toucher, Touching, place_on, start_posture
 from pretouch.experiments.bench.detection.contenders import Contender
 from pretouch.experiments.bench.detection.judge import matched
 from pretouch.experiments.bench.detection.replay import Said, replay
@@ -77,7 +77,7 @@ def _beside(skin: Skin, unit: int, hand_radius: float, rng: np.random.Generator)
     own = [k for k in skin.touching if skin.link[k] == link]
     reach = max(touch.radius for k in own if (touch := skin.units[k].touch) is not None)
     for _ in range(_TRIES):
-        point, normal = place_on(link, hand_radius, rng, _FROM_M)
+        point, normal = place_on(link, start_posture(), hand_radius, rng, _FROM_M)
         if all(np.linalg.norm(point - skin.T_link_sensor[k, :3, 3]) > 2 * reach for k in own):
             break
     return point, normal

@@ -1,13 +1,14 @@
 """What a receiver tells of each unit: plain numbers, cheap to keep, for monitors and records."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from pretouch.hardware.wire import Reset, Sample, imu_values
-from pretouch.types import FloatArray
+from pretouch.types import FloatArray, ImuReadings
 
 UnitState = Literal["never heard", "greeting", "live", "silent"]
 """Nothing genuine yet; hellos only; samples; neither any more."""
@@ -121,6 +122,17 @@ def imu_batch(received: Received) -> ImuBatch | None:
     newest = 1e-6 * (sample.time_us - sample.imu_age_us) + received.offset - received.bound
     stamp = newest + np.arange(1 - sample.imu_count, 1) / sample.imu_rate_hz
     return ImuBatch(received.unit, stamp, acceleration, angular_velocity, sample.imu_index)
+
+
+def imu_readings(batches: Sequence[ImuBatch]) -> ImuReadings:
+    """Return the IMU samples of several units as a control step takes them."""
+    none = [np.zeros((0, 3))]
+    return ImuReadings(
+        np.repeat([b.unit for b in batches], [len(b.stamp) for b in batches]).astype(np.int64),
+        np.concatenate([np.zeros(0), *(b.stamp for b in batches)]),
+        np.concatenate(none + [b.acceleration for b in batches]),
+        np.concatenate(none + [b.angular_velocity for b in batches]),
+    )
 
 
 class Latency:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pretouch.checks import Check, Checked, NonNegative, Positive, PositiveCount
+from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive, PositiveCount
 from pretouch.errors import ParameterError
 
 _LARGEST_NM = 1e4
@@ -65,6 +65,23 @@ class DetectionParams(Checked):
     touch_forgiveness: Annotated[float, Check(low=0.001, high=1.0)] = 0.1
     """Seconds of that time that a second untouched gives back [1]: in the long run a unit is believed to be touched
     for at most about so large a part of the time."""
+    use_imu: bool = False
+    """Whether a jolt that the units' accelerometers feel raises the prior of a contact on the links that explain it."""
+    imu_gain: Annotated[float, Check(low=1.0, high=1e4)] = 100.0
+    """Times the prior of all links together is larger, at most, after a jolt [1]. It is never lowered."""
+    imu_memory_s: Positive = 0.05
+    """Time in which that fades to a third [s]: the torques follow an impact so late."""
+    imu_contact_gain: Positive = 30.0
+    """Times the spread of the accelerations is larger with an impact, in each direction it can push [1]."""
+    imu_tails: Annotated[float, Check(low=3.0, high=1000.0)] = 8.0
+    """Degrees of freedom of the Student distribution of the accelerations without one: real vibration has outliers."""
+    imu_follow_1_s: Positive = 50.0
+    """How fast the arm follows a commanded velocity [1/s]: as a critically damped joint impedance of 3000 Nm/rad
+    does, that carries 1.2 kg m^2."""
+    imu_motion_doubt: Fraction = 0.5
+    """Part of what the commanded motion accelerates a unit by that may be otherwise [1], one standard deviation."""
+    rotor_kg_m2: NonNegative = 0.1
+    """Inertia of a drive at its joint [kg m^2], for what an impact accelerates (as the simulated arm's)."""
 
     learn: bool = True
     """Whether mean and spread of free motion are learnt; off, they stay as they began."""

@@ -13,6 +13,7 @@ from pretouch.types import (
     Contact,
     ControlStep,
     FloatArray,
+    ImuReadings,
     Inputs,
     IntArray,
     Mode,
@@ -28,6 +29,7 @@ from pretouch.types import (
 
 INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE}/msg/Truth"
 TOUCH = f"{PACKAGE}/msg/Touch"
+IMU = f"{PACKAGE}/msg/ImuReadings"
 _ROBOT, _READINGS = f"{PACKAGE}/msg/RobotState", f"{PACKAGE}/msg/RangeReadings"
 _OBSTACLES, _THRESHOLDS = f"{PACKAGE}/msg/Obstacles", f"{PACKAGE}/msg/Thresholds"
 _CONTACT, _QP = f"{PACKAGE}/msg/Contact", f"{PACKAGE}/msg/QpSolution"
@@ -116,6 +118,29 @@ def decode_inputs(data: bytes) -> tuple[int, Inputs | None, str]:
     r, s = m.robot, m.readings
     robot = RobotState(r.stamp, r.q, r.qd, r.q_commanded, r.qd_commanded, r.tau_ext, r.wrench if r.has_wrench else None)
     return m.sequence, Inputs(m.stamp, robot, RangeReadings(s.stamp, s.distance, s.status), m.resume), ""
+
+
+def encode_imu(sequence: int, time: float, imu: ImuReadings) -> bytes | None:
+    """Return IMU samples as CDR; None for what are none to a step either (`faults.sound_imu`)."""
+    try:
+        unit, stamp = np.array(imu.unit), np.array(imu.stamp, dtype=np.float64)
+        parts = [np.array(part, dtype=np.float64) for part in (imu.acceleration, imu.angular_velocity)]
+    except (AttributeError, TypeError, ValueError, OverflowError):
+        return None
+    if unit.dtype.kind not in "iu" or unit.ndim != 1 or unit.shape != stamp.shape:
+        return None
+    if any(part.shape != (*stamp.shape, 3) for part in parts):
+        return None
+    return encoded(IMU, make(IMU, sequence, time, unit.astype(np.int64), stamp, *map(_flat, parts)))
+
+
+def decode_imu(data: bytes) -> ImuReadings:
+    """Return the IMU samples of a step."""
+    m = decoded(IMU, data)
+    try:
+        return ImuReadings(m.unit, m.stamp, m.acceleration.reshape(-1, 3), m.angular_velocity.reshape(-1, 3))
+    except ValueError as error:
+        raise RecordingError(f"IMU samples in the recording cannot be read: {error}") from error
 
 
 def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = None) -> bytes:

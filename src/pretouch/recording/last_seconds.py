@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol, Self
 
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.recording.codec import decode_inputs, encode_inputs
+from pretouch.recording.codec import decode_imu, decode_inputs, encode_imu, encode_inputs
 from pretouch.recording.plain import JSON
 from pretouch.recording.truth import Truth
 from pretouch.recording.writer import Recording
@@ -33,12 +33,16 @@ class _Passed(NamedTuple):
     cycle: Cycle
     inputs: bytes | None
     truth: Truth | None
+    imu: bytes | None
 
     def again(self) -> Cycle:
         if self.inputs is None:
             return self.cycle
         inputs = decode_inputs(self.inputs)[1]
-        return self.cycle if inputs is None else replace(self.cycle, inputs=inputs)
+        if inputs is None:
+            return self.cycle
+        samples = None if self.imu is None else decode_imu(self.imu)
+        return replace(self.cycle, inputs=replace(inputs, imu=samples))
 
 
 class LastSeconds:
@@ -75,7 +79,9 @@ class LastSeconds:
         if self._recorder is not None:
             self._recorder.record(cycle, truth)
         data, whole = encode_inputs(0, cycle.inputs)
-        self._ring.append(_Passed(cycle, data if whole else None, truth))
+        imu = getattr(cycle.inputs, "imu", None)
+        samples = None if imu is None else encode_imu(0, cycle.step.stamp, imu)
+        self._ring.append(_Passed(cycle, data if whole else None, truth, samples))
         begin = cycle.step.stamp - self._seconds
         while self._ring[0].cycle.step.stamp < begin:
             self._ring.popleft()

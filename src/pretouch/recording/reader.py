@@ -10,7 +10,7 @@ import numpy as np
 
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
-from pretouch.recording.codec import decode_inputs, decode_step, decode_touch, decode_truth
+from pretouch.recording.codec import decode_imu, decode_inputs, decode_step, decode_touch, decode_truth
 from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.recorded_path import Tangents
@@ -79,6 +79,10 @@ class Recorded:
             given = replace(given, touch=decode_touch(touch))
         truth = raw["/pretouch/truth"].get(number)
         state = raw["/pretouch/state"].get(number)
+        imu = raw["/pretouch/imu"].get(number)
+        given = None if inputs is None else decode_inputs(inputs)[1]
+        if given is not None and imu is not None:
+            given = replace(given, imu=decode_imu(imu))
         anew, snapshot = (False, None) if state is None else decode_state(state)
         return Kept(
             run=max(0, bisect_right(self._begins, number) - 1),

@@ -164,7 +164,7 @@ def decode_state(data: bytes) -> tuple[bool, ControllerState]:
     message = decoded(STATE, data)
     try:
         return message.anew, _give(_Reading(message), "", ControllerState)
-    except (ValueError, KeyError, StopIteration) as error:
+    except (ValueError, KeyError, IndexError, StopIteration) as error:
         raise RecordingError(
             f"The controller's state in the recording is that of another version ({error}): open it with the version"
             " that made it."

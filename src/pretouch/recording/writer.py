@@ -17,10 +17,12 @@ import numpy as np
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.recording.codec import (
+    IMU,
     INPUTS,
     STEP,
     TOUCH,
     TRUTH,
+    encode_imu,
     encode_inputs,
     encode_step,
     encode_touch,
@@ -123,6 +125,10 @@ class Recording:
             items.append(Item("/pretouch/touch", TOUCH, number, time, touch))
         self._command = step.command if whole else None
         items.append(Item("/pretouch/inputs", INPUTS, number, time, data))
+        imu = getattr(cycle.inputs, "imu", None)
+        samples = None if imu is None else encode_imu(number, step.stamp, imu)
+        if samples is not None:
+            items.append(Item("/pretouch/imu", IMU, number, time, samples))
         tangent = self._tangent(step.path_phase)
         items.append(Item("/pretouch/step", STEP, number, time, encode_step(number, step, tangent)))
         if truth is not None:

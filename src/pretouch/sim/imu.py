@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled
+from pretouch.robot.link_motion import cross
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
@@ -52,6 +53,14 @@ class ImuParams(Checked):
     """Density of white noise [ug/sqrt(Hz)] (data sheet, An)."""
     angular_rate_noise_mdps: NonNegative = 7.0
     """Density of white noise [mdps/sqrt(Hz)] (data sheet, Rn)."""
+    vibration_m_s2: NonNegative = 0.0
+    """Standard deviation of what gears and structure shake each axis of the accelerometer with [m/s^2]. The links of
+    the simulated arm are rigid, so that they would not shake by themselves. An assumption, as is the resonance: each
+    unit's own, at rest as in motion."""
+    vibration_hz: Positive = 25.0
+    """Frequency of that resonance [Hz]: gear ripple of 241 cycles a turn at 0.65 rad/s."""
+    vibration_damping: Annotated[float, Check(low=0.0, high=1.0, open_low=True)] = 0.2
+    """Damping of it as a fraction of critical."""
 
 
 class ImuSample(NamedTuple):
@@ -98,6 +107,9 @@ class Imus:
         self._motion = data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc
         self._qvel, self._last_qvel = data.qvel, data.qvel.copy()
         self._felt = np.full((count, 6), np.nan)
+        self._shaking = np.zeros((2, count, 3))
+        self._shaken_by = np.random.default_rng([seed, 9])
+        self._resonance = _resonance(params, dt) if params.vibration_m_s2 > 0.0 else None
         plant.before_each_step(self._sample)
 
     def _sample(self, time: float) -> None:
@@ -112,13 +124,22 @@ class Imus:
         mujoco.mj_rnePostConstraint(plant.mj_model, plant.mj_data)
         self._qvel[:] = self._last_qvel = qvel
         taken = _take(
-            *self._motion, self._center, self._link, self._T, self._felt, self._follow, time - dt, dt,
+            *self._motion, self._center, self._link, self._T, self._shaken(), self._felt, self._follow, time - dt, dt,
             self._due, self.rate, self._mix, self._bias, self._noise, self._draws[self._drawn :], self._lsb,
             self._unit, self._time, self._counts,
         )  # fmt: skip
         self._drawn += taken
         for i in range(taken):
             self._send(ImuSample(int(self._unit[i]), float(self._time[i]), self._counts[i].copy()))
+
+    def _shaken(self) -> FloatArray:
+        """Return the vibration (K, 3) [m/s^2] at the accelerometers, one step after the last call."""
+        now, before = self._shaking
+        if self._resonance is not None:
+            keep, back, drive = self._resonance
+            now, before = keep * now - back * before + drive * self._shaken_by.standard_normal(now.shape), now
+            self._shaking = np.array((now, before))
+        return np.asarray(now)
 
 
 def imu_counts(params: ImuParams) -> FloatArray:
@@ -136,12 +157,22 @@ def _errors(params: ImuParams, count: int, rng: np.random.Generator) -> tuple[Fl
     return scale * turn, most * rng.uniform(-1, 1, (count, 6))
 
 
+def _resonance(params: ImuParams, dt: float) -> tuple[float, float, float]:
+    """Coefficients of x_k = keep x_(k-1) - back x_(k-2) + drive e_k, of white e: the vibration once a step `dt` [s]."""
+    w, damping = 2 * np.pi * params.vibration_hz, params.vibration_damping
+    back = np.exp(-2 * damping * w * dt)
+    keep = 2 * np.sqrt(back) * np.cos(w * np.sqrt(1 - damping**2) * dt)
+    # the variance of such a process (Box and Jenkins), for e of variance 1
+    variance = (1 + back) / ((1 - back) * ((1 + back) ** 2 - keep**2))
+    return float(keep), float(back), float(params.vibration_m_s2 / np.sqrt(variance))
+
+
 @compiled
 def _take(
     xpos: FloatArray, xmat: FloatArray, center: FloatArray, cvel: FloatArray, cacc: FloatArray, root: IntArray,
-    link: IntArray, T_link_sensor: FloatArray, felt: FloatArray, follow: FloatArray, now: float, dt: float,
-    due: FloatArray, rate: FloatArray, mix: FloatArray, bias: FloatArray, noise: FloatArray, draws: FloatArray,
-    lsb: FloatArray, unit: IntArray, time: FloatArray, counts: IntArray,
+    link: IntArray, T_link_sensor: FloatArray, shaken: FloatArray, felt: FloatArray, follow: FloatArray, now: float,
+    dt: float, due: FloatArray, rate: FloatArray, mix: FloatArray, bias: FloatArray, noise: FloatArray,
+    draws: FloatArray, lsb: FloatArray, unit: IntArray, time: FloatArray, counts: IntArray,
 ) -> int:  # fmt: skip
     """Follow the motion to `now`, `dt` after the last call [s], and take what samples are due; return how many.
 
@@ -153,6 +184,8 @@ def _take(
         true = _true(
             xpos[body], xmat[body], center[root[k]], cvel[body], cacc[body], T_link_sensor[k]
         )  # fmt: skip
+        for i in range(3):
+            true[3 + i] += shaken[k, i]
         for i in range(6):
             begun = not np.isnan(felt[k, i])
             before[i] = felt[k, i] if begun else true[i]
@@ -191,17 +224,11 @@ def _true(
             for j in range(3):
                 R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
     w, alpha = cvel[:3], cacc[:3]
-    velocity = cvel[3:] + _cross(w, arm)
-    acceleration = cacc[3:] + _cross(alpha, arm) + _cross(w, velocity)
+    velocity = cvel[3:] + cross(w, arm)
+    acceleration = cacc[3:] + cross(alpha, arm) + cross(w, velocity)
     own = np.zeros(6)
     for i in range(3):
         for j in range(3):
             own[i] += R[j, i] * w[j]
             own[3 + i] += R[j, i] * acceleration[j]
     return own
-
-
-@compiled
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross product (3,)."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -95,7 +95,7 @@ def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
     chosen, kinds = family["contact"], family["contact"]["kind"]
     every = [(k, duration) for k, kind in enumerate(kinds) for duration in kind["durations_s"]]
     at, found = float(family["duration"]["warm_up_s"]), []
-    q = brought_to(model(), path_of("rest").point(0.0))
+    q = start_posture()
     for _ in range(cell.count):
         k, duration = every[int(rng.integers(len(every)))]
         name = chosen["links"][int(rng.integers(len(chosen["links"])))]
@@ -109,6 +109,11 @@ def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
         found.append(touch)
         at = touch.end + rng.uniform(*family["duration"]["gap_s"])
     return found
+
+
+def start_posture() -> FloatArray:
+    """Joint positions (n,) in which the paths begin [rad]."""
+    return brought_to(model(), path_of("rest").point(0.0))
 
 
 def place_on(

@@ -1,0 +1,265 @@
+"""Impacts, by the units' accelerometers: what they measure less what the commanded motion explains.
+
+Each sample is put into a bin of 10 ms by its own stamp: units send at different times, a datagram at a time, and only
+what they felt at the same time can be compared. `impact_pattern` says of a bin which link's contact explains it. From
+that follow gains on the links of the sequential test, for a short while; where nothing jolts they are 1.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.contact.cues import Cues, no_cues
+from pretouch.contact.impact_pattern import likelihoods, responses
+from pretouch.params import DetectionParams, Profile
+from pretouch.robot.link_motion import chain_motion, lever_acceleration
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.sensing.imu_scale import STANDARD_GRAVITY
+from pretouch.sensing.skin import Skin
+from pretouch.types import BoolArray, FloatArray, ImuReadings, IntArray, RobotState
+from pretouch.values import value
+
+BIN_S = 0.01
+"""Length of a bin [s]: about that of an impact of a hand, and four samples."""
+BINS = 8
+"""Bins that are kept: the oldest datagram is 60 ms old."""
+SETTLED = 100
+"""Bins of a unit after which its mean and spread are known."""
+_MEAN_S = 0.3
+"""Time over which a unit's mean innovation is averaged [s]: bias, mounting and scale errors times a turning gravity."""
+_SPREAD_S = 10.0
+"""Time over which its spread is."""
+_LEAST = 0.02
+"""Smallest standard deviation of a bin's mean [m/s^2]: noise of 90 ug/sqrt(Hz) at 100 Hz is 0.01."""
+_OUTLIER = 9.0
+"""Squared deviation from which a bin counts for less in what is learnt: most of an impact is not learnt as noise."""
+_FINE_S = 0.001
+"""Longest step in which the arm's way after a command is reckoned [s]."""
+
+
+@value
+class ImpactState:
+    """What is remembered of B bins of K units."""
+
+    number: int
+    """Number of the newest bin; bin b lasts from b `BIN_S` on."""
+    felt: FloatArray
+    """(B, K, 3) sums of the accelerations in each bin, bin b in place b mod B [m/s^2]."""
+    heard: IntArray
+    """(B, K) how many there are."""
+    expected: FloatArray
+    """(B, K, 3) sums of those that the motion explains."""
+    moved: FloatArray
+    """(B, K) sums of their size, gravity left out."""
+    told: IntArray
+    """(B,) how many steps they are of."""
+    mean: FloatArray
+    """(K, 3) mean innovation of each unit [m/s^2]."""
+    spread: FloatArray
+    """(K, 3) its variance, of whole bins [m^2/s^4]."""
+    usual: FloatArray
+    """(K,) mean count of samples in a bin."""
+    seen: IntArray
+    """(K,) bins learnt from."""
+    speed: FloatArray
+    """(n,) joint velocities as the arm follows its commands [rad/s]."""
+    behind: FloatArray
+    """(n,) by how much it is behind them [rad]."""
+    excess: FloatArray
+    """(L,) gain of each link less 1."""
+
+
+def impact_init(model: RobotModel, units: int) -> ImpactState:
+    """Return the state of so many units before their first sample."""
+    grid = (BINS, units)
+    return ImpactState(
+        number=-1, felt=np.zeros((*grid, 3)), heard=np.zeros(grid, np.int64), expected=np.zeros((*grid, 3)),
+        moved=np.zeros(grid), told=np.zeros(BINS, np.int64), mean=np.zeros((units, 3)), spread=np.zeros((units, 3)),
+        usual=np.zeros(units), seen=np.zeros(units, np.int64), speed=np.zeros(model.n), behind=np.zeros(model.n),
+        excess=np.zeros(len(model.links)),
+    )  # fmt: skip
+
+
+def listen(
+    state: ImpactState, model: RobotModel, skin: Skin, kin: Kinematics, robot: RobotState, imu: ImuReadings,
+    now: float, profile: Profile,
+) -> tuple[Cues, ImpactState]:  # fmt: skip
+    """Take in the samples that came since the last step, and return what they say of an impact.
+
+    Args:
+        state: memory.
+        model: the arm.
+        skin: its units.
+        kin: its posture.
+        robot: its state.
+        imu: samples; units and numbers must be sound.
+        now: instant of the step [s].
+        profile: parameters.
+    """
+    p, s, period = profile.detection, state, profile.task.control_period_s
+    number = math.floor((now - 0.5 * period) / BIN_S)
+    gap = number - s.number
+    if not 0 <= gap < BINS:  # the first step, or time has jumped: no bin is whole
+        fresh = impact_init(model, len(skin))
+        s = ImpactState(
+            number, fresh.felt, fresh.heard, fresh.expected, fresh.moved, fresh.told, s.mean, s.spread, s.usual,
+            s.seen, robot.qd_commanded, fresh.behind, fresh.excess,
+        )  # fmt: skip
+        gap = 0
+    felt, heard, expected, moved, told = s.felt.copy(), s.heard.copy(), s.expected.copy(), s.moved.copy(), s.told.copy()
+    mean, spread, usual, seen = s.mean.copy(), s.spread.copy(), s.usual.copy(), s.seen.copy()
+    speed, behind, excess = s.speed.copy(), s.behind.copy(), s.excess * math.exp(-period / p.imu_memory_s)
+    likelihood = np.zeros((BINS, len(model.parts)))
+    judged = _listen(
+        number, gap, period, kin.anchor, kin.axis, kin.position, kin.rotation, model.moved_by, model.mass, model.com,
+        model.inertia, model.parts, model.middle, skin.link, skin.T_link_sensor, robot.qd_commanded,
+        imu.unit, imu.stamp, imu.acceleration, felt, heard, expected, moved, told, mean, spread, usual, seen,
+        speed, behind, p.imu_follow_1_s, p.imu_motion_doubt, p.rotor_kg_m2, p.imu_contact_gain, p.imu_tails, likelihood,
+    )  # fmt: skip
+    if judged:
+        _raise(excess, likelihood, model.parts, p)
+    after = ImpactState(
+        number, felt, heard, expected, moved, told, mean, spread, usual, seen, speed, behind, excess
+    )  # fmt: skip
+    return replace(no_cues(len(model.links)), gain=1.0 + excess), after
+
+
+def _raise(excess: FloatArray, likelihood: FloatArray, parts: IntArray, p: DetectionParams) -> None:
+    """Raise the gains (L,) of links to what the bin that says most, of likelihood ratios (B, P), says of them.
+
+    Their mean is the ratio of an impact anywhere; it is what is bounded, so that all links together weigh so much more.
+    """
+    anywhere, most = likelihood.mean(axis=1), p.imu_gain - 1.0
+    b = int(anywhere.argmax())
+    if anywhere[b] > 0.0:
+        excess[parts] = np.maximum(excess[parts], min(1.0, most / float(anywhere[b])) * likelihood[b])
+        # what fades may be on other links than what is new
+        excess[parts] *= min(1.0, most / float(excess[parts].mean()))
+
+
+@compiled
+def _listen(
+    number: int, gap: int, period: float, anchor: FloatArray, axis: FloatArray, position: FloatArray,
+    rotation: FloatArray, moved_by: BoolArray, mass: FloatArray, com: FloatArray, inertia: FloatArray, parts: IntArray,
+    middle: FloatArray, link: IntArray, T: FloatArray, qd_commanded: FloatArray, unit: IntArray, stamp: FloatArray,
+    acceleration: FloatArray, felt: FloatArray, heard: IntArray, expected: FloatArray, moved: FloatArray,
+    told: IntArray, mean: FloatArray, spread: FloatArray, usual: FloatArray, seen: IntArray, speed: FloatArray,
+    behind: FloatArray, follow: float, motion_doubt: float, rotor: float, gain: float, tails: float,
+    likelihood: FloatArray,
+) -> int:  # fmt: skip
+    """Move the bins on to `number`, fill them, and write the likelihood ratios (B, P) of those that were added to.
+
+    Returns how many there are. Writes what is remembered.
+    """
+    for b in range(number - gap + 1, number + 1):
+        k = b % BINS
+        _learn(felt[k], heard[k], expected[k], told[k], mean, spread, usual, seen)
+        felt[k], heard[k], expected[k], moved[k], told[k] = 0.0, 0, 0.0, 0.0, 0
+    growth = _followed(qd_commanded, speed, behind, follow, period)
+    _expect(
+        anchor, axis, position, rotation, moved_by, link, T, speed, growth, expected[number % BINS],
+        moved[number % BINS],
+    )  # fmt: skip
+    told[number % BINS] += 1
+    fresh = np.zeros(BINS, np.bool_)
+    for i in range(len(unit)):
+        b = int(np.floor(stamp[i] / BIN_S))
+        if number - BINS < b <= number:
+            k = b % BINS
+            felt[k, unit[i]] += acceleration[i]
+            heard[k, unit[i]] += 1
+            fresh[k] = True
+    judged = 0
+    A = np.empty((0, 0, 3, 3))
+    for k in range(BINS):
+        if fresh[k] and told[k]:
+            if not judged:
+                A = responses(
+                    anchor, axis, position, rotation, moved_by, mass, com, inertia, rotor, parts, middle, link, T
+                )
+            judged += 1
+            z, variance, known = _innovation(
+                felt[k], heard[k], expected[k], moved[k], told[k], mean, spread, usual, seen, motion_doubt
+            )
+            likelihoods(z, variance, known, A, gain, tails, likelihood[k])
+    return judged
+
+
+@compiled
+def _followed(
+    commanded: FloatArray, speed: FloatArray, behind: FloatArray, follow: float, period: float
+) -> FloatArray:  # fmt: skip
+    """Let the arm follow commanded velocities (n,) for a period [s]; return its mean acceleration (n,) [rad/s^2].
+
+    A critically damped joint impedance about the commanded positions and velocities.
+    """
+    steps = int(np.ceil(period / _FINE_S))
+    dt, before = period / steps, speed.copy()
+    for j in range(len(commanded)):
+        for _ in range(steps):
+            ahead = commanded[j] - speed[j]
+            behind[j] += ahead * dt
+            speed[j] += (follow * follow * behind[j] + 2.0 * follow * ahead) * dt
+    return (speed - before) / period
+
+
+@compiled
+def _expect(
+    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
+    link: IntArray, T: FloatArray, qd: FloatArray, qdd: FloatArray, expected: FloatArray, moved: FloatArray,
+) -> None:  # fmt: skip
+    """Add to `expected` (K, 3) the specific force of each unit, sensor frame, and to `moved` (K,) the motion's size."""
+    w, alpha, a, point = chain_motion(anchor, axis, qd, qdd)
+    for u in range(len(link)):
+        body, k = link[u], moved_by[link[u]].sum()
+        R = rotation[body] @ np.ascontiguousarray(T[u, :3, :3])
+        place = position[body] + rotation[body] @ np.ascontiguousarray(T[u, :3, 3])
+        force = a[k] + lever_acceleration(w[k], alpha[k], place - point[k])
+        moved[u] += np.sqrt(force @ force)
+        force[2] += STANDARD_GRAVITY
+        expected[u] += R.T @ force
+
+
+@compiled
+def _innovation(
+    felt: FloatArray, heard: IntArray, expected: FloatArray, moved: FloatArray, told: int, mean: FloatArray,
+    spread: FloatArray, usual: FloatArray, seen: IntArray, motion_doubt: float,
+) -> tuple[FloatArray, FloatArray, BoolArray]:  # fmt: skip
+    """Innovations (K, 3) of one bin with their variances (K, 3), and which units' are known (K,)."""
+    z, variance, known = np.zeros(mean.shape), np.ones(mean.shape), np.zeros(len(mean), np.bool_)
+    for u in range(len(mean)):
+        if heard[u] and seen[u] >= SETTLED:
+            known[u] = True
+            fewer = max(1.0, usual[u] / heard[u])
+            for i in range(3):
+                z[u, i] = felt[u, i] / heard[u] - expected[u, i] / told - mean[u, i]
+                variance[u, i] = fewer * spread[u, i] + (motion_doubt * moved[u] / told) ** 2
+    return z, variance, known
+
+
+@compiled
+def _learn(
+    felt: FloatArray, heard: IntArray, expected: FloatArray, told: int, mean: FloatArray, spread: FloatArray,
+    usual: FloatArray, seen: IntArray,
+) -> None:  # fmt: skip
+    """Learn mean and spread (K, 3) of the units from a bin that gets no more samples; outliers count for less."""
+    if not told:
+        return
+    for u in range(len(mean)):
+        if not heard[u]:
+            continue
+        first = 1.0 / (seen[u] + 1)
+        slow, slower = max(first, BIN_S / _MEAN_S), max(first, BIN_S / _SPREAD_S)
+        usual[u] += slower * (heard[u] - usual[u])
+        for i in range(3):
+            z = felt[u, i] / heard[u] - expected[u, i] / told - mean[u, i]
+            if seen[u] == 0:
+                mean[u, i] = z
+                continue
+            most = _OUTLIER * spread[u, i]
+            within = 1.0 if seen[u] < SETTLED or z * z < most else np.sqrt(most) / abs(z)
+            mean[u, i] += slow * within * z
+            spread[u, i] = max(spread[u, i] + slower * ((within * z) ** 2 - spread[u, i]), _LEAST**2)
+        seen[u] += 1

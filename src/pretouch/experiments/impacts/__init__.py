@@ -1,0 +1,1 @@
+"""Impacts felt by the units' accelerometers: contacts, their judgement, tables."""
