@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from pretouch.types import FloatArray, RangeReadings, RobotState
+from pretouch.types import FloatArray, RangeReadings, RobotState, SeenPoints
 
 
 class Robot(Protocol):
@@ -22,6 +22,14 @@ class Skin(Protocol):
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit."""
+        ...
+
+
+class Points(Protocol):
+    """An outside source of points, such as a camera."""
+
+    def read(self) -> SeenPoints:
+        """Return the newest set; the same one again, and at once, while there is no newer one."""
         ...
 
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pretouch.experiments import avoidance, clamp, dynamic, mounting, static, wire
+from pretouch.experiments import avoidance, clamp, dynamic, mounting, static, vision, wire
 from pretouch.experiments.claims import anticipation, between, detectable, free_motion, noise
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.tables import TextTable
@@ -38,6 +38,7 @@ WEAKNESSES = (
 HARDWARE = (wire.EXPERIMENT,)
 MOUNTING = (mounting.EXPERIMENT,)
 REACTION = (clamp.EXPERIMENT,)
+VISION = (vision.EXPERIMENT,)
 
 GROUPS = {
     "The paper's experiments": PAPER,
@@ -46,6 +47,7 @@ GROUPS = {
     "Readings over the wire": HARDWARE,
     "Where units sit": MOUNTING,
     "Caught between two things": REACTION,
+    "A camera beside the skin": VISION,
 }
 """All experiments by what they are for, in the order of the page."""
 EXPERIMENTS: dict[str, Experiment] = {e.name: e for group in GROUPS.values() for e in group}

@@ -23,10 +23,11 @@ LIBRARY = f"pretouch {pretouch.__version__}"
 PACKAGE = "pretouch_msgs"
 OWN = (
     "RobotState", "RangeReadings", "Inputs", "Obstacles", "Thresholds", "Contact", "QpSolution", "Step", "Run", "State",
-    "Truth", "UnitSample",
+    "Truth", "UnitSample", "SeenPoints",
 )  # fmt: skip
 """Our types; each has a file in `msg/`."""
-TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in ("Run", "Inputs", "Step", "State", "Truth")}
+_ON_TOPICS = ("Run", "Inputs", "Step", "State", "Truth", "SeenPoints")
+TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in _ON_TOPICS}
 """Type of the messages on each of our topics."""
 
 _HEAD = 4

@@ -3,13 +3,14 @@
 import struct
 from bisect import bisect_right
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
-from pretouch.recording.codec import decode_inputs, decode_step, decode_truth
+from pretouch.recording.codec import decode_inputs, decode_points, decode_step, decode_truth
 from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.recorded_path import Tangents
@@ -78,12 +79,24 @@ class Recorded:
         anew, snapshot = (False, None) if state is None else decode_state(state)
         return Kept(
             run=max(0, bisect_right(self._begins, number) - 1),
-            inputs=None if inputs is None else decode_inputs(inputs)[1],
+            inputs=None if inputs is None else self._with_points(number, decode_inputs(inputs)[1]),
             step=decode_step(raw["/pretouch/step"][number])[1],
             truth=None if truth is None else decode_truth(truth)[1],
             snapshot=snapshot,
             anew=anew,
         )
+
+    def _with_points(self, number: int, inputs: Inputs | None) -> Inputs | None:
+        """Return inputs with the points of outside sources, if there were any; None where these are missing."""
+        raw = self._raw["/pretouch/seenpoints"]
+        if inputs is None or number not in raw:
+            return inputs
+        same_as, points = decode_points(raw[number])
+        if same_as != number:
+            if same_as not in raw:
+                return None
+            points = decode_points(raw[same_as])[1]
+        return replace(inputs, points=points)
 
     def __iter__(self) -> Iterator[Kept]:
         return (self[i] for i in range(len(self)))

@@ -118,13 +118,25 @@ class _Reading:
     """The parts of a State message, to be taken in turn."""
 
     def __init__(self, message: Any) -> None:
-        self._parts = zip(message.name, message.kind, message.shape, strict=True)
+        self._parts = list(zip(message.name, message.kind, message.shape, strict=True))[::-1]
         self._numbers, self._used = message.numbers, 0
         self._wholes = iter(message.wholes.tolist())
         self._texts = iter(message.texts)
 
+    def none(self, name: str) -> bool:
+        """Whether nothing was kept under a name: then it is taken.
+
+        What a state remembers last may have come with a later version than the recording's.
+        """
+        if self._parts and self._parts[-1][:2] == (name, "none"):
+            self._parts.pop()
+            return True
+        return not self._parts
+
     def next(self, name: str) -> tuple[str, str]:
-        found, kind, shape = next(self._parts)
+        if not self._parts:
+            raise ValueError(f"it ends where {name!r} belongs")
+        found, kind, shape = self._parts.pop()
         if found != name:
             raise ValueError(f"{found!r} where {name!r} belongs")
         return kind, shape
@@ -160,13 +172,13 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
     """Return the next value, annotated with a type."""
     optional = get_origin(hint) in (Union, UnionType)
     if optional:
+        if parts.none(name):
+            return None
         hint = _without_none(hint)
     if is_dataclass(hint):
         kind = hint if isinstance(hint, type) else type(hint)
         return kind(**{f: _give(parts, f"{name}.{f}" if name else f, inner) for f, inner in _hints(kind)})
     kind_name, shape = parts.next(name)
-    if optional and kind_name == "none":
-        return None
     if kind_name == "tuple":
         return tuple(_give(parts, f"{name}.{i}", inner) for i, inner in enumerate(_inner(hint, int(shape))))
     if kind_name == "array":
