@@ -67,8 +67,7 @@ def cells(grid: Grid) -> list[Cell]:
     return [
         Cell(NAME, name, {"scene": scene, "sensing": sensing, "view": view, "restrictions": mode})
         for (name, mode), scene, sensing in product(grid.controllers(DEFAULT_RESTRICTIONS), SCENES, SENSING)
-        if profile(name).perception.enabled
-        and (sensing == "skin" or profile(name).perception.outside_points > 0)
+        if profile(name).perception.enabled and (sensing == "skin" or profile(name).perception.outside_points > 0)
         for view in ((NO_VIEW,) if sensing == "skin" else VIEWS)
     ]
 
@@ -129,7 +128,7 @@ def results(record: Record, scene: Scene, model: RobotModel, d_max: float) -> Ro
         row["unseen_close_s"] = rounded(float((~shown & (truth.distance < _CLOSE_M)).sum()) * (times[1] - times[0]))
     if shown.any():
         first = int(np.argmax(shown))
-        row["first_seen_m"] = rounded(truth.distance[first])
+        row["first_seen_m"] = rounded(truth.distance[first], 4)
         touch = record.first_contact()
         row["seen_before_s"] = None if touch is None else rounded(touch - times[first])
     return row

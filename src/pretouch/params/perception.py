@@ -50,6 +50,10 @@ class PerceptionParams(Checked):
     outside_persistence_s: Positive = 0.15
     """How long such a point is kept after the measurement that showed it [s]: 60 ms of latency and two lost frames of a
     camera at 30 Hz."""
+    outside_hidden_s: NonNegative = 3.0
+    """How long such a point is kept where the arm has come so near to it that it would be taken for the arm [s]: what a
+    source shows there says nothing. At 0.03 m/s, about a touch speed, it is the way through that margin. 0: as any
+    other point."""
     outside_slow_after_s: Positive = 0.2
     """Age of an outside source's newest measurement at which the arm begins to slow [s]: as that, and another frame."""
     outside_silent_after_s: Positive = 0.4

@@ -17,7 +17,7 @@ _ONE_INSTANT = 1e-3
 """Stamps that differ by less [s] are taken as one: in that time no arm moves by more than 2 mm."""
 _APART = 0.5
 """Points of one link are kept whose directions from it have at most this cosine: 60 degrees between them."""
-_UNKNOWN, _OBSTACLE, _EXPLAINED = range(3)
+_UNKNOWN, _OBSTACLE, _EXPLAINED, _HIDDEN = range(4)
 
 
 @compiled
@@ -46,25 +46,38 @@ def take_points(
     point: FloatArray, sigma: FloatArray, now: float, body_link: IntArray, body_from: FloatArray, body_to: FloatArray,
     body_radius: FloatArray, place: IntArray, arm_link: IntArray, arm_ends: FloatArray, arm_radius: FloatArray,
     other_ends: FloatArray, other_radius: FloatArray, planes: FloatArray, anchor: FloatArray, axis: FloatArray,
-    moved_by: BoolArray, qd: FloatArray, posed: float, persistence: float, margin: float, sigmas: float, kept: int,
-    memory: float,
+    moved_by: BoolArray, qd: FloatArray, posed: float, persistence: float, hidden: float, margin: float, sigmas: float,
+    kept: int, memory: float,
 ) -> None:  # fmt: skip
-    """Choose the points of each link's places, and change the tracks (first line of arguments) by them."""
-    count = 0
-    near, which = np.empty((len(stamp), 3)), np.empty(len(stamp), np.int64)
+    """Choose the points of each link's places, and change the tracks (first line of arguments) by them.
+
+    Points that were kept before stand for election with the new ones where the arm hides them. Of the tracks' times
+    `used` is when a point was measured, and `seen` when it was last known to be there or hidden.
+    """
+    ends = np.empty_like(arm_ends)
+    move_ends(arm_ends, arm_link, anchor, axis, moved_by, qd, posed - heard, ends)
+    placed_for, room = heard, len(stamp) + len(last)
+    near, spread, when = np.empty((room, 3)), np.empty(room), np.empty(room)
+    known, count = np.full(room, _UNKNOWN), 0
+    for p in range(len(last)):
+        u = sigmas * kept_sigma[p]
+        if now - times[USED, p] <= hidden and now - times[SEEN, p] <= persistence:
+            gap_of_arm = _gap(last, p, ends, arm_radius)
+            if -u <= gap_of_arm <= margin + u:
+                near[count], spread[count], when[count], known[count] = last[p], kept_sigma[p], times[USED, p], _HIDDEN
+                count += 1
     for m in range(len(stamp)):
         if _is_point(stamp[m], point, m, sigma[m]) and 0.0 <= now - stamp[m] <= persistence:
-            near[count], which[count] = point[m], m
+            near[count], spread[count], when[count] = point[m], sigma[m], stamp[m]
             count += 1
-    near, which = near[:count], which[:count]
+    near = near[:count]
     body_point, link, gap = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
     direction = np.zeros((count, 3))
     direction[:, 2] = 1.0
     closest(body_link, body_from, body_to, body_radius, near, body_point, link, direction, gap)
     for m in range(count):
-        gap[m] -= sigmas * sigma[which[m]]
+        gap[m] -= sigmas * spread[m]
 
-    known, ends, placed_for = np.full(count, _UNKNOWN), arm_ends.copy(), np.nan
     chosen = np.full(len(kept_sigma), -1, np.int64)
     for rank in range(kept):
         for m in range(count):
@@ -72,18 +85,13 @@ def take_points(
             best = chosen[first + rank]
             if known[m] == _EXPLAINED or (best >= 0 and not gap[m] < gap[best]):
                 continue
-            apart = True
-            for other in range(rank):
-                c = chosen[first + other]
-                apart = apart and c >= 0 and c != m and dot(direction[c], direction[m]) <= _APART
-            if not apart:
+            if not _is_apart(direction, m, chosen[first : first + rank]):
                 continue
             if known[m] == _UNKNOWN:
-                k = which[m]
-                if not abs(stamp[k] - placed_for) < _ONE_INSTANT:
-                    placed_for = stamp[k]
+                if not abs(when[m] - placed_for) < _ONE_INSTANT:
+                    placed_for = when[m]
                     move_ends(arm_ends, arm_link, anchor, axis, moved_by, qd, posed - placed_for, ends)
-                within = margin + sigmas * sigma[k]
+                within = margin + sigmas * spread[m]
                 known[m] = _OBSTACLE
                 if (
                     _on_capsules(near, m, ends, arm_radius, within)
@@ -94,17 +102,37 @@ def take_points(
                     continue
             chosen[first + rank] = m
 
-    points, stamps, taken = np.zeros((len(chosen), 3)), np.full(len(chosen), heard), chosen >= 0
+    points, stamps, taken = np.zeros((len(chosen), 3)), np.full(len(chosen), heard), np.zeros(len(chosen), np.bool_)
     for p in range(len(chosen)):
-        if taken[p]:
-            points[p], stamps[p] = near[chosen[p]], stamp[which[chosen[p]]]
+        if chosen[p] >= 0:
+            points[p], stamps[p], taken[p] = near[chosen[p]], when[chosen[p]], known[chosen[p]] == _OBSTACLE
     if memory > 0:
         follow_points(motion, last, times[SEEN], points, stamps, taken, memory)
     for p in range(len(chosen)):
-        times[USED, p], times[HEARD, p] = heard, heard
-        if taken[p]:
-            times[SEEN, p], kept_sigma[p] = stamps[p], sigma[which[chosen[p]]]
-            last[p] = points[p]
+        times[HEARD, p] = heard
+        if chosen[p] >= 0:
+            last[p], kept_sigma[p], times[USED, p] = points[p], spread[chosen[p]], stamps[p]
+            times[SEEN, p] = stamps[p] if taken[p] else heard
+            if memory > 0 and not taken[p]:
+                motion[0, p], motion[1, p] = points[p], 0.0
+
+
+@compiled
+def _is_apart(direction: FloatArray, m: int, chosen: IntArray) -> bool:
+    """Whether point m lies in another direction from its link than all those chosen of it; not if one is missing."""
+    for c in chosen:  # noqa: SIM110  compiled code knows no generators
+        if c < 0 or c == m or dot(direction[c], direction[m]) > _APART:
+            return False
+    return True
+
+
+@compiled
+def _gap(points: FloatArray, m: int, ends: FloatArray, radius: FloatArray) -> float:
+    """Distance [m] of point m from the nearest of some placed capsules, negative inside."""
+    least = np.inf
+    for c in range(len(radius)):
+        least = min(least, to_axis(points, m, ends[0], ends[1], c)[1] - radius[c])
+    return least
 
 
 @compiled

@@ -137,7 +137,7 @@ def _taken(
         tracks.point, tracks.times, motion, sigma, points.heard, points.stamp, points.point, points.sigma, now,
         body.link, body_from, body_to, body.radius, place, arm.link, arm_ends, arm.radius, other_ends, others.radius,
         fixtures.planes, kin.anchor, kin.axis, model.moved_by, robot.qd, robot.stamp, params.outside_persistence_s,
-        params.outside_margin_m, params.spread_sigmas, params.outside_points,
+        params.outside_hidden_s,        params.outside_margin_m, params.spread_sigmas, params.outside_points,
         params.closing_memory_s if params.closing_speed else 0.0,
     )  # fmt: skip
     return OutsideState(tracks, sigma, points.heard)
