@@ -62,13 +62,10 @@ def test_an_arm_slows_before_what_only_an_outside_source_sees(panda_model, paper
     for _ in range(400):
         step, ahead = turn(arm, seen(arm.time, place)), turn(free, None)
         fastest = max(fastest, ahead.ee_velocity[1])
-        distance = step.obstacles.body_distance.min(initial=1.0)
-        if distance <= 0.0:
-            break  # there it would be felt
-        if distance < 0.02:
-            assert step.obstacles.unit.min() >= units
-            speeds.append(step.ee_velocity[1])
-    assert distance <= 0.0
+        nearest = step.obstacles
+        if len(nearest.unit) and nearest.body_distance.min() < 0.02 and nearest.direction[0, 1] > 0.8:
+            assert nearest.unit.min() >= units
+            speeds.append(step.ee_velocity[1])  # it goes straight at the point
     assert fastest > 0.25
     assert len(speeds) > 5
     assert 0.0 < max(speeds) < 0.5 * fastest

@@ -115,7 +115,7 @@ def results(record: Record, scene: Scene, model: RobotModel, d_max: float) -> Ro
     of_it = [_distances(step.obstacles.point, shape) < _SAME_M for step, shape in zip(steps, shapes, strict=True)]
     near = [step.obstacles.body_distance < _FALSE_M for step in steps]
     row["false_fraction"] = rounded(
-        np.mean([bool((close & ~true).any()) for close, true in zip(near, of_it, strict=True)]), 4
+        float(np.mean([bool((close & ~true).any()) for close, true in zip(near, of_it, strict=True)])), 4
     )
     if scene.object is None:
         return row
