@@ -69,8 +69,10 @@ def test_the_arm_hides_a_hand_from_the_camera_and_the_skin_still_sees_what_comes
         return vision.trial(Cell("vision", "pretouch", where), 1000, context)[0]
 
     front, behind = (played("hand", "camera", view) for view in ("front", "behind"))
+    both = played("hand", "both", "behind")
     assert front["seen_fraction"] > 0.7
     assert behind["seen_fraction"] < 0.5 * front["seen_fraction"]
+    assert both["seen_fraction"] > behind["seen_fraction"] + 0.1
     room = played("room", "both", "front")
     assert room["false_fraction"] < 0.01
     board = played("board", "both", "behind")
