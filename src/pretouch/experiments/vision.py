@@ -33,6 +33,8 @@ VIEWS = {"front": (1.6, 0.0, 1.0), "behind": (0.5, 1.6, 0.5)}
 """Where the camera is [m]: in front of the arm, above what comes near; or on the other side of the arm than the board
 and the person's hand, so that the arm hides them."""
 NO_VIEW = "none"
+_OWN_PROFILE = "pretouch"
+"""Run beside those asked for: a profile that takes outside points."""
 
 _LOOKS_AT_M = (0.4, 0.0, 0.3)
 _SIDE = "-y"
@@ -63,10 +65,14 @@ class Scene:
 
 
 def cells(grid: Grid) -> list[Cell]:
-    """Each scene with the skin alone, for each profile that senses; with a camera for those that take its points."""
+    """Each scene with the skin alone, for each profile that senses; with a camera for those that take its points.
+
+    `pretouch` is among them whatever is asked for.
+    """
+    modes = Grid(tuple(dict.fromkeys((*grid.profiles, _OWN_PROFILE))), grid.restrictions)
     return [
         Cell(NAME, name, {"scene": scene, "sensing": sensing, "view": view, "restrictions": mode})
-        for (name, mode), scene, sensing in product(grid.controllers(DEFAULT_RESTRICTIONS), SCENES, SENSING)
+        for (name, mode), scene, sensing in product(modes.controllers(DEFAULT_RESTRICTIONS), SCENES, SENSING)
         if profile(name).perception.enabled and (sensing == "skin" or profile(name).perception.outside_points > 0)
         for view in ((NO_VIEW,) if sensing == "skin" else VIEWS)
     ]
