@@ -92,7 +92,8 @@ def test_no_number_but_beta_may_be_negative(params: object, name: str):
 
 @pytest.mark.parametrize(("params", "name"), COUNTS, ids=name_of)
 def test_counts_are_whole_and_not_zero(params: object, name: str):
-    for value in (0, 100.5):
+    may_be_none = name == "outside_points"
+    for value in (-1 if may_be_none else 0, 100.5):
         with pytest.raises(ParameterError, match=name):
             replace(params, **{name: value})
 

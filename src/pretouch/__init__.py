@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from pretouch.types import RangeReadings as RangeReadings
     from pretouch.types import RangeStatus as RangeStatus
     from pretouch.types import RobotState as RobotState
+    from pretouch.types import SeenPoints as SeenPoints
 
 _PLACES = {
     "contact.detect": ("detect",),
@@ -76,7 +77,7 @@ _PLACES = {
     "robot.model": ("RobotModel",),
     "sensing.skin": ("Skin", "load_skin", "paper_skin"),
     "sensing.unit": ("SensorUnit",),
-    "types": ("ControlStep", "Inputs", "Mode", "Obstacles", "RangeReadings", "RangeStatus", "RobotState"),
+    "types": ("ControlStep", "Inputs", "Mode", "Obstacles", "RangeReadings", "RangeStatus", "RobotState", "SeenPoints"),
 }
 _PLACE = {name: f"pretouch.{module}" for module, names in _PLACES.items() for name in names}
 

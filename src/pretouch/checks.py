@@ -36,6 +36,7 @@ Negative = Annotated[float, Check(high=0.0, open_high=True)]
 Positive = Annotated[float, Check(low=0.0, open_low=True)]
 NonNegative = Annotated[float, Check(low=0.0)]
 Fraction = Annotated[float, Check(low=0.0, high=1.0)]
+Count = Annotated[int, Check(low=0)]
 PositiveCount = Annotated[int, Check(low=1)]
 
 

@@ -16,14 +16,24 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.tactile import TouchState, feel_touch, touch_init, touch_settings
 from pretouch.control import path as paths
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.near import NearState, near_init, near_motion, near_settings
+from pretouch.control.near import NearState, near_init, near_motion, near_settings, widened
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import doing, events_of
-from pretouch.faults import Watch, examine, sound_imu, sound_readings, sound_robot, sound_touch, watch_init
+from pretouch.faults import (
+    Watch,
+    examine,
+    sound_imu,
+    sound_points,
+    sound_readings,
+    sound_robot,
+    sound_touch,
+    watch_init,
+)
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.params import Profile
 from pretouch.perception.obstacles import TrackState, track_init
+from pretouch.perception.outside import OutsideState, outside_silence, see_outside
 from pretouch.perception.perceive import perceive, silent_units
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import RobotModel
@@ -52,6 +62,8 @@ class ControllerState:
     """Of the units with a touch sensor, one; none unless there are such units and the profile uses them."""
     impact: tuple[ImpactState, ...] = ()
     """Of the units' accelerometers, one; none before IMU samples came, or if the profile does not use them."""
+    outside: OutsideState | None = None
+    """What outside sources showed; None before there is one."""
 
 
 STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motion", "record")
@@ -110,6 +122,7 @@ class Controller:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.threshold.window_samples == theirs.threshold.window_samples
         same_window = same_window and mine.detection.method == theirs.detection.method
+        same_points = mine.perception.outside_points == theirs.perception.outside_points
         way = state.path
         if self.path is not before.path:
             way = paths.joined(self.path, self.model.kinematics(robot.q).position[self.model.ee])
@@ -120,6 +133,7 @@ class Controller:
             path=way,
             near=near_init(self.model, len(self.skin)) if mine.anticipation != theirs.anticipation else state.near,
             touch=state.touch if mine.detection == theirs.detection else touch_init(self._touching),
+            outside=state.outside if same_points else None,
         )
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
@@ -138,6 +152,7 @@ class Controller:
         )
         readings, unfit = sound_readings(inputs.readings, len(self.skin))
         touches, wrong = sound_touch(inputs.touch, len(self.skin)) if self._touching else (None, "")
+        points, lost = sound_points(inputs.points)
         unfit, now = unfit or wrong, watch.stamp
         mark("state")
         kin = model.kinematics(robot.q)
@@ -147,7 +162,12 @@ class Controller:
         # what is near: eq. 1 and the closest points of the body
         known = track_init(len(self.skin)) if Event.TIME_BACKWARDS in events else state.tracks
         seen, tracks = perceive(known, model, self.skin, self.fixtures, kin, readings, now, p.perception, robot)
+        seen, outside = see_outside(
+            state.outside, Event.TIME_BACKWARDS in events, seen, points, len(self.skin), model, self.fixtures, kin,
+            robot, now, p.perception,
+        )  # fmt: skip
         heard, silent = silent_units(self.skin, tracks, readings.status, seen.longest_silence, now, p.perception)
+        told, lost = outside_silence(outside, lost, now, p.perception)
         mark("perception")
 
         # what is felt: eqs. 8-11
@@ -164,11 +184,12 @@ class Controller:
         mark("contact")
 
         # what to do
-        close, before = bool(silent) or response.seen_near(seen.obstacles, p.reaction), doing(state.mode, felt.armed, p)
+        close = bool(silent or lost) or response.seen_near(seen.obstacles, p.reaction)
+        before = doing(state.mode, felt.armed, p)
         push = response.Felt(model, kin, robot, felt, close, state.command, p)
         react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
         events |= events_of(
-            unfit, silent, felt, feeling.window.count, react, close, before, state.near.detour.blocked, p
+            unfit, silent, lost, felt, feeling.window.count, react, close, before, state.near.detour.blocked, p
         )  # fmt: skip
         mode = next_mode(state.mode, events, inputs.resume)
         contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
@@ -178,7 +199,7 @@ class Controller:
 
         # how fast: eqs. 3-4 on the path, or eq. 12
         slowed = speed_scale(seen.nearest, p.reduction.d_max_m) if p.reduction.enabled else 1.0
-        scale, reduction = reduce_speed(state.reduction, min(heard, slowed), p.reduction)
+        scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.reduction)
         shifted = x - state.near.detour.offset if p.anticipation.detour else x
         way = paths.follow(self.path, state.path, shifted, p.task)
         answer, react = response.answered(react, doing(mode, felt.armed, p), push)
@@ -187,8 +208,10 @@ class Controller:
 
         # how near: eqs. 5-7, and the joint velocities: eq. 2
         touch = None if answer is None else answer.touch
+        room = len(self.skin) + (0 if outside is None else len(outside.sigma))
         motion, near = near_motion(
-            state.near, self._nearness, model, kin, robot, seen.obstacles, desired, state.rotation_goal, self.limits, p,
+            widened(state.near, room), self._nearness, model, kin, robot, seen.obstacles, desired,
+            state.rotation_goal, self.limits, p,
             mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch,
         )  # fmt: skip
         qp = motion.qp
@@ -213,7 +236,7 @@ class Controller:
             path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
             near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal, touch=touched,
-            impact=impact,
+            impact=impact, outside=outside,
         )  # fmt: skip
         mark("record")
         return step, after

@@ -22,7 +22,7 @@ def doing(mode: ModeState, armed: bool, params: Profile) -> Doing:
 
 
 def events_of(
-    unfit: str, silent: str, felt: Detection, samples: int, answer: ResponseState, near: bool, before: Doing,
+    unfit: str, silent: str, lost: str, felt: Detection, samples: int, answer: ResponseState, near: bool, before: Doing,
     blocked: float, p: Profile,
 ) -> dict[Event, str]:  # fmt: skip
     """Name what was seen, heard and felt in one step.
@@ -41,6 +41,8 @@ def events_of(
         events[Event.SKIN_UNFIT] = unfit
     if silent:
         events[Event.SKIN_SILENT] = silent
+    if lost:
+        events[Event.POINTS_LOST] = lost
     if not felt.armed and p.detection.method != "thresholds" and bool(np.isnan(felt.residual).any()):
         events.setdefault(Event.NO_FORCE, f"up to {p.failure.force_timeout_s:g} s")
     elif not felt.armed:

@@ -7,6 +7,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.modes import Event
 from pretouch.params import FailureParams
+from pretouch.perception.chosen_points import usable
 from pretouch.types import (
     WHOLE,
     FloatArray,
@@ -15,6 +16,7 @@ from pretouch.types import (
     RangeReadings,
     RangeStatus,
     RobotState,
+    SeenPoints,
     TouchReadings,
 )
 from pretouch.values import value
@@ -33,6 +35,8 @@ _LATEST = 1e12
 
 MOST_IMU = 64
 """IMU samples of a unit that one step takes in: two of the longest datagrams."""
+MOST_POINTS = 20_000
+"""Points of outside sources that are taken in one step: what they cost stays bounded."""
 
 _PARTS = ("joint positions", "joint velocities", "commanded joint positions", "commanded joint velocities")
 
@@ -265,6 +269,32 @@ def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings 
     stamp[np.isnan(stamp)] = -np.inf
     force[~((force >= 0.0) & (force < _STRONGEST))] = np.nan
     return TouchReadings(stamp, contact != 0, force, status.astype(np.int64)), ""
+
+
+def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
+    """Give points of outside sources as arrays of float64; of those that cannot be used, take none and say why.
+
+    A set of which more than half the points are no such thing cannot be used; single ones are left out later. No copy
+    is made, for nothing of the arrays is kept beyond the step.
+    """
+    if points is None:
+        return None, ""
+    try:
+        heard = float(points.heard)
+        given = points.stamp, points.point, points.sigma
+        stamp, point, sigma = (np.ascontiguousarray(part, dtype=np.float64) for part in given)
+    except AttributeError:
+        return None, f"gives {points!r}"
+    except (TypeError, ValueError, OverflowError):
+        return None, "gives what is no arrays of numbers"
+    if stamp.shape != sigma.shape or point.shape != (*stamp.shape, 3) or stamp.ndim != 1:
+        return None, f"gives stamps, points and sigmas of the shapes {stamp.shape}, {point.shape} and {sigma.shape}"
+    if len(stamp) > MOST_POINTS:
+        return None, f"gives {len(stamp)} points, more than {MOST_POINTS}"
+    good, none = usable(stamp, point, sigma)
+    if 2 * good < len(stamp) - none:
+        return None, f"gives {len(stamp) - none - good} of {len(stamp) - none} points that are none"
+    return SeenPoints(heard, stamp, point, sigma), ""
 
 
 @compiled

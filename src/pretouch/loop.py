@@ -16,7 +16,7 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
-from pretouch.ports import Clock, Robot, Skin, imu_of, touch_of
+from pretouch.ports import Clock, Points, Robot, Skin, imu_of, touch_of
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, TouchReadings
 from pretouch.values import value
 
@@ -179,18 +179,19 @@ def run(
     done: Callable[[ControlStep], bool],
     resume: Callable[[], bool] = lambda: False,
     learnt: ResidualModel | None = None,
+    points: Points | None = None,
 ) -> None:
     """Turn the controller until `done` says so of a step. However it ends, the arm is first brought to rest.
 
     `resume` says whether a person now asks to leave a latched HOLD; `learnt` is free motion as an earlier session left
-    it.
+    it. `points` is an outside source of points; once there is one, its silence stops the arm.
     """
     state = controller.init(robot.read(), learnt)
     sent = state.command
     try:
         while True:
             tick = clock.tick()
-            cycle = turn(controller, state, robot, skin, tick, resume())
+            cycle = turn(controller, state, robot, skin, tick, resume(), points)
             state, sent = cycle.after, cycle.step.command
             recorder.record(cycle)
             if done(cycle.step):
@@ -201,13 +202,15 @@ def run(
 
 
 def turn(
-    controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float, resume: bool = False
-) -> Cycle:
+    controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float, resume: bool = False,
+    points: Points | None = None,
+) -> Cycle:  # fmt: skip
     """Turn the controller once, at a tick [s]: read, step, command."""
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
     imu = imu_of(skin) if controller.profile.detection.use_imu else None
+    seen = None if points is None else points.read()
     stamp = _instant(tick, controller.limits.period, report, readings, touch)
-    inputs = Inputs(stamp, report, readings, resume, touch, imu)
+    inputs = Inputs(stamp, report, readings, resume, touch, imu, seen)
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)

@@ -24,6 +24,7 @@ class Event(Enum):
     CONTACT = auto()
     SKIN_UNFIT = auto()
     SKIN_SILENT = auto()
+    POINTS_LOST = auto()
     NO_FORCE = auto()
     GIVEN_UP = auto()
     PRESSED = auto()
@@ -97,6 +98,11 @@ TABLE: tuple[Transition, ...] = (
     Transition(
         Event.SKIN_SILENT, _ANY, Mode.HOLD,
         "No usable reading from {}: check the unit's power, radio and sensor; the arm goes on when it is heard again.",
+        soft=True,
+    ),
+    Transition(
+        Event.POINTS_LOST, _ANY, Mode.HOLD,
+        "The outside source of points {}: check it and its clock; the arm goes on when it is heard again.",
         soft=True,
     ),
     Transition(

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from pretouch.types import FloatArray, ImuReadings, RangeReadings, RobotState, TouchReadings
+from pretouch.types import FloatArray, ImuReadings, RangeReadings, RobotState, SeenPoints, TouchReadings
 
 
 class Robot(Protocol):
@@ -51,6 +51,14 @@ def imu_of(skin: object) -> ImuReadings | None:
     """Return the IMU samples of a skin that came since the last call, None of one whose units have none."""
     imu = getattr(skin, "imu", None)
     return None if imu is None else imu()
+
+
+class Points(Protocol):
+    """An outside source of points, such as a camera."""
+
+    def read(self) -> SeenPoints:
+        """Return the newest set; the same one again, and at once, while there is no newer one."""
+        ...
 
 
 class Clock(Protocol):

@@ -18,8 +18,17 @@ from pretouch import loop
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
-from pretouch.ports import Robot, Skin
-from pretouch.types import ControlStep, FloatArray, ImuReadings, Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.ports import Points, Robot, Skin
+from pretouch.types import (
+    ControlStep,
+    FloatArray,
+    ImuReadings,
+    Inputs,
+    RangeReadings,
+    RangeStatus,
+    RobotState,
+    SeenPoints,
+)
 
 _PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
 """Of Linux' `prctl`."""
@@ -41,6 +50,7 @@ def run(
     cpu: int | None = None,
     tell: Callable[[str], None] = print,
     learnt: ResidualModel | None = None,
+    points: Points | None = None,
 ) -> None:
     """`loop.run`, warmed up and in a process prepared for real time. However it ends, `clock.timing()` is the report.
 
@@ -58,17 +68,18 @@ def run(
         cpu: see `real_time`.
         tell: is given each sentence on what could not be had, before the loop begins.
         learnt: free motion as an earlier session left it.
+        points: an outside source of points; it is read in the loop, so it must not wait.
     """
     if not math.isclose(clock.period, controller.limits.period, rel_tol=1e-9):
         raise ParameterError(
             f"The clock has a period of {clock.period!r} s, the controller {controller.limits.period!r} s:"
             " make them the same (params.at_rate makes a profile for another rate)."
         )
-    warm_up(controller, robot.read())
+    warm_up(controller, robot.read(), points is not None)
     with _ended_in_order(), real_time(priority, cpu) as missing:
         for sentence in missing:
             tell(sentence)
-        loop.run(controller, robot, skin, clock, recorder, done, resume, learnt)
+        loop.run(controller, robot, skin, clock, recorder, done, resume, learnt, points)
 
 
 @contextmanager
@@ -186,7 +197,7 @@ def _stay(cpu: int | None, undo: ExitStack) -> str:
     return ""
 
 
-def warm_up(controller: Controller, robot: RobotState) -> None:
+def warm_up(controller: Controller, robot: RobotState, points: bool = False) -> None:
     """Run steps whose results are dropped, so that nothing is left to be compiled or loaded in the loop.
 
     They see obstacles and none, follow the path, meet a contact and a robot that cannot be believed: TRACK, REACT and
@@ -195,11 +206,12 @@ def warm_up(controller: Controller, robot: RobotState) -> None:
     Args:
         controller: the one that the loop will turn.
         robot: a state of the arm, as its interface gives it.
+        points: whether there will be an outside source of points.
     """
     quiet, push = np.zeros(6), np.array([0.9 * controller.profile.failure.force_max_n, 0, 0, 0, 0, 0])
     lost = np.full(len(robot.q), np.nan)
     for seen in (RangeStatus.SIGNAL, RangeStatus.OK):
-        rehearsal = _Rehearsal(controller, robot)
+        rehearsal = _Rehearsal(controller, robot, points)
         for _ in range(controller.profile.threshold.window_samples):
             rehearsal.step(None, quiet)
         for wrench in (robot.wrench, None, quiet, push):
@@ -213,8 +225,8 @@ def warm_up(controller: Controller, robot: RobotState) -> None:
 class _Rehearsal:
     """A controller that is given made-up inputs, one period after another."""
 
-    def __init__(self, controller: Controller, robot: RobotState) -> None:
-        self._controller, self._robot, self._now = controller, robot, robot.stamp
+    def __init__(self, controller: Controller, robot: RobotState, points: bool) -> None:
+        self._controller, self._robot, self._now, self._points = controller, robot, robot.stamp, points
         self._state = controller.init(robot)
 
     def step(
@@ -230,5 +242,10 @@ class _Rehearsal:
         # of each unit one sample, so that nothing of what they are used for is compiled in the loop
         imu = ImuReadings(np.arange(units), np.full(units, self._now - self._controller.limits.period),
                           np.zeros((units, 3)), np.zeros((units, 3)))  # fmt: skip
-        inputs = Inputs(self._now, robot, readings, resume, imu=imu)
+        points = None
+        if self._points:
+            near = self._controller.model.kinematics(self._robot.q).position + np.array([0.0, 0.3, 0.1])
+            count = len(near) if seen is RangeStatus.OK else 0
+            points = SeenPoints(self._now, np.full(count, self._now), near[:count], np.full(count, 0.01))
+        inputs = Inputs(self._now, robot, readings, resume, imu=imu, points=points)
         _, self._state = self._controller.step(self._state, inputs)

@@ -128,6 +128,24 @@ class RobotState:
 
 
 @value
+class SeenPoints:
+    """The newest M points of what outside sources see, such as cameras, in the base frame.
+
+    What a source shows of the arm itself or of fixtures may be in it. A row with a NaN shows nothing.
+    """
+
+    heard: float
+    """Instant of the newest measurement, of the source that has been silent for longest [s]; -inf before the first. A
+    set without points that was heard says that nothing is seen."""
+    stamp: FloatArray
+    """(M,) instant at which each point was measured [s]."""
+    point: FloatArray
+    """(M, 3) [m]."""
+    sigma: FloatArray
+    """(M,) standard deviation of each point in the worst direction, that of the sensor's own pose included [m]."""
+
+
+@value
 class Inputs:
     """All that one control step is given."""
 
@@ -141,6 +159,8 @@ class Inputs:
     """What units say of being touched; None of a skin that has no touch sensors."""
     imu: ImuReadings | None = None
     """None where units have no IMU, or nobody asks them."""
+    points: SeenPoints | None = None
+    """What outside sources see; None without one. Once given, silence of theirs stops the arm."""
 
 
 class Mode(Enum):
@@ -159,7 +179,8 @@ class Obstacles:
     """K sensed points, each with its closest point on the robot's body. Base frame."""
 
     unit: IntArray
-    """(K,) index of the sensing unit in the skin."""
+    """(K,) index of the sensing unit in the skin; from the number of units on, the place of a point of outside sources
+    in `perception.outside`."""
     point: FloatArray
     """(K, 3) obstacle positions, eq. 1 [m]."""
     ee_distance: FloatArray

@@ -5,11 +5,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
+from pretouch.perception.closest import no_obstacles
 from pretouch.perception.obstacles import (
     is_evidence,
     is_fresh,
     locate,
     measured_distance,
+    points_of_units,
     sensor_poses,
     track,
     track_init,
@@ -229,3 +231,11 @@ def test_a_track_holds_what_was_really_shown(messages):
 def test_an_unheard_unit_is_not_fresh():
     state = track_init(4)
     np.testing.assert_array_equal(is_fresh(state, _readings([-INF, NAN, INF, 0.0]), 0.0), [False, False, False, True])
+
+
+def test_points_of_units_leave_out_those_of_other_sources():
+    seen = no_obstacles()
+    seen.unit, seen.point = np.array([2, 0, 3, 9]), np.arange(12.0).reshape(4, 3)
+    found = points_of_units(seen, 3)
+    assert found[[2, 0]].tolist() == [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]
+    assert np.isnan(found[1]).all()

@@ -33,6 +33,7 @@ from pretouch.types import (
     QpSolution,
     RangeReadings,
     RobotState,
+    SeenPoints,
     Thresholds,
     Touched,
     TouchReadings,
@@ -221,13 +222,15 @@ def test_inputs_of_other_types_are_kept_as_the_controller_takes_them(spoil, want
 def test_messages_mirror_the_types_field_by_field():
     mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, Touched, ControlStep, Inputs, ImuReadings)
     own = {"sequence", "time", "unreadable", "has_wrench", "has_contact", "path_tangent"}
-    beside = {"touch", "imu"}  # of Inputs: in messages of their own, so that older recordings open
+    beside = {"touch", "imu", "points"}  # of Inputs: in messages of their own, so that older recordings open
     for kind in mirrored:
         name = {"ControlStep": "Step"}.get(kind.__name__, kind.__name__)
         there = {field for field, _ in typestore().get_msgdef(f"{PACKAGE}/msg/{name}").fields}
         assert there - own == {f.name for f in fields(kind)} - beside
     touch = {field for field, _ in typestore().get_msgdef(f"{PACKAGE}/msg/Touch").fields}
     assert touch - {"sequence", "step_stamp"} == {f.name for f in fields(TouchReadings)}
+    points = {field for field, _ in typestore().get_msgdef(f"{PACKAGE}/msg/SeenPoints").fields}
+    assert points - own == {f.name for f in fields(SeenPoints)} | {"same_as"}
 
 
 def test_the_rows_of_the_thresholds_have_their_names():

@@ -55,6 +55,15 @@ def test_distances_are_least_by_unit_by_link_and_in_time(panda_model, paper_skin
     assert found.within_d_max_s == pytest.approx(0.03)
 
 
+def test_what_outside_sources_saw_counts_for_the_body_and_for_no_unit(panda_model, paper_skin):
+    near = [[(0, "panda_hand", 0.5, 0.7), (9, "panda_link4", 0.05, 0.2)], [(22, "panda_link4", 0.06, 0.3)]]
+    steps = [made.step(panda_model, stamp=0.01 * i, near=points) for i, points in enumerate(near)]
+    found = distances(course_of(panda_model, paper_skin, steps))
+    assert (found.body.name, found.body.distance) == ("hand_left", 0.5)
+    assert (found.ee.distance, found.links[0].name, found.links[0].distance) == (0.2, "panda_link4", 0.05)
+    assert found.below_crit_s == pytest.approx(0.02)
+
+
 def test_the_nearest_of_several_points_counts_in_whatever_order(panda_model, paper_skin):
     near = [(0, "panda_hand", 0.5, 0.3), (1, "panda_hand", 0.4, 0.2), (2, "panda_hand", 0.6, np.nan)]
     course = course_of(panda_model, paper_skin, [made.step(panda_model, near=near)])

@@ -31,6 +31,11 @@ def test_the_nearest_of_two_points_of_a_unit_counts() -> None:
     assert found[1] == pytest.approx((0.8 - 0.2) / 0.75)
 
 
+def test_what_outside_sources_see_is_expected_at_no_unit() -> None:
+    found = expectation(obstacles([1, 7, 12], [0.45, 0.05, 0.05]), 7, ThresholdParams(d_min_m=0.05, d_max_m=0.85))
+    np.testing.assert_allclose(found, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-12)
+
+
 def test_without_obstacles_nothing_is_expected() -> None:
     assert not expectation(obstacles([], []), 7, ThresholdParams()).any()
 

@@ -60,6 +60,16 @@ def near_init(model: RobotModel, units: int) -> NearState:
     return NearState(slots_init(units), np.zeros(model.n), detour_init())
 
 
+def widened(state: NearState, units: int) -> NearState:
+    """Return the state with room for so many units, those there were first."""
+    half = len(state.slots) // 2
+    if half >= units:
+        return state
+    slots = slots_init(units)
+    slots[:half], slots[units : units + half] = state.slots[:half], state.slots[half:]
+    return NearState(slots, state.null_velocity, state.detour)
+
+
 def anticipates(profile: Profile) -> bool:
     """Whether a profile asks for anything that `joint_motion` alone does not do."""
     p = profile.anticipation

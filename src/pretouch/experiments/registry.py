@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pretouch.experiments import avoidance, clamp, dynamic, imu, mounting, pinch, static, tactile, wire
+from pretouch.experiments import avoidance, clamp, dynamic, imu, mounting, pinch, static, tactile, vision, wire
 from pretouch.experiments.claims import anticipation, between, detectable, free_motion, noise
 from pretouch.experiments.coverage import study as coverage
 from pretouch.experiments.experiment import Experiment, Row
@@ -41,6 +41,7 @@ MOUNTING = (mounting.EXPERIMENT, coverage.EXPERIMENT)
 REACTION = (clamp.EXPERIMENT, pinch.EXPERIMENT)
 TOUCH = (tactile.EXPERIMENT,)
 IMPACTS = (imu.EXPERIMENT,)
+VISION = (vision.EXPERIMENT,)
 
 GROUPS = {
     "The paper's experiments": PAPER,
@@ -51,6 +52,7 @@ GROUPS = {
     "Caught between two things": REACTION,
     "Touch sensors of units": TOUCH,
     "Impacts by the units' accelerometers": IMPACTS,
+    "A camera beside the skin": VISION,
 }
 """All experiments by what they are for, in the order of the page."""
 EXPERIMENTS: dict[str, Experiment] = {e.name: e for group in GROUPS.values() for e in group}

@@ -7,6 +7,7 @@ import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.experiments.trial import Record, record_of
+from pretouch.perception.obstacles import points_of_units
 from pretouch.recording.reader import open_recording
 from pretouch.types import BoolArray, ControlStep, FloatArray, Mode
 
@@ -84,9 +85,7 @@ def trace_of(record: Record) -> Trace:
 
 def sensed_points(step: ControlStep) -> FloatArray:
     """Obstacle of each unit (K, 3) [m], NaN where it showed none."""
-    points = np.full((len(step.range_distance), 3), np.nan)
-    points[step.obstacles.unit] = step.obstacles.point
-    return points
+    return points_of_units(step.obstacles, len(step.range_distance))
 
 
 def _nearest_limit(step: ControlStep) -> float:

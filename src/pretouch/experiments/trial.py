@@ -23,6 +23,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.wire_skin import WireSkin
+from pretouch.sim.depth_camera import DepthCamera, DepthCameraParams
 from pretouch.sim.hand import Hand, HandScript, PersonArm
 from pretouch.sim.plant import Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
@@ -57,6 +58,10 @@ class Setup:
     """What moves the hand."""
     plant: PlantParams = field(default_factory=PlantParams)
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    camera: FloatArray | None = None
+    """Pose T_O_camera (4, 4) of a depth camera; none, and the controller has the skin alone."""
+    seeing: DepthCameraParams = field(default_factory=DepthCameraParams)
+    """How the camera sees."""
     wire: FleetParams | None = None
     """Units and network for readings that come over UDP sockets; none, and they come within the process."""
     recording: FilePath | None = None
@@ -185,6 +190,7 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         finders, traffic = (units.range_finders, units.receiver.units) if isinstance(units, WireSkin) else (units, ())
         who = setup.person
         hand = Hand(plant, setup.hand, who.speed_max, who.stiffness, who.damping) if setup.hand else None
+        camera = None if setup.camera is None else DepthCamera(plant, setup.camera, setup.seeing, setup.seed)
         if setup.prepare:
             setup.prepare(plant, finders)
         known = setup.skin if setup.believed is None else setup.believed
@@ -194,7 +200,7 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         plant.advance(SETTLE_S)
         with _recording(setup, controller) as recording:
             recorder = _Recorder(plant, hand, recording)
-            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant))
+            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant), points=camera)
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),

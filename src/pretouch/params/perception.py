@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from pretouch.checks import Checked, NonNegative, Positive
+from pretouch.checks import Checked, Count, NonNegative, Positive
 from pretouch.errors import ParameterError
 
 
@@ -40,6 +40,24 @@ class PerceptionParams(Checked):
     closing_memory_s: Positive = 0.09
     """Time in which the weight of a reading in that estimate falls by 1/e [s]: ours. A change of speed is followed
     to half in 0.14 s and to nine tenths in 0.34 s; a range noise of 20 mm at 50 Hz leaves 0.05 m/s."""
+    outside_points: Count = 0
+    """Points of outside sources, such as cameras, that are kept for each link that moves, in different directions from
+    it; 0: none are taken."""
+    outside_margin_m: NonNegative = 0.05
+    """A point of an outside source is taken as the arm or a fixture up to this from its surface, and its uncertainty
+    [m]: 20 mm by which links may differ from their capsules, 15 mm that posture and latency leave, 15 mm of edges:
+    ours."""
+    outside_persistence_s: Positive = 0.15
+    """How long such a point is kept after the measurement that showed it [s]: 60 ms of latency and two lost frames of a
+    camera at 30 Hz."""
+    outside_hidden_s: NonNegative = 3.0
+    """How long such a point is kept where the arm has come so near to it that it would be taken for the arm [s]: what a
+    source shows there says nothing. At 0.03 m/s, about a touch speed, it is the way through that margin. 0: as any
+    other point."""
+    outside_slow_after_s: Positive = 0.2
+    """Age of an outside source's newest measurement at which the arm begins to slow [s]: as that, and another frame."""
+    outside_silent_after_s: Positive = 0.4
+    """Age of an outside source's newest measurement at which the arm holds [s]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -47,4 +65,9 @@ class PerceptionParams(Checked):
             raise ParameterError(
                 f"PerceptionParams.slow_after_s is {self.slow_after_s}: it must be less than silent_after_s,"
                 f" {self.silent_after_s}."
+            )
+        if self.outside_slow_after_s >= self.outside_silent_after_s:
+            raise ParameterError(
+                f"PerceptionParams.outside_slow_after_s is {self.outside_slow_after_s}: it must be less than"
+                f" outside_silent_after_s, {self.outside_silent_after_s}."
             )

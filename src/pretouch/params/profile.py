@@ -77,7 +77,11 @@ PROFILES: dict[str, Profile] = {
     "pretouch": Profile(
         name="pretouch",
         perception=PerceptionParams(
-            closing_speed=True, reckon_below_minimum=True, place_at_stamp=True, keep_while_silent=True
+            closing_speed=True,
+            reckon_below_minimum=True,
+            place_at_stamp=True,
+            keep_while_silent=True,
+            outside_points=2,
         ),
         task=TaskParams(mid_joint_projected=True),
         reduction=ReductionParams(enabled=False),

@@ -7,7 +7,7 @@ from pretouch.perception.closing import motion_init
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MAX_DISTANCE, MIN_DISTANCE
-from pretouch.types import BoolArray, FloatArray, IntArray, RangeReadings, RangeStatus
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus
 from pretouch.values import value
 
 
@@ -48,6 +48,13 @@ def track_init(units: int) -> TrackState:
     return TrackState(
         np.full((units, 3), np.nan), np.full((units, 3), np.nan), np.full((3, units), -np.inf), motion_init(units)
     )
+
+
+def points_of_units(obstacles: Obstacles, units: int) -> FloatArray:
+    """Where each unit of a skin shows an obstacle (K, 3) [m], NaN where it shows none; other sources are not in it."""
+    points, own = np.full((units, 3), np.nan), obstacles.unit < units
+    points[obstacles.unit[own]] = obstacles.point[own]
+    return points
 
 
 def sensor_poses(skin: Skin, kin: Kinematics) -> tuple[FloatArray, FloatArray]:

@@ -22,6 +22,7 @@ from pretouch.types import (
     QpSolution,
     RangeReadings,
     RobotState,
+    SeenPoints,
     Thresholds,
     Touched,
     TouchReadings,
@@ -30,6 +31,7 @@ from pretouch.types import (
 INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE}/msg/Truth"
 TOUCH = f"{PACKAGE}/msg/Touch"
 IMU = f"{PACKAGE}/msg/ImuReadings"
+POINTS = f"{PACKAGE}/msg/SeenPoints"
 _ROBOT, _READINGS = f"{PACKAGE}/msg/RobotState", f"{PACKAGE}/msg/RangeReadings"
 _OBSTACLES, _THRESHOLDS = f"{PACKAGE}/msg/Obstacles", f"{PACKAGE}/msg/Thresholds"
 _CONTACT, _QP = f"{PACKAGE}/msg/Contact", f"{PACKAGE}/msg/QpSolution"
@@ -55,6 +57,8 @@ def encode_inputs(sequence: int, inputs: Inputs) -> tuple[bytes, bool]:
         fields = (_number(inputs.stamp), _robot(inputs.robot), _readings(inputs.readings), bool(inputs.resume))
         if inputs.touch is not None:
             _touch(inputs.touch)  # has a message of its own
+        if inputs.points is not None:
+            _points(inputs.points)
         return encoded(INPUTS, make(INPUTS, sequence, *fields, "")), True
     except Exception as error:  # inputs may be anything, with any behaviour
         nothing = make(_ROBOT, 0.0, _NONE, _NONE, _NONE, _NONE, _NONE, False, _NONE)
@@ -108,6 +112,26 @@ def _robot(robot: RobotState) -> Any:
 
 def _readings(readings: RangeReadings) -> Any:
     return make(_READINGS, _numbers(readings.stamp), _numbers(readings.distance), _wholes(readings.status))
+
+
+def _points(points: SeenPoints) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+    """Return points of outside sources as they are kept, if they are such to the controller."""
+    point = np.asarray(points.point)
+    if point.ndim != 2 or point.shape[1] != 3:
+        raise UnreadableError("points are no rows of three numbers")
+    return _number(points.heard), _numbers(points.stamp), _numbers(point.reshape(-1)), _numbers(points.sigma)
+
+
+def encode_points(sequence: int, points: SeenPoints, same_as: int) -> bytes:
+    """Return points of outside sources as CDR; where they are the same as those of an earlier step, only its number."""
+    kept = _points(points) if same_as == sequence else (0.0, _NONE, _NONE, _NONE)
+    return encoded(POINTS, make(POINTS, sequence, same_as, *kept))
+
+
+def decode_points(data: bytes) -> tuple[int, SeenPoints]:
+    """Return the number of the step whose message holds the points, and those in this one."""
+    m = decoded(POINTS, data)
+    return m.same_as, SeenPoints(m.heard, m.stamp, m.point.reshape(-1, 3), m.sigma)
 
 
 def decode_inputs(data: bytes) -> tuple[int, Inputs | None, str]:

@@ -23,13 +23,11 @@ LIBRARY = f"pretouch {pretouch.__version__}"
 PACKAGE = "pretouch_msgs"
 OWN = (
     "RobotState", "RangeReadings", "Inputs", "Obstacles", "Thresholds", "Contact", "QpSolution", "Touched", "Step",
-    "Run", "State", "Truth", "UnitSample", "Touch", "ImuReadings",
+    "Run", "State", "Truth", "UnitSample", "Touch", "ImuReadings", "SeenPoints",
 )  # fmt: skip
 """Our types; each has a file in `msg/`."""
-TOPICS = {
-    f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}"
-    for name in ("Run", "Inputs", "Step", "State", "Truth", "Touch")
-}
+_ON_TOPICS = ("Run", "Inputs", "Step", "State", "Truth", "Touch", "SeenPoints")
+TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in _ON_TOPICS}
 TOPICS["/pretouch/imu"] = f"{PACKAGE}/msg/ImuReadings"
 """Type of the messages on each of our topics."""
 

@@ -10,7 +10,14 @@ import numpy as np
 
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
-from pretouch.recording.codec import decode_imu, decode_inputs, decode_step, decode_touch, decode_truth
+from pretouch.recording.codec import (
+    decode_imu,
+    decode_inputs,
+    decode_points,
+    decode_step,
+    decode_touch,
+    decode_truth,
+)
 from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.recorded_path import Tangents
@@ -73,25 +80,40 @@ class Recorded:
     def __getitem__(self, i: int) -> Kept:
         number = self._numbers[i]
         raw = self._raw
-        inputs, touch = raw["/pretouch/inputs"].get(number), raw["/pretouch/touch"].get(number)
-        given = None if inputs is None else decode_inputs(inputs)[1]
-        if given is not None and touch is not None:
-            given = replace(given, touch=decode_touch(touch))
         truth = raw["/pretouch/truth"].get(number)
         state = raw["/pretouch/state"].get(number)
-        imu = raw["/pretouch/imu"].get(number)
-        given = None if inputs is None else decode_inputs(inputs)[1]
-        if given is not None and imu is not None:
-            given = replace(given, imu=decode_imu(imu))
         anew, snapshot = (False, None) if state is None else decode_state(state)
         return Kept(
             run=max(0, bisect_right(self._begins, number) - 1),
-            inputs=given,
+            inputs=self._inputs(number),
             step=decode_step(raw["/pretouch/step"][number])[1],
             truth=None if truth is None else decode_truth(truth)[1],
             snapshot=snapshot,
             anew=anew,
         )
+
+    def _inputs(self, number: int) -> Inputs | None:
+        """Return all that a step was given; None where a part of it is missing."""
+        raw = self._raw
+        data, touch, imu = (raw[f"/pretouch/{part}"].get(number) for part in ("inputs", "touch", "imu"))
+        inputs = None if data is None else decode_inputs(data)[1]
+        if inputs is not None and touch is not None:
+            inputs = replace(inputs, touch=decode_touch(touch))
+        if inputs is not None and imu is not None:
+            inputs = replace(inputs, imu=decode_imu(imu))
+        return self._with_points(number, inputs)
+
+    def _with_points(self, number: int, inputs: Inputs | None) -> Inputs | None:
+        """Return inputs with the points of outside sources, if there were any; None where these are missing."""
+        raw = self._raw["/pretouch/seenpoints"]
+        if inputs is None or number not in raw:
+            return inputs
+        same_as, points = decode_points(raw[number])
+        if same_as != number:
+            if same_as not in raw:
+                return None
+            points = decode_points(raw[same_as])[1]
+        return replace(inputs, points=points)
 
     def __iter__(self) -> Iterator[Kept]:
         return (self[i] for i in range(len(self)))

@@ -130,6 +130,12 @@ class _Reading:
         self._wholes = iter(message.wholes.tolist())
         self._texts = iter(message.texts)
 
+    def none(self, name: str) -> bool:
+        """Whether nothing was kept under a name: then it is taken."""
+        found = self._at < len(self._parts) and self._parts[self._at][:2] == (name, "none")
+        self._at += int(found)
+        return found
+
     def next(self, name: str) -> tuple[str, str]:
         if self._at == len(self._parts):
             raise ValueError(f"nothing where {name!r} belongs")
@@ -175,6 +181,8 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
     """Return the next value, annotated with a type."""
     optional = get_origin(hint) in (Union, UnionType)
     if optional:
+        if parts.none(name):
+            return None
         hint = _without_none(hint)
     if is_dataclass(hint):
         kind = hint if isinstance(hint, type) else type(hint)
@@ -185,8 +193,6 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
                 given[field] = _give(parts, whole, inner)
         return kind(**given)
     kind_name, shape = parts.next(name)
-    if optional and kind_name == "none":
-        return None
     if kind_name == "tuple":
         return tuple(_give(parts, f"{name}.{i}", inner) for i, inner in enumerate(_inner(hint, int(shape))))
     if kind_name == "array":

@@ -19,11 +19,13 @@ from pretouch.loop import Cycle
 from pretouch.recording.codec import (
     IMU,
     INPUTS,
+    POINTS,
     STEP,
     TOUCH,
     TRUTH,
     encode_imu,
     encode_inputs,
+    encode_points,
     encode_step,
     encode_touch,
     encode_truth,
@@ -37,7 +39,7 @@ from pretouch.recording.standard import STANDARD, Standard, imu_items, nanosecon
 from pretouch.recording.state_codec import STATE, encode_state
 from pretouch.recording.truth import Truth
 from pretouch.robot.model import RobotModel
-from pretouch.types import ControlStep, FloatArray
+from pretouch.types import ControlStep, FloatArray, SeenPoints
 
 SNAPSHOT_S = 3.0
 """Time between two snapshots of the controller's state [s]."""
@@ -81,6 +83,8 @@ class Recording:
         self._first = self._last = self._begun_at = math.nan
         self._log_time = 0
         self._closed: Closed | None = None
+        self._points: tuple[SeenPoints | None, int] = None, 0
+        """Those written last, and the number of the step that they are with."""
         self._signals: list[signal.Signals] = []
         """Those that raise SystemExit for as long as this is a context."""
         self._model: RobotModel | None = None
@@ -129,6 +133,12 @@ class Recording:
         samples = None if imu is None else encode_imu(number, step.stamp, imu)
         if samples is not None:
             items.append(Item("/pretouch/imu", IMU, number, time, samples))
+        points = cycle.inputs.points if whole else None
+        if points is not None:
+            if points is not self._points[0]:
+                self._points = points, number
+            data_of_points = encode_points(number, points, self._points[1])
+            items.append(Item("/pretouch/seenpoints", POINTS, number, time, data_of_points))
         tangent = self._tangent(step.path_phase)
         items.append(Item("/pretouch/step", STEP, number, time, encode_step(number, step, tangent)))
         if truth is not None:

@@ -47,7 +47,7 @@ def distances(course: Course) -> Distances:
         if (low := least(course.link_distance[:, k])) is not None
     ]
     ee = least(course.ee_distance)
-    lasted, body = durations(course.time), least_of_each(course.body_distance)
+    lasted, body = durations(course.time), least_of_each(course.link_distance)
     crit = course.of_runs(lambda run: run.profile.restriction.d_crit_m)
     notice = course.of_runs(lambda run: run.profile.restriction.d_notice_m)
     d_max = course.of_runs(lambda run: run.profile.reduction.d_max_m)

@@ -140,7 +140,8 @@ def _near(batch: list["Kept"], run: "Run", layout: _Layout, place: IntArray) -> 
     names = np.array([layout.links.index(name) for name in run.model.links], dtype=np.int64)
     by_unit = np.full((len(seen), len(layout.units)), np.nan)
     by_link = np.full((len(seen), len(layout.links)), np.nan)
-    np.fmin.at(by_unit, (row, place[unit]), body)
+    own = unit < len(place)  # what outside sources see is of no unit
+    np.fmin.at(by_unit, (row[own], place[unit[own]]), body[own])
     np.fmin.at(by_link, (row, names[link]), body)
     nearest, where = np.full(len(seen), np.nan), np.full((len(seen), 3), np.nan)
     farthest_first = np.argsort(-ee, kind="stable")  # of several entries for a row the last one stays

@@ -24,7 +24,8 @@ def expectation(obstacles: Obstacles, units: int, params: ThresholdParams) -> Fl
     expected = np.zeros(units)
     if len(obstacles.unit):
         graded = obstacle_force(obstacles.body_distance, 1.0, params.d_max_m, params.d_min_m)
-        np.maximum.at(expected, obstacles.unit, graded)
+        own = obstacles.unit < units  # what other sources see is at no unit
+        np.maximum.at(expected, obstacles.unit[own], graded[own])
     return expected
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pretouch.perception.obstacles import locate, sensor_poses
+from pretouch.perception.obstacles import locate, points_of_units, sensor_poses
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, ControlStep, FloatArray, IntArray
@@ -86,9 +86,7 @@ class Units:
         """Where each unit senses something (K, 3) [m], base frame; NaN where it does not."""
         if not perceiving:
             return locate(*sensor_poses(self._skin, kin), reading)
-        points = np.full((len(reading), 3), np.nan)
-        points[step.obstacles.unit] = step.obstacles.point
-        return points
+        return points_of_units(step.obstacles, len(reading))
 
 
 def _all(colour: palette.Colour, units: IntArray) -> NDArray[np.uint8]:

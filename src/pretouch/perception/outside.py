@@ -1,0 +1,181 @@
+"""Points of outside sources, such as cameras: which of them are obstacles, and how long they last.
+
+Of any number of points at most `outside_points` are kept for each link that moves: the one that is nearest to it by
+what is certain of their distance, then the nearest one in another direction, and so on. Each has a place of its own,
+so a place goes on showing the same side of the same link, as a unit of the skin does. What is on the arm or a fixture
+is left out, the arm being where it was when the points were measured.
+"""
+
+import math
+
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.params import PerceptionParams
+from pretouch.perception.chosen_points import take_points
+from pretouch.perception.closest import closest, distances
+from pretouch.perception.closing import closing_speeds
+from pretouch.perception.obstacles import HEARD, SEEN, TrackState, track_init
+from pretouch.perception.perceive import Perception
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.perception.vectors import placed_ends
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState, SeenPoints
+from pretouch.values import value
+
+
+@value
+class OutsideState:
+    """What outside sources showed last, in P places."""
+
+    tracks: TrackState
+    """As of P units; all were heard when the sources were."""
+    sigma: FloatArray
+    """(P,) standard deviation of each point [m]."""
+    heard: float
+    """Newest instant the sources were heard of [s]; -inf before the first."""
+
+
+def moving_links(model: RobotModel) -> IntArray:
+    """Indices of the links that move and have a body, in order: those that points are kept for."""
+    return np.unique(model.body.link)
+
+
+def outside_init(model: RobotModel, kept: int) -> OutsideState:
+    """Return the state before any point, with so many places for each link that moves."""
+    places = kept * len(moving_links(model))
+    return OutsideState(track_init(places), np.zeros(places), -math.inf)
+
+
+def see_outside(
+    state: OutsideState | None, anew: bool, seen: Perception, points: SeenPoints | None, units: int, model: RobotModel,
+    fixtures: Fixtures, kin: Kinematics, robot: RobotState, now: float, params: PerceptionParams,
+) -> tuple[Perception, OutsideState | None]:  # fmt: skip
+    """Add what outside sources see to what the skin does, and return what to remember.
+
+    Without a source so far, or where none is to be used, both are as given. Distances are less by `spread_sigmas`
+    standard deviations of each point. Points that are newer than the step tell nothing, as with units.
+
+    Args:
+        state: memory; None before there was a source.
+        anew: whether what was seen is to be forgotten, for time went backwards.
+        seen: by the skin.
+        points: newest set; None for none.
+        units: number of units of the skin; the places follow their indices.
+        model: the arm.
+        fixtures: what is known to stand around it.
+        kin: its posture.
+        robot: the state that `kin` is of.
+        now: instant of this step [s].
+        params: of perception.
+    """
+    if not params.enabled or params.outside_points == 0 or (state is None and points is None):
+        return seen, state
+    if state is None or anew:
+        state = outside_init(model, params.outside_points)
+    body = model.body
+    body_from, body_to = placed_ends(body.link, body.a, body.b, kin.position, kin.rotation)
+    if points is not None and state.heard < points.heard <= now:
+        state = _taken(state, points, body_from, body_to, model, fixtures, kin, robot, now, params)
+    before = state.tracks
+    count, direction = len(state.sigma), before.direction.copy()
+    indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
+    found, nearest = _shown(
+        before.point, direction, before.times, before.motion, state.sigma, now, params.outside_persistence_s,
+        params.outside_silent_after_s if params.keep_while_silent else 0.0, params.spread_sigmas, params.closing_speed,
+        body.link, body_from, body_to, body.radius, kin.position[model.ee], units, indices, vectors, scalars,
+    )  # fmt: skip
+    after = OutsideState(TrackState(before.point, direction, before.times, before.motion), state.sigma, state.heard)
+    if found == 0:
+        return seen, after
+    o = seen.obstacles
+    both = Obstacles(
+        unit=np.concatenate((o.unit, indices[0, :found])), point=np.concatenate((o.point, vectors[0, :found])),
+        ee_distance=np.concatenate((o.ee_distance, scalars[0, :found])),
+        body_point=np.concatenate((o.body_point, vectors[1, :found])),
+        link=np.concatenate((o.link, indices[1, :found])),
+        direction=np.concatenate((o.direction, vectors[2, :found])),
+        body_distance=np.concatenate((o.body_distance, scalars[1, :found])),
+        closing_speed=np.concatenate((o.closing_speed, scalars[2, :found])),
+    )  # fmt: skip
+    return Perception(both, seen.distance, min(seen.nearest, nearest), seen.longest_silence), after
+
+
+def outside_silence(state: OutsideState | None, unfit: str, now: float, params: PerceptionParams) -> tuple[float, str]:
+    """Factor in [0, 1] on the speed for outside sources that fall silent, and what is wrong with them.
+
+    As with units, silence is no free space: from `outside_slow_after_s` on the arm slows, at `outside_silent_after_s`
+    it stands, and at once where `unfit` says what cannot be used of the points given.
+    """
+    if not params.enabled or params.outside_points == 0:
+        return 1.0, ""
+    if unfit:
+        return 0.0, unfit
+    silence = -math.inf if state is None else now - state.heard
+    if silence <= params.outside_slow_after_s:
+        return 1.0, ""
+    longest = params.outside_silent_after_s
+    factor = max(0.0, (longest - silence) / (longest - params.outside_slow_after_s))
+    if silence < longest:
+        return factor, ""
+    return 0.0, "has not been heard yet" if math.isinf(silence) else f"has been silent for {silence:.2f} s"
+
+
+def _taken(
+    state: OutsideState, points: SeenPoints, body_from: FloatArray, body_to: FloatArray, model: RobotModel,
+    fixtures: Fixtures, kin: Kinematics, robot: RobotState, now: float, params: PerceptionParams,
+) -> OutsideState:  # fmt: skip
+    """Return the state with a newer set of points taken in."""
+    old, arm, body, others = state.tracks, model.capsules, model.body, fixtures.capsules
+    motion = old.motion.copy() if params.closing_speed else old.motion
+    tracks, sigma = TrackState(old.point.copy(), old.direction, old.times.copy(), motion), state.sigma.copy()
+    place = np.full(len(model.links), -1, dtype=np.int64)
+    place[moving_links(model)] = np.arange(len(sigma) // params.outside_points)
+    arm_ends = placed_ends(arm.link, arm.a, arm.b, kin.position, kin.rotation)
+    other_ends = placed_ends(others.link, others.a, others.b, kin.position, kin.rotation)
+    take_points(
+        tracks.point, tracks.times, motion, sigma, points.heard, points.stamp, points.point, points.sigma, now,
+        body.link, body_from, body_to, body.radius, place, arm.link, arm_ends, arm.radius, other_ends, others.radius,
+        fixtures.planes, kin.anchor, kin.axis, model.moved_by, robot.qd, robot.stamp, params.outside_persistence_s,
+        params.outside_hidden_s,        params.outside_margin_m, params.spread_sigmas, params.outside_points,
+        params.closing_memory_s if params.closing_speed else 0.0,
+    )  # fmt: skip
+    return OutsideState(tracks, sigma, points.heard)
+
+
+@compiled
+def _shown(
+    point: FloatArray, last_direction: FloatArray, times: FloatArray, motion: FloatArray, sigma: FloatArray, now: float,
+    persistence: float, silence: float, sigmas: float, closing: bool, body_link: IntArray, body_from: FloatArray,
+    body_to: FloatArray, body_radius: FloatArray, ee: FloatArray, units: int, indices: IntArray, vectors: FloatArray,
+    scalars: FloatArray,
+) -> tuple[int, float]:  # fmt: skip
+    """Write the obstacles of the places whose points last (last line), as `perceive` does of units.
+
+    Returns how many there are, and the distance of the nearest from the end-effector's origin [m].
+    """
+    place, link, near, body_point, direction = indices[0], indices[1], vectors[0], vectors[1], vectors[2]
+    ee_distance, body_distance = scalars[0], scalars[1]
+    found = 0
+    for p in range(len(sigma)):
+        unanswered = times[HEARD, p] <= times[SEEN, p]
+        if now - times[SEEN, p] <= (max(persistence, silence) if unanswered else persistence):
+            place[found] = p
+            near[found], direction[found] = point[p], last_direction[p]
+            if np.isnan(direction[found, 0]):
+                direction[found, 0], direction[found, 1], direction[found, 2] = 0.0, 0.0, 1.0
+            found += 1
+    near, direction = near[:found], direction[:found]
+    closest(body_link, body_from, body_to, body_radius, near, body_point, link, direction, body_distance)
+    distances(near, ee, ee_distance)
+    if closing:
+        closing_speeds(motion, place[:found], direction, scalars[2])
+    nearest = np.inf
+    for m in range(found):
+        p = place[m]
+        last_direction[p] = direction[m]
+        body_distance[m] -= sigmas * sigma[p]
+        ee_distance[m] = max(0.0, ee_distance[m] - sigmas * sigma[p])
+        nearest = min(nearest, ee_distance[m])
+        place[m] = p + units
+    return found, nearest

@@ -1,0 +1,260 @@
+"""Points of outside sources: which become obstacles, where, for how long, and what their silence does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pretouch.params import PerceptionParams
+from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.perception.outside import moving_links, outside_silence, see_outside
+from pretouch.perception.perceive import Perception
+from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.perception.vectors import placed
+from pretouch.robot.description import panda
+from pretouch.types import RobotState, SeenPoints
+
+TCP = np.array([0.30689, 0.0, 0.48688])
+"""End-effector origin in the ready posture, see `test_model.py` [m]."""
+UNITS = 7
+PARAMS = PerceptionParams(outside_points=2)
+NOTHING = Perception(no_obstacles(), np.full(UNITS, np.nan), np.inf, 0.0)
+
+
+def points_at(stamp: float, *point, sigma: float = 0.0) -> SeenPoints:
+    at = np.array(point, dtype=np.float64).reshape(-1, 3)
+    return SeenPoints(stamp, np.full(len(at), stamp), at, np.full(len(at), sigma))
+
+
+class Watcher:
+    """Perception of outside points alone, its state carried along."""
+
+    def __init__(self, model, params=PARAMS, fixtures=None):
+        self.model, self.params, self.fixtures = model, params, fixtures or no_fixtures()
+        self.state, self.qd = None, np.zeros(7)
+        self.pose(panda().q_ready)
+
+    def pose(self, q):
+        self.q, self.kin = q, self.model.kinematics(q)
+
+    def see(self, now: float, points: SeenPoints | None, anew: bool = False):
+        robot = RobotState(now, self.q, self.qd, self.q, self.qd, np.zeros(7), None)
+        seen, self.state = see_outside(
+            self.state, anew, NOTHING, points, UNITS, self.model, self.fixtures, self.kin, robot, now, self.params
+        )
+        self.nearest = seen.nearest
+        return seen.obstacles
+
+
+@pytest.fixture
+def watcher(panda_model):
+    return Watcher(panda_model)
+
+
+BESIDE = TCP + np.array([0.0, 0.4, 0.0])
+
+
+def test_without_a_source_or_a_place_for_it_nothing_is_touched(panda_model):
+    robot = RobotState(0.0, *(np.zeros(7) for _ in range(5)), None)
+    for params, points in (
+        (PARAMS, None), (PerceptionParams(), points_at(0.0, BESIDE)), (replace(PARAMS, enabled=False), points_at(0.0)),
+    ):  # fmt: skip
+        given = (None, False, NOTHING, points, UNITS, panda_model, no_fixtures(), None, robot, 0.0, params)
+        seen, state = see_outside(*given)
+        assert seen is NOTHING
+        assert state is None
+
+
+def test_a_point_is_an_obstacle_at_its_distance_less_two_sigmas(watcher):
+    near = watcher.see(1.0, points_at(1.0, BESIDE, sigma=0.01))
+    exact = closest_points(watcher.kin, watcher.model.body, TCP, np.zeros(1, int), BESIDE[None], np.eye(3)[:1])
+    assert len(near.unit) == 1
+    assert near.unit[0] >= UNITS
+    assert near.point == pytest.approx(BESIDE[None])
+    assert near.body_distance == pytest.approx(exact.body_distance - 0.02)
+    assert near.ee_distance == pytest.approx([0.4 - 0.02], abs=1e-5)
+    assert near.direction == pytest.approx(exact.direction)
+    assert near.link.tolist() == exact.link.tolist()
+    assert watcher.nearest == near.ee_distance[0]
+
+
+def test_the_places_follow_the_units_of_the_skin(watcher):
+    near = watcher.see(1.0, points_at(1.0, BESIDE))
+    place = near.unit[0] - UNITS
+    assert moving_links(watcher.model)[place // 2] == near.link[0]
+
+
+def on_the_arm(model, q, count: int = 400):
+    """Points on the surface of the arm's capsules in a posture, base included."""
+    rng, (a, b) = np.random.default_rng(5), placed(model.capsules, model.kinematics(q))
+    which, along = rng.integers(0, len(a), count), rng.uniform(0, 1, count)[:, None]
+    out = rng.standard_normal((count, 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    return a[which] + along * (b - a)[which] + model.capsules.radius[which, None] * out
+
+
+def test_what_shows_the_arm_itself_is_no_obstacle(watcher):
+    assert len(watcher.see(1.0, points_at(1.0, on_the_arm(watcher.model, watcher.q))).unit) == 0
+
+
+def test_the_arm_is_left_out_where_it_was_when_the_points_were_measured(panda_model):
+    qd, late = np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 0.13
+    q = panda().q_ready
+    before = on_the_arm(panda_model, q - late * qd)
+    moving, unaware = Watcher(panda_model), Watcher(panda_model)
+    moving.qd = qd
+    seen = points_at(1.0 - late, before)
+    assert len(moving.see(1.0, seen).unit) == 0
+    assert len(unaware.see(1.0, seen).unit) > 0, "from where the arm is now, it would be taken for an obstacle"
+
+
+def test_fixtures_are_left_out_up_to_the_margin_and_the_uncertainty(panda_model):
+    floor = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
+    for height, sigma, seen in ((0.04, 0.0, 0), (0.06, 0.0, 1), (0.06, 0.01, 0), (-0.3, 0.0, 0)):
+        watcher = Watcher(panda_model, fixtures=floor)
+        assert len(watcher.see(1.0, points_at(1.0, [0.7, 0.3, height - 0.2], sigma=sigma)).unit) == seen
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda s: replace(s, point=s.point * np.nan),
+        lambda s: replace(s, point=s.point * np.inf),
+        lambda s: replace(s, point=s.point * 1000),
+        lambda s: replace(s, sigma=-s.sigma - 0.01),
+        lambda s: replace(s, sigma=s.sigma * np.nan),
+        lambda s: replace(s, sigma=s.sigma + 2.0),
+        lambda s: replace(s, stamp=s.stamp + 0.2),
+        lambda s: replace(s, stamp=s.stamp - 0.2),
+        lambda s: replace(s, stamp=s.stamp * np.nan),
+    ],
+)
+def test_a_point_that_is_none_is_left_out_and_the_others_stay(watcher, spoil):
+    one = points_at(1.0, BESIDE)
+    bad = spoil(points_at(1.0, TCP - np.array([0.0, 0.3, 0.0])))
+    both = SeenPoints(
+        1.0, *(np.concatenate((getattr(bad, name), getattr(one, name))) for name in ("stamp", "point", "sigma"))
+    )
+    near = watcher.see(1.0, both)
+    assert near.point == pytest.approx(BESIDE[None])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 300))
+@settings(max_examples=30)
+def test_of_any_points_the_nearest_of_each_link_are_kept(panda_model, seed, count):
+    rng = np.random.default_rng(seed)
+    points = rng.uniform([-0.8, -0.8, 0.0], [1.0, 0.8, 1.2], (count, 3))
+    sigma = rng.uniform(0.0, 0.02, count)
+    watcher = Watcher(panda_model)
+    near = watcher.see(1.0, SeenPoints(1.0, np.full(count, 1.0), points, sigma))
+    aside = np.tile([0.0, 0.0, 1.0], (count, 1))
+    all_of_them = closest_points(watcher.kin, panda_model.body, TCP, np.zeros(count, int), points, aside)
+    a, b = placed(panda_model.capsules, watcher.kin)
+    along = np.clip(
+        ((points[:, None] - a) * (b - a)).sum(2) / np.maximum(((b - a) ** 2).sum(1), 1e-12), 0.0, 1.0
+    )  # fmt: skip
+    gap = np.linalg.norm(points[:, None] - a - along[..., None] * (b - a), axis=2) - panda_model.capsules.radius
+    free = gap.min(axis=1, initial=np.inf) > PARAMS.outside_margin_m + 2 * sigma
+    lower = all_of_them.body_distance - 2 * sigma
+    for link in moving_links(panda_model):
+        mine = free & (all_of_them.link == link)
+        kept = near.link == link
+        assert kept.sum() <= 2
+        assert mine.any() == kept.any()
+        if mine.any():
+            assert near.body_distance[kept].min() == pytest.approx(lower[mine].min())
+        if kept.sum() == 2:
+            first, second = near.direction[kept]
+            assert first @ second <= 0.5
+    assert len(set(near.unit.tolist())) == len(near.unit)
+
+
+def test_both_sides_of_a_link_are_kept(watcher):
+    other = TCP + np.array([0.0, -0.45, 0.0])
+    crowd = BESIDE + np.random.default_rng(1).uniform(0.0, 0.02, (50, 3))
+    near = watcher.see(1.0, points_at(1.0, BESIDE, *crowd, other))
+    shown = {round(float(y), 2) for y in near.point[:, 1]}
+    assert {0.4, -0.45} <= shown
+
+
+def test_a_point_lasts_for_the_persistence_and_until_the_source_tells_otherwise(panda_model):
+    brief, lasting = Watcher(panda_model), Watcher(panda_model, replace(PARAMS, keep_while_silent=True))
+    for watcher in (brief, lasting):
+        watcher.see(1.0, points_at(1.0, BESIDE))
+        assert len(watcher.see(1.149, None).unit) == 1
+    assert len(brief.see(1.16, None).unit) == 0
+    assert len(lasting.see(1.39, None).unit) == 1, "a silent source does not say that it is gone"
+    assert len(lasting.see(1.41, None).unit) == 0
+    answered = Watcher(panda_model, replace(PARAMS, keep_while_silent=True))
+    answered.see(1.0, points_at(1.0, BESIDE))
+    assert len(answered.see(1.1, points_at(1.1)).unit) == 1, "one frame without it removes nothing"
+    assert len(answered.see(1.16, points_at(1.16)).unit) == 0
+
+
+def test_what_the_arm_comes_to_is_not_forgotten_for_being_taken_for_the_arm(panda_model):
+    side = TCP + np.array([0.0, 0.2, 0.06])
+    for hidden, kept in ((3.0, True), (0.0, False)):
+        watcher = Watcher(panda_model, replace(PARAMS, outside_hidden_s=hidden))
+        (gap,) = watcher.see(1.0, points_at(1.0, side)).body_distance
+        assert gap > PARAMS.outside_margin_m
+        # the arm turns about its base until the point is within the margin, where the source tells nothing of it
+        turned = watcher.q.copy()
+        turned[0] += (gap - 0.03) / np.linalg.norm(side[:2])
+        watcher.pose(turned)
+        seen = [watcher.see(now, points_at(now, side)) for now in np.arange(1.03, 3.9, 0.03)]
+        assert [len(near.unit) == 1 for near in seen[6:]] == [kept] * len(seen[6:])
+        if kept:
+            assert 0.0 < seen[-1].body_distance[0] < PARAMS.outside_margin_m
+        last = [watcher.see(now, points_at(now)) for now in np.arange(3.9, 4.5, 0.03)]
+        assert len(last[-1].unit) == 0, "not for ever"
+
+
+def test_a_point_in_the_air_that_is_gone_is_not_kept_for_the_arm_once_it_leaves(panda_model):
+    watcher = Watcher(panda_model)
+    side = TCP + np.array([0.0, 0.2, 0.06])
+    watcher.see(1.0, points_at(1.0, side))
+    for now in np.arange(1.03, 1.5, 0.03):
+        near = watcher.see(now, points_at(now))
+    assert len(near.unit) == 0
+
+
+@pytest.mark.parametrize("speed", [-0.3, 0.0, 0.5])
+def test_the_own_speed_of_what_is_seen_is_known(panda_model, speed):
+    watcher = Watcher(panda_model, replace(PARAMS, closing_speed=True))
+    for k in range(15):
+        now = 1.0 + k / 30
+        near = watcher.see(now, points_at(now, BESIDE - [0.0, speed * k / 30, 0.0]))
+    (of_hand,) = near.closing_speed[near.body_distance == near.body_distance.min()]
+    assert of_hand == pytest.approx(speed * abs(near.direction[np.argmin(near.body_distance), 1]), abs=0.02)
+
+
+def test_a_set_from_the_future_or_from_before_is_not_heard(watcher):
+    assert len(watcher.see(1.0, points_at(1.5, BESIDE)).unit) == 0
+    assert watcher.state.heard == -np.inf
+    watcher.see(1.0, points_at(1.0, BESIDE))
+    watcher.see(1.01, points_at(0.9))
+    assert watcher.state.heard == 1.0
+
+
+def test_time_that_goes_backwards_forgets_what_was_seen(watcher):
+    watcher.see(1.0, points_at(1.0, BESIDE))
+    assert len(watcher.see(0.5, points_at(0.5), anew=True).unit) == 0
+    assert watcher.state.heard == 0.5
+
+
+def test_a_source_that_falls_silent_slows_the_arm_and_stops_it(watcher):
+    watcher.see(1.0, points_at(1.0))
+    assert outside_silence(watcher.state, "", 1.2, PARAMS) == (1.0, "")
+    factor, lost = outside_silence(watcher.state, "", 1.3, PARAMS)
+    assert (factor, lost) == (pytest.approx(0.5), "")
+    assert outside_silence(watcher.state, "", 1.41, PARAMS) == (0.0, "has been silent for 0.41 s")
+    assert outside_silence(watcher.state, "gives nonsense", 1.0, PARAMS) == (0.0, "gives nonsense")
+    assert outside_silence(watcher.state, "gives nonsense", 1.0, PerceptionParams()) == (1.0, "")
+    assert outside_silence(None, "", 1.0, PARAMS) == (1.0, "")
+
+
+def test_a_source_that_was_never_heard_is_silent(watcher):
+    watcher.see(1.0, points_at(-np.inf))
+    assert outside_silence(watcher.state, "", 1.0, PARAMS) == (0.0, "has not been heard yet")

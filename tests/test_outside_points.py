@@ -1,0 +1,193 @@
+"""Outside points through the whole controller, the loop and a recording."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.control.near import NearState, near_init, widened
+from pretouch.faults import MOST_POINTS, sound_points
+from pretouch.params import PROFILES
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.realtime import warm_up
+from pretouch.recording.codec import decode_points, encode_points
+from pretouch.recording.messages import decoded, encoded
+from pretouch.recording.reader import open_recording
+from pretouch.recording.state_codec import STATE, decode_state, encode_state
+from pretouch.recording.verify import verify
+from pretouch.recording.writer import Recording
+from pretouch.sensing.skin import Skin
+from pretouch.types import Inputs, Mode, SeenPoints
+from tests.following_arm import Arm
+from tests.fuzz.invariants import same
+from tests.recording.runs import Run, controller_of
+
+PRETOUCH = PROFILES["pretouch"]
+
+
+def seen(now: float, *point, sigma: float = 0.005) -> SeenPoints:
+    at = np.array(point, dtype=np.float64).reshape(-1, 3)
+    return SeenPoints(now, np.full(len(at), now), at, np.full(len(at), sigma))
+
+
+def turn(arm: Arm, points: SeenPoints | None):
+    inputs = Inputs(arm.time, arm.robot(), arm.readings(), False, points)
+    step, arm.state = arm.controller.step(arm.state, inputs)
+    arm.qd, arm.q, arm.time = step.command, arm.q + step.command * 0.01, arm.time + 0.01
+    return step
+
+
+def test_a_profile_that_takes_no_points_does_the_same_to_the_bit_with_and_without(panda_model, paper_skin):
+    plain, given = Arm(panda_model, paper_skin), Arm(panda_model, paper_skin)
+    for _ in range(150):
+        one, other = turn(plain, None), turn(given, seen(given.time, given.ee() + np.array([0.0, 0.2, 0.0])))
+        assert same(one, other)
+    assert same(plain.state, given.state)
+
+
+def test_pretouch_without_a_source_does_the_same_to_the_bit_whatever_is_kept_of_points(panda_model, paper_skin):
+    off = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside_points=0))
+    arms = [Arm(panda_model, paper_skin, profile) for profile in (PRETOUCH, off)]
+    for _ in range(150):
+        assert same(*(turn(arm, None) for arm in arms))
+    assert same(arms[0].state, arms[1].state)
+
+
+@pytest.mark.parametrize("units", [7, 0])
+def test_an_arm_slows_before_what_only_an_outside_source_sees(panda_model, paper_skin, units):
+    skin = paper_skin if units else Skin([], panda_model)
+    arm, free = Arm(panda_model, skin, PRETOUCH), Arm(panda_model, skin, PRETOUCH)
+    place = arm.ee() + np.array([0.0, 0.25, 0.0])
+    speeds, fastest = [], 0.0
+    for _ in range(400):
+        step, ahead = turn(arm, seen(arm.time, place)), turn(free, None)
+        fastest = max(fastest, ahead.ee_velocity[1])
+        nearest = step.obstacles
+        if len(nearest.unit) and nearest.body_distance.min() < 0.02 and nearest.direction[0, 1] > 0.8:
+            assert nearest.unit.min() >= units
+            speeds.append(step.ee_velocity[1])  # it goes straight at the point
+    assert fastest > 0.25
+    assert len(speeds) > 5
+    assert 0.0 < max(speeds) < 0.5 * fastest
+    assert step.mode is Mode.TRACK
+
+
+def test_a_source_once_given_that_falls_silent_stops_the_arm_and_lets_it_go_on(panda_model, paper_skin):
+    arm = Arm(panda_model, paper_skin, PRETOUCH)
+    for _ in range(150):
+        turn(arm, seen(arm.time))
+    last = seen(arm.time)
+    modes = [turn(arm, last) for _ in range(60)]
+    assert modes[15].mode is Mode.TRACK
+    assert 0.0 < modes[30].speed_scale < 1.0
+    assert modes[-1].mode is Mode.HOLD
+    assert "outside source of points has been silent" in modes[-1].reason
+    assert turn(arm, None).mode is Mode.HOLD, "nor when there is no set at all"
+    assert turn(arm, seen(arm.time)).mode is Mode.TRACK
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        (5, "gives 5"),
+        (SeenPoints(1.0, np.zeros(2), np.zeros((3, 3)), np.zeros(3)), "of the shapes (2,), (3, 3) and (3,)"),
+        (SeenPoints(1.0, np.zeros(1), np.zeros(3), np.zeros(1)), "of the shapes (1,), (3,) and (1,)"),
+        (SeenPoints("soon", np.zeros(1), np.zeros((1, 3)), np.zeros(1)), "no arrays of numbers"),
+        (seen(1.0, *np.zeros((MOST_POINTS + 1, 3))), f"gives 20001 points, more than {MOST_POINTS}"),
+        (seen(1.0, *np.full((5, 3), 500.0), [np.nan] * 3, [0.0] * 3), "5 of 6 points that are none"),
+    ],
+)
+def test_points_that_cannot_be_used_are_named(panda_model, paper_skin, points, said):
+    sound, wrong = sound_points(points)
+    assert sound is None
+    assert said in wrong
+    arm = Arm(panda_model, paper_skin, PRETOUCH)
+    for _ in range(150):
+        turn(arm, seen(arm.time))
+    step = turn(arm, points)
+    assert step.mode is Mode.HOLD
+    assert said in step.reason
+    assert turn(arm, seen(arm.time)).mode is Mode.TRACK
+
+
+def test_room_for_more_units_leaves_the_rows_there_are(panda_model):
+    state = near_init(panda_model, 2)
+    slots = np.arange(36.0).reshape(4, 9)
+    wider = widened(NearState(slots, state.null_velocity, state.detour), 5)
+    assert (wider.slots[:2] == slots[:2]).all()
+    assert (wider.slots[5:7] == slots[2:]).all()
+    assert (wider.slots[[2, 3, 4, 7, 8, 9], 0] == -1).all()
+    assert widened(wider, 3) is wider
+
+
+def frames(now: float, rng: np.random.Generator) -> SeenPoints:
+    """Points about the arm, a new set every 40 ms."""
+    return seen(now, *rng.uniform([-0.2, -0.6, 0.1], [0.9, 0.6, 1.0], (40, 3)))
+
+
+def test_a_run_with_points_is_recomputed_bit_for_bit(panda_model, paper_skin, tmp_path):
+    controller, rng = controller_of(panda_model, paper_skin, PRETOUCH), np.random.default_rng(4)
+    run, held = Run(controller, 2), None
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for k in range(500):
+            if k > 100 and k % 4 == 0:
+                held = frames(run.time, rng)
+            recording.record(run.turn(lambda inputs, held=held: replace(inputs, points=held)))
+    recorded = open_recording(tmp_path / "a.mcap")
+    for kept, cycle in zip(recorded, run.cycles, strict=True):
+        assert same(kept.inputs, cycle.inputs)
+    verdict = verify(recorded)
+    assert verdict.exact
+    assert verdict.agrees
+    assert any((kept.step.obstacles.unit >= 7).any() for kept in recorded)
+
+
+def test_points_are_written_once(panda_model):
+    points = seen(1.0, [0.1, 0.2, 0.3])
+    number, back = decode_points(encode_points(7, points, 7))
+    assert number == 7
+    assert same(back, points)
+    number, back = decode_points(encode_points(8, points, 7))
+    assert (number, len(back.stamp)) == (7, 0)
+
+
+def test_inputs_with_points_that_fit_no_message_are_said_to_be_unreadable(panda_model, paper_skin, tmp_path):
+    controller = controller_of(panda_model, paper_skin, PRETOUCH)
+    run, odd = Run(controller), SeenPoints(0.0, np.zeros(2), np.zeros(5), np.zeros(2))
+    with Recording(tmp_path / "a.mcap", controller) as recording:
+        for k in range(20):
+            recording.record(run.turn(lambda inputs, k=k: replace(inputs, points=odd if k == 9 else None)))
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert recorded[9].inputs is None
+    assert "points are no rows" in recorded.unreadable(9)
+    assert verify(recorded).agrees
+
+
+def test_a_state_recorded_before_there_were_outside_points_still_opens(panda_model, paper_skin):
+    state = controller_of(panda_model, paper_skin).init(Run(controller_of(panda_model, paper_skin)).inputs().robot)
+    message = decoded(STATE, encode_state(3, state, True))
+    assert message.name[-1] == "outside"
+    message.name, message.kind, message.shape = message.name[:-1], message.kind[:-1], message.shape[:-1]
+    assert same(decode_state(encoded(STATE, message))[1], state)
+
+
+def test_another_number_of_places_begins_anew(panda_model, paper_skin):
+    arm = Arm(panda_model, paper_skin, PRETOUCH)
+    turn(arm, seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
+    one = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside_points=1))
+    other = controller_of(panda_model, paper_skin, one)
+    assert other.adopt(arm.state, arm.controller).outside is None
+    arm.state, arm.controller = other.adopt(arm.state, arm.controller), other
+    step = turn(arm, seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
+    assert (step.obstacles.unit >= 7).any()
+    assert same(other.adopt(arm.state, other).outside, arm.state.outside)
+
+
+def test_warming_up_knows_of_points_and_leaves_the_arm_as_it_is(panda_model, paper_skin):
+    arm = Arm(panda_model, paper_skin, PRETOUCH)
+    arm.controller.fixtures = no_fixtures()
+    robot, calls = arm.robot(), []
+    step = arm.controller.step
+    arm.controller.step = lambda state, inputs: calls.append(inputs.points) or step(state, inputs)
+    warm_up(arm.controller, robot, points=True)
+    assert {len(points.stamp) > 0 for points in calls} == {True, False}
