@@ -57,6 +57,8 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         scene=SceneSpec(hand=hand),
         path=Circle(),
         seed=seed,
+        plant=context.arm,
+        ranging=context.ranging,
         recording=context.recording,
         hand=Visitor(context.model, visits(str(cell.where["place"]), seed)),
     )

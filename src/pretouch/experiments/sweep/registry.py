@@ -1,0 +1,14 @@
+"""All experiments that can be swept, by name."""
+
+from pretouch.errors import ExperimentError
+from pretouch.experiments.sweep.measures import CLOSED_LOOP, Measure
+from pretouch.experiments.sweep.streams import ON_STREAMS
+
+MEASURES: dict[str, Measure] = {m.name: m for m in (*CLOSED_LOOP, *ON_STREAMS)}
+
+
+def measure(name: str) -> Measure:
+    """Look an experiment up. Raises ExperimentError."""
+    if name not in MEASURES:
+        raise ExperimentError(f"The experiment {name!r} cannot be swept: choose from {', '.join(MEASURES)}.")
+    return MEASURES[name]
