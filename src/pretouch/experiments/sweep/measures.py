@@ -134,7 +134,8 @@ CLOSED_LOOP = (
         "static", "the arm runs into a board (paper IV-A)", "paper:restriction.mode=off", StaticScene(),
         {
             **_PEAKS, "delay_s": "time from the touch to the reaction [s]",
-            "impact_speed_m_s": "speed of the touch [m/s]", "contact": "whether it touched the board", "missed": "whether a touch was not felt", **_FALSE,
+            "impact_speed_m_s": "speed of the touch [m/s]", "contact": "whether it touched the board",
+            "missed": "whether a touch was not felt", **_FALSE,
         },
         _static, _static_cost,
     ),
