@@ -34,8 +34,8 @@ class Measure:
     """Measures a setting, given what `shared` made of it."""
     cost_s: Callable[[Setting], float]
     """Processor time of `run`, about [s]."""
-    groups: tuple[str, ...] = ()
-    """Groups of the profile, or single parameters, that can change something; none: all of them."""
+    groups: tuple[str, ...] | None = None
+    """Groups of the profile, or single parameters, that can change something; None: all of them."""
     shared: Callable[[Setting], Any] | None = None
     """Makes what cells with the same `Setting.world` have in common: a recorded stream."""
     shared_cost_s: Callable[[Setting], float] = lambda _: 0.0
@@ -44,11 +44,9 @@ class Measure:
         """Refuse a parameter of the profile that cannot change anything here."""
         group = name.partition(".")[0]
         of_profile = group in Profile.__dataclass_fields__
-        if self.groups and of_profile and not {group, name} & set(self.groups):
-            raise ExperimentError(
-                f"The parameter {name} changes nothing in {self.name}, where detectors replay recorded streams: take"
-                f" one of {', '.join(self.groups)}, or the experiment static."
-            )
+        if self.groups is not None and of_profile and not {group, name} & set(self.groups):
+            of = f"take one of {', '.join(self.groups)}, or" if self.groups else "take one of scene, or"
+            raise ExperimentError(f"The parameter {name} changes nothing in {self.name}: {of} the experiment static.")
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 from pretouch.errors import ExperimentError
 from pretouch.experiments.sweep.measures import CLOSED_LOOP, Measure
 from pretouch.experiments.sweep.streams import ON_STREAMS
+from pretouch.experiments.sweep.trying import ISHIGAMI
 
-MEASURES: dict[str, Measure] = {m.name: m for m in (*CLOSED_LOOP, *ON_STREAMS)}
+MEASURES: dict[str, Measure] = {m.name: m for m in (*CLOSED_LOOP, *ON_STREAMS, ISHIGAMI)}
 
 
 def measure(name: str) -> Measure:

@@ -25,6 +25,7 @@ _PARTS = (
     "experiments/trial.py", "experiments/placement.py", "experiments/claims/free_run.py",
     "experiments/bench/dense_skin.py", "experiments/bench/detection", "experiments/bench/scenario_files.py",
     "experiments/sweep/measures.py", "experiments/sweep/setting.py", "experiments/sweep/streams.py",
+    "experiments/sweep/trying.py",
 )  # fmt: skip
 """Parts of the package that decide what is measured."""
 _ONE_AT_A_TIME = Lock()
