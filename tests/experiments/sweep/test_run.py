@@ -106,8 +106,9 @@ def test_an_answer_is_data_that_is_checked_before_it_is_written(tmp_path, answer
 def test_a_cell_that_fails_is_written_down_stops_no_other_and_is_tried_again(tmp_path):
     run = opened_ishigami(tmp_path, samples=2)
     store, bad = Store(run.folder / "cells", ISHIGAMI), run.jobs[0]
-    text = bad.written().replace('"scene.x1": ', '"scene.x1": 4 + ', 1).replace("4 + ", "44")
-    ((cell, result),) = store.answered(bad, work.work(text))
+    asked = json.loads(bad.written())
+    asked["cells"][0]["values"]["scene.x1"] = 44.0
+    ((cell, result),) = store.answered(bad, work.work(json.dumps(asked)))
     assert result.metrics is None
     assert "must be at most 3.2" in result.reason
     store.keep(cell, result)
