@@ -10,7 +10,7 @@ from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, RangeSample, _flat_wall
+from pretouch.sim.range_finder import MODES, RangeFinderParams, RangeFinders, RangeSample, _flat_wall
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import RangeStatus
 
