@@ -31,7 +31,7 @@ def seen(now: float, *point, sigma: float = 0.005) -> SeenPoints:
 
 
 def turn(arm: Arm, points: SeenPoints | None):
-    inputs = Inputs(arm.time, arm.robot(), arm.readings(), False, points)
+    inputs = Inputs(arm.time, arm.robot(), arm.readings(), points=points)
     step, arm.state = arm.controller.step(arm.state, inputs)
     arm.qd, arm.q, arm.time = step.command, arm.q + step.command * 0.01, arm.time + 0.01
     return step

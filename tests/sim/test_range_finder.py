@@ -10,7 +10,7 @@ from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, RangeSample, _flat_wall
+from pretouch.sim.range_finder import MODES, RangeFinderParams, RangeFinders, RangeSample, _flat_wall
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import RangeStatus
 
@@ -349,3 +349,9 @@ def test_without_a_target_only_ambient_light_is_left(panda_model):
     assert max(s.signal for s in samples) < 0.01
     assert np.mean([s.ambient for s in samples]) == pytest.approx(0.3, rel=0.01)
     assert len({round(s.ambient, 4) for s in samples}) > 20
+
+
+def test_units_measure_as_often_as_they_are_told():
+    assert RangeFinderParams().period_s == MODES["short"].period_s
+    assert RangeFinderParams(mode="long").period_s == MODES["long"].period_s
+    assert RangeFinderParams(rate_hz=10.0).period_s == 0.1

@@ -31,6 +31,7 @@ from pretouch.cli.robot_commands import Check, Import, Robot
 from pretouch.cli.run.options import Run
 from pretouch.cli.serve_fci_command import ServeFci
 from pretouch.cli.skin_commands import Skin
+from pretouch.cli.sweep import Sweep
 from pretouch.cli.words import words
 from pretouch.errors import ParameterError, PretouchError
 
@@ -68,6 +69,8 @@ def main(args: list[str] | None = None) -> int:
                     _free_motion(what)
                 case Bench(Cycle() as what):
                     _cycle(what)
+                case Sweep():
+                    _sweep(command)
                 case Live():
                     _live(command)
                 case Replay():
@@ -180,6 +183,12 @@ def _free_motion(command: FreeMotion) -> None:
     out = Path(command.out or "runs/bench-free-motion")
     request = Request(("free-motion",), command.seeds)
     run_all([(request, out)], out, Path(command.json) if command.json else out / "results.json")
+
+
+def _sweep(command: Sweep) -> None:
+    from pretouch.cli.sweep import sweep
+
+    sweep(command)
 
 
 def _cycle(command: Cycle) -> None:

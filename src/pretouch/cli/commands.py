@@ -14,6 +14,7 @@ from pretouch.cli.robot_commands import Robot
 from pretouch.cli.run.options import Run
 from pretouch.cli.serve_fci_command import ServeFci
 from pretouch.cli.skin_commands import Skin
+from pretouch.cli.sweep import Sweep
 from pretouch.hardware.address import HOST, PORT
 
 
@@ -235,6 +236,7 @@ Command = (
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Figure, tyro.conf.subcommand("figure")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[Sweep, tyro.conf.subcommand("sweep")]
     | Annotated[Live, tyro.conf.subcommand("live")]
     | Annotated[Replay, tyro.conf.subcommand("replay")]
     | Annotated[Recover, tyro.conf.subcommand("recover")]

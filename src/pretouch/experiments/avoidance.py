@@ -58,6 +58,8 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         path=Circle(),
         seed=seed,
         world=context.world,
+        plant=context.arm,
+        ranging=context.ranging,
         recording=context.recording,
         hand=Visitor(context.model, visits(str(cell.where["place"]), seed)),
     )

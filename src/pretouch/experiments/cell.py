@@ -10,6 +10,8 @@ from pretouch.experiments.placement import Placement
 from pretouch.params import Orientation, Profile, RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sim.plant_params import PlantParams, plant_params_of
+from pretouch.sim.range_finder import RangeFinderParams
 
 _ITS_OWN = ("braking", "flacco", "ding")
 """Restriction modes that make a profile what it is."""
@@ -76,6 +78,15 @@ class Context:
     """Set of worlds of which each trial's seed draws its own, or none."""
     recording: Path | None = None
     """File to record the trial in, if it is to be recorded."""
+    plant: PlantParams | None = None
+    """How far the arm is from its model; none, and as far as real arms are (`plant_params_of`)."""
+    ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    """How the skin's units err."""
+
+    @property
+    def arm(self) -> PlantParams:
+        """How far the arm is from its model."""
+        return self.plant or plant_params_of(self.model.description)
 
     def profile(self, cell: Cell) -> Profile:
         """Return a cell's profile with the restriction mode of the cell, if it names one, as this run has it."""

@@ -17,7 +17,6 @@ from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.sim.board import FACE_M, Side, board_beside, sign_of
 from pretouch.sim.plant import Plant
-from pretouch.sim.plant_params import plant_params_of
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import ControlStep
 
@@ -77,7 +76,8 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         path=path(trajectory, side, context.placement),
         seed=seed,
         world=context.world,
-        plant=plant_params_of(context.model.description),
+        plant=context.arm,
+        ranging=context.ranging,
         recording=context.recording,
     )
     record = play(setup, done_after_contact())

@@ -40,6 +40,8 @@ class RangeFinderParams(Checked):
 
     mode: Literal["short", "long"] = "short"
     """Distance mode."""
+    rate_hz: NonNegative = 0.0
+    """Readings of each unit in a second [Hz]; 0: as often as the mode allows, 50 in short mode and 7 in long mode."""
     rings: int = 2
     """Circles of rays that fill the 27 degree cone; 2 make 19 rays."""
     reflectance: Fraction = 0.5
@@ -69,6 +71,11 @@ class RangeFinderParams(Checked):
     """Times longer than the mode's own the period is: units that share a channel, or a processor."""
     dropout: Fraction = 0.005
     """Probability that a reading is lost on its way."""
+
+    @property
+    def period_s(self) -> float:
+        """Time between a unit's readings [s]."""
+        return self.period_factor * (1.0 / self.rate_hz if self.rate_hz else MODES[self.mode].period_s)
 
 
 class RangeSample(NamedTuple):
@@ -118,7 +125,7 @@ class RangeFinders:
         self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
         count = len(skin)
         self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
-        self._due: list[float] = self._rng.uniform(0, params.period_factor * self._mode.period_s, count).tolist()
+        self._due: list[float] = self._rng.uniform(0, params.period_s, count).tolist()
         self._arriving: list[tuple[float, int, float, float, int]] = []
         self._stamp = np.full(count, -np.inf)
         self._distance = np.zeros(count)
@@ -151,13 +158,11 @@ class RangeFinders:
     def _sample(self, time: float) -> None:
         if time < self._next_due:
             return
-        p, rng = self._params, self._rng
+        p, rng, period = self._params, self._rng, self._params.period_s
         for unit, due in enumerate(self._due):
             if due > time:
                 continue
-            self._due[unit] = due + p.period_factor * self._mode.period_s * (
-                1.0 + p.period_jitter * rng.standard_normal()
-            )
+            self._due[unit] = due + period * (1.0 + p.period_jitter * rng.standard_normal())
             distance, status, sigma, strength = self._measure(unit)
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
             lost = rng.random() < p.dropout

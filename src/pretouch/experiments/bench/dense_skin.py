@@ -1,6 +1,6 @@
-"""A skin of 32 units spread over the arm: the one of most scenarios, kept as `scenarios/dense_skin.toml`.
+"""Units spread over the arm. 32 of them are the skin of most scenarios, kept as `scenarios/dense_skin.toml`.
 
-It was made once by `python -m pretouch.experiments.bench.dense_skin FILE`.
+That was made once by `python -m pretouch.experiments.bench.dense_skin FILE`.
 """
 
 import sys
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pretouch.errors import ExperimentError
 from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
@@ -17,7 +18,9 @@ from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray
 
 UNITS = {"link2": 3, "link3": 5, "link4": 5, "link5": 7, "link6": 4, "link7": 2, "hand": 6}
-"""Units on each link."""
+"""Units on each link, of 32."""
+_FIRST = ("hand", "link7", "link6", "link5", "link4", "link3", "link2")
+"""Links in the order in which each gets its first unit: from what is likeliest to touch something."""
 _HEIGHT_M = 0.008
 """Height of a range finder above the surface [m]."""
 _CLEAR_M = (0.05, 0.1, 0.2, 0.3)
@@ -41,12 +44,39 @@ def gap(points: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray) ->
 
 
 def dense_skin(model: RobotModel) -> Skin:
-    """Spread units over each link of a Panda as far from each other as they can be, each looking off the arm."""
+    """Return the skin of 32 units."""
+    return spread_skin(model, sum(UNITS.values()))
+
+
+def units_of(count: int) -> dict[str, int]:
+    """How many of so many units sit on each link: one on each first, then in proportion to `UNITS`.
+
+    More units are always those of fewer and others. Shares are Webster's: the next unit goes where UNITS / (2 n + 1) is
+    largest for the n that are there, so that 32 units are `UNITS` itself.
+    """
+    given = dict.fromkeys(UNITS, 0)
+    for number in range(count):
+        most = max(_FIRST, key=lambda name: UNITS[name] / (2 * given[name] + 1))
+        given[_FIRST[number] if number < len(_FIRST) else most] += 1
+    return given
+
+
+def spread_skin(model: RobotModel, count: int) -> Skin:
+    """Spread units over the links of a Panda, on each as far from each other as they can be, each looking off the arm.
+
+    Raises ExperimentError for no unit, and for more than find a place.
+    """
+    if count < 1:
+        raise ExperimentError(f"The number of units is {count}: give at least 1, or a profile without proximity.")
     units = []
-    for name, count in UNITS.items():
+    for name, number_there in units_of(count).items():
         link = model.link_index(f"{model.description.name}_{name}")
         places, normals = _candidates(model, link)
-        for number, i in enumerate(_spread(places, count)):
+        if number_there > len(places):
+            raise ExperimentError(
+                f"Of {count} units {number_there} would sit on {name}, where {len(places)} find a place: give fewer."
+            )
+        for number, i in enumerate(_spread(places, number_there)):
             T = np.eye(4)
             T[:3, :3], T[:3, 3] = _looking(normals[i]), np.round(places[i], 5)
             units.append(SensorUnit(f"{name}_{number + 1}", model.links[link], T))
@@ -75,7 +105,7 @@ def _candidates(model: RobotModel, link: int) -> tuple[FloatArray, FloatArray]:
 
 def _spread(places: FloatArray, count: int) -> list[int]:
     """Indices of so many places, each the farthest from those before."""
-    chosen = [int(np.argmax(places[:, 2]))]
+    chosen = [int(np.argmax(places[:, 2]))] if count else []
     while len(chosen) < count:
         far = np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1)
         chosen.append(int(np.argmax(far)))

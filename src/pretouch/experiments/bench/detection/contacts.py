@@ -7,11 +7,21 @@ from typing import Any
 import numpy as np
 
 from pretouch.experiments.bench.dense_skin import gap, surface
-from pretouch.experiments.bench.detection.arm import AWAY, Alone, model, path_of, plant_of, record, sensing_of
+from pretouch.experiments.bench.detection.arm import (
+    AWAY,
+    Alone,
+    Sensing,
+    model,
+    path_of,
+    plant_of,
+    record,
+    sensing_of,
+)
 from pretouch.experiments.bench.detection.stream import Stream, save_stream
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_of
 from pretouch.perception.vectors import placed
 from pretouch.sim.plant import Plant, PointForce
+from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.posture import brought_to
 from pretouch.types import FloatArray
 
@@ -89,12 +99,15 @@ def contact_cells(seeds: SeedRange, quick: bool) -> list[ContactCell]:
     return cells
 
 
-def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
-    """Draw a cell's contacts: the seed says where, how and when."""
+def plan(cell: ContactCell, hand_radius: float, warm_up_s: float | None = None) -> list[Touching]:
+    """Draw a cell's contacts: the seed says where, how and when.
+
+    The first is after a warm-up [s], the scenario file's unless another is given.
+    """
     family, rng = scenario("contacts"), np.random.default_rng([cell.seed, 32])
     chosen, kinds = family["contact"], family["contact"]["kind"]
     every = [(k, duration) for k, kind in enumerate(kinds) for duration in kind["durations_s"]]
-    at, found = float(family["duration"]["warm_up_s"]), []
+    at, found = float(family["duration"]["warm_up_s"] if warm_up_s is None else warm_up_s), []
     q = start_posture()
     for _ in range(cell.count):
         k, duration = every[int(rng.integers(len(every)))]
@@ -191,16 +204,21 @@ class Toucher:
 
 
 def record_contacts(cell: ContactCell, file: FilePath) -> None:
-    """Record one cell's stream, with its contacts in it: `touch.NAME` for each field of `Touching`."""
-    sensing = sensing_of(cell.sensing, cell.seed)
-    touches = plan(cell, sensing.hand_radius)
+    """Record one cell's stream."""
+    save_stream(contact_stream(cell, plant_of(cell.kind), sensing_of(cell.sensing, cell.seed)), file)
+
+
+def contact_stream(cell: ContactCell, plant: PlantParams, sensing: Sensing, warm_up_s: float | None = None) -> Stream:
+    """Let an arm be touched and return its stream, with its contacts in it: `touch.NAME` for each field of `Touching`.
+
+    `cell` says how fast, how often and with which seed; `plant` and `sensing` on which arm.
+    """
+    touches = plan(cell, sensing.hand_radius, warm_up_s)
     path = path_of("circle" if cell.speed_m_s > 0 else "rest")
     end = touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1
-    what = Alone(
-        path, cell.speed_m_s, plant_of(cell.kind), sensing, sensing.hand_radius, cell.seed, end, cell.world
-    )  # fmt: skip
+    what = Alone(path, cell.speed_m_s, plant, sensing, sensing.hand_radius, cell.seed, end, cell.world)
     stream = record(what, lambda plant: Toucher(plant, touches, sensing.hand_radius).hand)
-    save_stream(replace(stream, truth=described(touches, sensing.hand_radius)), file)
+    return replace(stream, truth=described(touches, sensing.hand_radius))
 
 
 def described(touches: list[Touching], hand_radius: float) -> dict[str, FloatArray]:

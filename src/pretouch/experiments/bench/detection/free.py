@@ -6,13 +6,24 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from pretouch.experiments.bench.dense_skin import gap
-from pretouch.experiments.bench.detection.arm import AWAY, Alone, Prepare, model, path_of, plant_of, record, sensing_of
-from pretouch.experiments.bench.detection.stream import save_stream
+from pretouch.experiments.bench.detection.arm import (
+    AWAY,
+    Alone,
+    Prepare,
+    Sensing,
+    model,
+    path_of,
+    plant_of,
+    record,
+    sensing_of,
+)
+from pretouch.experiments.bench.detection.stream import Stream, save_stream
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_of
 from pretouch.loop import Cycle
 from pretouch.perception.vectors import placed
 from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
 
 _HAND_SIDE_M = 0.102
@@ -62,11 +73,21 @@ def warm_up_s() -> float:
 
 
 def record_free(cell: FreeCell, file: FilePath) -> None:
-    """Record one cell's stream; how near the ghost truly came is in it as `least_gap`."""
+    """Record one cell's stream."""
+    plant, sensing = plant_of(cell.kind), sensing_of("seven", cell.seed)
+    save_stream(free_stream(cell, plant, sensing, warm_up_s()), file)
+
+
+def free_stream(cell: FreeCell, plant: PlantParams, sensing: Sensing, before_s: float) -> Stream:
+    """Let an arm move that nothing touches, and return its stream; `before_s` [s] come before what counts.
+
+    How near the ghost truly came is in it as `least_gap`. `cell` says on which path, how fast, who is near and with
+    which seed; `plant` and `sensing` say which arm it is.
+    """
     near = scenario("free")["near"]
     what = Alone(
-        path_of(cell.path), cell.speed_m_s, plant_of(cell.kind), sensing_of("seven", cell.seed), near["radius_m"],
-        cell.seed, warm_up_s() + cell.counted_s, cell.world,
+        path_of(cell.path), cell.speed_m_s, plant, sensing, near["radius_m"], cell.seed, before_s + cell.counted_s,
+        cell.world,
     )  # fmt: skip
     nearest, steps = [np.inf], [0]
 
@@ -78,7 +99,7 @@ def record_free(cell: FreeCell, file: FilePath) -> None:
             nearest[0] = min(nearest[0], float(gap(ghost.position[None], a, b, body.radius)[0]) - near["radius_m"])
 
     stream = record(what, _bystander(cell), look)
-    save_stream(replace(stream, truth={"least_gap": np.array(nearest)}), file)
+    return replace(stream, truth={"least_gap": np.array(nearest)})
 
 
 def _bystander(cell: FreeCell) -> Prepare:

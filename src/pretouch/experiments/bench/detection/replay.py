@@ -42,12 +42,12 @@ class Replayed:
         return begun(self.alarm if value is None else self.statistic > value)
 
 
-def begun(alarm: BoolArray) -> list[int]:
-    """Steps at which an alarm begins, given those (S,) with one: each is answered for `REST` steps."""
+def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
+    """Steps at which an alarm begins, given those (S,) with one: each is answered for `rest` steps."""
     at, found, i = np.flatnonzero(alarm), [], 0
     while i < len(at):
         found.append(int(at[i]))
-        i = int(np.searchsorted(at, at[i] + REST))
+        i = int(np.searchsorted(at, at[i] + rest))
     return found
 
 
