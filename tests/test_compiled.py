@@ -12,7 +12,7 @@ import pytest
 
 import pretouch
 from pretouch import compiled
-from pretouch.perception.vectors import dot
+from pretouch.robot.vectors import dot
 
 PACKAGE = Path(pretouch.__file__).parent
 

@@ -16,9 +16,9 @@ from pretouch.contact.where import WhereState, locate, where_init
 from pretouch.contact.where_prior import hidden_places, place_surface, prior_of_places
 from pretouch.params import LocalisationParams
 from pretouch.perception.closest import no_obstacles
-from pretouch.perception.vectors import placed
 from pretouch.robot.description import panda
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.vectors import placed
 from pretouch.types import FloatArray, Obstacles, Touched
 
 MODEL = RobotModel(panda())

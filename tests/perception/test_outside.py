@@ -12,8 +12,8 @@ from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.perception.outside import moving_links, outside_silence, see_outside
 from pretouch.perception.perceive import Perception
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
-from pretouch.perception.vectors import placed
 from pretouch.robot.description import panda
+from pretouch.robot.vectors import placed
 from pretouch.types import RobotState, SeenPoints
 
 TCP = np.array([0.30689, 0.0, 0.48688])

@@ -9,9 +9,9 @@ from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import track_init
 from pretouch.perception.perceive import perceive, silent_units
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
-from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
+from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import RangeReadings, RangeStatus

@@ -11,8 +11,8 @@ from pretouch.coverage.surface import Surface
 from pretouch.perception.obstacles import poses
 from pretouch.perception.scene_filter import Fixtures, expected_range
 from pretouch.perception.sighting import ways_free, ways_seen
-from pretouch.perception.vectors import placed
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.vectors import placed
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 

@@ -15,8 +15,8 @@ from pretouch.experiments.weaknesses import views
 from pretouch.params import RestrictionMode, profile
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import expected_range
-from pretouch.perception.vectors import placed
 from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import placed
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import FloatArray
 

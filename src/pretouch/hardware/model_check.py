@@ -11,9 +11,9 @@ from pretouch.hardware.findings import Finding
 from pretouch.perception.closest import bounds
 from pretouch.perception.obstacles import is_evidence, measured_distance, sensor_poses
 from pretouch.perception.scene_filter import RAYS, Fixtures, capsule_return, expected_range, plane_return
-from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray, IntArray, RangeReadings
 

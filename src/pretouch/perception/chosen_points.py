@@ -6,7 +6,7 @@ from pretouch.compiled import compiled
 from pretouch.perception.closest import closest, to_axis
 from pretouch.perception.closing import follow_points
 from pretouch.perception.obstacles import HEARD, SEEN, USED
-from pretouch.perception.vectors import dot
+from pretouch.robot.vectors import dot
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _FARTHEST = 100.0

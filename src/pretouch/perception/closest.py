@@ -3,9 +3,9 @@
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
+from pretouch.robot.vectors import placed
 from pretouch.types import FloatArray, IntArray, Obstacles
 
 _ON_AXIS = 1e-9

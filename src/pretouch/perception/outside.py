@@ -18,8 +18,8 @@ from pretouch.perception.closing import closing_speeds
 from pretouch.perception.obstacles import HEARD, SEEN, TrackState, track_init
 from pretouch.perception.perceive import Perception
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.perception.vectors import placed_ends
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.vectors import placed_ends
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState, SeenPoints
 from pretouch.values import value
 

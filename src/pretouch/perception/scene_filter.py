@@ -7,9 +7,9 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.errors import FixtureError
 from pretouch.perception.closest import bounds, to_axis, to_spheres
-from pretouch.perception.vectors import dot, placed, rotate
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
+from pretouch.robot.vectors import dot, placed, rotate
 from pretouch.sensing.unit import CONE_ANGLE, cone_rays
 from pretouch.types import BoolArray, FloatArray, IntArray
 

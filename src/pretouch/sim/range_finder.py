@@ -68,7 +68,7 @@ class RangeFinderParams(Checked):
     period_jitter: Fraction = 0.02
     """Standard deviation of the period as a fraction of it."""
     period_factor: Annotated[float, Check(low=1.0)] = 1.0
-    """Times longer than the mode's own the period is: units that share a channel, or a processor."""
+    """Times longer than that the period is: units that share a channel, or a processor."""
     dropout: Fraction = 0.005
     """Probability that a reading is lost on its way."""
 

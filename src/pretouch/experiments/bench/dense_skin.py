@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.errors import ExperimentError
-from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin, save_skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray

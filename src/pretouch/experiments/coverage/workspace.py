@@ -6,9 +6,9 @@ from pretouch.errors import ExperimentError
 from pretouch.experiments.placement import Placement, placement_for
 from pretouch.importing.ready import ever_apart
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.perception.vectors import placed
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.vectors import placed
 from pretouch.sim.posture import brought_to
 from pretouch.types import FloatArray
 

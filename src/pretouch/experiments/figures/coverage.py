@@ -13,8 +13,8 @@ from pretouch.coverage.measure import Coverage
 from pretouch.coverage.surface import on_capsule
 from pretouch.coverage.ways import Ways
 from pretouch.perception.obstacles import sensor_poses
-from pretouch.perception.vectors import placed
 from pretouch.robot.model import Kinematics
+from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import CONE_ANGLE
 from pretouch.types import BoolArray, FloatArray

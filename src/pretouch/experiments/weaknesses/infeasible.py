@@ -16,9 +16,9 @@ from pretouch.experiments.metrics import rounded
 from pretouch.experiments.tables import TextTable, number
 from pretouch.params import Profile, profile
 from pretouch.perception.closest import closest_points
-from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.vectors import placed
 from pretouch.types import FloatArray, Obstacles, QpOutcome
 
 NAME = "infeasible"

@@ -5,9 +5,9 @@ from typing import Protocol
 
 import numpy as np
 
-from pretouch.perception.vectors import placed
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
+from pretouch.robot.vectors import placed
 from pretouch.sim.hand import HandGoal
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray

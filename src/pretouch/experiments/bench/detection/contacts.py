@@ -19,7 +19,7 @@ from pretouch.experiments.bench.detection.arm import (
 )
 from pretouch.experiments.bench.detection.stream import Stream, save_stream
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_of
-from pretouch.perception.vectors import placed
+from pretouch.robot.vectors import placed
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.posture import brought_to

@@ -20,7 +20,7 @@ from pretouch.experiments.bench.detection.arm import (
 from pretouch.experiments.bench.detection.stream import Stream, save_stream
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_of
 from pretouch.loop import Cycle
-from pretouch.perception.vectors import placed
+from pretouch.robot.vectors import placed
 from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams

@@ -8,7 +8,7 @@ from pretouch.controller import Controller, ControllerState
 from pretouch.experiments.bench.dense_skin import gap
 from pretouch.experiments.bench.detection.arm import model
 from pretouch.experiments.bench.scenario_files import scenario
-from pretouch.perception.vectors import placed
+from pretouch.robot.vectors import placed
 from pretouch.types import ControlStep, FloatArray, Inputs
 
 _TRIES = 4000
