@@ -20,7 +20,7 @@ from rosbags.highlevel import AnyReader
 from pretouch import cli
 from pretouch.errors import RecordingError
 from pretouch.hardware.traffic import Received
-from pretouch.hardware.wire import Flag, Sample, imu_values
+from pretouch.hardware.wire import Flag, Sample, TouchPart, imu_values
 from pretouch.recording.messages import encoded, make
 from pretouch.recording.reader import open_recording
 from pretouch.recording.recover import recover
@@ -34,12 +34,14 @@ BATCH = 8
 def sample(number: int, unit: int = 1) -> Sample:
     rng = np.random.default_rng([unit, number])
     imu = rng.integers(-32768, 32767, (BATCH, 6), dtype=np.int16).astype("<i2").tobytes()
+    touch = b"" if number % 3 else TouchPart(1, 0, 700, 2500, 300).encode()
+    flags = (Flag.RANGE_NEW if number % 4 else 0) | (Flag.TOUCH if touch else 0)
     return Sample(
-        unit=unit, flags=Flag.RANGE_NEW if number % 4 else 0, sequence=number, time_us=20_000 * number + 5,
+        unit=unit, flags=flags, sequence=number, time_us=20_000 * number + 5,
         beacon=3, beacon_hold_us=77, battery_mv=3700, temperature_cdeg=-512, bus_errors=2, range_stream=number % 256,
         range_status=0 if number % 7 else 4, range_mm=500 + number, range_age_us=9000, range_sigma=12, range_signal=800,
         range_ambient=20, range_spads=4000, imu_count=BATCH, imu_scale=0x21, imu_rate_hz=416, imu_index=BATCH * number,
-        imu_age_us=1200, imu=imu,
+        imu_age_us=1200, imu=imu, touch=touch,
     )  # fmt: skip
 
 
@@ -78,8 +80,9 @@ def test_every_field_of_every_sample_comes_back(place):
         assert len(unit.samples) == 100
         for number, kept in enumerate(unit.samples, 1):
             sent = sample(number)
-            assert all(getattr(kept, name) == getattr(sent, name) for name in Sample.__slots__ if name != "imu")
-            assert kept.imu.tobytes() == sent.imu
+            plain = [name for name in Sample.__slots__ if name not in ("imu", "touch")]
+            assert all(getattr(kept, name) == getattr(sent, name) for name in plain)
+            assert kept.imu.tobytes() == sent.imu + sent.touch
             assert kept.arrival == arrival(number)
             assert kept.stamp == stamp(number) or number <= 2
             assert (kept.offset, kept.bound) == (90.0, 1e-4)
