@@ -19,7 +19,7 @@ from pretouch.contact.two_places import best_pair, evidence_under, total_of
 from pretouch.contact.where_prior import hidden_places, place_surface, prior_of_places
 from pretouch.contact.where_summary import exchange, summarise
 from pretouch.params import LocalisationParams
-from pretouch.perception.vectors import placed_ends
+from pretouch.robot.body import placed_ends
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Obstacles, Touched
 from pretouch.values import value

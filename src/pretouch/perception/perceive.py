@@ -22,7 +22,8 @@ from pretouch.perception.obstacles import (
 from pretouch.perception.scene_filter import RAYS, Fixtures, leave_out, leave_out_planes
 from pretouch.perception.spread import bring_nearer, widen
 from pretouch.perception.stamped import move_back
-from pretouch.perception.vectors import placed_ends, rotate
+from pretouch.perception.vectors import rotate
+from pretouch.robot.body import placed_ends
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE

@@ -1,11 +1,9 @@
 """Small vector products for compiled loops, where calling a linear algebra library for three numbers is slow."""
 
-import numpy as np
-
 from pretouch.compiled import compiled
-from pretouch.robot.body import Capsules
+from pretouch.robot.body import Capsules, placed_ends
 from pretouch.robot.model import Kinematics
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray
 
 
 @compiled
@@ -25,18 +23,3 @@ def placed(capsules: Capsules, kin: Kinematics) -> tuple[FloatArray, FloatArray]
     """Both ends (C, 3) of each capsule's axis in the base frame [m]."""
     ends = placed_ends(capsules.link, capsules.a, capsules.b, kin.position, kin.rotation)
     return ends[0], ends[1]
-
-
-@compiled
-def placed_ends(link: IntArray, a: FloatArray, b: FloatArray, position: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Both ends (2, C, 3) of the axis of each capsule in the base frame [m]; see `placed`."""
-    ends = np.empty((2, len(link), 3))
-    for c in range(len(link)):
-        k = link[c]
-        for i in range(3):
-            ends[0, c, i] = position[k, i]
-            ends[1, c, i] = position[k, i]
-            for j in range(3):
-                ends[0, c, i] += rotation[k, i, j] * a[c, j]
-                ends[1, c, i] += rotation[k, i, j] * b[c, j]
-    return ends

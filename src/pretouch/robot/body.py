@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.errors import RobotModelError
 from pretouch.types import FloatArray, IntArray
 
@@ -47,3 +48,18 @@ def capsules_of(model: mujoco.MjModel) -> Capsules:
         b=model.geom_pos + half,
         radius=model.geom_size[:, 0].copy(),
     )
+
+
+@compiled
+def placed_ends(link: IntArray, a: FloatArray, b: FloatArray, position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Both ends (2, C, 3) of the axis of each capsule in the base frame [m]."""
+    ends = np.empty((2, len(link), 3))
+    for c in range(len(link)):
+        k = link[c]
+        for i in range(3):
+            ends[0, c, i] = position[k, i]
+            ends[1, c, i] = position[k, i]
+            for j in range(3):
+                ends[0, c, i] += rotation[k, i, j] * a[c, j]
+                ends[1, c, i] += rotation[k, i, j] * b[c, j]
+    return ends
