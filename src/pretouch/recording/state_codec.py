@@ -15,6 +15,7 @@ import numpy as np
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
 from pretouch.recording.messages import PACKAGE, decoded, encoded, make, plain_text
+from pretouch.types import IntArray
 
 STATE = f"{PACKAGE}/msg/State"
 
@@ -196,7 +197,8 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
     if kind_name == "tuple":
         return tuple(_give(parts, f"{name}.{i}", inner) for i, inner in enumerate(_inner(hint, int(shape))))
     if kind_name == "array":
-        return parts.numbers(tuple(map(int, shape.split())))
+        numbers = parts.numbers(tuple(map(int, shape.split())))
+        return numbers.astype(np.int64) if hint == IntArray else numbers
     if kind_name == "text":
         return hint(parts.text())
     if kind_name == "float":
