@@ -186,7 +186,8 @@ class Controller:
         # what to do
         close = bool(silent or lost) or response.seen_near(seen.obstacles, p.reaction)
         before = doing(state.mode, felt.armed, p)
-        push = response.Felt(model, kin, robot, felt, close, state.command, p)
+        fixed = self.fixtures
+        push = response.Felt(model, kin, robot, felt, close, state.command, p, fixed.planes, fixed.capsules)
         react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
         events |= events_of(
             unfit, silent, lost, felt, feeling.window.count, react, close, before, state.near.detour.blocked, p

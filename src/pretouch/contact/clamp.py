@@ -46,9 +46,9 @@ class ClampState:
     came: FloatArray
     """(n,) joint velocities with which the arm came to the contact [rad/s]."""
     between: str
-    """The links between which something is caught, in words; '' for none."""
+    """What something is caught between, in words; '' while that is not known."""
     force: float
-    """Force with which it pushes them apart [N]."""
+    """Force with which that is pushed apart [N]."""
 
 
 def clamp_init(q: FloatArray) -> ClampState:
@@ -65,14 +65,19 @@ def clamp_begun(before: ClampState, q: FloatArray, came: FloatArray) -> ClampSta
 
 
 def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
-    """Note the way of an arm that follows its task, at commanded joint positions (n,) [rad]."""
+    """Note the way of an arm that follows its task, at commanded joint positions (n,) [rad].
+
+    Where it has been moved meanwhile, by a reaction or by hand, the way begins anew.
+    """
+    if np.abs(q - state.path[0]).max() > _MOVED_RAD:
+        return replace(state, marked=0.0, path=np.tile(q, (_MARKS, 1)))
     if state.marked + dt < _APART_S:
         return replace(state, marked=state.marked + dt)
     return replace(state, marked=0.0, path=np.vstack((q[None], state.path[:-1])))
 
 
 def caught_between(state: ClampState, between: str, force: float, torque: FloatArray) -> ClampState:
-    """Take what is caught between two links, and turns the joints (n,) [Nm], for a clamp: out of it the arm opens."""
+    """Take what is caught between two things, and turns the joints (n,) [Nm], for a clamp: out of it the arm opens."""
     return replace(
         state, torque=float(np.abs(torque).max()), trail=state.path, between=between, force=force, opposed=0.0
     )  # fmt: skip
@@ -154,5 +159,7 @@ def _closes(state: ClampState, way: FloatArray) -> bool:
     return state.between != "" and float(way @ state.came) > 0.0
 
 
+_MOVED_RAD = 0.15
+"""More than a joint turns from one place of the way to the next while the arm follows its path [rad]."""
 _NEAR_RAD = 0.002
 """Distance at which a place of the way counts as reached [rad]."""

@@ -1,15 +1,17 @@
-"""Caught between two of the arm's own links: what pushes them apart, and nothing else (docs/reaction.md).
+"""Caught between two of the arm's own links, or between one and what stands beside the arm (docs/reaction.md).
 
 Two forces that cancel turn only the joints between the two links. A contact from outside turns the joints before its
-link too, unless its line of action passes through their axes.
+link too, unless its line of action passes through their axes. Between a link and a fixture is what pushes the link away
+from it, a gap's width before it, while the arm comes.
 """
 
 import numpy as np
 
 from pretouch.params import ReactionParams
+from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.self_distance import nearest_points
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray, IntArray, Touched
 from pretouch.values import value
 
 
@@ -69,3 +71,40 @@ def pinched(
         if found is None or odds > found.odds:
             found = Pinch(np.array([one, other]), at, along, rest, odds)
     return found
+
+
+def pressed(
+    model: RobotModel, kin: Kinematics, touched: Touched, planes: FloatArray, standing: Capsules, qd: FloatArray,
+    p: ReactionParams,
+) -> bool:  # fmt: skip
+    """Whether a link presses something against a fixture: where the surest contact is, and where its force points.
+
+    Args:
+        model: the arm.
+        kin: its posture.
+        touched: where it is touched.
+        planes: (P, 4) rows (normal, offset) of fixtures, normals into free space, base frame.
+        standing: capsules of fixtures, base frame.
+        qd: (n,) joint velocities with which the arm came [rad/s].
+        p: parameters.
+    """
+    if not len(touched.link):
+        return False
+    point, force = touched.point[0], touched.force[0]
+    size = float(np.sqrt(force @ force))
+    coming = -float(force @ model.jacobian(kin, int(touched.link[0]), point)[:3] @ qd)
+    if size < p.pinch_n or coming < p.pinch_closing_m_s * size:
+        return False
+    gap, away = planes[:, :3] @ point - planes[:, 3], planes[:, :3]
+    if len(standing):
+        # a segment that is a point: how far it is from each axis
+        there = np.broadcast_to(point, standing.a.shape)
+        foot, _ = nearest_points(standing.a, standing.b, there, there)
+        far = np.linalg.norm(point - foot, axis=1)
+        gap = np.concatenate([gap, far - standing.radius])
+        away = np.concatenate([away, (point - foot) / np.maximum(far, _ON_AXIS_M)[:, None]])
+    return bool(np.any((gap > p.pinch_least_m) & (gap < p.pinch_gap_m) & (away @ force > p.pinch_along * size)))
+
+
+_ON_AXIS_M = 1e-9
+"""Distance from a capsule's axis below which no direction leads away from it [m]."""

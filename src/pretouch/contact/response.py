@@ -17,9 +17,10 @@ from pretouch.contact.admittance import (
 )
 from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
 from pretouch.contact.detect import Detection
-from pretouch.contact.pinch import pinched
+from pretouch.contact.pinch import pinched, pressed
 from pretouch.contact.place import PlaceState, given_up, met, passed, place_init, pushed, waited
 from pretouch.params import Profile, ReactionParams
+from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import FloatArray, Obstacles, RobotState
 from pretouch.values import value
@@ -48,6 +49,10 @@ class Felt:
     command: FloatArray
     """(n,) joint velocities commanded last [rad/s]."""
     profile: Profile
+    planes: FloatArray
+    """(P, 4) planes of fixtures, rows (normal, offset)."""
+    standing: Capsules
+    """Other fixtures, base frame."""
 
 
 def seen_near(obstacles: Obstacles, params: ReactionParams) -> bool:
@@ -126,16 +131,20 @@ def noticed(state: ResponseState, doing: Doing, felt: Felt, phase: float, resume
 
 
 def _pinch(clamp: ClampState, felt: Felt) -> ClampState:
-    """Look for something caught between two links, as long as a contact is felt."""
+    """Look for something caught between two links, or one and a fixture, as long as a contact is felt."""
     p, found = felt.profile.reaction, felt.found
     if not p.pinches or clamp.torque or found.clear is None:
         return clamp
     torque, covariance = found.clear
     pinch = pinched(felt.model, felt.kin, torque, covariance, clamp.came, p)
-    if pinch is None:
-        return clamp
-    one, other = (felt.model.links[link] for link in pinch.link)
-    return caught_between(clamp, f"{one} and {other}", pinch.force, torque)
+    names = felt.model.links
+    if pinch is not None:
+        one, other = (names[link] for link in pinch.link)
+        return caught_between(clamp, f"{one} and {other}", pinch.force, torque)
+    if pressed(felt.model, felt.kin, found.touched, felt.planes, felt.standing, clamp.came, p):
+        force = float(np.linalg.norm(found.touched.force[0]))
+        return caught_between(clamp, f"{names[found.touched.link[0]]} and a fixture", force, torque)
+    return clamp
 
 
 def _residual(state: AdmittanceState, felt: Felt) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A limb that lies in the crook of the arm as the arm folds: caught between two of its own links."""
+"""A limb in the crook of an arm that folds, or on a floor on which the hand comes down: caught between two things."""
 
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -28,54 +28,57 @@ DEFAULT_RESTRICTIONS: RestrictionMode = "off"
 SPEEDS_M_S = (0.1, 0.2)
 """Speeds along the path [m/s]."""
 
-_FROM_TO_M = np.array([[0.45, 0.0, 0.5], [0.3, 0.0, 0.22]])
-"""The path to and fro [m]: at its end forearm and upper arm are 0.08 m apart."""
+PLACES = {
+    "crook": np.array([[0.45, 0.0, 0.5], [0.3, 0.0, 0.22]]),
+    "floor": np.array([[0.5, 0.0, 0.15], [0.5, 0.0, -0.15]]),
+}
+"""The path to and fro at each place [m]: at its end forearm and upper arm are 0.08 m apart, the fingers are 0.05 m above
+the floor."""
 _RADIUS_M = (0.045, 0.055)
 """Of the limb: 9 to 11 cm thick, as a forearm."""
 _ASIDE_M = 0.02
-"""How far it lies from the middle of the gap, along the axis about which the arm folds [m]."""
+"""How far it lies from the middle of the gap, along the axis about which the arm folds, or of the fingers [m]."""
 _RESTS_N = 15.0
 """Largest force with which the person keeps it there [N]."""
 _END_S = 9.0
 
 
 def cells(grid: Grid) -> list[Cell]:
-    """A cell for each speed, of each controller."""
+    """A cell for each place and speed, of each controller."""
     return [
-        Cell(NAME, name, {"speed_m_s": speed, "restrictions": mode})
-        for speed, (name, mode) in product(SPEEDS_M_S, grid.controllers(DEFAULT_RESTRICTIONS))
+        Cell(NAME, name, {"place": place, "speed_m_s": speed, "restrictions": mode})
+        for place, speed, (name, mode) in product(PLACES, SPEEDS_M_S, grid.controllers(DEFAULT_RESTRICTIONS))
     ]
 
 
 @dataclass
 class _Limb:
-    """Stays between upper arm and forearm, and measures what they press it with."""
+    """Lies where the person means to keep it, and measures what it is squeezed with."""
 
+    place: str
     model: RobotModel
     aside: float
-    """Where it lies along the axis of the fold [m]."""
+    """Where it lies along the y axis [m]."""
+    radius: float
+    """[m]"""
     force: list[float] = field(default_factory=list)
-    """The smaller of the forces of both links at each physics step [N]."""
-
-    def links(self) -> tuple[int, int]:
-        """Return the links that catch it."""
-        name = self.model.description.name
-        return self.model.link_index(f"{name}_link2"), self.model.link_index(f"{name}_link5")
+    """The smaller of the forces from both sides at each physics step [N]."""
 
     def middle(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Where it lies (3,) [m], given all links' origins and orientations."""
-        one, other = (self.model.capsules.of_links(np.array([link])) for link in self.links())
-        ends = [
-            position[c.link] + np.einsum("cij,cj->ci", rotation[c.link], end)
-            for c in (one, other)
-            for end in (c.a, c.b)
-        ]
-        first, second = nearest_points(ends[0][:, None], ends[1][:, None], ends[2][None], ends[3][None])
-        gap = np.linalg.norm(first - second, axis=2) - one.radius[:, None] - other.radius[None]
+        aside = np.array([0.0, self.aside, 0.0])
+        if self.place == "floor":
+            return aside + np.array([*PLACES["floor"][0, :2], SceneSpec().floor_height + self.radius])
+        name, body = self.model.description.name, self.model.capsules
+        first, second = (np.flatnonzero(body.link == self.model.link_index(f"{name}_{link}")) for link in _CROOK)
+        a, b = (
+            position[body.link] + np.einsum("cij,cj->ci", rotation[body.link], end) for end in (body.a, body.b)
+        )  # fmt: skip
+        p, q = nearest_points(a[first, None], b[first, None], a[None, second], b[None, second])
+        gap = np.linalg.norm(q - p, axis=2) - body.radius[first, None] - body.radius[None, second]
         i, j = np.unravel_index(gap.argmin(), gap.shape)
-        way = (second[i, j] - first[i, j]) / np.linalg.norm(second[i, j] - first[i, j])
-        between = 0.5 * (first[i, j] + one.radius[i] * way + second[i, j] - other.radius[j] * way)
-        return np.asarray(between + self.aside * np.array([0.0, 1.0, 0.0]))
+        way = (q[i, j] - p[i, j]) / np.linalg.norm(q[i, j] - p[i, j])
+        return np.asarray(p[i, j] + (body.radius[first[i]] + 0.5 * gap[i, j]) * way + aside)
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
         """Return where the person means to keep it."""
@@ -83,35 +86,41 @@ class _Limb:
 
     def attach(self, plant: Plant, _: object) -> None:
         """Measure before each physics step."""
-        limb, wrench, links = plant.mj_model.geom("hand").id, np.zeros(6), self.links()
+        mj, data, wrench = plant.mj_model, plant.mj_data, np.zeros(6)
+        limb, other_side = mj.geom("hand").id, self.model.link_index(f"{self.model.description.name}_{_CROOK[0]}")
+        if self.place == "floor":
+            other_side = int(mj.geom_bodyid[mj.geom("floor").id])
 
         def measure(_: float) -> None:
-            pressed = dict.fromkeys(links, 0.0)
-            for i in range(plant.mj_data.ncon):
-                contact = plant.mj_data.contact[i]
+            sides = [0.0, 0.0]
+            for i in range(data.ncon):
+                contact = data.contact[i]
                 if limb in (contact.geom1, contact.geom2):
-                    other = contact.geom1 if contact.geom2 == limb else contact.geom2
-                    link = int(plant.mj_model.geom_bodyid[other])
-                    mujoco.mj_contactForce(plant.mj_model, plant.mj_data, i, wrench)
-                    pressed[link] = pressed.get(link, 0.0) + float(wrench[0])
-            self.force.append(min(pressed[link] for link in links))
+                    thing = contact.geom1 if contact.geom2 == limb else contact.geom2
+                    mujoco.mj_contactForce(mj, data, i, wrench)
+                    sides[int(mj.geom_bodyid[thing]) == other_side] += float(wrench[0])
+            self.force.append(min(sides))
 
         plant.before_each_step(measure)
 
 
+_CROOK = ("link2", "link5")
+"""Upper arm and forearm."""
+
+
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
-    rng, model = np.random.default_rng([seed, 43]), context.model
-    limb = _Limb(model, _ASIDE_M * rng.uniform(-1, 1))
-    kin = model.kinematics(brought_to(model, _FROM_TO_M[0]))
+    rng, model, place = np.random.default_rng([seed, 43]), context.model, str(cell.where["place"])
+    limb = _Limb(place, model, _ASIDE_M * rng.uniform(-1, 1), rng.uniform(*_RADIUS_M))
+    kin = model.kinematics(brought_to(model, PLACES[place][0]))
     x, y, z = limb.middle(kin.position, kin.rotation).tolist()
     found = context.profile(cell)
     setup = Setup(
         model=model,
         skin=context.skin,
         profile=replace(found, task=replace(found.task, speed_m_s=float(cell.where["speed_m_s"]))),
-        scene=SceneSpec(hand=HandSpec(radius=rng.uniform(*_RADIUS_M), stiffness=40_000.0, mass=2.0, start=(x, y, z))),
-        path=WayPoints(_FROM_TO_M, closed=True),
+        scene=SceneSpec(hand=HandSpec(radius=limb.radius, stiffness=40_000.0, mass=2.0, start=(x, y, z))),
+        path=WayPoints(PLACES[place], closed=True),
         seed=seed,
         recording=context.recording,
         hand=limb,
@@ -119,10 +128,14 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     )
     record = play(setup, lambda step, _: step.stamp >= _END_S)
     row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
-    return row | results(np.array(limb.force), record), record
+    return row | results(np.array(limb.force), record, _NAMED[place]), record
 
 
-def results(force: FloatArray, record: Record) -> Row:
+_NAMED = {"crook": _CROOK, "floor": ("hand", "fixture")}
+"""What the arm has to name, at each place."""
+
+
+def results(force: FloatArray, record: Record, named: tuple[str, str]) -> Row:
     """Numbers of one trial, given the force (T,) [N] with which the limb was squeezed at each millisecond."""
     squeezed, last = force > TOUCH_N, record.steps[-1]
     said = [s.reason for s in record.steps if "aught between two things" in s.reason]
@@ -132,7 +145,7 @@ def results(force: FloatArray, record: Record) -> Row:
         "squeezed_s": rounded(float(squeezed.sum()) / 1000.0),
         "contacts": len(record.reactions()),
         "recognised": bool(said),
-        "links": bool(said) and all(f"link{n}" in said[0] for n in (2, 5)),
+        "links": bool(said) and all(name in said[0] for name in named),
         "latched": last.mode is Mode.HOLD and "resume" in last.reason,
     }
 
@@ -142,7 +155,7 @@ _MEASURES = ("peak_20ms_n", "squeezed_s", "contacts")
 
 def summarise(rows: list[Row]) -> Row:
     """Medians over the seeds of each cell."""
-    by = ("speed_m_s", "restrictions", "profile")
+    by = ("place", "speed_m_s", "restrictions", "profile")
     return {"cells": cells_of(rows, by, _MEASURES, totals=("caught", "recognised", "links", "latched"))}
 
 
@@ -150,6 +163,7 @@ def tables(part: Row) -> list[TextTable]:
     """What was between the links."""
     rows = tuple(
         (
+            cell["place"],
             f"{cell['speed_m_s']:g}",
             cell["profile"],
             f"{cell['caught']}/{cell['trials']}",
@@ -163,12 +177,23 @@ def tables(part: Row) -> list[TextTable]:
         for cell in part["cells"]
     )
     table = TextTable(
-        "A limb in the crook of the arm: medians",
-        ("speed\n[m/s]", "profile", "caught", "recognised", "links", "peak\n[N]", "for\n[s]", "contacts", "latched"),
+        "A limb between two things: medians",
+        (
+            "place",
+            "speed\n[m/s]",
+            "profile",
+            "caught",
+            "recognised",
+            "links",
+            "peak\n[N]",
+            "for\n[s]",
+            "contacts",
+            "latched",
+        ),
         rows,
-        f"A limb 9 to 11 cm thick between upper arm and forearm, for {_END_S:g} s of folding and unfolding. Peak: of"
-        " the force that squeezes it, mean of 20 ms. For: while squeezed. Recognised: trials in which the arm said that"
-        " something was caught between two of its links. Links: those in which it named the right ones. Latched:"
+        f"A limb 9 to 11 cm thick between upper arm and forearm, or on the floor under the hand, for {_END_S:g} s of"
+        " going to and fro. Peak: of the force that squeezes it, mean of 20 ms. For: while squeezed. Recognised: trials"
+        " in which the arm said that something was caught. Links: those in which it named the right ones. Latched:"
         " trials that end in a HOLD until a person resumes.",
     )
     return [table]

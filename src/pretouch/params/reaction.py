@@ -73,10 +73,13 @@ class ReactionParams(Checked):
     open_s: Positive = 0.5
     """Longest that it opens [s]."""
     pinches: bool = False
-    """Switch: whether something caught between two of the arm's links is told from a push, so that the arm opens and
-    holds (ours). It needs the torques' covariance, which the sequential detector knows."""
+    """Switch: whether something caught between two of the arm's links, or between one and a fixture, is told from a
+    push, so that the arm opens and holds (ours). It needs the sequential detector; fixtures, localisation too."""
     pinch_gap_m: Positive = 0.2
-    """Gap between two links in which something can be caught [m]: a thigh fits in no larger one."""
+    """Gap in which something can be caught [m]: a thigh fits in no larger one."""
+    pinch_least_m: NonNegative = 0.02
+    """Gap to a fixture below which the link touches the fixture itself [m]: as well as the place of a contact is known.
+    """
     pinch_closing_m_s: Positive = 0.02
     """Speed from which a gap counts as closing [m/s]: two links with a single link between them come nearer to each
     other by less, whatever the arm does."""
