@@ -12,8 +12,7 @@ from pretouch.errors import PretouchError
 class Localization(BenchOptions):
     """Hold where contacts are said to be against where they are: links, places, two at once; with skins and without.
 
-    About twenty minutes on two processors, with --quick two and a half. A run that was stopped goes on with the same
-    --out.
+    About twenty minutes on two processors, with --quick three. A run that was stopped goes on with the same --out.
     """
 
     docs: str = ""

@@ -32,7 +32,7 @@ PLACES = {
     "crook": np.array([[0.45, 0.0, 0.5], [0.3, 0.0, 0.22]]),
     "floor": np.array([[0.5, 0.0, 0.15], [0.5, 0.0, -0.15]]),
 }
-"""The path to and fro at each place [m]: at its end forearm and upper arm are 0.08 m apart, the fingers are 0.05 m above
+"""The path to and fro at each place [m]: at its end forearm and upper arm are 0.08 m apart, fingers are 0.05 m above
 the floor."""
 _RADIUS_M = (0.045, 0.055)
 """Of the limb: 9 to 11 cm thick, as a forearm."""
