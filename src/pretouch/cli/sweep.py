@@ -28,8 +28,8 @@ class Sweep:
     TOML file with [[sweep]] tables."""
     vary: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Parameter and range: NAME=LOW:HIGH, NAME=LOW:HIGH:log, or NAME=VALUE,VALUE; for a grid NAME=LOW:HIGH:LEVELS.
-    NAME is GROUP.FIELD of the profile, plant.FIELD, plant.kind, sensing.FIELD, skin.units or scene.FIELD. Give the
-    option as often as there are parameters."""
+    NAME is GROUP.FIELD of the profile, plant.FIELD, plant.kind, plant.world (a set of docs/sim-to-real.md),
+    sensing.FIELD, skin.units or scene.FIELD. Give the option as often as there are parameters."""
     fix: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Parameter that has another value throughout: NAME=VALUE."""
     design: Literal["", "grid", "lhs", "sobol"] = ""

@@ -1,3 +1,5 @@
+from dataclasses import replace
+from hashlib import sha256
 from itertools import pairwise
 
 import pytest
@@ -6,8 +8,9 @@ from pretouch.errors import ExperimentError, ParameterError
 from pretouch.experiments.bench.dense_skin import UNITS, units_of
 from pretouch.experiments.sweep.definition import sweep_of
 from pretouch.experiments.sweep.measures import StaticScene
-from pretouch.experiments.sweep.setting import built, skin_of
+from pretouch.experiments.sweep.setting import built, skin_of, world_digest
 from pretouch.params import profile
+from pretouch.sim.randomisation import drawn, world_set
 
 
 def test_each_value_arrives_where_its_name_says():
@@ -37,6 +40,25 @@ def test_nothing_varied_is_the_profile_and_the_arm_of_all_other_experiments():
     assert made.sensing.period_s == 0.02
 
 
+def test_a_world_draws_arm_and_sensors_under_what_is_varied(tmp_path):
+    one = built("paper", StaticScene(), {"plant.world": "realistic", "plant.payload_max_kg": 0.3}, 1003)
+    other = built("paper", StaticScene(), {"plant.world": "realistic"}, 1004)
+    world = drawn(world_set("realistic"), 1003)
+    assert one.plant == replace(world.plant, payload_max_kg=0.3)
+    assert one.sensing == world.ranging
+    assert one.plant.torque_offset_nm != other.plant.torque_offset_nm
+    assert built("paper", StaticScene(), {"plant.world": "none"}, 1003) == built("paper", StaticScene(), {}, 1003)
+
+
+def test_a_cell_knows_the_file_its_world_is_of(tmp_path):
+    place = tmp_path / "arm.toml"
+    place.write_text("[plant]\npayload_max_kg = 0.25\n")
+    values = {"plant.world": str(place)}
+    assert built("paper", StaticScene(), values, 0).plant.payload_max_kg == 0.25
+    assert world_digest(values) == sha256(place.read_bytes()).hexdigest()
+    assert world_digest({"plant.world": "none"}) is None
+
+
 @pytest.mark.parametrize(
     ("experiment", "vary", "error", "words"),
     [
@@ -50,6 +72,7 @@ def test_nothing_varied_is_the_profile_and_the_arm_of_all_other_experiments():
         ("static", {"skin.units": "0:4"}, ExperimentError, "skin.units is 0: give 1 or more"),
         ("static", {"skin.units": "1:65"}, ExperimentError, "holds 65, which is not allowed.*whole number to 64"),
         ("static", {"plant.kind": "nominal,rusty"}, ExperimentError, "plant.kind=rusty is unknown"),
+        ("static", {"plant.world": "none,mars"}, ExperimentError, "'mars' is none of nominal, realistic, stress"),
         ("contacts", {"reduction.d_max_m": "0.5:1"}, ExperimentError, "changes nothing in contacts: take one of thr"),
     ],
 )

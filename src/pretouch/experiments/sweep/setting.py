@@ -1,7 +1,8 @@
 """What one cell of a sweep is played with, made of a base profile and the values of the parameters that are swept.
 
 A parameter has a name with a dot: `GROUP.FIELD` of the profile, `plant.FIELD` of the simulated arm, `plant.kind` for a
-named one, `sensing.FIELD` of the range finders, `skin.units` for so many units spread over the arm, and `scene.FIELD`
+named one, `plant.world` for the arm and range finders that the seed draws of a set of worlds, `sensing.FIELD` of the
+range finders, `skin.units` for so many units spread over the arm, and `scene.FIELD`
 of what the experiment plays.
 """
 
@@ -18,13 +19,16 @@ from pretouch.experiments.bench.scenario_files import scenario
 from pretouch.params import Profile, profile
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.randomisation import WorldSet, drawn, world_set
 from pretouch.sim.range_finder import RangeFinderParams
 
 Value = float | int | str | bool
 Values = dict[str, Value]
 """Values of parameters by their names."""
 
-UNITS, KIND = "skin.units", "plant.kind"
+UNITS, KIND, WORLD = "skin.units", "plant.kind", "plant.world"
+USUAL_WORLD = "none"
+"""In place of the name of a world where none is drawn."""
 LARGEST_UNITS = 64
 
 
@@ -76,6 +80,8 @@ def current(name: str, base: Profile, scene: Checked) -> Value:
         return 0
     if name == KIND:
         return "nominal"
+    if name == WORLD:
+        return USUAL_WORLD
     groups: dict[str, Any] = {"plant": PlantParams(), "sensing": RangeFinderParams(), "scene": scene}
     groups |= {f.name: getattr(base, f.name) for f in fields(Profile) if f.name != "name"}
     if not dot or group not in groups:
@@ -83,7 +89,7 @@ def current(name: str, base: Profile, scene: Checked) -> Value:
         raise ExperimentError(f"The parameter {name!r} is unknown: write GROUP.FIELD with a group of {listed}.")
     known = [f.name for f in fields(groups[group])]
     if field not in known:
-        also = ["kind"] if group == "plant" else []
+        also = ["kind", "world"] if group == "plant" else []
         raise ExperimentError(f"The parameter {name!r} is unknown: {group} has {', '.join([*known, *also])}.")
     value = getattr(groups[group], field)
     if not isinstance(value, Real | str):
@@ -94,13 +100,15 @@ def current(name: str, base: Profile, scene: Checked) -> Value:
 def built(profile_text: str, scene: Checked, values: Values, seed: int) -> Setting:
     """Make a cell's setting; a value that is not allowed is an error of this package that says so."""
     parts: dict[str, dict[str, Any]] = {"plant": {}, "sensing": {}, "scene": {}}
-    text, units, kind = profile_text, 0, "nominal"
+    text, units, kind, world = profile_text, 0, "nominal", USUAL_WORLD
     for name, value in values.items():
         group, _, field = name.partition(".")
         if name == UNITS:
             units = _counted(value)
         elif name == KIND:
             kind = str(value)
+        elif name == WORLD:
+            world = str(value)
         elif group in parts:
             parts[group][field] = value
         else:
@@ -108,10 +116,25 @@ def built(profile_text: str, scene: Checked, values: Values, seed: int) -> Setti
     if kind not in plants():
         raise ExperimentError(f"The arm plant.kind={kind} is unknown: choose from {', '.join(plants())}.")
     profile(text)  # refuses what is not allowed
-    plant = replace(plant_of(kind), **parts["plant"])
+    plant, ranging = plant_of(kind), RangeFinderParams()
+    if world != USUAL_WORLD:
+        drawn_world = drawn(_set(world), seed, PlantParams())
+        plant, ranging = drawn_world.plant_with(plant, PlantParams()), drawn_world.ranging
     return Setting(
-        text, plant, replace(RangeFinderParams(), **parts["sensing"]), units, replace(scene, **parts["scene"]), seed  # type: ignore[type-var]
+        text, replace(plant, **parts["plant"]), replace(ranging, **parts["sensing"]), units,
+        replace(scene, **parts["scene"]), seed,  # type: ignore[type-var]
     )  # fmt: skip
+
+
+@cache
+def _set(name: str) -> WorldSet:
+    return world_set(name)
+
+
+def world_digest(values: Values) -> str | None:
+    """Digest of the set of worlds that values name, which decides what a cell is; None where they name none."""
+    world = str(values.get(WORLD, USUAL_WORLD))
+    return None if world == USUAL_WORLD else _set(world).digest
 
 
 def _counted(value: Value) -> int:

@@ -15,7 +15,7 @@ from pretouch.experiments.bench.store import fingerprint
 from pretouch.experiments.sweep.definition import Sweep
 from pretouch.experiments.sweep.design import Point
 from pretouch.experiments.sweep.registry import measure
-from pretouch.experiments.sweep.setting import Setting, Values, built
+from pretouch.experiments.sweep.setting import Setting, Values, built, world_digest
 from pretouch.params import Profile
 
 _PARTS = (
@@ -74,7 +74,7 @@ class Job:
 def cell_of(sweep: Sweep, point: Point) -> Cell:
     """Return a design point as a cell to play."""
     values = dict(sorted((sweep.fixed | point.values).items()))
-    whole = [sweep.experiment, sweep.profile, code(), values, point.seed]
+    whole = [sweep.experiment, sweep.profile, code(), values, point.seed, world_digest(values)]
     key = sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()[:24]
     return Cell(key, values, point.seed, sweep.measure.cost_s(sweep.setting(point.values, point.seed)))
 
