@@ -115,8 +115,8 @@ def _show(found: "Identified", model: "RobotModel", said: str) -> None:
         console.print("Without velocities neither their noise nor the observer's gain is told.", markup=False)
     console.print(
         "In brackets: the recording hardly tells it, and it stays near what is usual. Errors are standard errors. Of"
-        " the friction only what the robot does not compensate shows. In simulation offsets, ripple and payload were off by up to two and a half"
-        " times as much.",
+        " the friction only what the robot does not compensate shows. In simulation offsets, ripple and"
+        " payload were off by two and a half times as much.",
         markup=False,
     )
 
