@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.contact import response
-from pretouch.contact.cues import together
+from pretouch.contact.cues import Cues, together
 from pretouch.contact.feel import FeelState, feel, feel_init
 from pretouch.contact.impact import ImpactState, impact_init, listen
 from pretouch.contact.residual_model import ResidualModel
@@ -36,9 +36,9 @@ from pretouch.perception.obstacles import TrackState, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
 from pretouch.perception.perceive import perceive, silent_units
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.robot.model import RobotModel
+from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, FloatArray, Inputs, Mode, QpOutcome, RobotState
+from pretouch.types import ControlStep, FloatArray, Inputs, Mode, QpOutcome, RobotState, TouchReadings
 from pretouch.values import value
 
 
@@ -172,12 +172,7 @@ class Controller:
 
         # what is felt: eqs. 8-11
         watched = p.perception.enabled and len(self.skin) > 0 and heard >= 1.0 and not silent
-        cues, touched = feel_touch(state.touch, self._touching, touches, kin, now, self.limits.period, p.detection)
-        impact = state.impact
-        if p.detection.use_imu and (imu := sound_imu(inputs.imu, len(self.skin))) is not None:
-            before_it = impact[0] if impact else impact_init(model, len(self.skin))
-            jolts, heard_impact = listen(before_it, model, self.skin, kin, robot, imu, now, p)
-            cues, impact = jolts if cues is None else together(cues, jolts), (heard_impact,)
+        cues, touched, impact = self._cues(state, touches, inputs, kin, robot, now)
         felt, feeling = feel(
             state.feel, model, kin, robot, seen.obstacles, state.mode.mode is Mode.REACT, p, watched, cues
         )  # fmt: skip
@@ -241,6 +236,20 @@ class Controller:
         )  # fmt: skip
         mark("record")
         return step, after
+
+    def _cues(
+        self, state: ControllerState, touches: TouchReadings | None, inputs: Inputs, kin: Kinematics, robot: RobotState,
+        now: float,
+    ) -> tuple[Cues | None, tuple[TouchState, ...], tuple[ImpactState, ...]]:  # fmt: skip
+        """Return what the units' touch sensors and accelerometers say of a touch, and what to remember of each."""
+        p, model, skin = self.profile, self.model, self.skin
+        cues, touched = feel_touch(state.touch, self._touching, touches, kin, now, self.limits.period, p.detection)
+        imu = sound_imu(inputs.imu, len(skin)) if p.detection.use_imu else None
+        if imu is None:
+            return cues, touched, state.impact
+        before = state.impact[0] if state.impact else impact_init(model, len(skin))
+        jolts, impact = listen(before, model, skin, kin, robot, imu, now, p)
+        return jolts if cues is None else together(cues, jolts), touched, (impact,)
 
 
 _TROUBLE = {QpOutcome.FAILED: Event.SOLVER_FAILED, QpOutcome.INFEASIBLE: Event.BLOCKED}
