@@ -1,7 +1,7 @@
 """What must hold after each control step, whatever went in. Each check recomputes what it compares with."""
 
 import math
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from pretouch.params import Profile
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
-from pretouch.types import ControlStep, Mode, QpOutcome
+from pretouch.types import ControlStep, Mode, QpOutcome, Touched
 from tests.fuzz.oracle import LATCHING, MODES, WORDS, Expected, Oracle
 
 SOFT = {"silent", "no force", "given up", "pressed", "caught", "latched"}
@@ -52,10 +52,24 @@ def check_shapes(step: ControlStep, n: int, units: int) -> None:
         **dict.fromkeys(("unit", "link", "ee_distance", "body_distance", "closing_speed"), (k,)),
         **dict.fromkeys(("point", "body_point", "direction"), (k, 3)),
     }  # fmt: skip
-    for name, array in arrays_of(step):
+    check_touched(step.touched)
+    for name, array in arrays_of(replace(step, touched=None)):
         whole, logical = name in ("unit", "link", "restricted"), name == "axes"
         assert array.dtype == (np.int64 if whole else np.bool_ if logical else np.float64), name
         assert array.shape == shapes.get(name, (3,)), name
+
+
+def check_touched(touched: Touched) -> None:
+    """One contact or two on different links, finite, with a probability each; or none."""
+    count = len(touched.link)
+    assert count <= 2
+    assert touched.link.dtype == np.int64
+    assert touched.point.shape == touched.force.shape == (count, 3)
+    assert touched.link.shape == touched.sigma.shape == touched.probability.shape == (count,)
+    assert all(np.isfinite(array).all() for _, array in arrays_of(touched))
+    assert len(set(touched.link.tolist())) == count
+    assert (touched.sigma >= 0.0).all()
+    assert ((touched.probability > 0.0) & (touched.probability <= 1.0 + 1e-9)).all()
 
 
 def check_finite(step: ControlStep, e: Expected, p: Profile) -> None:

@@ -80,7 +80,7 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "method": ("sequential", "sequential", "fixed", "thresholds"), "freeze_while_reacting": (True, False),
         "false_alarms_per_hour": (1.0, 3600.0), "use_proximity": (True, False), "near_gain": (100.0, 1e4),
         "learn": (True, False), "learn_unseen": (False, True), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0),
-        "suspect": (0.6, 1.0), "confirm_samples": (1, 3),
+        "suspect": (0.6, 1.0), "confirm_samples": (1, 3), "localise": (True, False),
     },
     ReactionParams: {
         "method": ("admittance", "admittance", "decay"), "clamps": (True, False), "gives_up": (True, False),
@@ -90,6 +90,8 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "reverse_band": (2.0, 1.0), "start_energy_j": (0.2, 0.0, 50.0), "tank_max_j": (2.0, 1e-3),
         "mean_s": (0.5, 0.01), "quiet_s": (0.05, 1.0), "patience_s": (0.1, 10.0), "clamp_nm": (4.0, 0.1),
         "clamp_s": (0.03, 0.01), "clamp_turns": (2, 1), "open_m_s": (0.1, 2.0), "open_s": (0.05, 0.5),
+        "pinches": (True, False), "pinch_gap_m": (0.2, 5.0), "pinch_closing_m_s": (0.02, 1e-6), "pinch_n": (10.0, 0.01),
+        "pinch_along": (0.85, 0.0), "pinch_rest": (9.0, 1e6), "pinch_explained": (27.0, 1e-6),
         "give_up_contacts": (3, 1), "place_m": (0.1, 10.0), "clear_s": (0.1, 1.0), "retry_s": (0.3, 30.0),
     },
 }  # fmt: skip

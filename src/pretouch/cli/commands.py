@@ -34,7 +34,7 @@ class Reproduce:
 
     experiment: tyro.conf.Positional[str] = "all"
     """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), one of the studies of its claims and weaknesses, or all of
-    them, which takes about three quarters of an hour on two processors."""
+    them, which takes about an hour and a quarter on two processors."""
     seeds: int = 12
     """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
     first_seed: int = 0
