@@ -94,7 +94,7 @@ class ReactionParams(Checked):
     """Square of the torques that a caught thing may leave unexplained, in deviations of free motion [1]: 94 % of the
     chi-square distribution of the four that a force does not explain."""
     pinch_explained: Positive = 27.0
-    """Least square of the torques that it has to explain [1]. Of 217 contacts from outside one met both bounds."""
+    """Least square of the torques that it has to explain [1]. Of 297 contacts from outside one met both bounds."""
     give_up_contacts: PositiveCount = 3
     """Contacts at one place of the path after which it gives up."""
     place_m: Positive = 0.1

@@ -21,6 +21,8 @@ from pretouch.values import value
 _ACCELERATION_LSB = np.array(list(ACCELERATION_LSB.values()))
 _ANGULAR_VELOCITY_LSB = np.array(list(ANGULAR_RATE_LSB.values()))
 """One count by the codes of scales in datagrams [m/s^2], [rad/s]."""
+_IMU_BYTES = 12
+"""Size of an IMU sample in a datagram: six counts."""
 
 
 @value
@@ -120,7 +122,10 @@ def _of_samples(samples: list[Any]) -> MeasuredUnit | None:
     )
     scale = np.array([s.imu_scale for s in used], dtype=np.int64)
     acceleration_lsb, angular_velocity_lsb = _ACCELERATION_LSB[scale & 3], _ANGULAR_VELOCITY_LSB[scale >> 4 & 7]
-    raw = np.concatenate([s.imu for s in used]).view("<i2").reshape(-1, 6).astype(np.float64)
+    # behind the IMU samples there may be a touch reading
+    raw = (
+        np.concatenate([s.imu[: _IMU_BYTES * s.imu_count] for s in used]).view("<i2").reshape(-1, 6).astype(np.float64)
+    )
     imu = ImuTrace(
         _nominal(counters, np.array([s.imu_rate_hz for s in used], dtype=np.float64)),
         raw[:, 3:] * np.repeat(acceleration_lsb, counters.count)[:, None],

@@ -9,10 +9,20 @@ from typing import NamedTuple, Protocol, Self
 
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.recording.codec import decode_imu, decode_inputs, encode_imu, encode_inputs
+from pretouch.recording.codec import (
+    decode_imu,
+    decode_inputs,
+    decode_points,
+    decode_touch,
+    encode_imu,
+    encode_inputs,
+    encode_points,
+    encode_touch,
+)
 from pretouch.recording.plain import JSON
 from pretouch.recording.truth import Truth
 from pretouch.recording.writer import Recording
+from pretouch.types import SeenPoints
 
 
 class Further(Protocol):
@@ -33,7 +43,9 @@ class _Passed(NamedTuple):
     cycle: Cycle
     inputs: bytes | None
     truth: Truth | None
+    touch: bytes | None
     imu: bytes | None
+    points: bytes | None
 
     def again(self) -> Cycle:
         if self.inputs is None:
@@ -41,8 +53,13 @@ class _Passed(NamedTuple):
         inputs = decode_inputs(self.inputs)[1]
         if inputs is None:
             return self.cycle
-        samples = None if self.imu is None else decode_imu(self.imu)
-        return replace(self.cycle, inputs=replace(inputs, imu=samples))
+        whole = replace(
+            inputs,
+            touch=None if self.touch is None else decode_touch(self.touch),
+            imu=None if self.imu is None else decode_imu(self.imu),
+            points=None if self.points is None else decode_points(self.points)[1],
+        )
+        return replace(self.cycle, inputs=whole)
 
 
 class LastSeconds:
@@ -73,20 +90,28 @@ class LastSeconds:
         self._seconds, self._most, self._about = seconds, most, dict(about or {})
         self._ring: deque[_Passed] = deque(maxlen=max(1, round(2 * seconds / controller.limits.period)))
         self._writing: list[threading.Thread] = []
+        self._points: tuple[SeenPoints | None, bytes | None] = None, None
+        """Those that came last, and what is kept of them."""
 
     def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
         """Keep one turn of the loop for a while."""
         if self._recorder is not None:
             self._recorder.record(cycle, truth)
         data, whole = encode_inputs(0, cycle.inputs)
-        imu = getattr(cycle.inputs, "imu", None)
-        samples = None if imu is None else encode_imu(0, cycle.step.stamp, imu)
-        self._ring.append(_Passed(cycle, data if whole else None, truth, samples))
+        self._ring.append(self._passed(cycle, data, truth) if whole else _Passed(cycle, None, truth, None, None, None))
         begin = cycle.step.stamp - self._seconds
         while self._ring[0].cycle.step.stamp < begin:
             self._ring.popleft()
         if cycle.after.mode.latched and not cycle.before.mode.latched:
             self._write()
+
+    def _passed(self, cycle: Cycle, data: bytes, truth: Truth | None) -> _Passed:
+        """Return a cycle whose inputs are those of now; a set of points that stays the same is written down once."""
+        given = cycle.inputs
+        if given.points is not self._points[0]:
+            self._points = given.points, None if given.points is None else encode_points(0, given.points, 0)
+        imu = None if given.imu is None else encode_imu(0, cycle.step.stamp, given.imu)
+        return _Passed(cycle, data, truth, encode_touch(0, given), imu, self._points[1])
 
     def change(self, controller: Controller) -> None:
         """Let the cycles from the next one on be those of another controller of the same arm."""

@@ -11,6 +11,7 @@ OFF = {
     "perception.reckon_below_minimum": "no",
     "perception.place_at_stamp": "no",
     "perception.keep_while_silent": "no",
+    "perception.outside_points": "0",
     "task.mid_joint_projected": "no",
     "reduction.enabled": "yes",
     "restriction.mode": "off",
