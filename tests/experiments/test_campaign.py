@@ -22,8 +22,8 @@ from pretouch.experiments.campaign import (
     progress_of,
     run_campaign,
     trial_file,
-    write_json,
 )
+from pretouch.experiments.results_file import write_json
 from pretouch.params import PROFILES
 from pretouch.sensing.skin import PAPER_SKIN
 

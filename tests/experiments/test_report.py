@@ -9,10 +9,11 @@ from PIL import Image
 
 from pretouch.errors import ExperimentError, RecordingError
 from pretouch.experiments import dynamic, static
-from pretouch.experiments.campaign import Request, open_folder, recording_file, trial_file, write_json
+from pretouch.experiments.campaign import Request, open_folder, recording_file, trial_file
 from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.registry import EXPERIMENTS, summarise
 from pretouch.experiments.report import write_report
+from pretouch.experiments.results_file import write_json
 from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trace import Trace, read_trace, trace_of
 from pretouch.experiments.trial import record_of

@@ -31,7 +31,7 @@ def bench_detection(command: Detection) -> None:
     from pretouch.experiments.bench.detection.campaign import NAME, Bench, run_bench
     from pretouch.experiments.bench.detection.published import summary_of
     from pretouch.experiments.bench.documents import DOCUMENT, around
-    from pretouch.experiments.campaign import write_json
+    from pretouch.experiments.results_file import write_json
     from pretouch.experiments.worlds import sentence
 
     out, docs = command.folder("bench-detection"), command.documents

@@ -18,10 +18,10 @@ from pretouch.experiments.campaign import (
     open_folder,
     progress_of,
     run_campaign,
-    write_json,
 )
 from pretouch.experiments.registry import summarise, tables
 from pretouch.experiments.report import write_report
+from pretouch.experiments.results_file import write_json
 
 
 def run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) -> None:

@@ -13,7 +13,7 @@ from pretouch.cli.tables import show
 from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ParameterError
-from pretouch.experiments.campaign import write_json
+from pretouch.experiments.results_file import write_json
 from pretouch.experiments.tables import TextTable
 from pretouch.importing.body import FARTHEST, FitError
 from pretouch.importing.folder import check_free, write_folder

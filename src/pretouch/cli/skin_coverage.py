@@ -17,8 +17,8 @@ from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, suggest
 from pretouch.coverage.ways import Ways
 from pretouch.errors import ExperimentError, ParameterError, SkinError
-from pretouch.experiments.campaign import write_json
 from pretouch.experiments.coverage.measuring import Setting, coverage_of
+from pretouch.experiments.results_file import write_json
 from pretouch.importing.folder import SKIN
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.description_file import load_description

@@ -2,10 +2,8 @@
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from hashlib import sha256
@@ -17,6 +15,7 @@ from pretouch.errors import ExperimentError, SkinError
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.placement import placement_for
 from pretouch.experiments.registry import EXPERIMENTS
+from pretouch.experiments.results_file import failure_said, write_json
 from pretouch.experiments.workers import interrupt_held_back, workers
 from pretouch.params import Orientation, RestrictionMode, profile
 from pretouch.robot.description import panda
@@ -193,23 +192,6 @@ def _object(path: Path) -> dict[str, Any]:
     return value
 
 
-def write_json(value: Any, path: Path) -> None:
-    """Write a JSON file, whole or not at all; into a device or pipe as it is, never in its place."""
-    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
-    if path.exists() and not path.is_file() and not path.is_dir():
-        path.write_text(text, encoding="utf-8")
-        return
-    path = Path(os.path.realpath(path))
-    name = sha256(os.fsencode(path.name)).hexdigest()[:16]  # as short for a long name
-    temporary = path.with_name(f".{name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
 @dataclass(frozen=True)
 class Progress:
     """How far a campaign is."""
@@ -253,22 +235,6 @@ def run_campaign(request: Request, out: Path, progress: Callable[[float], None])
             with failure_said(out):
                 future.result()
             progress(futures[future])
-
-
-@contextmanager
-def failure_said(out: Path) -> Iterator[None]:
-    """Turn a worker that was killed, or results that could not be written, into an ExperimentError."""
-    try:
-        yield
-    except BrokenProcessPool as error:
-        raise ExperimentError(
-            "A worker process was killed, for want of memory perhaps: the same command with the same --out goes on."
-        ) from error
-    except OSError as error:
-        raise ExperimentError(
-            f"Results could not be written to {out} ({error.strerror or error}): remove the cause, and the same command"
-            " with the same --out goes on."
-        ) from error
 
 
 def trial_file(out: Path, cell: Cell, seed: int) -> Path:

@@ -2,6 +2,7 @@
 
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Row
+from pretouch.experiments.impacts.judged import judged
 from pretouch.experiments.impacts.tables import summarise, tables
 from pretouch.params import profile
 
@@ -25,9 +26,6 @@ def cells(grid: Grid) -> list[Cell]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
     """Run one trial; return its row of results. Its course is of no use to a figure."""
-    # what contacts are recorded with is of the benchmarks, which know all experiments
-    from pretouch.experiments.impacts.judged import judged
-
     row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
     return row | judged(context.profile(cell), seed, WAYS[str(cell.where["way"])], FREE_S), None
 

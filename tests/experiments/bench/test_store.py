@@ -7,7 +7,7 @@ import pytest
 from pretouch.errors import ExperimentError
 from pretouch.experiments.bench.documents import begin_mark, end_mark, markdown, put
 from pretouch.experiments.bench.store import Task, fingerprint, missing, open_bench, read_rows, run_tasks, write_arrays
-from pretouch.experiments.campaign import write_json
+from pretouch.experiments.results_file import write_json
 from pretouch.experiments.tables import TextTable
 from pretouch.params import profile
 

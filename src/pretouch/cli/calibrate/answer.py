@@ -14,7 +14,7 @@ from pretouch.cli.calibrate.numbers import numbers
 from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.cli.writing import unwritable_said
 from pretouch.errors import CalibrationError
-from pretouch.experiments.campaign import write_json
+from pretouch.experiments.results_file import write_json
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, save_skin
 

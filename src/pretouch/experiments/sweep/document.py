@@ -5,8 +5,8 @@ from typing import Any
 
 from pretouch import __version__
 from pretouch.experiments.bench.documents import markdown, put, shown
-from pretouch.experiments.campaign import write_json
 from pretouch.experiments.experiment import Picture
+from pretouch.experiments.results_file import write_json
 from pretouch.experiments.sweep.indices import indices
 from pretouch.experiments.sweep.results import write_table
 from pretouch.experiments.sweep.run import Run

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pretouch.experiments.campaign import write_json
+from pretouch.experiments.results_file import write_json
 from pretouch.experiments.sweep.cluster import run_on_cluster
 from pretouch.experiments.sweep.definition import Sweep
 from pretouch.experiments.sweep.design import Point, points

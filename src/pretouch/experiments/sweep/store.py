@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pretouch.errors import ExperimentError
-from pretouch.experiments.campaign import write_json
+from pretouch.experiments.results_file import write_json
 from pretouch.experiments.sweep.measures import Measure
 from pretouch.experiments.sweep.work import Cell, Job
 

@@ -13,7 +13,7 @@ from pretouch.experiments.bench.avoidance.scenario import Scenario, scenarios
 from pretouch.experiments.bench.avoidance.setting import Setting, setting
 from pretouch.experiments.bench.avoidance.truth import Truth, truth_of
 from pretouch.experiments.bench.store import Row
-from pretouch.experiments.campaign import write_json
+from pretouch.experiments.results_file import write_json
 from pretouch.experiments.trial import Record, play
 from pretouch.params import profile
 

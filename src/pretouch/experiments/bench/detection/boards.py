@@ -10,8 +10,8 @@ from pretouch.experiments import static
 from pretouch.experiments.bench.detection.arm import Sensing, model, sensing_of
 from pretouch.experiments.bench.detection.contenders import Contender
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_of
-from pretouch.experiments.campaign import write_json
 from pretouch.experiments.metrics import rounded
+from pretouch.experiments.results_file import write_json
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.sensing.skin import paper_skin
 

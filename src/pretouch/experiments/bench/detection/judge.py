@@ -14,8 +14,8 @@ from pretouch.experiments.bench.detection.replay import REST, Replayed, replay
 from pretouch.experiments.bench.detection.stream import Stream, load_stream
 from pretouch.experiments.bench.scenario_files import scenario
 from pretouch.experiments.bench.store import Row
-from pretouch.experiments.campaign import write_json
 from pretouch.experiments.metrics import rounded
+from pretouch.experiments.results_file import write_json
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray
 

@@ -15,8 +15,8 @@ from pretouch.experiments.bench.localization.contacts import TouchedCell
 from pretouch.experiments.bench.localization.limit import position_limit
 from pretouch.experiments.bench.scenario_files import scenario
 from pretouch.experiments.bench.store import Row
-from pretouch.experiments.campaign import write_json
 from pretouch.experiments.metrics import rounded
+from pretouch.experiments.results_file import write_json
 from pretouch.params import profile
 from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, IntArray, Touched
