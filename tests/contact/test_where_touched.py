@@ -118,16 +118,19 @@ def test_a_touch_whose_place_is_hidden_still_counts_by_its_link():
     assert odds == pytest.approx(cues.gain[link], rel=1e-3)
 
 
-def test_a_false_touch_takes_few_pushes_on_link_3_that_the_torques_put_there():
+def test_a_false_touch_takes_few_pushes_on_link_2_that_the_torques_put_there():
+    # two torques contradict little; counted by the gain of its link too, a false touch takes a quarter of them
     lost = right = 0
-    for seed in range(40):
+    rng = np.random.default_rng(5)
+    for seed in range(120):
         kin = posture(seed)
-        c, false = of("panda_link3", kin), of(("panda_link2", "panda_link4", "panda_link5")[seed % 3], kin)
+        free = np.flatnonzero(exposed(kin))
+        c = int(rng.choice(free[SURFACE.link[free] == MODEL.link_index("panda_link2")]))
+        false = int(rng.choice(free[SURFACE.link[free] != SURFACE.link[c]]))
         torque = noisy(torques(kin, (c, 40.0)), seed)
         alone, _ = said(kin, torque)
         if body(alone.link[0]) == SURFACE.body[c]:
             told, _ = said(kin, torque, cues=touched(kin, false))
             right, lost = right + 1, lost + (body(told.link[0]) != SURFACE.body[c])
-    print("RL", right, lost)
-    assert right >= 15
-    assert lost <= right / 5
+    assert right >= 60
+    assert lost <= right / 8
