@@ -39,9 +39,14 @@ def test_a_small_run_and_its_tables():
     assert sum(contact["with"]["cued"] for contact in made["contacts"]) >= 2, "links with units on or beyond them"
     assert not any(contact["without"]["cued"] for contact in made["contacts"])
     rows = [{"experiment": "imu", "way": way, "profile": "pretouch", "seed": 1003, **made} for way in ("usual", "calm")]
-    delays, groups, links, free = imu.EXPERIMENT.tables(imu.EXPERIMENT.summarise(rows))
+    delays, groups, links, where, free = imu.EXPERIMENT.tables(imu.EXPERIMENT.summarise(rows))
     assert delays.rows[0][:3] == ("usual", "all", "4")
     assert {row[0] for row in groups.rows} == {"forearm", "wrist, hand"}
     assert len(free.rows) == 2
-    for table in (delays, groups, links, free):
+    firm = next(row for row in where.rows if row[:3] == ("usual", "push 20", "15 N, 100 ms and more"))
+    assert firm[3] == "2"
+    later = next(row for row in where.rows if row[:3] == ("usual", "all", "alarm both ways"))
+    both = [c for c in made["contacts"] if "where_later" in c["without"] and "where_later" in c["with"]]
+    assert int(later[3]) == len(both) >= 2
+    for table in (delays, groups, links, where, free):
         assert all(len(row) == len(table.header) for row in table.rows)

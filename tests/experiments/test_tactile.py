@@ -5,12 +5,27 @@ import pytest
 
 from pretouch.experiments import tactile, tactile_trial
 from pretouch.experiments.cell import Cell, Context, Grid
+from pretouch.experiments.tactile_kinds import INNER, INNER_LINKS
 from pretouch.experiments.tactile_tables import summarise, tables
-from pretouch.experiments.tactile_trial import feeling, plan
+from pretouch.experiments.tactile_trial import feeling, inner_skin, plan
 
 
 def contact(force: float, without: float | None, with_touch: float | None, felt: float | None = 0.02) -> dict:
-    return {"link": "a", "force_n": force, "duration_s": 0.2, "felt_s": felt, "without": without, "with": with_touch}
+    return {
+        "link": "a",
+        "force_n": force,
+        "duration_s": 0.2,
+        "felt_s": felt,
+        "without": without,
+        "with": with_touch,
+        "where": {"without": said(0.2, right=False), "with": said(0.01)},
+    }
+
+
+def said(error: float | None, right: bool = True) -> dict:
+    """What was said of a contact that is `error` off; None of one that is not felt."""
+    felt = error is not None
+    return {"felt": felt, "right": felt and right, "error_m": error, "two": False}
 
 
 def row(contacts: list[dict], place: str = "on patch") -> dict:
@@ -50,16 +65,47 @@ def test_rows_are_counted_by_place_and_force_and_delays_compared_on_the_same_con
     assert (cell["both"], cell["delay_without_ms"], cell["delay_with_ms"]) == (1, 60.0, 40.0)
     whole = next(c for c in found["cells"] if (c["place"], c["force_n"]) == ("on patch", "all"))
     assert (whole["contacts"], whole["delay_without_ms"]) == (3, 40.0)
-    contacts, free = tables(found)
+    contacts, where, free = tables(found)
     assert len(contacts.rows) == 5
+    # 15 N and more that last 100 ms: one; all felt, the busy one too: five
+    assert where.rows[0] == ("on patch", "unseen", "all", "15 N, 100 ms and more", "1", "1 / 1", "0 / 1", "0 / 0", "1",
+                             "20.0 / 1.0", "20.0 / 1.0")  # fmt: skip
+    assert [row[3:5] for row in where.rows[1:]] == [("all felt", "4"), ("all felt", "1")]
     assert "1 contacts that began" in contacts.note
     assert free.rows[1][:4] == ("with", "0.50", "200", "1")
     assert tables(summarise([])) == []
 
 
+def test_contacts_of_the_inner_links_are_pushes_on_their_patches(paper_skin):
+    skin = inner_skin(paper_skin)
+    links = {f"panda_{name}" for name in INNER_LINKS}
+    assert len(skin.touching) == len(skin)
+    assert {unit.link for unit in skin.units} >= links
+    touches = plan(skin, INNER, 1500, 0.05)
+    named = [skin.units[int(np.flatnonzero(skin.link == touch.link)[0])].link for touch in touches]
+    assert set(named) == links
+    assert max(named.count(link) for link in links) < 20
+    for touch in touches:
+        assert touch.force_n >= 15.0
+        assert touch.duration_s >= 0.1
+        own = skin.T_link_sensor[skin.link == touch.link, :3, 3]
+        assert np.linalg.norm(own - touch.point, axis=1).min() <= 0.02 + 1e-9
+
+
+def test_places_of_the_inner_links_are_told_link_by_link_and_errors_compared_on_the_same_contacts():
+    inner = [contact(30.0, 0.02, 0.02), contact(15.0, 0.02, 0.02) | {"link": "b"}, contact(60.0, None, 0.02)]
+    inner[2]["where"]["without"] = said(None)
+    found = summarise([row(inner, INNER)])["where"]
+    assert [cell["link"] for cell in found] == ["all", "all", "a", "a", "b", "b"]
+    whole = found[0]
+    assert (whole["contacts"], whole["both"]) == (3, 2)
+    assert (whole["without"]["felt"], whole["with"]["felt"], whole["with"]["right"]) == (2, 3, 3)
+    assert (whole["without"]["p50_m"], whole["with"]["p90_m"]) == (0.2, 0.01)
+
+
 def test_the_cells_are_its_own(panda_model):
     cells = tactile.cells(Grid(("paper", "pretouch")))
-    assert len(cells) == 5
+    assert len(cells) == 7
     assert {cell.profile for cell in cells} == {"pretouch"}
 
 
@@ -74,3 +120,6 @@ def test_a_touch_is_told_and_nothing_is_felt_later_for_it(panda_model, paper_ski
         assert one["felt_s"] is not None
         assert one["felt_s"] < 0.06
         assert one["without"] is None or one["with"] <= one["without"] + 1e-9
+        assert set(one["where"]) == {"without", "with"}
+        if one["where"]["with"]["felt"]:
+            assert one["where"]["with"]["error_m"] < 0.1

@@ -11,7 +11,8 @@ class Cues:
     """Evidence of the units of one step, for detection and localisation. L links of the arm, C touched places."""
 
     gain: FloatArray
-    """(L,) times a contact on each link is likelier than without the units; 1 where they say nothing."""
+    """(L,) times a contact on each link is likelier than without the units; 1 where they say nothing. What localisation
+    makes of a link with a touched place is that place alone."""
     link: IntArray
     """(C,) index of the link of each place that a unit says is touched."""
     point: FloatArray
@@ -19,7 +20,7 @@ class Cues:
     sigma: FloatArray
     """(C,) standard deviation of each in the worst direction [m]."""
     force: FloatArray
-    """(C,) size of the force there [N], NaN where the unit measures none."""
+    """(C,) size of the force there [N], NaN where the unit measures none; nothing is inferred from it."""
 
 
 def no_cues(links: int) -> Cues:

@@ -61,13 +61,21 @@ def prior_of_places(
 
     A mixture: contacts spread over the surface that is not hidden, times what units say of each link (`gain`); contacts
     by what is seen, which lie near the points (K, 3) that are, the nearer to the body (K,) [m] the likelier; contacts
-    where a unit says that it is touched (T,), spread by its own error. What is not seen keeps its part.
+    where a unit says that it is touched (T,), spread by its own error. What is not seen keeps its part. A touch whose
+    place is known counts by that place, and not once more by the gain of its link: else what is left for the case that
+    it is false would lie on that link too.
     """
     count, base, most = len(at), 0.0, 0.0
-    weight, extra = np.zeros(count), np.empty(count)
+    weight, extra, told_kernels = np.zeros(count), np.empty(count), np.zeros(count)
+    by_place = np.zeros(len(gain), np.bool_)
+    for k in range(len(told_link)):
+        if _kernel(at, link, area, hidden, told_link[k], told[k], max(told_sigma[k], told_least), extra):
+            by_place[told_link[k]] = True
+            for c in range(count):
+                told_kernels[c] += extra[c]
     for c in range(count):
         if not hidden[c]:
-            weight[c] = area[c] * gain[link[c]]
+            weight[c] = area[c] if by_place[link[c]] else area[c] * gain[link[c]]
             base += weight[c]
     for c in range(count):
         weight[c] /= max(base, 1e-300)
@@ -79,12 +87,7 @@ def prior_of_places(
             for c in range(count):
                 kernels[c] += nearness * extra[c]
     _mix(weight, kernels, seen_share * most)
-    kernels[:] = 0.0
-    for k in range(len(told_link)):
-        if _kernel(at, link, area, hidden, told_link[k], told[k], max(told_sigma[k], told_least), extra):
-            for c in range(count):
-                kernels[c] += extra[c]
-    _mix(weight, kernels, told_share)
+    _mix(weight, told_kernels, told_share)
     for c in range(count):
         ln[c] = math.log(max(weight[c], _NEVER))
 

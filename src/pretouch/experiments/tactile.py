@@ -4,12 +4,11 @@ from itertools import product
 
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Row
+from pretouch.experiments.tactile_kinds import BESIDE, INNER, NOWHERE, ON_PATCH
 from pretouch.experiments.tactile_tables import summarise, tables
 
 NAME = "tactile"
 PROFILE = "pretouch"
-PLACES = ("on patch", "beside", "nowhere")
-"""Where contacts are: on a unit's patch, on the same link off all patches, or none at all."""
 WARM_UP_S = 60.0
 """Time before the first contact, in which free motion is learnt [s]: as in the benchmark of detection."""
 FREE_S = 180.0
@@ -23,8 +22,8 @@ def cells(_grid: Grid) -> list[Cell]:
 
     The profile is the experiment's own, for what is compared are its two ways to feel the same arm.
     """
-    wanted = [(place, sight) for place, sight in product(PLACES[:2], ("seen", "unseen"))]
-    return [Cell(NAME, PROFILE, {"place": place, "hand": sight}) for place, sight in (*wanted, (PLACES[2], "none"))]
+    wanted = [(place, sight) for place, sight in product((ON_PATCH, BESIDE, INNER), ("seen", "unseen"))]
+    return [Cell(NAME, PROFILE, {"place": place, "hand": sight}) for place, sight in (*wanted, (NOWHERE, "none"))]
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
@@ -35,7 +34,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
 
 
 def _cost(cell: Cell) -> float:
-    return WARM_UP_S + (FREE_S if cell.where["place"] == PLACES[2] else 3.1 * COUNT)
+    return WARM_UP_S + (FREE_S if cell.where["place"] == NOWHERE else 3.1 * COUNT)
 
 
 EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, tables, recorded=False)

@@ -7,10 +7,10 @@ import numpy as np
 from pretouch.experiments.claims.detectors import rate_bounds
 from pretouch.experiments.experiment import Row
 from pretouch.experiments.groups import grouped
+from pretouch.experiments.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
 from pretouch.experiments.metrics import rounded
 from pretouch.experiments.tables import TextTable
-
-_BOTH = ("without", "with")
+from pretouch.experiments.tactile_kinds import INNER
 
 
 def summarise(rows: list[Row]) -> Row:
@@ -19,16 +19,29 @@ def summarise(rows: list[Row]) -> Row:
         {"place": row["place"], "hand": row["hand"], **contact} for row in rows for contact in row.get("contacts", [])
     ]
     for contact in contacts:
-        contact["busy"] = any(contact[name] is not None and contact[name] < 0 for name in _BOTH)
+        contact["busy"] = any(contact[name] is not None and contact[name] < 0 for name in SIDES)
     judged = sorted((c for c in contacts if not c["busy"]), key=lambda c: float(c["force_n"]))
     free = [row["free"] for row in rows if "free" in row]
     together = [{**contact, "force_n": "all"} for contact in judged]
     keys = ("place", "hand", "force_n")
     return {
+        "where": _where(contacts),
         "cells": [where | _cell(group) for where, group in grouped(judged + together, keys)],
         "busy": sum(contact["busy"] for contact in contacts),
-        "free": {name: sum(row[name] for row in free) for name in ("hours", "false_touches", *_BOTH)} if free else None,
+        "free": {name: sum(row[name] for row in free) for name in ("hours", "false_touches", *SIDES)} if free else None,
     }
+
+
+def _where(contacts: list[Row]) -> list[Row]:
+    """Places said of firm contacts and of all that were felt, by place and sight; of the inner links each alone too."""
+    every = [{**contact, "link": "all"} for contact in contacts]
+    inner = [contact for contact in contacts if contact["place"] == INNER]
+    return [
+        where | {"of": name} | compared([contact["where"] for contact in own])
+        for where, group in grouped(every + inner, ("place", "hand", "link"))
+        for name in (FIRM, FELT)
+        if (own := chosen(group, name))
+    ]
 
 
 def _cell(group: list[Row]) -> Row:
@@ -40,7 +53,7 @@ def _cell(group: list[Row]) -> Row:
         "felt_ms": _median([c["felt_s"] for c in group if c["felt_s"] is not None]),
         "both": len(both),
     }
-    for name in _BOTH:
+    for name in SIDES:
         found[f"missed_{name}"] = sum(c[name] is None for c in group)
         found[f"delay_{name}_ms"] = _median([c[name] for c in both])
     return found
@@ -58,7 +71,7 @@ def tables(part: Row) -> list[TextTable]:
             (
                 cell["place"], cell["hand"], cell["force_n"] if cell["force_n"] == "all" else f"{cell['force_n']:g}",
                 str(cell["contacts"]), str(cell["felt"]), _ms(cell["felt_ms"]),
-                *(str(cell[f"missed_{name}"]) for name in _BOTH), *(_ms(cell[f"delay_{name}_ms"]) for name in _BOTH),
+                *(str(cell[f"missed_{name}"]) for name in SIDES), *(_ms(cell[f"delay_{name}_ms"]) for name in SIDES),
             )
             for cell in part["cells"]
         )  # fmt: skip
@@ -73,6 +86,14 @@ def tables(part: Row) -> list[TextTable]:
             f" found. {part['busy']} contacts that began while an earlier alarm was still answered are left out."
         )
         made.append(TextTable("Contacts with touch sensors and without", header, rows, note, names=3))
+    if part["where"]:
+        made.append(TextTable(
+            "Where contacts are said to be, without touch and with",
+            ("place", "hand", "link", "contacts", *HEADER),
+            tuple((c["place"], c["hand"], c["link"], c["of"], *columns(c)) for c in part["where"]),
+            NOTE,
+            names=4,
+        ))  # fmt: skip
     if part["free"]:
         made.append(_free(part["free"]))
     return made
@@ -83,7 +104,7 @@ def _free(free: Row) -> TextTable:
     rows = tuple(
         (name, f"{free['hours']:.2f}", str(free["false_touches"]), str(free[name]), f"{low:.1f} to {high:.1f}",
          f"{1000 * free[name] / max(free['false_touches'], 1):.1f}")
-        for name in _BOTH
+        for name in SIDES
         for low, high in [rate_bounds(free[name], max(free["hours"], 1e-9))]
     )  # fmt: skip
     return TextTable(

@@ -7,35 +7,46 @@ import numpy as np
 
 from pretouch.contact.cues import Cues
 from pretouch.contact.tactile import feel_touch, touch_init, touch_settings
+from pretouch.experiments.bench.dense_skin import gap
 from pretouch.experiments.bench.detection.arm import AWAY, Alone, model, path_of, plant_of, record, sensing_of
 from pretouch.experiments.bench.detection.contacts import Toucher, Touching, place_on, start_posture
 from pretouch.experiments.bench.detection.contenders import Contender
 from pretouch.experiments.bench.detection.judge import matched
 from pretouch.experiments.bench.detection.replay import Said, replay
 from pretouch.experiments.bench.detection.stream import Stream
+from pretouch.experiments.bench.localization.judge import said_of
+from pretouch.experiments.calibration.random_skin import random_skin
 from pretouch.experiments.cell import Cell, Context
 from pretouch.experiments.experiment import Row
+from pretouch.experiments.located import SIDES
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tactile import COUNT, FREE_S, NAME, PLACES, PROFILE, WARM_UP_S
+from pretouch.experiments.tactile import COUNT, FREE_S, NAME, PROFILE, WARM_UP_S
+from pretouch.experiments.tactile_kinds import (
+    BESIDE,
+    FORCES_N,
+    INNER,
+    INNER_KINDS,
+    INNER_LINKS,
+    INNER_N,
+    KINDS,
+    NOWHERE,
+)
 from pretouch.params import profile
 from pretouch.robot.model import Kinematics
+from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import TouchPatch
+from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.sim.plant import Plant
 from pretouch.sim.touch_sensor import TouchSensorParams, TouchSensors
 from pretouch.types import BoolArray, FloatArray, TouchReadings
 
-WITHOUT, WITH = "without", "with"
-DETECTORS = {WITHOUT: "pretouch:detection.use_touch=no", WITH: "pretouch"}
+DETECTORS = dict(zip(SIDES, ("pretouch:detection.use_touch=no", "pretouch"), strict=True))
 """Profiles that are given the same stream and the same touches."""
-FORCES_N = (2.0, 5.0, 10.0, 15.0, 30.0)
 FALSE_PER_HOUR = 600.0
 """Rate of false touches of each unit where there are no contacts [1/h]: often enough to be counted, and for the unit's
 account to stay nearly empty."""
 
 _SPEED_M_S = 0.3
-_KINDS = ((0, 0.06, 0.005), (1, 0.2, 0.02))
-"""Index of the kind in the benchmark's scenario, duration and rise [s]: a tap and a push."""
 _GAP_S = (2.6, 3.2)
 """From the end of a contact to the start of the next, uniform [s]: as in the benchmark."""
 _TILT = 0.25
@@ -48,16 +59,44 @@ def feeling(skin: Skin) -> Skin:
     return skin if len(skin.touching) else Skin([replace(unit, touch=TouchPatch()) for unit in skin.units], model())
 
 
+def inner_skin(skin: Skin) -> Skin:
+    """Return a skin with more units, all of which feel touch: those of the skin of 32 on links 2 to 4, and one on 1."""
+    links = [f"{model().description.name}_{name}" for name in INNER_LINKS]
+    more = [unit for unit in sensing_of("nominal", 0).skin.units if unit.link in links]
+    units = [*skin.units, *more, _within_reach(links[0])]
+    return Skin([unit if unit.touch else replace(unit, touch=TouchPatch()) for unit in units], model())
+
+
+def _within_reach(link: str) -> SensorUnit:
+    """Return a unit on a link, the first of random ones that a hand can come to."""
+    arm, kin = model(), model().kinematics(start_posture())
+    a, b = placed(arm.capsules, kin)
+    index = arm.link_index(link)
+    for seed in range(_TRIES):
+        unit = next(unit for unit in random_skin(arm, seed, first_link=True).units if unit.link == link)
+        T = unit.T_link_sensor
+        beam = T[:3, 3] + np.outer(np.linspace(_CLEAR_M, _FROM_M, 9), T[:3, 2])
+        if gap(beam @ kin.rotation[index].T + kin.position[index], a, b, arm.capsules.radius).min() > 0.5 * _CLEAR_M:
+            break
+    return unit
+
+
 def plan(skin: Skin, place: str, seed: int, hand_radius: float) -> list[Touching]:
     """Draw the contacts of a trial: where, how hard, how long and when."""
     rng, at, found = np.random.default_rng([seed, 51]), WARM_UP_S, []
-    for _ in range(COUNT if place != PLACES[2] else 0):
-        unit = int(rng.choice(skin.touching))
-        point, normal = _on_patch(skin, unit, rng) if place == PLACES[0] else _beside(skin, unit, hand_radius, rng)
-        kind, duration, rise = _KINDS[int(rng.integers(len(_KINDS)))]
+    own, kinds, forces = skin.touching, KINDS, FORCES_N
+    inner = [model().link_index(f"{model().description.name}_{name}") for name in INNER_LINKS]
+    if place == INNER:
+        kinds, forces = INNER_KINDS, INNER_N
+    for _ in range(COUNT if place != NOWHERE else 0):
+        if place == INNER:
+            own = skin.touching[skin.link[skin.touching] == rng.choice(inner)]
+        unit = int(rng.choice(own))
+        point, normal = _beside(skin, unit, hand_radius, rng) if place == BESIDE else _on_patch(skin, unit, rng)
+        kind, duration, rise = kinds[int(rng.integers(len(kinds)))]
         inwards = _TILT * rng.uniform(-1, 1, 3) - normal
         found.append(Touching(
-            int(skin.link[unit]), kind, float(rng.choice(FORCES_N)), rise, duration, at, point, normal,
+            int(skin.link[unit]), kind, float(rng.choice(forces)), rise, duration, at, point, normal,
             inwards / np.linalg.norm(inwards),
         ))  # fmt: skip
         at = found[-1].end + rng.uniform(*_GAP_S)
@@ -85,6 +124,8 @@ def _beside(skin: Skin, unit: int, hand_radius: float, rng: np.random.Generator)
 
 _FROM_M = 0.4
 """How far away the hand comes from [m]: as in the benchmark."""
+_CLEAR_M = 0.05
+"""From where on its way has to be free [m]."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +173,8 @@ def cues_of(course: Course, skin: Skin, profile_text: str) -> Said:
 
 def played(cell: Cell, seed: int, context: Context, free_s: float = FREE_S) -> tuple[Row, None]:
     """Run one trial; return its row of results."""
-    skin, place = feeling(context.skin), str(cell.where["place"])
+    place = str(cell.where["place"])
+    skin = inner_skin(context.skin) if place == INNER else feeling(context.skin)
     course = recorded(skin, place, cell.where["hand"] == "seen", seed, free_s)
     made = {
         name: replay(course.stream, Contender(name, text, "scale"), model(), cues_of(course, skin, text))
@@ -158,6 +200,10 @@ def played(cell: Cell, seed: int, context: Context, free_s: float = FREE_S) -> t
             "duration_s": touch.duration_s,
             "felt_s": _felt(course, touch),
             **{name: None if found[k] is None else rounded(found[k] or 0.0, 4) for name, found in delays.items()},
+            "where": {
+                name: said_of(touch, found.stamp, found.touched, course.stream.robot["q"])
+                for name, found in made.items()
+            },
         }
         for k, touch in enumerate(course.touches)
     ]

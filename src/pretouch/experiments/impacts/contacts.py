@@ -29,7 +29,7 @@ from pretouch.robot.model import Kinematics
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant
 from pretouch.sim.units import SentImus
-from pretouch.types import BoolArray, FloatArray, ImuReadings, RobotState
+from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, ImuReadings, RobotState, Touched
 
 LOOK = 3
 """Steps after an alarm at which the touched link is asked for: by then the units' datagrams have come."""
@@ -100,6 +100,8 @@ class Played:
     """(S, L) of the cues."""
     links: FloatArray
     """(S, P) ln R of a force on each part alone, `LOOK` steps after an alarm; NaN elsewhere."""
+    touched: list[Touched]
+    """Where the arm was said to be touched in each step."""
 
 
 def play_again(course: Course, profile: Profile, use_imu: bool) -> Played:
@@ -108,7 +110,7 @@ def play_again(course: Course, profile: Profile, use_imu: bool) -> Played:
     state, impact = feel_init(arm, profile), impact_init(arm, len(course.sensing.believed))
     steps = len(stream.count)
     alarm, gain = np.zeros(steps, np.bool_), np.ones((steps, len(arm.links)))
-    links = np.full((steps, len(arm.parts)), np.nan)
+    links, touched = np.full((steps, len(arm.parts)), np.nan), [NOT_TOUCHED] * steps
     for i, (robot, near, reacting, watched) in enumerate(stream.steps()):
         kin, cues = arm.kinematics(robot.q), no_cues(len(arm.links))
         if use_imu:
@@ -116,10 +118,10 @@ def play_again(course: Course, profile: Profile, use_imu: bool) -> Played:
                 impact, arm, course.sensing.believed, kin, robot, course.imu[i], robot.stamp, profile
             )  # fmt: skip
         found, state = feel(state, arm, kin, robot, near, reacting, profile, watched, cues)
-        alarm[i], gain[i] = found.contact is not None, cues.gain
+        alarm[i], gain[i], touched[i] = found.contact is not None, cues.gain, found.touched
         if i >= LOOK and alarm[i - LOOK]:
             links[i] = link_evidence(state, kin, robot, profile)
-    return Played(alarm, gain, links)
+    return Played(alarm, gain, links, touched)
 
 
 def link_evidence(state: FeelState, kin: Kinematics, robot: RobotState, profile: Profile) -> FloatArray:

@@ -8,6 +8,7 @@ import numpy as np
 from pretouch.experiments.bench.detection.arm import model
 from pretouch.experiments.bench.detection.contacts import Touching
 from pretouch.experiments.bench.detection.replay import begun
+from pretouch.experiments.bench.localization.judge import place_said, said_of
 from pretouch.experiments.experiment import Row
 from pretouch.experiments.impacts.contacts import LOOK, WARM_UP_S, Course, Played, course, plan, play_again
 from pretouch.experiments.impacts.kinds import GROUPS, KINDS, LINKS
@@ -60,7 +61,13 @@ def judged(
 def _about(touch: Touching) -> Row:
     link = model().links[touch.link].removeprefix(f"{model().description.name}_")
     group = next(name for name, links in GROUPS.items() if link in links)
-    return {"kind": KINDS[touch.kind], "link": link, "group": group, "force_n": rounded(touch.force_n, 1)}
+    return {
+        "kind": KINDS[touch.kind],
+        "link": link,
+        "group": group,
+        "force_n": rounded(touch.force_n, 1),
+        "duration_s": rounded(touch.duration_s, 4),
+    }
 
 
 def _felt(touch: Touching, stamp: FloatArray, onsets: list[int]) -> int | None:
@@ -81,9 +88,12 @@ def _judged(touch: Touching, touched: Course, made: Played, step: int | None) ->
         "by_imu": bool(jolt.argmax() == true) if jolt.max() >= _GAIN else None,
         "by_imu_near": bool(abs(int(jolt.argmax()) - true) <= 1) if jolt.max() >= _GAIN else None,
     }
+    q = touched.stream.robot["q"]
+    row["where"] = said_of(touch, stamp, made.touched, q)
     if step is not None:
         later = min(step + LOOK, len(stamp) - 1)
         both = made.links[later] + np.log(made.gain[later][parts])
+        row["where_later"] = place_said(touch, made.touched[later], q[later])
         row["by_both"] = bool(both.argmax() == true)
         row["by_both_near"] = bool(abs(int(both.argmax()) - true) <= 1)
     return row

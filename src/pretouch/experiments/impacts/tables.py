@@ -7,11 +7,11 @@ import numpy as np
 
 from pretouch.experiments.experiment import Row
 from pretouch.experiments.impacts.kinds import GROUPS, KINDS
+from pretouch.experiments.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
 from pretouch.experiments.metrics import rounded
 from pretouch.experiments.tables import TextTable
 
-_SIDES = ("without", "with")
-ALL = "all"
+ALL, LATER = "all", "alarm both ways"
 
 
 def summarise(rows: list[Row]) -> Row:
@@ -25,10 +25,30 @@ def summarise(rows: list[Row]) -> Row:
             ]
             if found:
                 where = {"way": way, "profile": name, "kind": kind, "group": group, "contacts": len(found)}
-                cells.append(where | {side: _measured([c[side] for c in found]) for side in _SIDES} | _paired(found))
+                cells.append(where | {side: _measured([c[side] for c in found]) for side in SIDES} | _paired(found))
         hours = rounded(sum(row["hours"] for row in own), 4)
-        free.append({"way": way, "profile": name, "hours": hours} | {side: _free(own, side) for side in _SIDES})
-    return {"cells": cells, "free": free}
+        free.append({"way": way, "profile": name, "hours": hours} | {side: _free(own, side) for side in SIDES})
+    return {"cells": cells, "where": _where(rows), "free": free}
+
+
+def _where(rows: list[Row]) -> list[Row]:
+    """Places said of firm contacts, of all that were felt, and of these a while after the alarm: by way and kind."""
+    found = []
+    for way, name in dict.fromkeys((row["way"], row["profile"]) for row in rows):
+        contacts = [c for row in rows if (row["way"], row["profile"]) == (way, name) for c in row["contacts"]]
+        for kind in (ALL, *KINDS):
+            own = [
+                c | {"where": {side: c[side]["where"] for side in SIDES}} for c in contacts if kind in (ALL, c["kind"])
+            ]
+            later = [{side: c[side].get("where_later") for side in SIDES} for c in own]
+            sets = {which: [c["where"] for c in chosen(own, which)] for which in (FIRM, FELT)}
+            sets[LATER] = [said for said in later if all(said.values())]
+            found += [
+                {"way": way, "profile": name, "kind": kind, "of": which} | compared(said)
+                for which, said in sets.items()
+                if said
+            ]
+    return found
 
 
 def _measured(contacts: list[Row]) -> Row:
@@ -101,6 +121,14 @@ def tables(part: Row) -> list[TextTable]:
             " contacts felt. Both: with the gains of the accelerometers. +-1: or a link next to it.",
         ),
         TextTable(
+            "Where contacts are said to be",
+            ("way", "contact", "of", *HEADER),
+            tuple((c["way"], c["kind"], c["of"], *columns(c)) for c in part["where"]),
+            f"{NOTE} An impact ends after 10 ms, and little is felt by then. Alarm both ways: contacts that gave one"
+            " without and with, each judged 30 ms after its own.",
+            names=3,
+        ),
+        TextTable(
             "Free motion",
             ("way", "profile", "hours", "alarms\nwithout", "alarms\nwith", "cue\n[%]", "mean\ngain"),
             tuple(
@@ -119,7 +147,7 @@ def _delays(cell: Row) -> tuple[str, ...]:
     change = cell["mean_change_s"]
     return (
         str(cell["contacts"]),
-        *(" / ".join(_ms(cell[side][key]) for side in _SIDES) for key in ("median_s", "p95_s")),
+        *(" / ".join(_ms(cell[side][key]) for side in SIDES) for key in ("median_s", "p95_s")),
         f"{cell['without']['missed']} / {cell['with']['missed']}",
         str(cell["earlier"]),
         str(cell["later"]),

@@ -12,7 +12,7 @@ from pretouch.experiments.bench.detection.stream import Stream
 from pretouch.params import ReactionParams
 from pretouch.perception.closest import no_obstacles
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.types import BoolArray, FloatArray
+from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched
 
 NOTHING = no_obstacles()
 """What a profile without proximity is shown."""
@@ -36,6 +36,8 @@ class Replayed:
     """(S, 3) force it was taken for [N], NaN where none was found."""
     statistic: FloatArray
     """(S,) see `Contender.statistic`."""
+    touched: list[Touched]
+    """Where the arm was said to be touched in each of these steps."""
 
     def onsets(self, value: float | None = None) -> list[int]:
         """Return the steps at which an alarm begins; with another value of the sweep than the detector's, if given."""
@@ -57,12 +59,13 @@ def replay(stream: Stream, contender: Contender, model: RobotModel, said: Said =
     sees = params.perception.enabled
     state, steps = feel_init(model, params), len(stream.count)
     alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
-    force = np.full((steps, 3), np.nan)
+    force, touched = np.full((steps, 3), np.nan), [NOT_TOUCHED] * steps
     for i, (robot, obstacles, reacting, watched) in enumerate(stream.steps()):
         near = obstacles if sees else NOTHING
         kin = model.kinematics(robot.q)
         found, state = feel(state, model, kin, robot, near, reacting, params, sees and watched, said(i, kin))
+        touched[i] = found.touched
         statistic[i] = contender.statistic(found, state, robot.wrench, params.threshold)
         if found.contact is not None:
             alarm[i], force[i] = True, found.contact.force
-    return Replayed(stream.stamp, alarm, force, statistic)
+    return Replayed(stream.stamp, alarm, force, statistic, touched)

@@ -1,6 +1,7 @@
 """Where the localiser says that contacts are, held against where they are."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -46,7 +47,12 @@ class Said:
 
     def at(self, instant: float) -> int:
         """Return the last step not later than an instant [s]."""
-        return max(0, int(np.searchsorted(self.stamp, instant + 1e-9, side="right")) - 1)
+        return step_at(self.stamp, instant)
+
+
+def step_at(stamp: FloatArray, instant: float) -> int:
+    """Return the last of steps at these instants (S,) [s] not later than another one [s]."""
+    return max(0, int(np.searchsorted(stamp, instant + 1e-9, side="right")) - 1)
 
 
 def name_of(link: int) -> str:
@@ -106,24 +112,42 @@ def place_of(touch: Touching, kin: Kinematics) -> FloatArray:
     return np.asarray(kin.position[touch.link] + kin.rotation[touch.link] @ touch.point)
 
 
+def judged_s(touch: Touching) -> float:
+    """Time after its start at which a contact is judged [s]: the scenario file's, or its end if that is earlier."""
+    return float(min(scenario("localization")["judged"]["after_s"], touch.duration_s))
+
+
+def place_said(touch: Touching, found: Touched, q: FloatArray, when: str = "") -> Row:
+    """Hold what was said in one posture (n,) [rad] against where the contact was: of two the surer one.
+
+    `when` ends the names of its values.
+    """
+    rigid, kin = model().rigid, model().kinematics(q)
+    felt = len(found.link) > 0
+    off = float(np.linalg.norm(found.point[0] - place_of(touch, kin))) if felt else None
+    return {
+        f"felt{when}": felt,
+        f"right{when}": felt and bool(rigid[found.link[0]] == rigid[touch.link]),
+        f"error{when}_m": None if off is None else rounded(off, 5),
+        f"taken_for{when}": name_of(int(found.link[0])) if felt else None,
+        f"two{when}": len(found.link) == 2,
+        f"sigma{when}_m": rounded(float(found.sigma[0]), 5) if felt else None,
+    }
+
+
+def said_of(touch: Touching, stamp: FloatArray, touched: Sequence[Touched], q: FloatArray) -> Row:
+    """Hold what S steps said of a contact, at instants (S,) [s] in postures (S, n) [rad], against where it was."""
+    i = step_at(stamp, touch.start + judged_s(touch))
+    return place_said(touch, touched[i], q[i])
+
+
 def _one(touch: Touching, said: Said) -> Row:
     """Judge one contact, some time after it began and at its end."""
-    rigid, judged = model().rigid, scenario("localization")["judged"]
     row: Row = {"link": name_of(touch.link), "force_n": touch.force_n, "duration_s": touch.duration_s}
-    for when, after in (("", min(judged["after_s"], touch.duration_s)), ("_end", touch.duration_s)):
+    for when, after in (("", judged_s(touch)), ("_end", touch.duration_s)):
         i = said.at(touch.start + after)
-        found, kin = said.touched[i], model().kinematics(said.q[i])
-        felt = len(found.link) > 0
-        off = float(np.linalg.norm(found.point[0] - place_of(touch, kin))) if felt else None
-        row |= {
-            f"felt{when}": felt,
-            f"right{when}": felt and bool(rigid[found.link[0]] == rigid[touch.link]),
-            f"error{when}_m": None if off is None else rounded(off, 5),
-            f"taken_for{when}": name_of(int(found.link[0])) if felt else None,
-            f"two{when}": len(found.link) == 2,
-            f"sigma{when}_m": rounded(float(found.sigma[0]), 5) if felt else None,
-        }
-    i = said.at(touch.start + min(judged["after_s"], touch.duration_s))
+        row |= place_said(touch, said.touched[i], said.q[i], when)
+    i = said.at(touch.start + judged_s(touch))
     limit = position_limit(touch, model().kinematics(said.q[i]), said.q[i], said.spread[i])
     return row | {"limit_m": rounded(limit, 5)}
 
