@@ -86,8 +86,9 @@ class ReactionParams(Checked):
     pinch_thickness_m: Positive = 0.06
     """Mean thickness of what may be caught, between finger and forearm [m]: of two gaps that explain the torques as
     well, the narrower one is taken."""
-    pinch_n: Positive = 10.0
-    """Force from which something is caught [N]."""
+    pinch_n: Positive = 30.0
+    """Force from which something is caught [N]: a step of 2 Nm in one joint's estimate looks like 20 N with the lever
+    that forearm and upper arm have about the elbow. Less is a push, and opens the joint as well."""
     pinch_along: Annotated[float, Check(low=0.0, high=1.0)] = 0.85
     """Cosine of the largest angle between that force and the shortest way across the gap: friction."""
     pinch_rest: Positive = 9.0
