@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # the help is to need none of the heavy packages
     from pretouch.experiments.sweep.definition import Sweep as Defined
     from pretouch.experiments.sweep.run import Run
 
-_OWN = ("vary", "fix", "design", "metrics", "profile", "arms", "name")
+_OWN = ("vary", "fix", "design", "metrics", "ranks", "profile", "arms", "name")
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class Sweep:
     """Simulated arms; each seed is another one, in another scene. By default 16."""
     metrics: str = ""
     """Numbers that tables and figures show, separated by commas; by default all. The Parquet file has all."""
+    ranks: str = ""
+    """Numbers whose Sobol indices are to be those of their ranks, separated by commas: where a few are very large."""
     profile: str = ""
     """Profile to start from, or PROFILE:GROUP.FIELD=VALUE; by default the experiment's own."""
     name: str = ""
@@ -108,8 +110,8 @@ def defined(command: Sweep) -> "list[Defined]":
         return [
             sweep_of(
                 command.what, _pairs("vary", command.vary), fix=_pairs("fix", command.fix),
-                profile_text=command.profile, metrics=words(command.metrics), name=command.name, seeds=command.seeds,
-                **given,
+                profile_text=command.profile, metrics=words(command.metrics), ranks=words(command.ranks),
+                name=command.name, seeds=command.seeds, **given,
             )
         ]  # fmt: skip
     for option in _OWN:

@@ -90,3 +90,12 @@ def test_the_course_over_a_grid(tmp_path):
     assert [row["level"] for row in rows] == pytest.approx(np.linspace(-np.pi, np.pi, 5))
     assert [row["median"] for row in rows] == pytest.approx([row["level"] for row in rows], abs=1e-4)
     assert {row["n"] for row in rows} == {3}
+
+
+def test_indices_of_ranks_are_those_of_any_rising_function_of_the_numbers():
+    """One number that is a thousand times the others would else be all of the variance."""
+    sweep, rng = made.ishigami(64), np.random.default_rng(1007)
+    values = rng.uniform(1.0, 2.0, len(points(sweep)))
+    ranked, bent = sobol_indices(sweep, values, True), sobol_indices(sweep, np.exp(values**5), True)
+    assert ranked["rows"] == bent["rows"]
+    assert sobol_indices(sweep, values)["rows"] != sobol_indices(sweep, np.exp(values**5))["rows"]

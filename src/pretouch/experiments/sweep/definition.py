@@ -21,7 +21,7 @@ Design = Literal["grid", "lhs", "sobol"]
 SENSITIVITY = "sensitivity"
 """The sweeps of docs/sensitivity.md."""
 _SEED_RANGES: dict[SeedRange, tuple[int, int]] = {"published": (0, 999), "development": (1000, 1999)}
-_KEYS = ("name", "experiment", "profile", "design", "samples", "arms", "metrics", "vary", "fix", "text")
+_KEYS = ("name", "experiment", "profile", "design", "samples", "arms", "metrics", "ranks", "vary", "fix", "text")
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,9 @@ class Sweep:
     seeds: SeedRange = "development"
     text: str = ""
     """What it is about, for the document."""
+    ranks: tuple[str, ...] = ()
+    """Metrics of which Sobol indices are of the ranks: of numbers of which few are very large, the variance is that of
+    those few."""
 
     @property
     def measure(self) -> Measure:
@@ -70,7 +73,7 @@ class Sweep:
 def sweep_of(
     experiment: str, vary: Mapping[str, str], *, fix: Mapping[str, str] | None = None, profile_text: str = "",
     design: str = "sobol", samples: int = 64, arms: int = 16, metrics: tuple[str, ...] = (), name: str = "",
-    seeds: SeedRange = "development", text: str = "",
+    seeds: SeedRange = "development", text: str = "", ranks: tuple[str, ...] = (),
 ) -> Sweep:  # fmt: skip
     """Read and check a sweep whose ranges are given as text. Raises an error of this package."""
     what = measure(experiment)
@@ -90,7 +93,7 @@ def sweep_of(
         raise ExperimentError(f"The parameter {both[0]} is both varied and fixed: do one of them.")
     dimensions = tuple(dimension(one, text, current(one, base, what.scene)) for one, text in vary.items())
     fixed = {one: read_value(one, text, current(one, base, what.scene)) for one, text in (fix or {}).items()}
-    unknown = [one for one in metrics if one not in what.metrics]
+    unknown = [one for one in (*metrics, *ranks) if one not in what.metrics]
     if unknown:
         raise ExperimentError(f"{experiment} does not measure {unknown[0]!r}: choose from {', '.join(what.metrics)}.")
     if samples < 2 or (design == "sobol" and samples & (samples - 1)):
@@ -102,7 +105,8 @@ def sweep_of(
         raise ExperimentError(f"The number of arms is {arms}: give 1 to {high - low + 1}.")
     chosen = metrics or tuple(what.metrics)
     found = Sweep(
-        name or experiment, experiment, base_text, dimensions, fixed, design, samples, arms, chosen, seeds, text  # type: ignore[arg-type]
+        name or experiment, experiment, base_text, dimensions, fixed, design, samples, arms, chosen, seeds, text,  # type: ignore[arg-type]
+        ranks,
     )  # fmt: skip
     _check_ends(found)
     return found
@@ -152,13 +156,14 @@ def _from(entry: Any, number: int, path: Path, seeds: SeedRange) -> Sweep:
     texts = {key: entry.get(key, "") for key in ("name", "experiment", "profile", "design", "text")}
     counts = {key: entry[key] for key in ("samples", "arms") if key in entry}
     tables = {key: entry.get(key, {}) for key in ("vary", "fix")}
-    metrics = entry.get("metrics", [])
+    listed = {key: entry.get(key, []) for key in ("metrics", "ranks")}
     for kind, what, given in ((str, "text", texts), (int, "a whole number", counts), (dict, "a table", tables)):
         for key, value in given.items():
             if not isinstance(value, kind) or isinstance(value, bool):
                 raise ExperimentError(f"The {where} has {key} = {value!r}: give {what}.")
-    if not isinstance(metrics, list) or not all(isinstance(one, str) for one in metrics):
-        raise ExperimentError(f"The {where} has metrics = {metrics!r}: give a list of names.")
+    for key, names in listed.items():
+        if not isinstance(names, list) or not all(isinstance(one, str) for one in names):
+            raise ExperimentError(f"The {where} has {key} = {names!r}: give a list of names.")
     for key, table in tables.items():
         for name, value in table.items():
             if not isinstance(value, str):
@@ -166,8 +171,8 @@ def _from(entry: Any, number: int, path: Path, seeds: SeedRange) -> Sweep:
     try:
         return sweep_of(
             texts["experiment"], tables["vary"], fix=tables["fix"], profile_text=texts["profile"],
-            design=texts["design"] or "sobol", metrics=tuple(metrics), name=texts["name"], seeds=seeds,
-            text=texts["text"], **counts,
+            design=texts["design"] or "sobol", metrics=tuple(listed["metrics"]), name=texts["name"], seeds=seeds,
+            text=texts["text"], ranks=tuple(listed["ranks"]), **counts,
         )  # fmt: skip
     except PretouchError as error:
         raise ExperimentError(f"{error} (in {where})") from error

@@ -115,6 +115,8 @@ def _note(run: Run, about: dict[str, Any]) -> str:
             )
         else:
             said.append(f"{metric}: {sweep.measure.metrics[metric]}; there is none.")
+    if sweep.design == "sobol" and sweep.ranks:
+        said.append(f"Indices are those of the ranks of {', '.join(sweep.ranks)}.")
     failed = f", {about['failed']} failed" if about["failed"] else ""
     missing = about["cells"] - len({c.key for c in run.cells} & set(run.results))
     left = f", {missing} not played" if missing else ""

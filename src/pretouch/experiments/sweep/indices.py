@@ -27,7 +27,7 @@ def indices(run: Run) -> Row:
     for metric in sweep.metrics:
         values = values_of(run, metric)
         if sweep.design == "sobol":
-            found[metric] = sobol_indices(sweep, values)
+            found[metric] = sobol_indices(sweep, values, metric in sweep.ranks)
         elif sweep.design == "lhs":
             found[metric] = _correlations(run, values)
         else:
@@ -35,10 +35,11 @@ def indices(run: Run) -> Row:
     return found
 
 
-def sobol_indices(sweep: Sweep, values: FloatArray) -> Row:
+def sobol_indices(sweep: Sweep, values: FloatArray, ranked: bool = False) -> Row:
     """First-order and total index of each column, from values (samples * (D + 2),) in the order of the design.
 
-    A block in which a value is missing is left out whole, for its differences are what the indices are made of.
+    A block in which a value is missing is left out whole, for its differences are what the indices are made of. With
+    `ranked` the indices are those of the values' ranks.
     """
     from SALib.analyze import sobol
 
@@ -48,6 +49,8 @@ def sobol_indices(sweep: Sweep, values: FloatArray) -> Row:
     about: Row = {"blocks": len(whole), "of": len(blocks), **_spread(whole[:, [0, -1]].ravel())}
     if len(whole) < 2 or np.ptp(whole) <= _FLAT * np.abs(whole).max():
         return about | {"rows": []}
+    if ranked:
+        whole = rankdata(whole).reshape(whole.shape)
     made = sobol.analyze(
         problem(wanted), whole.ravel(), calc_second_order=False, num_resamples=_RESAMPLES, conf_level=LEVEL,
         seed=_DRAWN_WITH,
