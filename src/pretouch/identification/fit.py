@@ -119,7 +119,7 @@ def design(
     found: Usable, columns: Columns, carried: FloatArray, theta: FloatArray, gain: float, cycles: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives (N, n, p) of the residual by all numbers, and what they explain (N, n) [Nm]."""
-    count, n, _ = columns.carried.shape
+    count, n = found.samples.q.shape
     own = theta[: OWN * n].reshape(n, OWN)
     shapes = []
     for q, speed in zip(columns.q, columns.speed, strict=True):
