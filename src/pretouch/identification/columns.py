@@ -5,7 +5,7 @@ from scipy.signal import lfilter
 
 from pretouch.contact.residual_model import PLAIN, features
 from pretouch.identification.motion import GRID_S, Motion
-from pretouch.identification.samples import Usable
+from pretouch.identification.samples import Usable, joint_scale
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
@@ -32,11 +32,12 @@ class Columns:
     """(G, n, n + 1) of each segment: torque of each joint by weight and inertia of the links behind each joint and of
     1 kg at the end-effector [Nm], before the low-pass."""
     kick: FloatArray
-    """(N, n) noise of the measured velocities times the mass matrix [kg m^2 rad/s]; 0 without velocities."""
+    """(N, n) noise of the measured velocities, as likely as it is, times the mass matrix [kg m^2 rad/s]; 0 without
+    velocities."""
     velocity_noise: FloatArray
     """(N, n) measured velocities less derivatives of positions [rad/s]."""
     mass_square: FloatArray
-    """(n,) mean of the diagonal of M M^T [kg^2 m^4]."""
+    """(n, n) mean of the squares of the mass matrix [kg^2 m^4]."""
     calm: BoolArray
     """(N,) samples in and shortly before which no joint's speed changes quickly: there its derivative is known."""
 
@@ -46,23 +47,27 @@ def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Colum
     s = found.samples
     spans = [slice(a, b) for a, b in found.segments]
     kick, noise, calm = np.zeros(s.q.shape), np.zeros(s.q.shape), np.zeros(len(s.time), np.bool_)
-    fine, positions, speeds, carried, squares = [], [], [], [], []
+    fine, positions, speeds, carried, masses = [], [], [], [], []
     for span, motion in zip(spans, motions, strict=True):
         time, path = s.time[span], motion.between()
         M = np.array([model.mass_matrix(q) for q in motion.q])
-        squares.append(np.einsum("gij,gij->gi", M, M))
+        masses.append(M)
         rows = zip(motion.q, motion.qd, motion.qdd, strict=True)
         carried.append(np.array([features(model, model.kinematics(q), *of)[:, PLAIN:] for q, *of in rows]))
         calm[span] = _calm(motion, time)
         if s.qd is not None:
             growth = at_samples(time, motion.at, GRID_S, motion.qdd)
             noise[span] = _noise(s.qd[span], path(time, 1), growth, calm[span])
-            kick[span] = np.einsum("tij,tj->ti", at_samples(time, motion.at, GRID_S, M), noise[span])
         at = np.arange(time[0], time[-1] + 0.5 * _FINE_S, _FINE_S)
         fine.append(at)
         positions.append(path(at))
         speeds.append(path(at, 1))
-    square = np.concatenate(squares).mean(axis=0)
+    if s.qd is not None and calm.any():
+        # part of what differs is the derivatives' own noise: on average this share is the velocities'
+        share = np.maximum(1.0 - (motions[0].speed_noise / joint_scale(noise[calm])) ** 2, 0.0)
+        for span, motion, M in zip(spans, motions, masses, strict=True):
+            kick[span] = np.einsum("tij,tj->ti", at_samples(s.time[span], motion.at, GRID_S, M), share * noise[span])
+    square = (np.concatenate(masses) ** 2).mean(axis=0)
     return Columns(
         tuple(motions), tuple(fine), tuple(positions), tuple(speeds), tuple(carried), kick, noise, square, calm
     )  # fmt: skip

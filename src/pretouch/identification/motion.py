@@ -9,6 +9,7 @@ from the noise: as narrow as that allows, for a wide one rounds a path's corners
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from pretouch.identification.samples import joint_scale
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
@@ -48,6 +49,8 @@ class Motion:
     """Half the width of the fit [s]."""
     noise: FloatArray
     """(n,) standard deviation of the positions, errors of the stamps in it [rad]."""
+    speed_noise: FloatArray
+    """(n,) that of the speeds, usually [rad/s]."""
 
     def between(self) -> CubicHermiteSpline:
         """Positions as a function of time, and by its derivative speeds."""
@@ -65,14 +68,14 @@ def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[Mot
         if noise.max() * gain[1] <= _SURE_RAD_S and noise.max() * gain[2] <= _SURE_RAD_S2:
             break
     narrow = [local_cubic(*each, 0.5 * half)[0][1] for each in given]
-    differs = [np.abs(speed - fitted[1]) for speed, (fitted, _) in zip(narrow, fits, strict=True)]
-    allowed = _ROUNDED_RAD_S + _SIGMAS * 1.4826 * np.median(np.concatenate(differs), axis=0)
-    return [
-        Motion(
-            at, *fitted, _quick(fitted[2], gains[:, 2, None] * noise) | np.any(off > allowed, axis=1), half, noise
-        )
-        for at, (fitted, gains), off in zip(grids, fits, differs, strict=True)
-    ]  # fmt: skip
+    differs = [speed - fitted[1] for speed, (fitted, _) in zip(narrow, fits, strict=True)]
+    allowed = _ROUNDED_RAD_S + _SIGMAS * joint_scale(np.concatenate(differs))
+    quick = [
+        _quick(fitted[2], gains[:, 2, None] * noise) | np.any(np.abs(off) > allowed, axis=1)
+        for (fitted, gains), off in zip(fits, differs, strict=True)
+    ]
+    rows = zip(grids, fits, quick, strict=True)
+    return [Motion(at, *fitted, unsure, half, noise, gain[1] * noise) for at, (fitted, _), unsure in rows]
 
 
 def _quick(qdd: FloatArray, noise: FloatArray) -> BoolArray:
@@ -87,7 +90,7 @@ def position_noise(times: list[FloatArray], positions: list[FloatArray], half: f
     for time, q in zip(times, positions, strict=True):
         (fitted, _, _), gains = local_cubic(time, q, time, half)
         rows.append((q - fitted) / np.sqrt(np.maximum(1.0 - 2.0 * gains[:, 3] + gains[:, 0] ** 2, 0.01))[:, None])
-    return np.asarray(1.4826 * np.median(np.abs(np.concatenate(rows)), axis=0))
+    return joint_scale(np.concatenate(rows))
 
 
 def local_cubic(time: FloatArray, values: FloatArray, at: FloatArray, half: float) -> tuple[FloatArray, FloatArray]:

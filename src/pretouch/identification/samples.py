@@ -73,7 +73,7 @@ def usable(samples: ArmSamples) -> Usable:
             f"The samples come at {rate:.3g} Hz: what an observer says changes within 20 ms, so record at"
             f" {_LOWEST_HZ:g} Hz or more."
         )
-    every = int(np.ceil(rate / _HIGHEST_HZ))
+    every = int(np.ceil(rate / _HIGHEST_HZ - 0.05))  # stamps are not exact
     if every > 1:
         notes.append(f"Of {rate:.4g} samples a second every {every}. is used.")
         found = taken(found, np.arange(len(found.time)) % every == 0)
@@ -101,6 +101,11 @@ def taken(samples: ArmSamples, which: BoolArray) -> ArmSamples:
     """Return some of the samples."""
     qd = None if samples.qd is None else samples.qd[which]
     return replace(samples, time=samples.time[which], q=samples.q[which], qd=qd, tau=samples.tau[which])
+
+
+def joint_scale(left: FloatArray) -> FloatArray:
+    """Robust standard deviation (n,) of samples (N, n)."""
+    return np.asarray(1.4826 * np.median(np.abs(left - np.median(left, axis=0)), axis=0)) + 1e-6
 
 
 def _check_motion(samples: ArmSamples, segments: tuple[tuple[int, int], ...], period: float) -> None:

@@ -22,10 +22,8 @@ _MEDIAN_SQUARE = 0.455
 """Median of the square of normal noise of variance 1."""
 _PACE_HALF_S = 0.13
 """Half the width of the fit that tells how much too fast or slow the stamps go [s]."""
-_PACE, _MOST_PACE = 0.05, 0.1
-"""How far stamps go too fast or slow, as believed before, and at most [1]."""
-_VELOCITY_NOISE_RAD_S = 0.01
-"""Of measured velocities, as believed before [rad/s]: 0.007 to 0.010 of a real Panda (field notes)."""
+_MOST_PACE = 0.1
+"""How much too fast or slow stamps go at most [1]."""
 
 
 def moved(found: Usable) -> tuple[Usable, list[Motion]]:
@@ -64,7 +62,7 @@ def _stamp_errors(
 ) -> tuple[list[FloatArray], float]:
     """Errors (N,) [s] that explain what positions are off along the speed, and their size; 0 where there are none.
 
-    They are believed as far as they exceed what positions are off across the speed.
+    They are believed as far as they exceed what positions are off across the speed, and if most of the noise is theirs.
     """
     n = positions[0].shape[1]
     paths = [motion.between() for motion in motions]
@@ -73,28 +71,42 @@ def _stamp_errors(
     speed, off = np.concatenate(speeds), np.concatenate(offs)
     square = np.maximum(np.einsum("ti,ti->t", speed, speed), 1e-12)
     moving = square > _MOVING_RAD_S**2
+    nothing = [np.zeros(len(time)) for time in stamps]
     if n < 2 or moving.sum() < _LEAST_MOVING:
-        return [np.zeros(len(time)) for time in stamps], 0.0
+        return nothing, 0.0
     error = np.einsum("ti,ti->t", off, speed) / square
     across = off - error[:, None] * speed
     noise = np.median(across[moving] ** 2) * n / (n - 1.0) / _MEDIAN_SQUARE
-    variance = max(float(np.median(error[moving] ** 2 - _MEDIAN_SQUARE * noise / square[moving])) / _MEDIAN_SQUARE, 0.0)
+    variance = float(np.median(error[moving] ** 2 - _MEDIAN_SQUARE * noise / square[moving])) / _MEDIAN_SQUARE
+    if variance * float(np.median(square[moving])) < noise:
+        return nothing, 0.0
     believed = error * variance * square / (variance * square + noise + 1e-18)
     return np.split(believed, np.cumsum([len(time) for time in stamps])[:-1]), float(np.sqrt(variance))
 
 
 def _paced(stamps: list[FloatArray], velocities: list[FloatArray], motions: list[Motion]) -> list[FloatArray]:
-    """Stretch time where all joints are measured slower than their positions change, and the other way round."""
-    parts = []
-    for time, measured, motion in zip(stamps, velocities, motions, strict=True):
-        speed = motion.between()(time, 1)
+    """Stretch time where all joints are measured slower than their positions change, and the other way round.
+
+    That is believed as far as it exceeds what the velocities' noise does.
+    """
+    speeds = [motion.between()(time, 1) for time, motion in zip(stamps, motions, strict=True)]
+    velocity = np.concatenate(velocities) - np.concatenate(speeds)
+    noise = float(np.mean(np.median(velocity**2, axis=0)) / _MEDIAN_SQUARE)
+    pace, spread = [], []
+    for time, measured, speed in zip(stamps, velocities, speeds, strict=True):
         products = np.stack([(measured - speed) * speed, speed**2], axis=2).sum(axis=1)
         (sums, _, _), gains = local_cubic(time, products, time, _PACE_HALF_S)
-        before = (_VELOCITY_NOISE_RAD_S / _PACE * gains[:, 0]) ** 2
-        parts.append(np.clip(sums[:, 0] / (np.maximum(sums[:, 1], 0.0) + before), -_MOST_PACE, _MOST_PACE))
-    usual = float(np.median(np.concatenate(parts)))  # velocities that are all told too large are no matter of time
+        square = np.maximum(sums[:, 1], 1e-6)
+        pace.append(sums[:, 0] / square)
+        spread.append(noise * gains[:, 0] ** 2 / square)
+    each, own = np.concatenate(pace), np.concatenate(spread)
+    usual = float(np.median(each))  # velocities that are all told too large are no matter of time
+    moving = (np.concatenate(speeds) ** 2).sum(axis=1) > _MOVING_RAD_S**2
+    variance = float(np.median((each - usual)[moving] ** 2 - _MEDIAN_SQUARE * own[moving])) / _MEDIAN_SQUARE
+    if variance <= 0.0:
+        return stamps
     paced = []
-    for time, part in zip(stamps, parts, strict=True):
-        steps = np.diff(time) / (1.0 + 0.5 * (part[1:] + part[:-1]) - usual)
-        paced.append(time[0] + np.append(0.0, np.cumsum(steps)))
+    for time, part, error in zip(stamps, pace, spread, strict=True):
+        believed = np.clip((part - usual) * variance / (variance + error), -_MOST_PACE, _MOST_PACE)
+        paced.append(time[0] + np.append(0.0, np.cumsum(np.diff(time) / (1.0 + 0.5 * (believed[1:] + believed[:-1])))))
     return paced
