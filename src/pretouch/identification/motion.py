@@ -75,7 +75,10 @@ def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[Mot
         for (fitted, gains), off in zip(fits, differs, strict=True)
     ]
     rows = zip(grids, fits, quick, strict=True)
-    return [Motion(at, *fitted, unsure, half, noise, gain[1] * noise) for at, (fitted, _), unsure in rows]
+    return [
+        Motion(at, fitted[0], fitted[1], fitted[2], unsure, half, noise, gain[1] * noise)
+        for at, (fitted, _), unsure in rows
+    ]
 
 
 def _quick(qdd: FloatArray, noise: FloatArray) -> BoolArray:

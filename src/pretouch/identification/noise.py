@@ -61,7 +61,7 @@ def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usua
     noise = columns.velocity_noise[used]
     velocity = np.nan
     if seen:  # the derivatives' noise is in what differs, too
-        square = np.mean(joint_scale(noise) ** 2 - columns.motion[0].speed_noise ** 2)
+        square = float(np.mean(joint_scale(noise) ** 2 - columns.motion[0].speed_noise ** 2))
         velocity = float(np.sqrt(max(square, _LEAST_VELOCITY_RAD_S**2)))
     torque = _torque_noise(covariance[0], velocity, columns, fitted, usual)
     again = np.array([_torque_noise(sample[0], velocity, columns, fitted, usual) for sample in without])
