@@ -66,3 +66,19 @@ def test_states_that_are_told_again_count_once():
     found = usable(twice)
     assert found.samples.time == pytest.approx(TIME)
     assert "400 of 4400 samples repeat the one before them" in " ".join(found.notes)
+
+
+@pytest.mark.parametrize(("missing", "segments"), [(8, 1), (12, 2)])
+def test_a_short_gap_is_bridged_and_a_long_one_parts(missing, segments):
+    given = at(TIME)
+    left = np.delete(np.arange(len(TIME)), np.arange(2000, 2000 + missing))
+    found = usable(ArmSamples(*(column[left] for column in (given.time, given.q, given.qd, given.tau))))
+    assert len(found.segments) == segments
+    (motion, *_), path = moved(found)[1], 0.5 * RATES * np.cos(RATES * 20.04)
+    assert segments == 2 or motion.between()(20.04, 1) == pytest.approx(path, abs=1e-4)
+
+
+@pytest.mark.parametrize(("rate", "left"), [(250, 250), (255, 255), (500, 250), (1000, 250)])
+def test_samples_are_thinned_to_about_250_a_second(rate, left):
+    found = usable(at(np.arange(30 * rate) / rate + 1e-5 * np.sin(np.arange(30 * rate))))
+    assert len(found.samples.time) == 30 * left
