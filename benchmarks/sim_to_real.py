@@ -129,7 +129,16 @@ def study(world: str, seed: int, seconds: float) -> dict[str, object]:
             "notes": list(found.notes), "compared": compared}  # fmt: skip
 
 
-def swung(seed: int, world: str, seconds: float) -> dict[str, object]:
+def rough(samples: ArmSamples, seed: int) -> ArmSamples:
+    """As a recording may be: noise and steps of encoders, stamps late by up to 2 ms, samples lost, gaps of 60 ms."""
+    rng, count = np.random.default_rng(seed), len(samples.time)
+    kept = (rng.random(count) > 0.005) & (np.arange(count) % 500 > 5)
+    q = 1e-5 * np.round((samples.q + 2e-5 * rng.standard_normal(samples.q.shape)) / 1e-5)
+    late = replace(samples, time=samples.time + rng.uniform(0.0, 0.002, count), q=q)
+    return ArmSamples(late.time[kept], late.q[kept], late.qd[kept], late.tau[kept])
+
+
+def swung(seed: int, world: str, seconds: float, roughly: bool) -> dict[str, object]:
     """Swing an arm's joints along sines, identify it, and say how far the numbers are off."""
     plant = Plant(MODEL, SceneSpec(), drawn(world_set(world), seed).plant, MODEL.description.q_ready, seed)
     rate, rows = 2 * np.pi * np.array([0.11, 0.13, 0.17, 0.19, 0.23, 0.29, 0.31]), []
@@ -140,7 +149,7 @@ def swung(seed: int, world: str, seconds: float) -> dict[str, object]:
         state = plant.read()
         rows.append((state.stamp, state.q, state.qd, state.tau_ext))
     samples = ArmSamples(*(np.array(column) for column in zip(*rows, strict=True)))
-    found = identify(samples, MODEL, usual_of(PlantParams()))
+    found = identify(rough(samples, seed) if roughly else samples, MODEL, usual_of(PlantParams()))
     return {"world": world, "seed": seed, "deviations": deviations(found, plant), "notes": list(found.notes)}
 
 
@@ -163,9 +172,10 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=90.0)
     parser.add_argument("--out", type=Path, default=Path("sim-to-real.jsonl"))
     parser.add_argument("--swung", action="store_true", help="only how far the numbers are off, of joints that swing")
+    parser.add_argument("--rough", action="store_true", help="with --swung: noise of encoders, uneven stamps, losses")
     given = parser.parse_args()
     if given.swung:
-        rows = [swung(seed, given.world, given.seconds) for seed in given.seeds]
+        rows = [swung(seed, given.world, given.seconds, given.rough) for seed in given.seeds]
         given.out.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
         coverage(rows)
         return

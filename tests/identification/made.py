@@ -34,8 +34,8 @@ class Made:
     """Amplitude of each joint [rad]."""
 
 
-def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5) -> ArmSamples:
-    """Samples at 100 Hz."""
+def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5, every: int = 10) -> ArmSamples:
+    """Samples at 1 kHz / `every`."""
     rng, n, dt = np.random.default_rng(seed), MODEL.n, 0.001
     rate = 2 * np.pi * np.array([0.11, 0.13, 0.17, 0.19, 0.23, 0.29, 0.31])
     t = dt * np.arange(round(seconds / dt))[:, None]
@@ -59,7 +59,7 @@ def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5) -> Ar
             sensed[1] -= 8.0
         _, bias = MODEL.mass_matrix_and_bias(q[i], measured[i], np.empty(n))
         state = observe(state, M, bias, measured[i], sensed, made.gain, dt)
-        if i % 10 == 9:
+        if i % every == every - 1:
             rows.append((t[i, 0], q[i], measured[i], state.residual))
     return ArmSamples(*(np.array(column) for column in zip(*rows, strict=True)))
 

@@ -136,6 +136,7 @@ def joint_rows(found: "Identified", model: "RobotModel") -> list[tuple[str, Any,
     n, first = model.n, own.size
     mass = slice(first, first + n)
     steep = np.exp(own[:, 2])
+    seen = np.isfinite(found.noise.velocity_rad_s)  # else the noise of velocities is in that of torques
     return [
         ("offset [Nm]", own[:, 0], errors[:, 0], told[:, 0]),
         ("friction F1, not compensated [Nm]", own[:, 1], errors[:, 1], told[:, 1]),
@@ -143,7 +144,12 @@ def joint_rows(found: "Identified", model: "RobotModel") -> list[tuple[str, Any,
         ("friction F3 [rad/s]", own[:, 3], errors[:, 3], told[:, 3]),
         ("ripple [Nm]", ripple, ripple_error, ripple > 3.0 * ripple_error),
         ("mass error of its links", found.fit.numbers[mass], found.fit.errors[mass], found.known()[mass]),
-        ("torque noise [Nm]", found.noise.torque_nm, found.noise.torque_errors_nm, found.noise.torque_nm > 0.0),
+        (
+            "torque noise [Nm]",
+            found.noise.torque_nm,
+            found.noise.torque_errors_nm,
+            seen & (found.noise.torque_nm > 0.0),
+        ),
         ("spread about the mean [Nm]", found.noise.total_nm, 0.0 * ripple, ripple > -1.0),
     ]
 

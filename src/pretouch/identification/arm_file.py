@@ -31,14 +31,18 @@ def arm_toml(found: Identified, model: RobotModel, source: str) -> str:
         *_field("friction_f3_rad_s", own[:, 3], errors[:, 3], told[:, 3]),
         *_field("ripple_nm", ripple, ripple_error, told[:, 4] & (ripple > 3.0 * ripple_error)),
         *_field("ripple_phases_rad", phase, ripple_error / np.maximum(ripple, 1e-9), np.ones(n, np.bool_)),
-        *_field("torque_noise_nm", noise.torque_nm, noise.torque_errors_nm, noise.torque_nm > 0.0),
         *_masses(found, model, known),
     ]
     if np.isfinite(noise.velocity_rad_s):
+        lines += _field("torque_noise_nm", noise.torque_nm, noise.torque_errors_nm, noise.torque_nm > 0.0)
         lines += _number("velocity_noise_rad_s", noise.velocity_rad_s, noise.velocity_error_rad_s)
         lines += _number("observer_gain_1_s", fitted.gain, float(fitted.errors[-1]))
     else:
-        lines += ["", "# velocity_noise_rad_s and observer_gain_1_s stay: the recording has no measured velocities."]
+        lines += [
+            "",
+            "# velocity_noise_rad_s and observer_gain_1_s stay: the recording has no measured velocities.",
+            "# torque_noise_nm stays as well: what is left of the torques has the noise of both in it.",
+        ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from pretouch.errors import CalibrationError
-from pretouch.identification.fit import Fit, joint_scale
+from pretouch.identification.fit import Fit
 from pretouch.identification.params import IdentifyParams
-from pretouch.identification.samples import Usable
+from pretouch.identification.samples import Usable, joint_scale
 from pretouch.types import BoolArray, FloatArray
 
 

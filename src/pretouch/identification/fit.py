@@ -18,7 +18,7 @@ import numpy as np
 
 from pretouch.identification.columns import Columns, carried_late, friction_parts, low_passed
 from pretouch.identification.params import IdentifyParams, Usual
-from pretouch.identification.samples import Usable
+from pretouch.identification.samples import Usable, joint_scale
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
@@ -53,11 +53,6 @@ class Fit:
         """Return numbers or errors (p,) of the joints as (n, 6)."""
         n = self.expected.shape[1]
         return which[: OWN * n].reshape(n, OWN)
-
-
-def joint_scale(left: FloatArray) -> FloatArray:
-    """Robust standard deviation (n,) of samples (N, n)."""
-    return np.asarray(1.4826 * np.median(np.abs(left - np.median(left, axis=0)), axis=0)) + 1e-6
 
 
 def fit(
@@ -119,7 +114,7 @@ def design(
     found: Usable, columns: Columns, carried: FloatArray, theta: FloatArray, gain: float, cycles: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives (N, n, p) of the residual by all numbers, and what they explain (N, n) [Nm]."""
-    count, n, _ = columns.carried.shape
+    count, n = found.samples.q.shape
     own = theta[: OWN * n].reshape(n, OWN)
     shapes = []
     for q, speed in zip(columns.q, columns.speed, strict=True):

@@ -9,6 +9,7 @@ from pretouch.identification.fit import OWN, Fit, fit
 from pretouch.identification.noise import Noise, noise_of
 from pretouch.identification.params import IdentifyParams, Usual
 from pretouch.identification.samples import LEAST_S, ArmSamples, usable
+from pretouch.identification.stamps import moved
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
@@ -59,8 +60,8 @@ def identify(samples: ArmSamples, model: RobotModel, usual: Usual, p: IdentifyPa
             f"The recording has {samples.q.shape[1]} joints and {samples.tau.shape[1]} torques, and"
             f" {model.description.name} has {model.n} joints: give the arm it is of."
         )
-    found = usable(samples)
-    columns = columns_of(found, model)
+    found, motions = moved(usable(samples))
+    columns = columns_of(found, motions, model)
     cycles = np.array(usual.ripple_cycles)
     settled = used = columns.calm
     spans: tuple[tuple[float, float], ...] = ()

@@ -5,9 +5,9 @@ from scipy.optimize import minimize_scalar
 
 from pretouch.errors import CalibrationError
 from pretouch.identification.columns import Columns
-from pretouch.identification.fit import Fit, joint_scale
+from pretouch.identification.fit import Fit
 from pretouch.identification.params import IdentifyParams, Usual
-from pretouch.identification.samples import Usable
+from pretouch.identification.samples import Usable, joint_scale
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
@@ -15,6 +15,8 @@ LAGS = 20
 """Lags of the autocorrelation that are kept."""
 _FITTED = 10
 _LEAST_BLOCKS = 8
+_LEAST_VELOCITY_RAD_S = 1e-5
+"""Least noise of measured velocities that is told [rad/s]."""
 
 
 @value
@@ -57,7 +59,10 @@ def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usua
     without = (len(blocks) * covariance - blocks) / (len(blocks) - 1)  # each with one block left out: the jackknife
     seen = found.samples.qd is not None
     noise = columns.velocity_noise[used]
-    velocity = float(np.sqrt(np.mean(joint_scale(noise) ** 2))) if seen else np.nan
+    velocity = np.nan
+    if seen:  # the derivatives' noise is in what differs, too
+        square = float(np.mean(joint_scale(noise) ** 2 - columns.motion[0].speed_noise ** 2))
+        velocity = float(np.sqrt(max(square, _LEAST_VELOCITY_RAD_S**2)))
     torque = _torque_noise(covariance[0], velocity, columns, fitted, usual)
     again = np.array([_torque_noise(sample[0], velocity, columns, fitted, usual) for sample in without])
     gains = np.array([_gain_of(sample, found.period, usual) for sample in without])
@@ -99,13 +104,19 @@ def _torque_noise(variance: FloatArray, velocity: float, columns: Columns, fitte
 
     A first-order noise of corner a through the discrete low-pass of the observer, alpha = K dt / (1 + K dt), keeps the
     part alpha / (2 - alpha) (1 + rho (1 - alpha)) / (1 - rho (1 - alpha)) of its variance, rho = exp(-a dt). What
-    earlier noise of the velocities left in the integral is taken off: K'^2 (M M^T)_jj alpha / (2 - alpha) of it.
+    earlier noise of the velocities left in the integral is taken off: K'^2 (M M^T)_jj alpha / (2 - alpha) of it; and
+    so is what the noise of the positions' derivatives, which is in what was taken for noise of the velocities, leaves.
     """
     dt, gain = usual.period_s, fitted.gain
     alpha, rho = gain * dt / (1.0 + gain * dt), np.exp(-2.0 * np.pi * usual.torque_noise_hz * dt)
     late = rho * (1.0 - alpha)
     part = alpha / (2.0 - alpha) * (1.0 + late) / (1.0 - late)
-    own = 0.0 if np.isnan(velocity) else (alpha / dt * velocity) ** 2 * columns.mass_square * alpha / (2.0 - alpha)
+    own = np.zeros(len(variance))
+    if not np.isnan(velocity):
+        unknown = columns.motion[0].speed_noise ** 2
+        unknown = unknown * velocity**2 / (unknown + velocity**2)
+        shares = velocity**2 * alpha / (2.0 - alpha) + unknown
+        own = (alpha / dt) ** 2 * columns.mass_square @ shares
     return np.sqrt(np.maximum(variance - own, 0.0) / part)
 
 

@@ -13,7 +13,8 @@ LEAST_S = 20.0
 """Shortest free motion that is used [s]: the noise takes as long to be told from friction."""
 LEAST_MOVED_RAD = 0.1
 """A recording is of an arm that moves if a joint turns by this [rad]."""
-_GAP_PERIODS = 3.5
+_GAP_PERIODS, _BRIDGED_S = 3.5, 0.1
+"""Samples further apart than both [s] have a gap between them; over less the motion is told by those around."""
 _HIGHEST_HZ = 250.0
 """Rate above which samples are left out [Hz]: the observer's low-pass leaves nothing up there to learn from."""
 _LOWEST_HZ = 40.0
@@ -65,18 +66,19 @@ def usable(samples: ArmSamples) -> Usable:
         order = np.append(np.diff(np.maximum.accumulate(found.time)) > 0.0, True)
         notes.append(f"{int((~order).sum())} samples do not come after the one before them, and are left out.")
         found = taken(found, order)
+    found = _told_once(found, notes)
     rate = 1.0 / float(np.median(np.diff(found.time)))
     if rate < _LOWEST_HZ:
         raise CalibrationError(
             f"The samples come at {rate:.3g} Hz: what an observer says changes within 20 ms, so record at"
             f" {_LOWEST_HZ:g} Hz or more."
         )
-    every = int(np.ceil(rate / _HIGHEST_HZ))
+    every = int(np.ceil(rate / _HIGHEST_HZ - 0.05))  # stamps are not exact
     if every > 1:
         notes.append(f"Of {rate:.4g} samples a second every {every}. is used.")
         found = taken(found, np.arange(len(found.time)) % every == 0)
     period = float(np.median(np.diff(found.time)))
-    breaks = np.flatnonzero(np.diff(found.time) > _GAP_PERIODS * period) + 1
+    breaks = np.flatnonzero(np.diff(found.time) > max(_GAP_PERIODS * period, _BRIDGED_S)) + 1
     edges = [0, *breaks.tolist(), len(found.time)]
     segments = tuple((a, b) for a, b in pairwise(edges) if (b - a) * period >= 1.0)
     if len(segments) > 1:
@@ -85,10 +87,25 @@ def usable(samples: ArmSamples) -> Usable:
     return Usable(found, segments, tuple(notes))
 
 
+def _told_once(found: ArmSamples, notes: list[str]) -> ArmSamples:
+    """Leave out states of a moving arm that are the same as the one before them to the last bit: they are old."""
+    columns = [found.q, found.tau] + ([] if found.qd is None else [found.qd])
+    new = np.append(True, np.any([(np.diff(c, axis=0) != 0.0).any(axis=1) for c in columns], axis=0))
+    if new.all() or np.ptp(found.q, axis=0).max() < LEAST_MOVED_RAD:
+        return found
+    notes.append(f"{int((~new).sum())} of {len(new)} samples repeat the one before them, and are left out.")
+    return taken(found, new)
+
+
 def taken(samples: ArmSamples, which: BoolArray) -> ArmSamples:
     """Return some of the samples."""
     qd = None if samples.qd is None else samples.qd[which]
     return replace(samples, time=samples.time[which], q=samples.q[which], qd=qd, tau=samples.tau[which])
+
+
+def joint_scale(left: FloatArray) -> FloatArray:
+    """Robust standard deviation (n,) of samples (N, n)."""
+    return np.asarray(1.4826 * np.median(np.abs(left - np.median(left, axis=0)), axis=0)) + 1e-6
 
 
 def _check_motion(samples: ArmSamples, segments: tuple[tuple[int, int], ...], period: float) -> None:
