@@ -99,6 +99,14 @@ def test_two_contacts_are_told_from_one():
     assert len(found.link) == 1
 
 
+def test_two_contacts_are_on_two_bodies_even_where_both_of_their_places_spread_to_a_third():
+    found, _ = said(posture(1951), np.array([29.3, -24.7, 12.3, 5.5, -5.1, 9.3, 6.9]))
+    assert len(found.link) == 2
+    assert MODEL.rigid[found.link[0]] != MODEL.rigid[found.link[1]]
+    assert ((found.probability > 0.0) & (found.probability <= 1.0)).all()
+    assert found.probability[0] >= found.probability[1]
+
+
 def test_nothing_is_said_while_nothing_is_felt_and_nothing_is_remembered_afterwards():
     kin = posture()
     torque = torques(kin, (of("panda_hand", kin), 40.0))

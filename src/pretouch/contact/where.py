@@ -17,7 +17,7 @@ from pretouch.contact.one_place import covariance_of_mean
 from pretouch.contact.sequential import LENGTHS
 from pretouch.contact.two_places import best_pair, evidence_under, total_of
 from pretouch.contact.where_prior import hidden_places, place_surface, prior_of_places
-from pretouch.contact.where_summary import exchange, summarise
+from pretouch.contact.where_summary import exchange, leave_out, summarise
 from pretouch.params import LocalisationParams
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed_ends
@@ -189,6 +189,11 @@ def _infer(
                 size -= forces[0, pair[0], i] * outwards[pair[0], i]
         if best - one > (0.0 if two else margin):
             for k in range(2):
+                summarise(lns[k], at, outwards, link, first, forces[k], on, point, force, sigma, probability, k)
+            if rigid[on[0]] == rigid[on[1]]:
+                # each place left out the other's own body only: the less sure contact is on the likeliest other one
+                k = 0 if probability[0] < probability[1] else 1
+                leave_out(lns[k], body, rigid[on[k]])
                 summarise(lns[k], at, outwards, link, first, forces[k], on, point, force, sigma, probability, k)
             if probability[1] > probability[0]:
                 exchange(on, point, force, sigma, probability)

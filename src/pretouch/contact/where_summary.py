@@ -68,6 +68,14 @@ def _largest(V: FloatArray) -> float:
 
 
 @compiled
+def leave_out(ln: FloatArray, body: IntArray, out: int) -> None:
+    """Leave the places (N,) of one rigid body out of a distribution."""
+    for c in range(len(ln)):
+        if body[c] == out:
+            ln[c] = -np.inf
+
+
+@compiled
 def exchange(on: IntArray, point: FloatArray, force: FloatArray, sigma: FloatArray, probability: FloatArray) -> None:
     """Exchange both contacts."""
     on[0], on[1] = on[1], on[0]
