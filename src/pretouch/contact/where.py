@@ -28,7 +28,7 @@ _LENGTHS = np.array(LENGTHS)
 _OVER = 0.5
 """Evidence below which a contact is over: as soon as it is no longer more likely than not, in nats."""
 _LEFT = 6.0
-"""What the best single contact has to leave unexplained before two are looked for [1]: it hardly pays for the second one's freedom."""
+"""What the best single contact has to leave unexplained before two are looked for [1]: less hardly pays for two."""
 _TURNS = 2
 """Times that one of two contacts is moved in a step."""
 
