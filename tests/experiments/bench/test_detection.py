@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from pretouch.contact.detect import Detection
+from pretouch.contact.reaction import reaction_velocity
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.experiments.bench.detection import campaign, contacts, free, judge
@@ -13,6 +15,7 @@ from pretouch.experiments.bench.detection.arm import AWAY, model
 from pretouch.experiments.bench.detection.campaign import Bench, Rows
 from pretouch.experiments.bench.detection.contacts import ContactCell, Toucher, Touching, contact_cells, plan
 from pretouch.experiments.bench.detection.contenders import CONTENDERS, Contender, ablated
+from pretouch.experiments.bench.detection.first_motion import FirstMotion
 from pretouch.experiments.bench.detection.free import FreeCell, free_cells
 from pretouch.experiments.bench.detection.judge import BUSY, matched
 from pretouch.experiments.bench.detection.published import document_part, pictures, summary_of
@@ -23,6 +26,7 @@ from pretouch.experiments.bench.detection.tables import reached
 from pretouch.experiments.bench.store import read_rows, run_tasks
 from pretouch.loop import run
 from pretouch.params import profile
+from pretouch.perception.closest import no_obstacles
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant, PlantClock
@@ -30,6 +34,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
+from pretouch.types import Contact, RobotState, Thresholds
 
 HAND = 10
 PAPER = Contender("paper", "paper", "f_base_n")
@@ -59,6 +64,12 @@ def closed_loop():
     return touched("paper")
 
 
+@pytest.fixture(scope="module")
+def our_loop():
+    """The same of ours."""
+    return touched("pretouch")
+
+
 def test_a_replay_finds_what_the_controller_found_in_the_closed_loop(closed_loop, tmp_path):
     steps, stream = closed_loop
     save_stream(stream, tmp_path / "stream.npz")
@@ -72,12 +83,59 @@ def test_a_replay_finds_what_the_controller_found_in_the_closed_loop(closed_loop
     assert stream.reacting.any()
 
 
-def test_a_replay_of_ours_has_the_evidence_of_the_closed_loop_step_by_step():
-    steps, stream = touched("pretouch")
+def test_a_replay_of_ours_has_the_evidence_of_the_closed_loop_step_by_step(our_loop):
+    steps, stream = our_loop
     made = replay(stream, CONTENDERS[-1], model())
     armed = [i for i, step in enumerate(steps) if step.armed]
     assert any(step.contact is not None for step in steps)
     np.testing.assert_array_equal(made.statistic[armed], [steps[i].evidence for i in armed])
+
+
+@pytest.mark.parametrize("name", ["paper", "pretouch"])
+def test_the_first_motion_of_an_answer_is_with_the_push(name, closed_loop, our_loop):
+    _, stream = closed_loop if name == "paper" else our_loop
+    made = replay(stream, Contender(name, name, "scale"), model())
+    moving = np.flatnonzero(np.isfinite(made.motion).all(axis=1))
+    assert len(moving) == len(made.onsets()) == 1
+    kin = model().kinematics(stream.robot["q"][moving[0]])
+    touch = touching(2.5)
+    point = kin.position[HAND] + kin.rotation[HAND] @ touch.point
+    velocity = model().jacobian(kin, HAND, point)[:3] @ made.motion[moving[0]]
+    assert velocity @ (kin.rotation[HAND] @ touch.inwards) > 0.02
+    assert judge._towards((0.05, made.onsets()[0]), touch, stream, made) is False
+    away = replace(made, motion=-made.motion)
+    assert judge._towards((0.05, made.onsets()[0]), touch, stream, away) is True
+    assert judge._towards((0.05, moving[0] + 1), touch, stream, made) is False, "nothing moves"
+    if name == "paper":
+        push = reaction_velocity(made.force[moving[0]], profile(name).reaction.compliance_m_s_n, 0.3)
+        np.testing.assert_allclose(model().ee_jacobian(kin)[:3] @ made.motion[moving[0]], push, atol=1e-9)
+
+
+def test_a_push_on_an_inner_link_that_feels_backwards_at_the_hand_moves_the_arm_with_it():
+    arm, ours, rng = model(), profile("pretouch"), np.random.default_rng(1000)
+    q, still = arm.description.q_ready, np.zeros(7)
+    robot = RobotState(0.0, q, still, q, still, still, None)
+    kin, link, backwards = arm.kinematics(robot.q), arm.link_index("panda_link2"), 0
+    for _ in range(20):
+        force = rng.normal(size=3)
+        there = arm.jacobian(kin, link, kin.position[link] + np.array([0.0, 0.0, 0.2]))[:3]
+        torque = there.T @ force
+        force, torque = 8.0 * force / np.abs(torque).max(), 8.0 * torque / np.abs(torque).max()
+        backwards += np.linalg.pinv(arm.ee_jacobian(kin)[:3].T) @ torque @ force < 0.0
+        first = FirstMotion(arm, ours, robot.q, REST)
+        for _ in range(3):
+            assert first.step(kin, robot, felt(np.zeros(7)), no_obstacles()) is None
+        moves = [first.step(kin, robot, felt(torque), no_obstacles()) for _ in range(50)]
+        begins = [qd for qd in moves if qd is not None]
+        assert len(begins) == 1
+        assert force @ there @ begins[0] > 0.0
+    assert backwards
+
+
+def felt(torque):
+    """What a detector says of joint torques (n,): a contact, where there are any."""
+    contact = Contact(np.ones(3), np.ones(3, np.bool_)) if torque.any() else None
+    return Detection(Thresholds(np.zeros((6, 3))), contact, True, torque, 2.0 if torque.any() else 0.0)
 
 
 def test_a_stream_gives_back_what_the_controller_was_given(closed_loop, tmp_path):

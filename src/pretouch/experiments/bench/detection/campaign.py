@@ -23,7 +23,7 @@ _RECORDED_BY = (
     *(f"{_HERE}/{module}.py" for module in ("arm", "contacts", "free", "stream")),
 )  # fmt: skip
 """Parts of the package that decide what a stream holds."""
-_JUDGED_BY = (*_RECORDED_BY, "contact", f"{_HERE}/judge.py", f"{_HERE}/replay.py")
+_JUDGED_BY = (*_RECORDED_BY, "contact", *(f"{_HERE}/{module}.py" for module in ("judge", "replay", "first_motion")))
 """Parts that decide what a detector makes of a stream."""
 _MOVED_BY = (*_RECORDED_BY, "contact", "controller.py", "modes.py", "experiments/static.py", f"{_HERE}/boards.py")
 """Parts that decide what happens in the closed loop."""

@@ -129,9 +129,14 @@ def _delay(match: Match) -> float | None:
 
 
 def _towards(match: Match, touch: Touching, stream: Stream, made: Replayed) -> bool | None:
-    """Whether the force felt at the alarm points against the true one, so that the arm would go towards the person."""
-    step = match[1]
-    if step is None:
+    """Whether the touched point would begin to move against the force on it, towards the person."""
+    if match[1] is None:
         return None
-    true = model().kinematics(stream.robot["q"][step]).rotation[touch.link] @ touch.inwards
-    return bool(made.force[step] @ true < 0.0)
+    moving = np.flatnonzero(np.isfinite(made.motion[match[1] : match[1] + REST, 0]))
+    if not len(moving):
+        return False
+    step = match[1] + int(moving[0])
+    kin = model().kinematics(stream.robot["q"][step])
+    rotation = kin.rotation[touch.link]
+    there = model().jacobian(kin, touch.link, kin.position[touch.link] + rotation @ touch.point)[:3]
+    return bool((rotation @ touch.inwards) @ there @ made.motion[step] < 0.0)

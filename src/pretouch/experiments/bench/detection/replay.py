@@ -8,6 +8,7 @@ import numpy as np
 from pretouch.contact.cues import Cues
 from pretouch.contact.feel import feel, feel_init
 from pretouch.experiments.bench.detection.contenders import Contender
+from pretouch.experiments.bench.detection.first_motion import FirstMotion
 from pretouch.experiments.bench.detection.stream import Stream
 from pretouch.params import ReactionParams
 from pretouch.perception.closest import no_obstacles
@@ -34,6 +35,8 @@ class Replayed:
     """(S,) whether a contact was found."""
     force: FloatArray
     """(S, 3) force it was taken for [N], NaN where none was found."""
+    motion: FloatArray
+    """(S, n) joint velocities with which the arm would begin to move in answer to an alarm [rad/s], else NaN."""
     statistic: FloatArray
     """(S,) see `Contender.statistic`."""
     touched: list[Touched]
@@ -60,6 +63,7 @@ def replay(stream: Stream, contender: Contender, model: RobotModel, said: Said =
     state, steps = feel_init(model, params), len(stream.count)
     alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
     force, touched = np.full((steps, 3), np.nan), [NOT_TOUCHED] * steps
+    motion, first = np.full((steps, model.n), np.nan), FirstMotion(model, params, stream.robot["q"][0], REST)
     for i, (robot, obstacles, reacting, watched) in enumerate(stream.steps()):
         near = obstacles if sees else NOTHING
         kin = model.kinematics(robot.q)
@@ -68,4 +72,7 @@ def replay(stream: Stream, contender: Contender, model: RobotModel, said: Said =
         statistic[i] = contender.statistic(found, state, robot.wrench, params.threshold)
         if found.contact is not None:
             alarm[i], force[i] = True, found.contact.force
-    return Replayed(stream.stamp, alarm, force, statistic, touched)
+        begins = first.step(kin, robot, found, near)
+        if begins is not None:
+            motion[i] = begins
+    return Replayed(stream.stamp, alarm, force, motion, statistic, touched)

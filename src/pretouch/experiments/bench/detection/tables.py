@@ -56,16 +56,16 @@ def _goals(
     return TextTable(
         title,
         ("detector", "false\n[1/h]", "seen\nmedian, 95 % [ms]", "missed", "unseen\nmedian, 95 % [ms]", "missed",
-         "felt\nbackwards", "goals\nreached"),
+         "towards\nperson", "goals\nreached"),
         tuple(lines),
         f"Goals: at most {goal['false_alarms_per_hour']:g} false alarm an hour in free motion at"
         f" {goal['speed_m_s']:g} m/s, with or without somebody near; median delay at most"
         f" {1000 * goal['seen_delay_s']:g} ms for contacts the skin saw and {1000 * goal['unseen_delay_s']:g} ms for"
         f" others, none missed, of those of {goal['force_n']:g} N and more lasting {1000 * goal['duration_s']:g} ms and"
         " more on the links 3 to 7 and the hand, whose torques exceed three standard deviations of free motion's. Below"
-        " a rate: 95 % bounds. Delay: from the true force passing 1 N, of what was detected. Felt backwards: the arm"
-        " would have moved towards the person, of all detected: none is the goal. Reached: as measured here,"
-        f" whatever the bounds.{note}",
+        " a rate: 95 % bounds. Delay: from the true force passing 1 N, of what was detected. Towards person: the"
+        " touched point would begin to move against the force on it, of all detected: none is the goal. Reached: as"
+        f" measured here, whatever the bounds.{note}",
         1,
     )  # fmt: skip
 
