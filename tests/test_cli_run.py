@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli.run.robots import Opened
+from pretouch.cli.run.opened import Opened
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording

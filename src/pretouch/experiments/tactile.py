@@ -4,17 +4,8 @@ from itertools import product
 
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Row
-from pretouch.experiments.tactile_kinds import BESIDE, INNER, NOWHERE, ON_PATCH
+from pretouch.experiments.tactile_kinds import BESIDE, COUNT, FREE_S, INNER, NAME, NOWHERE, ON_PATCH, PROFILE, WARM_UP_S
 from pretouch.experiments.tactile_tables import summarise, tables
-
-NAME = "tactile"
-PROFILE = "pretouch"
-WARM_UP_S = 60.0
-"""Time before the first contact, in which free motion is learnt [s]: as in the benchmark of detection."""
-FREE_S = 180.0
-"""Time in which alarms are counted where there are no contacts [s]."""
-COUNT = 30
-"""Contacts of a trial."""
 
 
 def cells(_grid: Grid) -> list[Cell]:

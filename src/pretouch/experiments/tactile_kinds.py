@@ -1,4 +1,13 @@
-"""The contacts of the study of touch sensors: where, how hard, how long."""
+"""The trials of the study of touch sensors, and their contacts: where, how hard, how long."""
+
+NAME = "tactile"
+PROFILE = "pretouch"
+WARM_UP_S = 60.0
+"""Time before the first contact, in which free motion is learnt [s]: as in the benchmark of detection."""
+FREE_S = 180.0
+"""Time in which alarms are counted where there are no contacts [s]."""
+COUNT = 30
+"""Contacts of a trial."""
 
 ON_PATCH, BESIDE, INNER, NOWHERE = "on patch", "beside", "inner links", "nowhere"
 """Where contacts are: on a unit's patch, on the same link off all patches, on a patch of links 1 to 4, which get units

@@ -20,16 +20,20 @@ from pretouch.experiments.cell import Cell, Context
 from pretouch.experiments.experiment import Row
 from pretouch.experiments.located import SIDES
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tactile import COUNT, FREE_S, NAME, PROFILE, WARM_UP_S
 from pretouch.experiments.tactile_kinds import (
     BESIDE,
+    COUNT,
     FORCES_N,
+    FREE_S,
     INNER,
     INNER_KINDS,
     INNER_LINKS,
     INNER_N,
     KINDS,
+    NAME,
     NOWHERE,
+    PROFILE,
+    WARM_UP_S,
 )
 from pretouch.params import profile
 from pretouch.robot.model import Kinematics

@@ -9,9 +9,10 @@ import numpy as np
 from pretouch.cli.run.asking import demand_yes, say
 from pretouch.cli.run.learnt import free_motion
 from pretouch.cli.run.moving import Way, moved
+from pretouch.cli.run.opened import Opened
 from pretouch.cli.run.options import Run, check_options
 from pretouch.cli.run.parts import Parts, parts
-from pretouch.cli.run.robots import Opened, opened
+from pretouch.cli.run.robots import opened
 from pretouch.cli.writing import check_writable
 from pretouch.errors import RecordingError, RobotError
 from pretouch.loop import MonotonicClock

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from pretouch.cli.run.asking import demand_yes, say
+from pretouch.cli.run.opened import Opened, network_units
 from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
-from pretouch.cli.run.robots import Opened, network_units
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import CollisionParams, collision_behavior, largest_threshold
 from pretouch.session.franka import FrankaSessionArm, identity

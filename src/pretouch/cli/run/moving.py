@@ -9,8 +9,8 @@ import numpy as np
 
 from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.run.asking import say
+from pretouch.cli.run.opened import Opened
 from pretouch.cli.run.options import Run
-from pretouch.cli.run.robots import Opened
 from pretouch.errors import HardwareError, PretouchError
 from pretouch.loop import MonotonicClock
 from pretouch.session.finding import refusals

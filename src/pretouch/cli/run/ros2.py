@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import cast
 
+from pretouch.cli.run.opened import Opened
 from pretouch.cli.run.options import RobotOptions, Run
 from pretouch.cli.run.parts import Parts
-from pretouch.cli.run.robots import Opened
 from pretouch.errors import HardwareError
 from pretouch.hardware.ros2.extra import check_extra
 from pretouch.hardware.ros2.params import ArmParams, Frame, NodeParams, OutputParams, Sign, SkinParams
