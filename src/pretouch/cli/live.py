@@ -27,11 +27,6 @@ def live(command: Live) -> None:
         raise ParameterError(f"The path is {command.path!r}: choose circle or line.")
     path, profile = cast(PathName, command.path), find_profile(command.profile)
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
-    if command.world:
-        from pretouch.sim.randomisation import drawn, world_set
-
-        world = drawn(world_set(command.world), command.seed)
-        settings = replace(settings, plant=world.plant, ranging=world.ranging)
 
     from pretouch.robot.description import panda
     from pretouch.robot.model import RobotModel
@@ -41,8 +36,17 @@ def live(command: Live) -> None:
 
     model = RobotModel(panda())
     skin = load_skin(command.skin, model) if command.skin else paper_skin(model)
+    believed = skin
+    if command.world:
+        from pretouch.experiments.misplacement import Misplacement, misplaced
+        from pretouch.sim.randomisation import drawn, world_set
+
+        world = drawn(world_set(command.world), command.seed)
+        settings = replace(settings, plant=world.plant, ranging=world.ranging)
+        if not command.keys:
+            believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), command.seed)
     with _units(command, skin.ids) as real:
-        simulation = LiveSimulation(settings, model, skin, real)
+        simulation = LiveSimulation(settings, model, believed, real, skin)
         if command.record:
             simulation.start_recording(Path(command.record))
         serve_live(simulation, options, ended)

@@ -42,14 +42,16 @@ class LiveSimulation:
 
     def __init__(
         self, settings: LiveSettings | None = None, model: RobotModel | None = None, skin: Skin | None = None,
-        real: "RealUnits | None" = None,
+        real: "RealUnits | None" = None, true_skin: Skin | None = None,
     ) -> None:  # fmt: skip
         """Begin with the first control cycle done. Without others, the arm is a Panda with the paper's skin.
 
-        With `real` units, they are what the skin's units read.
+        With `real` units, they are what the skin's units read. Simulated ones sit where `true_skin` says, if it is
+        given, whatever the controller believes.
         """
         self.model = model or RobotModel(panda())
         self.skin = skin or paper_skin(self.model)
+        self._true_skin = true_skin or self.skin
         self.real = real
         """The real units on the arm; None: it carries simulated ones."""
         self.recording: Recording | None = None
@@ -60,7 +62,7 @@ class LiveSimulation:
 
     def _begin(self, settings: LiveSettings) -> None:
         path = live_path(settings)
-        room = Room(settings, path, self.model, self.skin, self.real)
+        room = Room(settings, path, self.model, self._true_skin, self.real)
         closed = self.stop_recording()
         if closed:
             self.notice = closed.sentence
