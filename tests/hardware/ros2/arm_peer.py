@@ -50,7 +50,7 @@ def main(domain: int, log: str, rate: float, ideal: bool, extra: bool, release: 
         begin, tick, sent, each = monotonic(), 0, 0, round(1 / rate / DT)
         while True:
             sleep(max(begin + (tick + 1) * DT - monotonic(), 0.0))
-            now = monotonic()
+            now, day = monotonic(), time_ns()
             steps = int((now - begin) / DT) - tick
             if not steps:
                 continue
@@ -69,7 +69,7 @@ def main(domain: int, log: str, rate: float, ideal: bool, extra: bool, release: 
                     case ["push", x, y, z]:
                         force[:] = float(x), float(y), float(z)
                     case ["freeze"]:
-                        frozen = time_ns()
+                        frozen = day
                     case ["mute"]:
                         muted = True
                     case ["deaf"]:
@@ -82,8 +82,8 @@ def main(domain: int, log: str, rate: float, ideal: bool, extra: bool, release: 
             if muted or tick // each == sent:
                 continue
             sent = tick // each
-            today = frozen or time_ns()
-            stamp = (today // 10**9, today % 10**9)
+            # the time of the state, though it was long in the making
+            stamp = divmod(frozen or day, 10**9)
             robot = plant.read()
             positions, velocities = spline.commanded if ideal else (robot.q, robot.qd)
             more = np.full(2 if extra else 0, 0.02)

@@ -18,7 +18,8 @@ from pretouch.session.remembered import Remembered
 from pretouch.session.ros2 import identity
 from tests.hardware.ros2.processes import ArmPeer, arm_peer
 
-pytestmark = pytest.mark.slow
+# two processes in real time: alone, lest another test takes the arm's time and it is rightly found not to follow
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
 LIMIT_S = 90.0
 
 
