@@ -113,6 +113,7 @@ def test_numbers_and_table_of_the_study():
     assert len(table.rows[0]) == len(table.header)
 
 
+@pytest.mark.slow
 def test_a_short_trial_agrees_with_what_was_foreseen(panda_model, paper_skin, monkeypatch):
     """The simulated range finders cast rays in MuJoCo; coverage knows nothing of them."""
     monkeypatch.setattr(study, "COUNT", 3)

@@ -31,6 +31,7 @@ def test_each_kind_meets_each_link_once():
     assert all(b.start > a.end + 2.0 for a, b in pairwise(touches))
 
 
+@pytest.mark.slow
 def test_a_small_run_and_its_tables():
     made = judged(profile("pretouch"), 1003, (0.02, 0.3), 36.0, ("impact 0.5", "push 20"), ("hand", "link5"))
     assert len(made["contacts"]) == 4

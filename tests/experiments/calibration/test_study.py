@@ -112,6 +112,7 @@ def test_no_skins_are_refused(panda_model):
         study(panda_model, skins=0)
 
 
+@pytest.mark.slow
 def test_a_study_of_one_skin_on_a_short_motion_finds_its_units(panda_model):
     said: list[tuple[int, int]] = []
     made = study(

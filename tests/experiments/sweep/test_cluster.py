@@ -56,6 +56,7 @@ def test_no_scheduler_is_a_sentence_in_bounded_time(tmp_path, monkeypatch):
         play(run, Where(scheduler="tcp://127.0.0.1:9"), ignore)
 
 
+@pytest.mark.slow
 def test_cells_of_a_worker_that_is_killed_half_way_are_played_by_the_other(tmp_path, small_cluster):
     _, workers, address = small_cluster
     run = opened_ishigami(tmp_path, samples=8, pause_s="0.02")
@@ -66,6 +67,7 @@ def test_cells_of_a_worker_that_is_killed_half_way_are_played_by_the_other(tmp_p
     assert len(files(run)) == 40
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_gone_half_way_is_said_and_the_sweep_goes_on_here(tmp_path, small_cluster):
     scheduler, _, address = small_cluster
     run = opened_ishigami(tmp_path, samples=16, pause_s="0.05")
