@@ -55,7 +55,7 @@ class Client(Protocol):
         ...
 
     def recover(self) -> None:
-        """Leave the mode "reflex", as pressing the button in Desk does."""
+        """Leave the mode "reflex", as pressing the button in Desk does; a RobotError if no state says that it has."""
         ...
 
     def stop(self) -> None:

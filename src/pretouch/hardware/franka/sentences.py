@@ -38,6 +38,14 @@ def check_ready(state: FrankaState, address: str) -> None:
     raise RobotError(f'The arm at {address} is in mode "{state.mode}"{after}: {_WAY_OUT[state.mode]}.')
 
 
+def unrecovered(state: FrankaState, address: str) -> NoReturn:
+    """Raise a RobotError for an arm that took the order to recover and still is in a mode that says otherwise."""
+    after = f" after {', '.join(state.errors)}" if state.errors else ""
+    raise RobotError(
+        f'The arm at {address} was told to recover and is in mode "{state.mode}" still{after}: {_WAY_OUT["reflex"]}.'
+    )
+
+
 def unconnected(address: str, ours: int, kind: str, error: Exception) -> NoReturn:
     """Raise a RobotError for an arm that could not be connected to with a library that speaks version `ours`."""
     text = brief(error)

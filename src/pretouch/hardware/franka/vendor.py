@@ -11,6 +11,10 @@ from pretouch.hardware.franka.only_one import OnlyOne
 from pretouch.hardware.franka.state import FrankaState, franka_state
 from pretouch.types import FloatArray
 
+_RECOVERING = ("reflex", "automatic error recovery")
+_STATES_AFTER = 500
+"""States, one each millisecond, in which an arm that was told to recover must be seen to have done so."""
+
 
 class VendorClient:
     """Base of the `client.Client`s.
@@ -76,9 +80,13 @@ class VendorClient:
             self._robot.set_load(mass, com.tolist(), inertia.T.ravel().tolist())
 
     def recover(self) -> None:
-        """Leave the mode "reflex"."""
+        """Leave the mode "reflex", and wait for a state that says so: the answer may overtake states."""
         with self._asking("recover"):
             self._robot.automatic_error_recovery()
+        for _ in range(_STATES_AFTER):
+            if (state := self.read()).mode not in _RECOVERING:
+                return
+        sentences.unrecovered(state, self._address)
 
     def stop(self) -> None:
         """End any motion at once."""
