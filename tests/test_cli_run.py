@@ -143,6 +143,7 @@ LEARNING = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_no_pushes")
 def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tmp_path, capsys):
     place = tmp_path / "state" / "pretouch" / "free-motion" / "simulated-panda-seed-0.toml"

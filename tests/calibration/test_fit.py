@@ -87,6 +87,7 @@ def nees(found: Fit, true: Estimate) -> float:
     return float(e @ np.linalg.solve(found.covariance[:6, :6], e))
 
 
+@pytest.mark.slow
 def test_the_covariance_is_honest():
     link, told = motion(), []
     for seed in range(150):

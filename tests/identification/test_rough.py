@@ -60,6 +60,7 @@ ROUGH = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rough", ROUGH)
 def test_an_arm_comes_out_of_a_rough_recording(fast, rough):
     found = identify(ROUGH[rough](fast), MODEL, USUAL)

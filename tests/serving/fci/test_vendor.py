@@ -26,6 +26,7 @@ def test_a_motion_ends_where_its_velocities_lead(serve: Any, kind: RobotKind) ->
     np.testing.assert_allclose(done["after"]["q"], done["after"]["q_d"], atol=5e-3)
 
 
+@pytest.mark.slow
 def test_two_runs_are_the_same_to_the_last_bit(serve: Any, kind: RobotKind) -> None:
     runs, truths = [], []
     for _ in range(2):
