@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from pretouch.errors import RecordingError
 from pretouch.recording.codec import (
@@ -113,14 +114,21 @@ def test_a_step_comes_back_to_the_bit(step):
     assert same(back, step)
 
 
-@given(steps())
-def test_a_step_of_a_version_that_knew_no_touched_places_comes_back_without_any(step):
+@pytest.fixture(scope="module")
+def before_touched() -> tuple[Typestore, str]:
+    """Our types with one of a step as it was before it told where the arm is touched, and that one's name."""
     kind = f"{PACKAGE}/msg/StepBefore"
     text = "\n".join(line for line in own_definition("Step").splitlines() if not line.startswith("Touched "))
     store = get_typestore(Stores.ROS2_JAZZY)
     for name in OWN:
         store.register(get_types_from_msg(own_definition(name), f"{PACKAGE}/msg/{name}"))
     store.register(get_types_from_msg(text, kind))
+    return store, kind
+
+
+@given(step=steps())
+def test_a_step_of_a_version_that_knew_no_touched_places_comes_back_without_any(step, before_touched):
+    store, kind = before_touched
     message = decoded(STEP, encode_step(7, step))
     names = [name for name in type(message).__dataclass_fields__ if name != "__msgtype__"]
     known = [getattr(message, name) for name in names if name != "touched"]
