@@ -34,16 +34,12 @@ def check_ready(state: FrankaState, address: str) -> None:
     """Raise a RobotError with the way out if the arm is in no mode to begin a motion."""
     if state.mode == "idle":
         return
-    after = f" after {', '.join(state.errors)}" if state.errors else ""
-    raise RobotError(f'The arm at {address} is in mode "{state.mode}"{after}: {_WAY_OUT[state.mode]}.')
+    raise RobotError(f"The arm at {address} is in {_mode(state)}: {_WAY_OUT[state.mode]}.")
 
 
 def unrecovered(state: FrankaState, address: str) -> NoReturn:
     """Raise a RobotError for an arm that took the order to recover and still is in a mode that says otherwise."""
-    after = f" after {', '.join(state.errors)}" if state.errors else ""
-    raise RobotError(
-        f'The arm at {address} was told to recover and is in mode "{state.mode}" still{after}: {_WAY_OUT["reflex"]}.'
-    )
+    raise RobotError(f"The arm at {address} was told to recover and still is in {_mode(state)}: {_WAY_OUT['reflex']}.")
 
 
 def unconnected(address: str, ours: int, kind: str, error: Exception) -> NoReturn:
@@ -79,3 +75,8 @@ def refused(address: str, what: str, error: Exception) -> NoReturn:
 def brief(error: Exception) -> str:
     """Return the first line of what a library says, without its name."""
     return str(error).partition("\n")[0].removeprefix("libfranka: ").rstrip(".! ")
+
+
+def _mode(state: FrankaState) -> str:
+    after = f" after {', '.join(state.errors)}" if state.errors else ""
+    return f'mode "{state.mode}"{after}'
