@@ -22,7 +22,7 @@ from pretouch.hardware.serial_line import SerialLine
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 BOOT = b"\x00\xffets Jan  8 2013,rst cause:2, boot mode:(3,6)\r\n\x9c{garbage\n"
-NETWORK = Network("lab", "correct horse", "192.168.1.10", 47470)
+NETWORK = Network("lab", "correct horse", "192.168.1.10", 29470)
 
 
 def firmware_provisioning(folder):
@@ -120,7 +120,7 @@ def test_a_new_unit_is_told_its_key_and_says_so(unit, tmp_path, password, capsys
     stored = json.loads((tmp_path / "config.json").read_text().splitlines()[0])
     assert stored["key"] == key.key.hex()
     assert (stored["unit"], stored["ssid"], stored["password"]) == (1, "lab", "correct horse")
-    assert (stored["host"], stored["port"]) == ("192.168.1.10", 47470)
+    assert (stored["host"], stored["port"]) == ("192.168.1.10", 29470)
     said = "".join(capsys.readouterr())
     assert "hand-1 is number 1 with the key " + fingerprint(key.key) in said
     assert key.key.hex() not in said

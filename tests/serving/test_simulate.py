@@ -94,14 +94,14 @@ def test_it_ends_by_itself_in_order_and_says_how_it_went_each_second(options):
 
 def test_a_receiver_that_does_not_answer_is_named_once():
     units, said = [SimpleNamespace(in_session=False, silent=False)], []
-    fleet = SimpleNamespace(ids=["a"], units=units, sent=0, lost=0, receiver=("desk", 47470))
+    fleet = SimpleNamespace(ids=["a"], units=units, sent=0, lost=0, receiver=("desk", 29470))
     clock = SimpleNamespace(now=0.0, left_out=0.0)
     cycle = SimpleNamespace(step=SimpleNamespace(ee_velocity=np.zeros(3), mode=Mode.TRACK))
     teller = simulate._Teller(fleet, clock, said.append)
     for second in range(1, 20):
         clock.now, units[0].in_session = float(second), 8 <= second < 12
         teller.record(cycle)
-    named = [i for i, line in enumerate(said) if line.startswith("Nobody answers at desk:47470: ")]
+    named = [i for i, line in enumerate(said) if line.startswith("Nobody answers at desk:29470: ")]
     assert [i - k for k, i in enumerate(named)] == [3, 14]  # after the lines of so many seconds
 
 
