@@ -23,6 +23,7 @@ from pretouch.recording.skin_reader import read_skin
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import RangeStatus
 from tests.hardware.desk import Desk
+from tests.ports import free_port
 
 ROOT = Path(__file__).parents[1]
 
@@ -36,9 +37,7 @@ def keys(tmp_path):
 
 @pytest.fixture
 def port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
+    return free_port()
 
 
 def monitor(tmp_path, port, *more):

@@ -2,7 +2,6 @@
 
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -24,6 +23,7 @@ from pretouch.sensing.skin import load_skin
 from pretouch.session.signals import signals_noted
 from pretouch.types import RobotState
 from tests.calibrated_arm import swinging
+from tests.ports import free_port
 
 FILES = ("--keys", "keys.toml", "--out", "skin.toml", "--units-port", "0", "--robot", "simulated", "--yes")
 
@@ -224,9 +224,7 @@ def test_a_motion_that_is_interrupted_leaves_its_recording_and_says_how_to_go_on
 
 @pytest.mark.slow
 def test_three_terminals_rehearse_a_real_arm(panda_model, paper_skin, tmp_path):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
-        one.bind(("127.0.0.1", 0))
-        port = str(one.getsockname()[1])
+    port = str(free_port())
     arm = started(tmp_path, "simulate", "--keys", "keys.toml", "--port", port, "--calibration-joints", "joints.mcap")
     assert arm.stdout
     assert "Made keys" in arm.stdout.readline()

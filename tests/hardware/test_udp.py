@@ -6,9 +6,22 @@ import sys
 import pytest
 
 from pretouch.hardware import udp
+from pretouch.hardware.address import PORT
 from tests.hardware.fake_unit import Bench
+from tests.ports import PORTS, free_port
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="the options are Linux's")
+
+LOWEST_GIVEN = 32768
+"""The first port that Linux gives to a socket which asks for none, unless told otherwise (ip_local_port_range)."""
+
+
+def test_no_port_that_is_named_beforehand_is_one_that_any_socket_may_be_given():
+    assert PORT < LOWEST_GIVEN
+    assert PORTS[-1] < LOWEST_GIVEN
+    one, another = free_port(), free_port()
+    assert {one, another} < set(PORTS)
+    assert one != another
 
 
 class Options:

@@ -1,7 +1,6 @@
 """A page and somebody at it: serves it in a thread, and drives a headless Chromium."""
 
 import shutil
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.ports import free_port
 
 from pretouch.types import FloatArray
 from pretouch.viewer.scene import CAMERA_AT, CAMERA_FOV, CAMERA_FROM
@@ -18,12 +18,6 @@ from pretouch.viewer.server import ServeOptions, url_of
 PATIENCE_S = 120
 """Time a page in software WebGL on a busy machine is given [s]."""
 SCREENSHOTS = Path("build/screenshots")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Served:

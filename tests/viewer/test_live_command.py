@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.viewer.browser import free_port
+from tests.ports import free_port
 
 from pretouch.cli import main
 from pretouch.recording.reader import open_recording

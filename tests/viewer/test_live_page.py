@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.viewer.browser import free_port, seen_at
+from tests.ports import free_port
+from tests.viewer.browser import seen_at
 
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording

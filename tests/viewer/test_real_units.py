@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from tests.viewer.browser import free_port
+from tests.ports import free_port
 
 from pretouch.errors import ParameterError
 from pretouch.hardware.receiver_process import Traffic

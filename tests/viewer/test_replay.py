@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.viewer.browser import free_port
+from tests.ports import free_port
 
 from pretouch.params import PROFILES
 from pretouch.recording.compare import Found, compare

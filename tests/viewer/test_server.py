@@ -2,7 +2,7 @@ import socket
 import sys
 
 import pytest
-from tests.viewer.browser import free_port
+from tests.ports import free_port
 
 from pretouch.errors import ViewerError
 from pretouch.viewer.server import ServeOptions, check_extra, check_port, served, url_of

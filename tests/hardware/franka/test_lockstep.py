@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import socket
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from pretouch.sim.scene import SceneSpec, fixtures
 from pretouch.types import RangeReadings
 from tests.hardware.franka.made import CheckingArm, middle
 from tests.hardware.franka.served import Served, loopback, output
+from tests.ports import free_port
 
 KINDS = ("panda", "fr3")
 Serve = Callable[..., Served]
@@ -95,9 +95,7 @@ def test_units_in_lockstep_repeat_to_the_last_bit(serve: Serve, tmp_path: Path) 
     save_keys(made_keys(skin.ids, 0), keys)
     results = []
     for _ in range(2):
-        with socket.socket(type=socket.SOCK_DGRAM) as free:
-            free.bind((host, 0))
-            port = str(free.getsockname()[1])
+        port = str(free_port())
         served = serve("panda", "--lockstep", "--start", "path", "--units", f"{host}:{port}", "--keys", str(keys))
         results.append(drive(served, "units", host, port, str(keys)))
     assert results[0] == results[1]
