@@ -197,14 +197,8 @@ def started(*args):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("number", "code"),
-    [
-        (signal.SIGINT, 130),
-        pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow),
-        pytest.param(signal.SIGKILL, -9, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
 def test_a_monitor_that_is_ended_leaves_its_recording(keys, port, tmp_path, number, code):
     place = tmp_path / "units.mcap"
     with Desk(keys, port) as desk:

@@ -124,6 +124,7 @@ def test_a_short_trial_agrees_with_what_was_foreseen(panda_model, paper_skin, mo
     assert 0.6 < row["predicted"] < 0.8
 
 
+@pytest.mark.slow
 def test_units_put_anywhere_are_others_for_each_seed(panda_model, paper_skin):
     one, other = (study.skin_of("random", panda_model, paper_skin, seed) for seed in (1000, 1001))
     best = study.skin_of("suggested", panda_model, paper_skin, 1000)

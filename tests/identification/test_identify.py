@@ -122,6 +122,7 @@ def test_a_recording_that_cannot_tell_is_refused_with_what_is_missing(samples, c
         identify(change(samples), MODEL, USUAL)
 
 
+@pytest.mark.slow
 def test_torques_with_gravity_in_them_are_of_another_arm(samples):
     gravity = np.array([MODEL.mass_matrix_and_bias(q, np.zeros(7), np.zeros(7))[1] for q in samples.q])
     with pytest.raises(CalibrationError, match="another arm than panda"):

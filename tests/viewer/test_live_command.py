@@ -48,9 +48,8 @@ def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str]) -> Non
     assert capsys.readouterr().err == "LiveSettings.seed is -1: it must be at least 0.\n"
 
 
-@pytest.mark.parametrize(
-    ("number", "code"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_interrupted_it_closes_its_recording_and_says_where_it_is(
     number: signal.Signals, code: int, tmp_path: Path
 ) -> None:

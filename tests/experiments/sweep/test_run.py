@@ -171,6 +171,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_a_sweep_whose_process_is_killed_goes_on_where_it_was(tmp_path):
     script = tmp_path / "parent.py"
     script.write_text(PARENT)

@@ -19,9 +19,9 @@ LATE_S = 0.1
 """How late a busy machine may hand a message on [s]."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "ending",
-    [pytest.param(signal.SIGKILL, id="killed"), pytest.param(signal.SIGSTOP, id="frozen", marks=pytest.mark.slow)],
+    "ending", [pytest.param(signal.SIGKILL, id="killed"), pytest.param(signal.SIGSTOP, id="frozen")]
 )
 def test_an_arm_whose_commands_end_comes_to_rest_within_its_limits(
     domain: int, tmp_path: Path, ending: signal.Signals
