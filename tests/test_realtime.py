@@ -6,8 +6,11 @@ import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from types import SimpleNamespace
+from typing import Self
 
 import numpy as np
 import pytest
@@ -216,6 +219,51 @@ def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypat
     assert len(told) == 1
     assert arm.collecting == [False] * 20
     assert clock.timing().cycles == 20
+
+
+class HeardArm(Arm):
+    """An arm whose states are received by a thread of this process."""
+
+    def __init__(self, controller: Controller) -> None:
+        super().__init__(controller)
+        self.first: RobotState | None = None
+        self._stamp, self._end = time.monotonic(), threading.Event()
+        self._thread = threading.Thread(target=self._receive, daemon=True)
+
+    def _receive(self) -> None:
+        while not self._end.wait(0.002):
+            self._stamp = time.monotonic()
+
+    def read(self) -> RobotState:
+        return at_rest(self.model, self._stamp)
+
+    def record(self, cycle: Cycle) -> None:
+        super().record(cycle)
+        self.first = self.first or cycle.inputs.robot
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end.set()
+        self._thread.join()
+
+
+def test_the_loop_begins_with_a_state_that_is_newer_than_the_preparations(
+    controller: Controller, monkeypatch: pytest.MonkeyPatch
+):
+    collected: list[float] = []
+
+    def collect() -> None:
+        ctypes.PyDLL(None).usleep(200_000)  # as a collection it keeps other threads from the interpreter
+        collected.append(time.monotonic())
+
+    monkeypatch.setattr(gc, "collect", collect)
+    with HeardArm(controller) as arm:
+        realtime.run(controller, arm, NoReadings(arm.units), MonotonicClock(0.001), arm, lambda step: True)
+    assert arm.first is not None
+    assert arm.first.stamp >= collected[-1]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])

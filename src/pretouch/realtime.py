@@ -35,6 +35,10 @@ _PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
 
 _WARM_UP_STEPS = 3
 """Steps of each kind: what one sees for the first time the next one remembers."""
+_NEWS_S = 0.5
+"""Longest time the first state is waited for [s]: then the controller says how old the newest is."""
+_LOOK_S = 0.001
+"""Between two looks at whether a state has come [s]."""
 
 
 def run(
@@ -79,7 +83,20 @@ def run(
     with _ended_in_order(), real_time(priority, cpu) as missing:
         for sentence in missing:
             tell(sentence)
+        _await_news(robot)
         loop.run(controller, robot, skin, clock, recorder, done, resume, learnt, points)
+
+
+def _await_news(robot: Robot) -> None:
+    """Wait for a state measured from now on.
+
+    Preparing keeps the interpreter from other threads, as from one that receives the arm's states: with the newest that
+    it left, the first step would find the arm silent.
+    """
+    looks = loop.MonotonicClock(_LOOK_S)
+    now = begun = looks.tick()
+    while not robot.read().stamp >= begun and now < begun + _NEWS_S:
+        now = looks.tick()
 
 
 @contextmanager
