@@ -1,10 +1,9 @@
-"""What a process is given for real time, that it is taken back, and that nothing is left to compile in the loop."""
+"""What a process is given for real time, that it is taken back, and how a loop in it begins and ends."""
 
 import ctypes
 import gc
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -20,11 +19,11 @@ from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, MonotonicClock
-from pretouch.params import PROFILES, at_rate, profile
+from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RobotState
+from pretouch.types import ControlStep, RangeReadings, RobotState
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="priorities and processors are chosen on Linux only")
 FAST = at_rate(PROFILES["paper"], 1000.0)
@@ -293,92 +292,3 @@ def test_a_clock_of_another_period_is_refused(controller: Controller):
     with pytest.raises(ParameterError, match=r"period of 0\.01 s, the controller 0\.001 s: make them the same"):
         realtime.run(controller, arm, NoReadings(arm.units), clock, arm, lambda step: True)
     assert arm.steps == []
-
-
-def recorded(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> list[ControlStep]:
-    steps: list[ControlStep] = []
-    turn = controller.step
-
-    def step(state: object, inputs: Inputs) -> object:
-        steps.append((result := turn(state, inputs))[0])
-        return result
-
-    monkeypatch.setattr(controller, "step", step)
-    return steps
-
-
-@pytest.mark.parametrize("name", ["paper", "blind", "paper:restriction.mode=hard", "paper:threshold.compare=raw"])
-@pytest.mark.parametrize("rate", [100.0, 1000.0])
-def test_a_warm_up_sees_every_mode(
-    panda_model: RobotModel, paper_skin: Skin, monkeypatch: pytest.MonkeyPatch, name: str, rate: float
-):
-    controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(profile(name), rate))
-    steps = recorded(controller, monkeypatch)
-    realtime.warm_up(controller, at_rest(panda_model))
-    assert {step.mode for step in steps} == set(Mode)
-    if name == "paper":
-        seen = {(step.mode, len(step.restricted) > 0) for step in steps}
-        assert seen >= {(Mode.TRACK, True), (Mode.TRACK, False), (Mode.REACT, True), (Mode.REACT, False)}
-
-
-def test_steps_leave_nothing_for_the_collector(controller: Controller):
-    realtime.warm_up(controller, at_rest(controller.model))
-    with realtime.real_time():
-        realtime.warm_up(controller, at_rest(controller.model))
-        # a cycle of objects in each of a thousand steps would be thousands
-        assert gc.collect() < 100
-
-
-PROBE = """
-import sys, types
-import numpy as np
-from pretouch import realtime
-from pretouch.control.path import Circle
-from pretouch.controller import Controller
-from pretouch.loop import Cycle
-from pretouch.params import at_rate, profile
-from pretouch.perception.scene_filter import no_fixtures
-from pretouch.robot.description import panda
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import paper_skin
-from pretouch.types import Inputs, Mode, RangeReadings, RobotState
-
-def loaded():
-    found = {}
-    for module in [m for name, m in sys.modules.items() if name.startswith("pretouch")]:
-        for name, value in vars(module).items():
-            if hasattr(value, "signatures"):
-                found[module.__name__, name] = len(value.signatures)
-    return found
-
-model = RobotModel(panda())
-controller = Controller(model, paper_skin(model), no_fixtures(), Circle(), at_rate(profile(sys.argv[2]), 1000.0))
-q, qd, now, units = model.description.q_ready, np.zeros(7), 0.0, len(controller.skin)
-
-def robot(push=0.0):
-    return RobotState(now, q, qd, q, qd, np.zeros(7), np.array([push, 0, 0, 0, 0, 0]))
-
-if sys.argv[1] == "warm":
-    realtime.warm_up(controller, robot())
-before, state, modes = loaded(), controller.init(robot()), set()
-for i in range(1500):
-    now += 0.001
-    status = np.full(units, 0 if 1100 < i < 1300 else 2)
-    seen = RangeReadings(np.full(units, now), np.linspace(0.05, 0.6, units), status)
-    step, state = controller.step(state, Inputs(now, robot(5000.0 if i == 1400 else 0.0), seen))
-    q, qd = q + step.command * 0.001, step.command
-    modes.add(step.mode)
-assert modes == set(Mode), modes
-new = {name: count for name, count in loaded().items() if count != before.get(name, 0)}
-sys.exit(f"compiled in the loop: {new}" if new else 0)
-"""
-
-
-@pytest.mark.parametrize(
-    ("how", "name"), [("warm", "paper"), ("warm", "paper:restriction.mode=hard"), ("warm", "blind"), ("cold", "paper")]
-)
-def test_nothing_is_compiled_after_a_warm_up(how: str, name: str):
-    done = subprocess.run([sys.executable, "-c", PROBE, how, name], capture_output=True, text=True)
-    assert done.returncode == (0 if how == "warm" else 1), done.stderr
-    if how == "cold":
-        assert done.stderr.startswith("compiled in the loop")
