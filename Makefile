@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka ros2 meshes browser micropython test test-slow lint bench peers format clean
+.PHONY: setup demo live franka ros2 meshes browser micropython test test-skipped test-slow lint bench peers format clean
 
 setup: $(STAMP)
 
@@ -44,11 +44,15 @@ micropython:
 	npm install --prefix build/micropython --no-package-lock --no-audit --no-fund --silent
 
 test: setup
-	$(BIN)/pytest -n 2 -m "not slow"
+	$(BIN)/pytest -n 2 -m "not slow" --list-skipped build/skipped
+
+# the files in which the last `make test` skipped something, once what they need is installed; nothing may be skipped now
+test-skipped: setup
+	@test ! -s build/skipped || $(BIN)/pytest -n 2 -m "not slow" --none-skipped $$(cat build/skipped)
 
 test-slow: setup
-	$(BIN)/pytest -n 2 -m "slow and not alone"
-	$(BIN)/pytest -n 0 -m alone
+	$(BIN)/pytest -n 2 -m "slow and not alone" --none-skipped
+	$(BIN)/pytest -n 0 -m alone --none-skipped
 
 lint: setup
 	$(BIN)/ruff check .

@@ -12,6 +12,10 @@ class ParameterError(PretouchError, ValueError):
     """A parameter is outside its allowed range."""
 
 
+class MissingExtraError(PretouchError, ImportError):
+    """A command needs an extra that is not installed."""
+
+
 class RobotModelError(PretouchError, ValueError):
     """A robot model cannot be used as it is, or a link or joint is unknown to it."""
 
