@@ -3,7 +3,7 @@
     python examples/04_your_own_points.py
 
 A source is anything with `read`: it returns the newest points in the base frame, each with the instant of its
-measurement and its standard deviation, and when it was heard last, seen something or not. See docs/vision.md.
+measurement and its standard deviation, and when it was heard last, seen something or not. See docs/how-to/vision.md.
 """
 
 import numpy as np

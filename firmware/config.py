@@ -13,7 +13,7 @@ PATH = "config.json"
 KEY_SIZE = 32
 _KEPT = ("unit", "ssid", "password", "host", "port", "battery_full_mv")
 _TOUCH = ("touch_ohm", "touch_least_mn", "touch_mn_per_us")
-"""Of a unit with a touch sensor: see docs/hardware/wiring.md."""
+"""Of a unit with a touch sensor: see docs/how-to/wiring.md."""
 
 
 class ConfigError(Exception):

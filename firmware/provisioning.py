@@ -1,4 +1,4 @@
-"""Tells a unit over USB who it is and where it sends: one JSON line in, one out (docs/hardware/flashing.md).
+"""Tells a unit over USB who it is and where it sends: one JSON line in, one out (docs/how-to/flashing.md).
 
 Key and password are only ever taken, never given.
 """

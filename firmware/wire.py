@@ -1,4 +1,4 @@
-"""The unit's side of the datagrams, version 1 (docs/hardware/wire.md), byte for byte as the receiver has them."""
+"""The unit's side of the datagrams, version 1 (docs/reference/wire.md), byte for byte as the receiver has them."""
 
 import hashlib
 import struct

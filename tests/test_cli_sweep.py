@@ -14,8 +14,9 @@ def run(capsys, *args):
 
 def test_a_sweep_shows_and_writes_what_it_says_and_is_not_played_twice(capsys, tmp_path):
     docs, out = tmp_path / "docs", tmp_path / "out"
-    docs.mkdir()
-    (docs / "sensitivity.md").write_text("By hand.\n<!-- tried: generated, begin -->\n<!-- tried: generated, end -->\n")
+    (docs / "results").mkdir(parents=True)
+    document = docs / "results" / "sensitivity.md"
+    document.write_text("By hand.\n<!-- tried: generated, begin -->\n<!-- tried: generated, end -->\n")
     args = (
         "ishigami", *X, "--samples", "4", "--name", "tried", "--processes", "1", "--out", str(out), "--docs", str(docs),
     )  # fmt: skip
@@ -23,9 +24,9 @@ def test_a_sweep_shows_and_writes_what_it_says_and_is_not_played_twice(capsys, t
     assert code == 0
     assert "24 cells to play" in said.err or "20 cells to play" in said.err
     assert "scene.x1" in said.out
-    text = (docs / "sensitivity.md").read_text()
+    text = document.read_text()
     assert text.startswith("By hand.")
-    assert "![tried: first-order and total indices](images/sweep-tried.png)" in text
+    assert "![tried: first-order and total indices](../images/sweep-tried.png)" in text
     assert (docs / "images" / "sweep-tried.png").stat().st_size > 1000
     assert (out / "tried" / "results.parquet").exists()
     assert json.loads((out / "tried" / "indices.json").read_text())["failed"] == 0
@@ -43,7 +44,7 @@ def test_a_sweep_shows_and_writes_what_it_says_and_is_not_played_twice(capsys, t
         (("sensitivity", "--vary", "scene.x1=0:1"), "--vary goes with an experiment, not with sensitivity"),
         (("missing.toml",), "missing.toml is neither an experiment nor a file"),
         (("ishigami", *X, "--processes", "-1"), "number of processes is -1"),
-        (("ishigami", *X, "--docs", "nowhere"), "nowhere/sensitivity.md cannot be read"),
+        (("ishigami", *X, "--docs", "nowhere"), "nowhere/results/sensitivity.md cannot be read"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_sentence(capsys, args, words):

@@ -9,7 +9,7 @@ from pretouch.experiments.registry import EXPERIMENTS
 ROOT = Path(__file__).parents[1]
 ROWS = re.findall(
     r"^\| (?:(\d+) \| )?.*? \| `(pretouch[\w.]+)` \| `(tests/[\w/]+\.py)::(\w+)` \|$",
-    (ROOT / "docs" / "equations.md").read_text(),
+    (ROOT / "docs" / "reference" / "equations.md").read_text(),
     flags=re.MULTILINE,
 )
 
@@ -41,14 +41,47 @@ def test_the_table_of_equations_is_true(number, function, file, test):
     assert f"def {test}(" in (ROOT / file).read_text()
 
 
-def test_links_between_documents_lead_somewhere():
-    for document in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
-        for target in re.findall(r"\]\((?!https?:)([^)#]+)", document.read_text()):
-            assert (document.parent / target).exists(), f"{document.name}: {target}"
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+
+
+def anchors(document):
+    """Of each heading: lower case, no punctuation, hyphens for blanks; what GitHub makes of it."""
+    text = re.sub(r"^```.*?^```", "", document.read_text(), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_between_documents_lead_somewhere(document):
+    for target, anchor in re.findall(r"\]\((?!https?:)([^)#\s]*)#?([^)\s]*)\)", document.read_text()):
+        found = document.parent / target if target else document
+        assert found.exists(), target
+        assert not anchor or anchor in anchors(found), f"{target}#{anchor}"
+
+
+def test_the_index_has_every_document():
+    index = (ROOT / "docs" / "index.md").read_text()
+    documents = {str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")} - {"index.md"}
+    assert documents == set(re.findall(r"^- .*?\]\(([^)]*)\)", index, flags=re.MULTILINE))
+
+
+def test_documents_that_code_and_messages_name_are_there():
+    files = [ROOT / "Makefile", ROOT / "pyproject.toml"]
+    files += [p for top in ("src", "tests", "firmware", "examples", "benchmarks") for p in (ROOT / top).rglob("*.*")]
+    kinds = {".py", ".toml", ".msg", ""}
+    named = {
+        (path, name)
+        for path in files
+        if path.suffix in kinds
+        for name in re.findall(r"\bdocs/[\w/-]+\.md", path.read_text())
+        if path.parent.name != "house"
+    }
+    assert len(named) > 20
+    assert [f"{path}: {name}" for path, name in named if not (ROOT / name).exists()] == []
 
 
 def test_the_paper_page_names_experiments_there_are():
-    text = (ROOT / "docs" / "paper.md").read_text()
+    text = (ROOT / "docs" / "explanation" / "paper.md").read_text()
     claims, weaknesses = (part.split("\n## ")[0] for part in text.split("\n## ")[1:3])
     named = [row.rstrip(" |").split(" | ")[-1] for row in claims.splitlines() if row.startswith("| ")]
     named += [row.split(" | ")[1] for row in weaknesses.splitlines() if row.startswith("| ")]
@@ -58,12 +91,12 @@ def test_the_paper_page_names_experiments_there_are():
 
 
 def test_every_experiment_is_described():
-    text = (ROOT / "docs" / "experiments.md").read_text()
+    text = (ROOT / "docs" / "reference" / "experiments.md").read_text()
     assert [name for name in EXPERIMENTS if f"**{name}**" not in text] == []
 
 
 def test_names_in_the_notation_exist():
-    text = (ROOT / "docs" / "notation.md").read_text()
+    text = (ROOT / "docs" / "reference" / "notation.md").read_text()
     for owner, name in re.findall(r"`(\w+)\.(\w+)(?:\.min\(\))?`", text):
         if owner[0].isupper() and owner != "RobotModel":
             modules = (

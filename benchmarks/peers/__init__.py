@@ -1,1 +1,1 @@
-"""Pretouch against its peers on the same problem: see docs/peers.md, run by `python -m benchmarks.peers`."""
+"""Pretouch against its peers on the same problem: see docs/explanation/peers.md; `python -m benchmarks.peers`."""

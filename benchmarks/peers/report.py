@@ -1,4 +1,4 @@
-"""Tables of the results, for the terminal and for docs/peers.md."""
+"""Tables of the results, for the terminal and for docs/results/peers.md."""
 
 import platform
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-_BEGIN, _END = "<!-- measured: begin -->", "<!-- measured: end -->"
+_BEGIN, _END = "<!-- peers: generated, begin -->", "<!-- peers: generated, end -->"
 
 
 def machine() -> str:

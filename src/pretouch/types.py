@@ -1,7 +1,7 @@
 """The values that travel along the line from a reading to a joint velocity.
 
 Everything here is a value, set once when it is made; its arrays are to be read and not written to. See
-`docs/conventions.md`.
+`docs/reference/conventions.md`.
 """
 
 from dataclasses import field

@@ -181,7 +181,7 @@ def test_a_limit_that_makes_no_sense_is_refused(name):
 
 
 def test_every_limit_is_documented():
-    text = (Path(__file__).parents[2] / "docs" / "hardware" / "health.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "reference" / "health.md").read_text()
     missing = [f.name for f in fields(HealthParams) if f"`{f.name}`" not in text]
     assert not missing
     for f in fields(HealthParams):

@@ -1,4 +1,4 @@
-"""A unit against a receiver of a few lines, written here from docs/hardware/wire.md."""
+"""A unit against a receiver of a few lines, written here from docs/reference/wire.md."""
 
 from dataclasses import dataclass, field
 

@@ -16,7 +16,7 @@ class Localization(BenchOptions):
     """
 
     docs: str = ""
-    """Folder of documents (docs) whose localization.md is to be made anew; by default none."""
+    """Folder of documents (docs) whose results/localization.md is to be made anew; by default none."""
     json: str = ""
     """File for the numbers; by default results.json in the folder."""
 

@@ -21,7 +21,7 @@ class BenchOptions:
     out: str = ""
     """Folder for results and figures; by default runs/bench or runs/bench-NAME, with -quick if it is."""
     docs: str = ""
-    """Folder of documents (docs) whose benchmarks.md and images are to be made anew; by default none."""
+    """Folder of documents (docs) whose results/benchmarks.md and images are to be made anew; by default none."""
 
     def folder(self, name: str) -> Path:
         """Where the results go; `name` is that under runs/."""

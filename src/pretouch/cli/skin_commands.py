@@ -61,9 +61,9 @@ class Provision:
     port: int = PORT
     """UDP port of the receiver."""
     battery_full_mv: int = 0
-    """Voltage of the battery that fills the unit's converter [mV] (docs/hardware/wiring.md); 0: none is wired to it."""
+    """Voltage of the battery that fills the unit's converter [mV] (docs/how-to/wiring.md); 0: none is wired to it."""
     touch_ohm: int = 0
-    """Resistor from the touch sensor's pin to ground [ohm] (docs/hardware/wiring.md); 0: it has no such sensor."""
+    """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: it has no such sensor."""
     touch_least_mn: int = 500
     """Smallest force that counts as a touch [mN]: `force_min_n` of the skin file."""
     touch_mn_per_us: int = 10

@@ -24,11 +24,11 @@ class Sweep:
     """
 
     what: tyro.conf.Positional[str]
-    """static, avoidance, dynamic, free-motion or contacts; or `sensitivity`, the sweeps of docs/sensitivity.md; or a
-    TOML file with [[sweep]] tables."""
+    """static, avoidance, dynamic, free-motion or contacts; or `sensitivity`, the sweeps of
+    docs/explanation/sensitivity.md; or a TOML file with [[sweep]] tables."""
     vary: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Parameter and range: NAME=LOW:HIGH, NAME=LOW:HIGH:log, or NAME=VALUE,VALUE; for a grid NAME=LOW:HIGH:LEVELS.
-    NAME is GROUP.FIELD of the profile, plant.FIELD, plant.kind, plant.world (a set of docs/sim-to-real.md),
+    NAME is GROUP.FIELD of the profile, plant.FIELD, plant.kind, plant.world (a set of docs/how-to/sim-to-real.md),
     sensing.FIELD, skin.units or scene.FIELD. Give the option as often as there are parameters."""
     fix: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Parameter that has another value throughout: NAME=VALUE."""
@@ -57,7 +57,7 @@ class Sweep:
     out: str = ""
     """Folder for everything; by default runs/sweep or runs/sweep-sensitivity."""
     docs: str = ""
-    """Folder of documents (docs) whose sensitivity.md and images are to be made anew; by default none."""
+    """Folder of documents (docs) whose results/sensitivity.md and images are to be made anew; by default none."""
 
 
 def sweep(command: Sweep) -> None:

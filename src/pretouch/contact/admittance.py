@@ -1,8 +1,8 @@
 """Yielding to a push as long as it is felt: a virtual mass and damper in joint space that take energy and give none.
 
 Each joint obeys M dv/dt = d(tau) - D v, integrated implicitly, with tau the external torque less its mean in free
-motion. See docs/reaction.md for why joint space, and for the bound on the energy (Hannaford and Ryu 2002; Ferraguti
-et al. 2015; both bound it with what they call passivity observer and energy tank).
+motion. See docs/explanation/reaction.md for why joint space, and for the bound on the energy (Hannaford and Ryu 2002;
+Ferraguti et al. 2015; both bound it with what they call passivity observer and energy tank).
 """
 
 import math

@@ -1,8 +1,8 @@
-"""Caught between two of the arm's own links, or between one and what stands beside the arm (docs/reaction.md).
+"""Caught between two of the arm's own links, or between one and what stands beside the arm.
 
 Two forces that cancel turn only the joints between the two links. A contact from outside turns the joints before its
 link too, unless its line of action passes through their axes. Between a link and a fixture is what pushes the link away
-from it, a gap's width before it, while the arm comes.
+from it, a gap's width before it, while the arm comes. See docs/explanation/reaction.md.
 """
 
 import numpy as np

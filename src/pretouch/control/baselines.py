@@ -4,7 +4,7 @@ Flacco, Kroeger, De Luca, Khatib, "A depth space approach to human-robot collisi
 velocity moves the end-effector, and near other points of the body the joints that carry these towards an obstacle are
 slowed. Ding and Thomas, "Collision avoidance with proximity servoing for redundant serial robot manipulators", ICRA
 2020: limits on the approach of each closest point, and a weighted sum of the distances that must not fall. What of each
-is reproduced, and what not, stands in docs/baselines.md.
+is reproduced, and what not, stands in docs/explanation/baselines.md.
 """
 
 import numpy as np

@@ -225,7 +225,7 @@ def _unit_itself(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
         yield Finding(
             name, "fault", "firmware",
             f"{name} runs firmware {version(firmware)} (oldest that is served: {version(params.firmware)}): flash it"
-            " anew (docs/hardware/flashing.md).",
+            " anew (docs/how-to/flashing.md).",
         )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""When a sensor unit is not well: each limit with its unit and its reason (docs/hardware/health.md)."""
+"""When a sensor unit is not well: each limit with its unit and its reason (docs/reference/health.md)."""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -45,7 +45,7 @@ class LinkParams(Checked):
     """How a receiver treats its units."""
 
     beacon_period_s: Positive = 0.25
-    """Time between the beacons to a unit [s]. Without one for 2 s it leaves the session (docs/hardware/wire.md). Where
+    """Time between the beacons to a unit [s]. Without one for 2 s it leaves the session (docs/reference/wire.md). Where
     30 % are lost, that happens once in an hour and a half with eight in that time, and every minute and a half with
     four."""
     pending_most: PositiveCount = 4

@@ -1,4 +1,4 @@
-"""Telling a unit over USB who it is, its key, and where it sends, by one JSON line (docs/hardware/flashing.md).
+"""Telling a unit over USB who it is, its key, and where it sends, by one JSON line (docs/how-to/flashing.md).
 
 No message and no exception here holds a key or a password.
 """
@@ -52,9 +52,9 @@ class Network:
     """IPv4 address of the receiver in the unit's network."""
     port: int
     battery_full_mv: int = 0
-    """Voltage of the unit's battery that fills its converter [mV] (docs/hardware/wiring.md); 0: none is wired to it."""
+    """Voltage of the unit's battery that fills its converter [mV] (docs/how-to/wiring.md); 0: none is wired to it."""
     touch_ohm: int = 0
-    """Resistor from the touch sensor's pin to ground [ohm] (docs/hardware/wiring.md); 0: it has no such sensor."""
+    """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: it has no such sensor."""
     touch_least_mn: int = 500
     """Smallest force that is a touch [mN]."""
     touch_mn_per_us: int = 10

@@ -1,4 +1,4 @@
-"""All sensor units of a skin at one UDP socket (docs/hardware/wire.md): who may speak, what was measured, and when."""
+"""All sensor units of a skin at one UDP socket (docs/reference/wire.md): who may speak, what was measured, and when."""
 
 import errno
 import secrets

@@ -148,7 +148,7 @@ def _go_first(priority: int | None) -> None:
     except (AttributeError, OSError) as error:
         raise HardwareError(
             f"The receiver's process cannot have the real-time priority {priority} ({error}):"
-            " raise the limit `rtprio` (docs/realtime.md), or leave the priority out."
+            " raise the limit `rtprio` (docs/how-to/realtime.md), or leave the priority out."
         ) from None
 
 

@@ -1,4 +1,4 @@
-"""The datagrams between sensor units and their receiver, version 1 (docs/hardware/wire.md). Bytes to values and back.
+"""The datagrams between sensor units and their receiver, version 1 (docs/reference/wire.md). Bytes to values and back.
 
 Three kinds, all little-endian, each ended by the first 16 bytes of an HMAC-SHA256:
 

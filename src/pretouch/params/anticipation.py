@@ -43,7 +43,7 @@ class AnticipationParams(Checked):
     deceleration_m_s2: Positive = 0.6
     """Deceleration a of the braking curve [m/s^2]: that with which the curve binds the task's 0.3 m/s from about 0.1 m
     on, Table I's d_crit. From 0.15 to 1 it changes the time to a touch by 0.6 s and its force by nothing
-    (docs/anticipation.md)."""
+    (docs/explanation/anticipation.md)."""
     latency_s: NonNegative = 0.06
     """Time from a measurement to a motion tau [s]: a reading's period of 20 ms, its way of about 12 ms, a control
     period, and the 16 ms of the drives' set-point filter."""
@@ -52,7 +52,7 @@ class AnticipationParams(Checked):
     of the VL53L1X allows 20 to 25 mm of error in all)."""
     touch_speed_max_m_s: Positive = 0.05
     """Largest touch speed v_c, whatever the body region allows [m/s]: ours; a light arm would otherwise touch faster
-    than it was tried. Force against it: docs/anticipation.md."""
+    than it was tried. Force against it: docs/explanation/anticipation.md."""
     retreat_max_m_s: NonNegative = 0.1
     """Fastest retreat that an object which comes nearer may ask for [m/s]: ours."""
     effective_mass: bool = False

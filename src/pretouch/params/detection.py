@@ -1,4 +1,4 @@
-"""Parameters of contact detection: which method, and the numbers of each. See docs/detection.md."""
+"""Parameters of contact detection: which method, and the numbers of each. See docs/explanation/detection.md."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -129,7 +129,7 @@ class DetectionParams(Checked):
     confirm_samples: PositiveCount = 1
     """Samples in a row with the evidence of a contact that make one."""
     localise: bool = False
-    """Method sequential: whether the place of a contact is inferred too (docs/localization.md)."""
+    """Method sequential: whether the place of a contact is inferred too (docs/explanation/localization.md)."""
 
     def __post_init__(self) -> None:
         # a recording holds a list

@@ -1,4 +1,4 @@
-"""Parameters of the place of a contact. See docs/localization.md."""
+"""Parameters of the place of a contact. See docs/explanation/localization.md."""
 
 from dataclasses import dataclass
 from typing import Annotated

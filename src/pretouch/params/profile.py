@@ -100,8 +100,8 @@ PROFILES: dict[str, Profile] = {
 both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
 text (section V-C). `fixed`: as `blind`, with the bounds of the vendor's examples on torques and force. `observer`: as
 that, with tighter constant bounds on the torques of the momentum observer. `pretouch`: ours, each departure from the
-paper one switch (docs/detection.md, docs/anticipation.md, docs/reaction.md). `flacco` and `ding`: published ways to
-avoid obstacles, to compare with (docs/baselines.md)."""
+paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md).
+`flacco` and `ding`: published ways to avoid obstacles, to compare with (docs/explanation/baselines.md)."""
 
 
 def profile(name: str) -> Profile:

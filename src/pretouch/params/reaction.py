@@ -8,7 +8,7 @@ from pretouch.checks import Check, Checked, NonNegative, Positive, PositiveCount
 
 @dataclass(frozen=True)
 class ReactionParams(Checked):
-    """Moving with the push (eq. 12), or yielding to it as long as it lasts (docs/reaction.md)."""
+    """Moving with the push (eq. 12), or yielding to it as long as it lasts (docs/explanation/reaction.md)."""
 
     method: Literal["decay", "admittance"] = "decay"
     """`decay`: eq. 12, a velocity set at the onset that decays whatever is felt (paper). `admittance`: a virtual mass
@@ -103,7 +103,7 @@ class ReactionParams(Checked):
     pushed_j: Positive = 0.3
     """Energy that a contact gives an arm that stands, from which it is a push and counts for no place [J]: boards met
     at touch speed gave 0.05 J at most, at 0.3 m/s unbraked 0.5 J, pushes of 15 to 30 N for 0.3 s at least 0.59 J
-    (docs/reaction.md). To an arm that moves it may give twice its kinetic energy more."""
+    (docs/explanation/reaction.md). To an arm that moves it may give twice its kinetic energy more."""
     clear_s: Positive = 1.0
     """Time for which nothing is seen near before the arm that gave up tries again [s]."""
     retry_s: Positive = 30.0

@@ -22,7 +22,7 @@ class TaskParams(Checked):
     """Distance from the path at which the arm no longer advances along it but only returns [m]."""
     orientation: Orientation = "hold"
     """Whether the task is the hand's velocity alone, or also keeps its orientation at the start. The paper does not
-    say. Free, the hand rolls its units out of view of what restricts it (docs/experiments.md)."""
+    say. Free, the hand rolls its units out of view of what restricts it (docs/reference/experiments.md)."""
     orientation_gain_1_s: NonNegative = 1.0
     """Angular velocity per radian of orientation error when it is held [1/s]."""
     damping_max: NonNegative = 0.1

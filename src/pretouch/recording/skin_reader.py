@@ -21,7 +21,7 @@ from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
 _RANGE_NEW = 1
-"""Flag of a sample with a range that no sample before had (docs/hardware/wire.md)."""
+"""Flag of a sample with a range that no sample before had (docs/reference/wire.md)."""
 
 
 @value

@@ -16,9 +16,9 @@ LARGEST_COUNT = 2**15 - 1
 
 
 def counts_of(scale: int) -> tuple[float, float]:
-    """Return one count of accelerometer [m/s^2] and gyroscope [rad/s] by the scales of a datagram (wire.md).
+    """Return one count of accelerometer [m/s^2] and gyroscope [rad/s] by the scales of a datagram.
 
-    Full scales there are not are a ValueError.
+    Scales are those of docs/reference/wire.md; others are a ValueError.
     """
     rates = list(ANGULAR_RATE_LSB.values())
     code = scale >> 4 & 7

@@ -110,7 +110,7 @@ def world_set(name: str) -> WorldSet:
     except OSError as error:
         raise ParameterError(
             f"The world {name!r} is none of {', '.join(SETS)}, and no file of that name can be read"
-            f" ({error.strerror}): choose one of these, or give a TOML file (docs/sim-to-real.md)."
+            f" ({error.strerror}): choose one of these, or give a TOML file (docs/how-to/sim-to-real.md)."
         ) from error
     except ValueError as error:
         raise ParameterError(f"The world file {place} is no TOML file ({error}): correct it.") from error

@@ -11,7 +11,7 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.types import ImuReadings, RangeReadings
 
 DATAGRAM_S = 0.02
-"""Time between two datagrams of a unit [s] (docs/hardware/wire.md)."""
+"""Time between two datagrams of a unit [s] (docs/reference/wire.md)."""
 
 
 class SentImus:

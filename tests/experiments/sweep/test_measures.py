@@ -13,7 +13,7 @@ from pretouch.experiments.sweep.setting import built
 from pretouch.experiments.sweep.work import cell_of, jobs_of, work
 from pretouch.sensing.skin import paper_skin
 
-DOCUMENT = Path(__file__).parents[3] / "docs" / "sensitivity.md"
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def test_a_cell_of_the_static_experiment_is_its_trial():
@@ -63,7 +63,7 @@ def test_a_stream_that_cannot_be_recorded_fails_all_of_its_cells_with_the_reason
 
 
 def test_the_published_sweeps_can_be_played_and_their_document_has_a_place_for_each():
-    text = DOCUMENT.read_text(encoding="utf-8")
+    text = (DOCS / "results" / "sensitivity.md").read_text(encoding="utf-8")
     for sweep in sensitivity("published"):
         assert f"<!-- {sweep.name}: generated, begin -->" in text
         assert points(smaller(sweep, 2))
@@ -71,5 +71,5 @@ def test_the_published_sweeps_can_be_played_and_their_document_has_a_place_for_e
 
 
 def test_every_experiment_that_can_be_swept_is_described():
-    text = DOCUMENT.read_text(encoding="utf-8")
+    text = (DOCS / "how-to" / "sweep.md").read_text(encoding="utf-8")
     assert all(f"`{name}`" in text for name in MEASURES)

@@ -6,7 +6,7 @@ from pretouch.errors import ExperimentError
 from pretouch.experiments.experiment import Picture
 from pretouch.experiments.tables import TextTable
 
-DOCUMENT = "benchmarks.md"
+DOCUMENT = "results/benchmarks.md"
 """In a folder of documents."""
 
 
@@ -45,8 +45,8 @@ def publish(part: str, text: str, pictures: list[Picture], out: Path, docs: Path
 
 
 def shown(picture: Picture) -> str:
-    """Refer to a figure from the document."""
-    return f"![{picture.text}](images/{picture.name}.png)\n\n*{picture.text}.*"
+    """Refer to a figure from a document in `results`."""
+    return f"![{picture.text}](../images/{picture.name}.png)\n\n*{picture.text}.*"
 
 
 def around(path: Path, part: str) -> tuple[str, str]:

@@ -19,7 +19,7 @@ from pretouch.params import profile
 
 Design = Literal["grid", "lhs", "sobol"]
 SENSITIVITY = "sensitivity"
-"""The sweeps of docs/sensitivity.md."""
+"""The sweeps of docs/explanation/sensitivity.md."""
 _SEED_RANGES: dict[SeedRange, tuple[int, int]] = {"published": (0, 999), "development": (1000, 1999)}
 _KEYS = ("name", "experiment", "profile", "design", "samples", "arms", "metrics", "ranks", "vary", "fix", "text")
 
@@ -179,7 +179,7 @@ def _from(entry: Any, number: int, path: Path, seeds: SeedRange) -> Sweep:
 
 
 def sensitivity(seeds: SeedRange) -> list[Sweep]:
-    """Return the sweeps of docs/sensitivity.md."""
+    """Return the sweeps of docs/explanation/sensitivity.md."""
     return load_sweeps(Path(str(files("pretouch.experiments.sweep") / "sensitivity.toml")), seeds)
 
 

@@ -1,4 +1,4 @@
-"""What a sweep leaves for readers: numbers, a figure, tables, and its part of docs/sensitivity.md."""
+"""What a sweep leaves for readers: numbers, a figure, tables, and its part of docs/results/sensitivity.md."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from pretouch.experiments.sweep.store import unwritable
 from pretouch.experiments.sweep.work import code
 from pretouch.experiments.tables import TextTable
 
-DOCUMENT = "sensitivity.md"
+DOCUMENT = "results/sensitivity.md"
 """In a folder of documents."""
 
 

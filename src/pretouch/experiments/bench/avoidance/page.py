@@ -1,4 +1,4 @@
-"""The avoidance benchmark's part of docs/benchmarks.md."""
+"""The avoidance benchmark's part of docs/results/benchmarks.md."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def section(summary: Row, pictures: list[Picture], seeds: str) -> str:
     trials += sum(cell["trials"] for cell in summary["ablations"] if cell["contender"] != BASE)
     about = (
         f"{trials} trials with {seeds} seeds. Contenders: `blind` without proximity; `flacco` and `ding` as published,"
-        " and each with another tuning ([baselines.md](baselines.md)); `paper` with its restrictions, soft;"
+        " and each with another tuning ([baselines](../explanation/baselines.md)); `paper` with its restrictions, soft;"
         " `paper-off` without them."
     )
     scenes = [

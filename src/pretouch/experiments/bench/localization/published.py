@@ -7,7 +7,7 @@ from pretouch.experiments.bench.localization.campaign import NAME
 from pretouch.experiments.bench.localization.results import tables_of
 from pretouch.experiments.bench.store import Row
 
-DOCUMENT = "localization.md"
+DOCUMENT = "results/localization.md"
 """In a folder of documents."""
 
 
