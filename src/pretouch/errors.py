@@ -40,6 +40,10 @@ class ExperimentError(PretouchError, ValueError):
     """An experiment was asked for something it cannot do."""
 
 
+class SourceError(PretouchError, LookupError):
+    """Source text that kept results rest on cannot be found."""
+
+
 class RecordingError(PretouchError, ValueError):
     """A recording cannot be made, opened or used as asked."""
 
