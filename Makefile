@@ -55,7 +55,7 @@ test-slow: setup
 	$(BIN)/pytest -n 2 -m "slow and not alone" --none-skipped
 	$(BIN)/pytest -n 0 -m alone --none-skipped
 
-# every field of every control step, to the bit, here and in the commit BASE (docs/design.md, golden steps)
+# every field of every control step, to the bit, here and in the commit BASE (docs/explanation/design.md, golden steps)
 BASE ?= HEAD
 golden: setup
 	$(BIN)/python -m tests.golden $(BASE) $(foreach name,$(WITHOUT),--without "$(name)")
