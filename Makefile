@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka ros2 meshes browser micropython test test-skipped test-slow golden golden-values lint bench peers \
+.PHONY: setup demo live franka ros2 meshes browser micropython test test-skipped test-slow golden golden-values lint house bench peers \
 	format clean
 
 setup: $(STAMP)
@@ -69,6 +69,10 @@ lint: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# what the house is like beside what is aimed at; fails where it is beyond what is held
+house: setup
+	$(BIN)/python -m tools.house
 
 bench: setup
 	@for file in benchmarks/*.py; do $(BIN)/python $$file || exit 1; done

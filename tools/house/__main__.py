@@ -1,0 +1,107 @@
+"""Prints what the house is like beside what is aimed at, and fails where it is beyond what is held."""
+
+import subprocess
+import sys
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from statistics import median, quantiles
+
+from tools.house.source import Source, import_cycle
+from tools.house.words import words_by_hand
+
+from pretouch.params import PROFILES
+
+ROOT = Path(__file__).parents[2]
+_TIMES = 5
+_IMPORT = "import time; t = time.process_time(); import pretouch; print(time.process_time() - t)"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number of the house. Beyond `held` the check fails: lower it when the number falls, and do not raise it."""
+
+    name: str
+    value: float
+    held: float
+    aim: float | None = None
+    where: str = ""
+    least: bool = False
+    """Whether the number is to be at least what is held, in place of at most."""
+
+    @property
+    def kept(self) -> bool:
+        """Whether the number is within what is held."""
+        return self.value >= self.held if self.least else self.value <= self.held
+
+
+def measures() -> list[Measure]:
+    """Measure the house."""
+    product, lab = Source(ROOT / "src/pretouch"), Source(ROOT / "src/pretouch_lab")
+    lines, lab_lines = sum(product.files.values()), sum(lab.files.values())
+    functions = product.functions + lab.functions
+    longest_file = max((product.files | lab.files).items(), key=lambda item: item[1])
+    longest, widest = max(functions, key=lambda f: f.lines), max(functions, key=lambda f: f.parameters)
+    cycle = import_cycle([package.folder.name for package in (product, lab) if package.files])
+    values = [
+        value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
+    ]
+    return [
+        Measure("lines of the product", lines, 50_000, 35_000),
+        Measure("files of the product", len(product.files), 460, 300),
+        Measure("lines of product and lab", lines + lab_lines, 67_500, 50_000),
+        Measure("lines of the largest file", longest_file[1], 354, 350, str(longest_file[0].relative_to(ROOT / "src"))),
+        Measure("most parameters of a function", widest.parameters, 68, 8, widest.place),
+        Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 60, 0),
+        Measure("lines of functions, 95th percentile", quantiles([f.lines for f in functions], n=20)[-1], 30),
+        Measure("lines of the longest function", longest.lines, 90, 60, longest.place),
+        *(
+            Measure(
+                f"comments in {name} [%]", 100 * Source(ROOT / "src/pretouch" / name).comment_share, 0, 5, least=True
+            )
+            for name in ("control", "contact", "perception")
+        ),
+        Measure("words of documents by hand", sum(words_by_hand(ROOT).values()), 61_000, 42_000),
+        Measure("lines of README", len((ROOT / "README.md").read_text().splitlines()), 225, 150),
+        Measure("parameters of a profile", len(values), 210, 140),
+        Measure("booleans among them", sum(isinstance(value, bool) for value in values), 26, 6),
+        Measure("import pretouch, processor [s]", _import_s(), 0.2, 0.05),
+        Measure("modules in an import cycle", len(cycle), 0, 0, " > ".join(cycle)),
+    ]
+
+
+def _comments(package: str) -> Measure:
+    share = Source(ROOT / "src/pretouch" / package).comment_share
+    return Measure(f"comments in {package} [%]", round(100 * share, 1), 2.5, 5, least=True)
+
+
+def _values(group: object) -> list[object]:
+    if not is_dataclass(group):
+        return [group]
+    return [value for field in fields(group) for value in _values(getattr(group, field.name))]
+
+
+def _import_s() -> float:
+    """Return the median processor time of the package's import, each in a process of its own."""
+    command = [sys.executable, "-c", _IMPORT]
+    return median(float(subprocess.run(command, capture_output=True, check=True).stdout) for _ in range(_TIMES))
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.0f}" if value >= 100 else f"{value:.2g}"
+
+
+def main() -> int:
+    """Print the measures; return 1 where one is beyond what is held."""
+    found = measures()
+    print(f"{'':36}{'now':>8}{'held':>8}{'aim':>8}")
+    for measure in found:
+        numbers = "".join(f"{_number(number):>8}" for number in (measure.value, measure.held, measure.aim))
+        print(f"{measure.name:36}{numbers}  {'' if measure.kept else 'BEYOND '}{measure.where}".rstrip())
+    beyond = [measure.name for measure in found if not measure.kept]
+    if beyond:
+        print(f"Beyond what is held: {', '.join(beyond)}. Make it smaller, or say in tools/house why it must grow.")
+    return int(bool(beyond))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
