@@ -221,7 +221,7 @@ def test_a_package_is_found_in_the_path_given(tmp_path):
         ("a.obj", b"v 0 0 0\nf 1 2 3\n", "a corner that is not there"),
         ("a.obj", b"v 0 0\nf 1 1 1\n", "is damaged: line 1 holds no three numbers"),
         ("a.obj", b"", "holds no triangle"),
-        ("a.dae", b"<COLLADA", "is damaged|pip install"),
+        ("a.dae", b"<COLLADA", "is damaged|extra 'meshes'"),
         ("a.passwd", b"root:x", "none that can be read: use .stl, .obj, .dae"),
     ],
 )
