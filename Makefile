@@ -4,7 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka ros2 meshes browser micropython test test-slow lint bench peers format clean
+.PHONY: setup demo live franka ros2 meshes browser micropython test test-skipped test-slow golden golden-values lint bench peers \
+	format clean
 
 setup: $(STAMP)
 
@@ -44,11 +45,24 @@ micropython:
 	npm install --prefix build/micropython --no-package-lock --no-audit --no-fund --silent
 
 test: setup
-	$(BIN)/pytest -n 2 -m "not slow"
+	$(BIN)/pytest -n 2 -m "not slow" --list-skipped build/skipped
+
+# the files in which the last `make test` skipped something, once what they need is installed; nothing may be skipped now
+test-skipped: setup
+	@test ! -s build/skipped || $(BIN)/pytest -n 2 -m "not slow" --none-skipped $$(cat build/skipped)
 
 test-slow: setup
-	$(BIN)/pytest -n 2 -m "slow and not alone"
-	$(BIN)/pytest -n 0 -m alone
+	$(BIN)/pytest -n 2 -m "slow and not alone" --none-skipped
+	$(BIN)/pytest -n 0 -m alone --none-skipped
+
+# every field of every control step, to the bit, here and in the commit BASE (docs/explanation/design.md, golden steps)
+BASE ?= HEAD
+golden: setup
+	$(BIN)/python -m tests.golden $(BASE) $(foreach name,$(WITHOUT),--without "$(name)")
+
+# the values the default tests hold: renewed only where the arm is meant to do something else, in a commit of its own
+golden-values: setup
+	$(BIN)/python -m tests.golden.values
 
 lint: setup
 	$(BIN)/ruff check .

@@ -1,11 +1,15 @@
 """What all tests share: the arm, its skin, and how properties are searched."""
 
+from collections import Counter
+from pathlib import Path
+
 import pytest
 from hypothesis import settings
 
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing import skin
+from tests.needs import NEEDS
 
 settings.register_profile("pretouch", deadline=None, derandomize=True, database=None, max_examples=100)
 settings.load_profile("pretouch")
@@ -19,3 +23,30 @@ def panda_model() -> RobotModel:
 @pytest.fixture(scope="session")
 def paper_skin(panda_model: RobotModel) -> skin.Skin:
     return skin.paper_skin(panda_model)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--list-skipped", type=Path, help="write the files in which something was skipped to a file")
+    parser.addoption("--none-skipped", action="store_true", help="fail if anything was skipped")
+
+
+def _skipped(config: pytest.Config) -> list[pytest.TestReport]:
+    return config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if hasattr(session.config, "workerinput"):  # the process that started the workers tells of them all
+        return
+    skipped, listed = _skipped(session.config), session.config.option.list_skipped
+    if listed:
+        listed.parent.mkdir(parents=True, exist_ok=True)
+        listed.write_text("".join(f"{name}\n" for name in sorted({report.nodeid.split("::")[0] for report in skipped})))
+    if skipped and session.config.option.none_skipped:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    reasons = (report.longrepr[2].removeprefix("Skipped: ") for report in _skipped(config))
+    counts = Counter(reason.removeprefix(NEEDS) if reason.startswith(NEEDS) else reason for reason in reasons)
+    if counts:
+        terminalreporter.write_line(f"skipped: {', '.join(f'{n} for {what}' for what, n in counts.most_common())}")

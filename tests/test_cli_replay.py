@@ -8,7 +8,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from pretouch.cli.replay import recover, replay
-from pretouch.errors import ParameterError, RecordingError, ViewerError
+from pretouch.errors import MissingExtraError, ParameterError, RecordingError
 from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
 from pretouch.types import Inputs
@@ -129,7 +129,7 @@ def test_the_page_is_given_recording_place_and_comparison(whole, page):
 
 def test_without_the_extra_the_page_is_one_sentence(whole, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(ViewerError, match="extra 'viewer'") as error:
+    with pytest.raises(MissingExtraError, match="extra 'viewer'") as error:
         replay(whole)
     assert "\n" not in str(error.value)
 

@@ -3,7 +3,6 @@ import json
 import pytest
 
 from pretouch import cli
-from pretouch.experiments.sweep import extra
 
 X = ("--vary", "scene.x1=-3:3", "--vary", "scene.x2=-3:3")
 
@@ -53,13 +52,6 @@ def test_what_cannot_be_done_is_said_in_a_sentence(capsys, args, words):
     assert code == 2
     assert words in said.err
     assert "Traceback" not in said.err
-
-
-def test_without_the_extra_the_command_names_it(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr(extra, "find_spec", lambda name: None)
-    code, said = run(capsys, "ishigami", *X, "--out", str(tmp_path))
-    assert code == 2
-    assert "Sweeps need SALib, pyarrow: pip install 'pretouch[sweep]'." in said.err
 
 
 @pytest.mark.parametrize(

@@ -2,34 +2,15 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import njit
 
+from pretouch.errors import SourceError
+from pretouch.source_digest import source_digest
+
 Function = TypeVar("Function", bound=Callable[..., object])
-
-_NOT_COMPILED = (
-    "cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording", "calibration",
-    "importing", "coverage", "session", "traces.py",
-)  # fmt: skip
-
-
-def digest(folder: Path) -> str:
-    """Return what tells this state of the Python files under a folder from any other.
-
-    But for those of packages of which nothing gets into a compiled function.
-    """
-    content = sha256()
-    for path in sorted(folder.rglob("*.py")):
-        place = path.relative_to(folder)
-        if place.parts[0] not in _NOT_COMPILED:
-            content.update(str(place).encode() + b"\0" + path.read_bytes())
-    return content.hexdigest()[:12]
-
-
-_DIGEST = digest(Path(__file__).parent)
 
 
 def compiled(function: Function) -> Function:
@@ -41,10 +22,10 @@ def compiled(function: Function) -> Function:
     """
     # Numba looks at the function's own file only to tell whether what it kept is out of date. What got into a function
     # from another file, a constant or a call, it would go on using as it was: so the name it keeps it under tells all.
-    function.__qualname__ += f"-{_DIGEST}"
     try:
+        function.__qualname__ += f"-{source_digest(function)[:12]}"
         kept = njit(cache=True, error_model="numpy")(function)
-    except RuntimeError:  # nowhere to keep it
+    except (RuntimeError, SourceError):  # nowhere to keep it, or no text to tell whether it is out of date
         return cast(Function, njit(error_model="numpy")(function))
     _keep_if_possible(kept)
     return cast(Function, kept)

@@ -12,6 +12,10 @@ class ParameterError(PretouchError, ValueError):
     """A parameter is outside its allowed range."""
 
 
+class MissingExtraError(PretouchError, ImportError):
+    """A command needs an extra that is not installed."""
+
+
 class RobotModelError(PretouchError, ValueError):
     """A robot model cannot be used as it is, or a link or joint is unknown to it."""
 
@@ -34,6 +38,10 @@ class PathError(PretouchError, ValueError):
 
 class ExperimentError(PretouchError, ValueError):
     """An experiment was asked for something it cannot do."""
+
+
+class SourceError(PretouchError, LookupError):
+    """Source text that kept results rest on cannot be found."""
 
 
 class RecordingError(PretouchError, ValueError):

@@ -49,7 +49,7 @@ def request_and_folder(context, tmp_path_factory):
 
 def test_the_page_shows_each_table_and_picture(request_and_folder):
     request, out = request_and_folder
-    rows = [json.loads(file.read_text()) for file in (out / "trials").iterdir()]
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("*/*.json")]
     page = write_report([(request, out)], summarise(rows), out)
     links = Links()
     links.feed(page.read_text())
@@ -82,7 +82,7 @@ def test_a_recording_that_cannot_be_read_leaves_its_picture_out(request_and_fold
     out = copytree(whole, tmp_path / "out")
     (file,) = (out / "recordings").glob("dynamic*.mcap")
     file.write_bytes(file.read_bytes()[:100])
-    rows = [json.loads(file.read_text()) for file in (out / "trials").iterdir()]
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("*/*.json")]
     links = Links()
     links.feed(write_report([(request, out)], summarise(rows), out).read_text())
     assert links.images == ["static.png", "framework.png"]
@@ -133,7 +133,7 @@ def test_the_tables_are_written_in_markdown_too(request_and_folder, tmp_path, mo
     table = TextTable("Title", ("|a|", "b\n[m]"), (("x|y", "1\n2"),), "A note.")
     static_only = replace(EXPERIMENTS["static"], tables=lambda _: [table])
     monkeypatch.setattr("pretouch.experiments.report.GROUPS", {"Group": (static_only,)})
-    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("static*")]
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("static-*/*.json")]
     write_report([(request, out)], summarise(rows), tmp_path)
     assert (tmp_path / "tables.md").read_text().splitlines()[:5] == [
         "## Title", "", r"| \|a\| | b<br>[m] |", "| --- | --- |", r"| x\|y | 1<br>2 |",

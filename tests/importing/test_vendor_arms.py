@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.importing.test_robot_import import assert_same_mechanics, stripped
+from tests.needs import skip_for
 
 from pretouch.experiments import static
 from pretouch.experiments.campaign import Request
@@ -23,7 +24,7 @@ def robot(name: str) -> Path:
     try:
         listed = files("example-robot-data") or []
     except PackageNotFoundError:
-        pytest.skip("the robots need the extra 'meshes'")
+        skip_for("make meshes")
     return Path(str(next(f for f in listed if f.as_posix().endswith(name)).locate()))
 
 

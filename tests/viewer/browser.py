@@ -5,10 +5,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-import pytest
+from tests.needs import skip_for
 from tests.ports import free_port
 
 from pretouch.types import FloatArray
@@ -60,10 +61,13 @@ class Served:
 @contextmanager
 def chromium(width: int = 1280, height: int = 800) -> Iterator["Visitor"]:
     """A person's browser; the test is skipped where there is none."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="the browser test needs the extra 'browser'")
+    if find_spec("playwright") is None:
+        skip_for("make browser")
+    from playwright import sync_api
+
     found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if found is None:
-        pytest.skip("the browser test needs a Chromium on the PATH")
+        skip_for("apt-get install chromium")
     software = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", *software])

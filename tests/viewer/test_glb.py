@@ -4,6 +4,7 @@ import struct
 
 import numpy as np
 import pytest
+import trimesh
 
 from pretouch.errors import ViewerError
 from pretouch.robot.model import RobotModel
@@ -39,7 +40,6 @@ def test_a_file_holds_the_mesh_to_a_hundredth_of_a_millimetre_and_its_colours(pa
 
 
 def test_another_program_reads_the_file(panda_model: RobotModel) -> None:
-    trimesh = pytest.importorskip("trimesh")
     mesh = capsule_surfaces(panda_model)[6]
     data = ColouredMesh(mesh).painted(np.full(mesh.vertices.shape, 128.0))
     read_back = trimesh.load(io.BytesIO(data), file_type="glb", process=False).to_mesh()

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from tests.ports import free_port
 
+from pretouch import extras
 from pretouch.cli import main
 from pretouch.recording.reader import open_recording
 
 
 def test_a_busy_port_is_one_sentence_with_the_next_free_one(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
@@ -33,17 +33,15 @@ def test_a_missing_extra_is_one_sentence_with_the_command(
 ) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["live"]) == 2
-    assert capsys.readouterr().err == "The page needs the extra 'viewer': pip install 'pretouch[viewer]'\n"
+    assert capsys.readouterr().err == f"The page needs viser of the extra 'viewer': run {extras.command('viewer')}\n"
 
 
 def test_an_unknown_path_is_refused_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
     assert main(["live", "--path", "spiral", "--port", str(free_port())]) == 2
     assert capsys.readouterr().err == "The path is 'spiral': choose circle or line.\n"
 
 
 def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
     assert main(["live", "--seed", "-1", "--port", str(free_port())]) == 2
     assert capsys.readouterr().err == "LiveSettings.seed is -1: it must be at least 0.\n"
 
@@ -53,7 +51,6 @@ def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str]) -> Non
 def test_interrupted_it_closes_its_recording_and_says_where_it_is(
     number: signal.Signals, code: int, tmp_path: Path
 ) -> None:
-    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
     place, port = tmp_path / "session.mcap", free_port()
     command = [sys.executable, "-m", "pretouch.cli", "live", "--port", str(port), "--record", str(place)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1) as process:

@@ -22,8 +22,6 @@ from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.settings import Faults, LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
-pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
-
 
 class Clock:
     """Turns a page at 30 Hz of a time of its own."""

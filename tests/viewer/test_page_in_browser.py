@@ -25,7 +25,6 @@ from pretouch.viewer.scene import GIZMO_M
 from pretouch.viewer.settings import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
-pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
 pytestmark = pytest.mark.slow
 
 

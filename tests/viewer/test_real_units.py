@@ -206,7 +206,6 @@ def test_the_panel_shows_each_unit_and_what_is_wrong_with_it(room: Room) -> None
 
 @contextmanager
 def page_of(simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None) -> Iterator[LivePage]:
-    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
     with served(ServeOptions(port=free_port()), "test") as server:
         yield LivePage(server, simulation, say)
 

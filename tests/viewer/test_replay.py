@@ -16,8 +16,6 @@ from pretouch.viewer.replay import ReplayPage, frame_of, serve_replay, world_of
 from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
 
-pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
-
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:

@@ -4,8 +4,9 @@ import sys
 import pytest
 from tests.ports import free_port
 
-from pretouch.errors import ViewerError
-from pretouch.viewer.server import ServeOptions, check_extra, check_port, served, url_of
+from pretouch import extras
+from pretouch.errors import MissingExtraError, ViewerError
+from pretouch.viewer.server import ServeOptions, check_port, served, url_of
 
 
 def test_a_busy_port_is_one_sentence_with_the_next_free_one() -> None:
@@ -24,7 +25,6 @@ def test_a_busy_port_is_one_sentence_with_the_next_free_one() -> None:
 
 
 def test_a_second_page_on_the_same_port_is_refused_and_the_first_goes_on(capfd: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("viser", reason="the page needs the extra 'viewer'")
     options = ServeOptions(port=free_port())
     with served(options, "first") as server:
         with (
@@ -58,8 +58,6 @@ def test_a_host_that_is_not_this_machine_is_refused() -> None:
 
 def test_a_missing_extra_is_one_sentence_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(ViewerError) as caught:
-        check_extra()
-    assert str(caught.value) == "The page needs the extra 'viewer': pip install 'pretouch[viewer]'"
-    with pytest.raises(ViewerError, match="extra 'viewer'"), served(ServeOptions(port=free_port()), "page"):
+    with pytest.raises(MissingExtraError) as caught, served(ServeOptions(port=free_port()), "page"):
         pass
+    assert str(caught.value) == f"The page needs viser of the extra 'viewer': run {extras.command('viewer')}"

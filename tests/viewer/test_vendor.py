@@ -1,6 +1,9 @@
 import numpy as np
 import pytest
+import trimesh
+from tests.needs import skip_without
 
+from pretouch import extras
 from pretouch.robot.model import RobotModel
 from pretouch.viewer import vendor
 from pretouch.viewer.vendor import coarse, vendor_surfaces
@@ -8,7 +11,6 @@ from pretouch.viewer.vendor import coarse, vendor_surfaces
 
 def sphere(rings: int = 60) -> tuple[np.ndarray, np.ndarray]:
     """A sphere of radius 5 cm, each triangle with vertices of its own, as the vendor's files have them."""
-    trimesh = pytest.importorskip("trimesh")
     ball = trimesh.creation.uv_sphere(0.05, count=(rings, rings))
     return ball.triangles.reshape(-1, 3), np.arange(3 * len(ball.faces)).reshape(-1, 3)
 
@@ -35,11 +37,11 @@ def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(
     monkeypatch.setattr(vendor, "_folder", lambda: None)
     found, said = vendor_surfaces(panda_model)
     assert found == {}
-    assert "pip install 'pretouch[meshes]'" in said
+    assert said == f"The arm is drawn by its capsules: for the vendor's surfaces, run {extras.command('meshes')}"
 
 
 def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model: RobotModel) -> None:
-    pytest.importorskip("collada", reason="the vendor's surfaces need the extra 'meshes'")
+    skip_without("meshes")
     found, said = vendor_surfaces(panda_model)
     assert said == ""
     for link in np.unique(panda_model.capsules.link):

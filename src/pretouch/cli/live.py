@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, cast
 from pretouch.cli.commands import Live
 from pretouch.cli.ending import ended
 from pretouch.errors import HardwareError, ParameterError
+from pretouch.extras import need
 from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.params import profile as find_profile
-from pretouch.viewer.server import ServeOptions, check_extra, check_port
+from pretouch.viewer.server import ServeOptions, check_port
 from pretouch.viewer.settings import LiveSettings, PathName
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 def live(command: Live) -> None:
     """Serve the page until interrupted."""
     options = ServeOptions(command.host, command.port)
-    check_extra()
+    need("viewer", "The page")
     check_port(options)  # before the seconds that the simulation takes to begin
     if command.path not in ("circle", "line"):
         raise ParameterError(f"The path is {command.path!r}: choose circle or line.")

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from pretouch.cli.detect import axes_shown
 from pretouch.cli.ending import ended
+from pretouch.extras import need
 from pretouch.params import profile as find_profile
 from pretouch.recording import recover as recovering
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
@@ -35,9 +36,9 @@ def replay(
     console = Console(highlight=False, soft_wrap=True)
     other = find_profile(profile) if profile else None
     if page and not verify:  # what keeps it from being shown is said before the work for it
-        from pretouch.viewer.server import ServeOptions, check_extra, check_port
+        from pretouch.viewer.server import ServeOptions, check_port
 
-        check_extra()
+        need("viewer", "The page")
         check_port(ServeOptions(host, port))
     recorded = open_recording(place)
     if recorded.said:

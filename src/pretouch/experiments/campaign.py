@@ -15,6 +15,7 @@ from pretouch.errors import ExperimentError, SkinError
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.placement import placement_for
 from pretouch.experiments.registry import EXPERIMENTS
+from pretouch.experiments.result_key import parameters_digest, result_key
 from pretouch.experiments.results_file import failure_said, write_json
 from pretouch.experiments.workers import interrupt_held_back, workers
 from pretouch.params import Orientation, RestrictionMode, profile
@@ -126,8 +127,8 @@ def open_folder(request: Request, out: Path) -> None:
     wanted = json.loads(json.dumps({"version": __version__, **asdict(request), "sha256": _fingerprints(request)}))
     about = out / "run.json"
     try:
-        for part in ("trials", "recordings"):
-            (out / part).mkdir(parents=True, exist_ok=True)
+        for folder in {out / "recordings", *(trial_file(out, *task).parent for task in request.tasks())}:
+            folder.mkdir(parents=True, exist_ok=True)
         if about.exists():
             _check_same(_object(about), wanted, out)
         else:
@@ -150,8 +151,7 @@ def _fingerprints(request: Request) -> dict[str, str]:
     if request.arm:
         digests["the arm's files have"] = sha256(_arm_files(request.arm)).hexdigest()
     for name in dict.fromkeys(cell.profile for cell, _ in request.tasks()):
-        parameters = json.dumps(asdict(profile(name)), sort_keys=True, default=repr)
-        digests[f"the parameters of profile {name} have"] = sha256(parameters.encode()).hexdigest()
+        digests[f"the parameters of profile {name} have"] = parameters_digest(profile(name))
     return digests
 
 
@@ -238,8 +238,9 @@ def run_campaign(request: Request, out: Path, progress: Callable[[float], None])
 
 
 def trial_file(out: Path, cell: Cell, seed: int) -> Path:
-    """Return where a trial's row of results is kept."""
-    return out / "trials" / f"{cell.name}_{seed:04d}.json"
+    """Return where a trial's row of results is kept: elsewhere as soon as what plays the trial is another."""
+    key = result_key(EXPERIMENTS[cell.experiment].trial)
+    return out / "trials" / f"{cell.experiment}-{key}" / f"{cell.name}_{seed:04d}.json"
 
 
 def recording_file(out: Path, cell: Cell, seed: int) -> Path:
@@ -271,6 +272,7 @@ def _work(request: Request, out: Path, cell: Cell, seed: int) -> None:
     """Run one trial in a worker process and keep its results, and its recording if it is wanted."""
     experiment, context = EXPERIMENTS[cell.experiment], _context(request)
     place = recording_file(out, cell, seed)
+    place.unlink(missing_ok=True)  # of another program, or of a trial whose row was damaged
     unfinished = place.with_suffix(".unfinished")
     if request.record == "all" or (seed == 0 and experiment.recorded):
         unfinished.unlink(missing_ok=True)

@@ -2,13 +2,13 @@
 
 import warnings
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from pretouch.errors import RobotModelError
+from pretouch.extras import need
 from pretouch.types import FloatArray, IntArray
 
 _SCHEMES = ("package://", "model://")
@@ -165,10 +165,7 @@ def _obj(data: bytes) -> Surface:
 
 
 def _collada(path: Path) -> Surface:
-    if not (find_spec("trimesh") and find_spec("collada")):
-        raise RobotModelError(
-            f"The mesh {path} is a COLLADA file: pip install 'pretouch[viewer,meshes]' to read it, or give STL."
-        )
+    need("meshes", f"The mesh {path}, a COLLADA file,")
     import trimesh
 
     try:

@@ -5,17 +5,23 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-import pretouch
-from pretouch.compiled import digest
+from pretouch import __version__
+from pretouch.controller import Controller
+from pretouch.source_digest import source_digest
 
 _LIBRARIES = ("numpy", "numba", "mujoco-core", "daqp", "scipy")
 
 
 @cache
+def libraries() -> dict[str, str]:
+    """Return the versions of the libraries whose numbers a result rests on."""
+    return {name: version(name) for name in _LIBRARIES}
+
+
+@cache
 def versions() -> dict[str, str]:
     """Return what a recomputation to the bit rests on: program, its source, libraries, machine."""
-    found = {"pretouch": pretouch.__version__, "source": digest(Path(pretouch.__file__).parent)}
-    found |= {name: version(name) for name in _LIBRARIES}
+    found = {"pretouch": __version__, "source": source_digest(Controller)[:12], **libraries()}
     return found | {"python": platform.python_version(), "system": platform.system(), "machine": _machine()}
 
 

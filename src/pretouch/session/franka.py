@@ -1,6 +1,6 @@
 """A Franka arm as a session's, and by what its confirmed force sign is remembered."""
 
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.arm import FrankaArm
@@ -17,10 +17,7 @@ _LIBRARIES: dict[Kind, str] = {"panda": "panda-python", "fr3": "pylibfranka"}
 def identity(kind: Kind, address: str) -> Identity:
     """Return what a robot at an address is known by: another library asks for the guided pushes again."""
     library = _LIBRARIES[kind]
-    try:
-        return Identity(kind, address, f"{library} {version(library)}")
-    except PackageNotFoundError:
-        raise RobotError("Franka arms need the extra 'franka': pip install 'pretouch[franka]'") from None
+    return Identity(kind, address, f"{library} {version(library)}")
 
 
 class FrankaSessionArm:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pretouch.errors import ViewerError
+from pretouch.extras import need
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -36,7 +37,7 @@ def url_of(options: ServeOptions) -> str:
 @contextmanager
 def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
     """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
-    check_extra()
+    need("viewer", "The page")
     check_port(options)
     import viser
 
@@ -48,14 +49,6 @@ def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
             yield server
         finally:
             server.stop()
-
-
-def check_extra() -> None:
-    """Refuse to go on without the extra, saying how to install it."""
-    try:
-        import viser  # noqa: F401
-    except ImportError as error:
-        raise ViewerError("The page needs the extra 'viewer': pip install 'pretouch[viewer]'") from error
 
 
 def check_port(options: ServeOptions) -> None:

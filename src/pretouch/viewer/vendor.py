@@ -1,12 +1,12 @@
 """The vendor's surfaces of an arm, made coarse enough for a page; from the extra `meshes`, if it is installed."""
 
 from importlib.metadata import PackageNotFoundError, files
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pretouch.extras import command, missing
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
 from pretouch.viewer.surface import Mesh, normals_of
@@ -20,22 +20,16 @@ _EDGE_M = 0.015
 _FINGER_HEIGHT_M = 0.0584
 """Height of a finger's frame over the hand's (the vendor's URDF)."""
 
-MISSING = "The arm is drawn by its capsules: for the vendor's surfaces, pip install 'pretouch[meshes]'."
-
 
 def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
     """Surfaces by link index, link frame, and a sentence: none and why, or all and ''."""
     if model.description.name != "panda":
         return {}, f"The arm is drawn by its capsules: there are no surfaces for {model.description.name}."
     folder = _folder()
-    if folder is None:
-        return {}, MISSING
-    try:
-        import trimesh
-    except ImportError:
-        return {}, MISSING
-    if find_spec("collada") is None:  # by which trimesh reads the files
-        return {}, MISSING
+    if folder is None or missing("meshes"):
+        return {}, f"The arm is drawn by its capsules: for the vendor's surfaces, run {command('meshes')}"
+
+    import trimesh
 
     divided: Any = trimesh.remesh.subdivide_to_size
 

@@ -6,10 +6,9 @@ import pytest
 
 from pretouch.errors import ExperimentError
 from pretouch.experiments.bench.documents import begin_mark, end_mark, markdown, put
-from pretouch.experiments.bench.store import Task, fingerprint, missing, open_bench, read_rows, run_tasks, write_arrays
+from pretouch.experiments.bench.store import Task, missing, open_bench, read_rows, run_tasks, write_arrays
 from pretouch.experiments.results_file import write_json
 from pretouch.experiments.tables import TextTable
-from pretouch.params import profile
 
 
 def squared(number, file):
@@ -58,12 +57,6 @@ def test_a_damaged_row_is_named(tmp_path):
     task.file.write_text("{")
     with pytest.raises(ExperimentError, match=r"0\.json is damaged .* delete it and run again"):
         read_rows([task])
-
-
-def test_another_parameter_has_another_fingerprint():
-    assert fingerprint(profile("paper"), "contact") == fingerprint(profile("paper"), "contact")
-    assert fingerprint(profile("paper"), "contact") != fingerprint(profile("blind"), "contact")
-    assert fingerprint(profile("paper"), "contact") != fingerprint(profile("paper"), "controller.py")
 
 
 def test_only_what_is_between_the_markers_of_a_document_is_replaced(tmp_path):

@@ -126,7 +126,7 @@ def test_a_cell_that_fails_is_written_down_stops_no_other_and_is_tried_again(tmp
 
 def test_a_worker_of_another_version_is_refused(tmp_path):
     run = opened_ishigami(tmp_path, samples=2)
-    text = run.jobs[0].written().replace(work.code(), "0" * 12)
+    text = run.jobs[0].written().replace(work.code("ishigami"), "0" * 12)
     ((_, result),) = Store(tmp_path, ISHIGAMI).answered(run.jobs[0], work.work(text))
     assert "another version of pretouch" in result.reason
 

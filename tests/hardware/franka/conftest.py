@@ -1,5 +1,4 @@
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -7,9 +6,9 @@ import pytest
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from tests.hardware.franka.served import Served
+from tests.needs import modules_with
 
-# without the extra `franka` there is nothing to test
-collect_ignore_glob = ["test_*.py"] if None in map(find_spec, ("panda_py", "pylibfranka", "ruckig")) else []
+pytest_pycollect_makemodule = modules_with("franka")
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from pretouch.errors import RobotError
+from pretouch.errors import MissingExtraError, RobotError
 from pretouch.hardware.franka import arm, client, sentences
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.client import connect, reachable
@@ -62,7 +62,7 @@ def test_the_sentence_comes_from_the_process_too(panda_model: RobotModel) -> Non
 @pytest.mark.parametrize(("kind", "library"), [("panda", "panda_py"), ("fr3", "pylibfranka")])
 def test_a_missing_library_names_the_extra(monkeypatch: pytest.MonkeyPatch, kind: client.Kind, library: str) -> None:
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(RobotError, match=re.escape("pip install 'pretouch[franka]'")):
+    with pytest.raises(MissingExtraError, match=f"needs {library} of the extra 'franka'"):
         connect("127.0.99.99", kind)
 
 

@@ -2,11 +2,17 @@
 
 import socket
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 
-from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import NodeParams
+from tests.needs import modules_with
+
+if TYPE_CHECKING:
+    from pretouch.hardware.ros2.node import Ros2Node
+
+pytest_pycollect_makemodule = modules_with("ros2")
 
 # beyond 101 its ports are those that the system gives to anybody
 _DOMAINS = range(20, 101)
@@ -27,12 +33,16 @@ def domain() -> Iterator[int]:
 
 
 @pytest.fixture
-def node(domain: int) -> Iterator[Ros2Node]:
+def node(domain: int) -> "Iterator[Ros2Node]":
+    from pretouch.hardware.ros2.node import Ros2Node
+
     with Ros2Node(NodeParams(domain=domain)) as made:
         yield made
 
 
 @pytest.fixture
-def other(domain: int) -> Iterator[Ros2Node]:
+def other(domain: int) -> "Iterator[Ros2Node]":
+    from pretouch.hardware.ros2.node import Ros2Node
+
     with Ros2Node(NodeParams(domain=domain)) as made:
         yield made

@@ -17,6 +17,7 @@ import pytest
 from pretouch.hardware.ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import Distribution, NodeParams
+from tests.needs import skip_for
 
 HERE = Path(__file__).parent
 LAYOUTS = {
@@ -51,7 +52,7 @@ def fast_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The peer, compiled once for all processes of a test run."""
     compiler = shutil.which("g++")
     if compiler is None or not Path("/usr/include/fastdds/dds/domain/DomainParticipant.hpp").exists():
-        pytest.skip("needs g++ and libfastrtps-dev")
+        skip_for("apt-get install g++ libfastrtps-dev libfastcdr-dev")
     source = HERE / "fast_peer.cpp"
     own = tmp_path_factory.getbasetemp()
     folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "fast_dds"

@@ -5,7 +5,6 @@ from collections.abc import Callable
 import pytest
 
 from pretouch.errors import ParameterError, RobotError
-from pretouch.hardware.ros2 import extra
 from pretouch.hardware.ros2.network import check_range, domain_of
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, NodeParams, OutputParams, SkinParams
@@ -107,10 +106,3 @@ def test_two_nodes_of_a_program_share_a_domain_and_so_its_network(domain: int) -
             Ros2Node(NodeParams(domain=domain, interface="eth0"))
         with Ros2Node(NodeParams(domain=domain)):
             pass
-
-
-def test_a_missing_extra_names_the_way_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    extra.check_extra()
-    monkeypatch.setattr(extra, "find_spec", lambda name: None)
-    with pytest.raises(RobotError, match=r"pip install 'pretouch\[ros2\]'"):
-        extra.check_extra()

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.needs import skip_for
 
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
@@ -67,7 +68,7 @@ class Served:
         """Have a vendor's client do something (see `vendor_client.py`)."""
         name = "panda_py" if (kind or self.arm.kind) == "panda" else "pylibfranka"
         if find_spec(name) is None:
-            pytest.skip(f"{name} is not installed")
+            skip_for("make franka")
         command = [sys.executable, str(_VENDOR), kind or self.arm.kind, self.host, what, *map(str, values)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
         assert done.returncode == 0, done.stderr

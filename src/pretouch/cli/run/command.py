@@ -12,7 +12,7 @@ from pretouch.cli.run.moving import Way, moved
 from pretouch.cli.run.opened import Opened
 from pretouch.cli.run.options import Run, check_options
 from pretouch.cli.run.parts import Parts, parts
-from pretouch.cli.run.robots import opened
+from pretouch.cli.run.robots import need_extra, opened
 from pretouch.cli.writing import check_writable
 from pretouch.errors import RecordingError, RobotError
 from pretouch.loop import MonotonicClock
@@ -38,6 +38,7 @@ def run(command: Run) -> int:
     if command.record:
         _check_free(Path(command.record))
     made = parts(command)
+    need_extra(command)
     if command.robot.lockstep:
         from pretouch.cli.run.lockstep import run_lockstep
 

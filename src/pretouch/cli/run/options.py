@@ -1,6 +1,8 @@
 """What can be said after `pretouch run`, and which of it goes together."""
 
+import socket
 from dataclasses import dataclass, field
+from ipaddress import ip_address
 from typing import Annotated, Literal
 
 import tyro
@@ -149,6 +151,25 @@ def check_options(command: Run) -> None:
         raise ParameterError(f"--seconds is {command.task.seconds:g}: give 0 or more.")
     if command.seed < 0:
         raise ParameterError(f"The seed is {command.seed}: it must be at least 0.")
+    if robot.lockstep:
+        _check_lockstep(command)
+
+
+def _check_lockstep(command: Run) -> None:
+    """Raise an error for an arm that may be a real one, which would wait for nobody, and what lockstep does not do."""
+    try:
+        here = ip_address(socket.gethostbyname(command.robot.ip)).is_loopback
+    except (OSError, UnicodeError):
+        here = False
+    if not here:
+        raise RobotError(
+            f"--lockstep is for a simulated arm on this machine, as 127.0.0.1, and the arm is at {command.robot.ip}:"
+            " leave it out."
+        )
+    if not command.task.seconds:
+        raise RobotError("A run in lockstep needs --seconds: robot time passes as fast as this machine can.")
+    if command.task.approach or command.robot.confirm_push or command.robot.recover:
+        raise RobotError("--approach, --confirm-push and --recover do not go with --lockstep: leave them out.")
 
 
 _ONLY = {

@@ -6,9 +6,20 @@ from contextlib import contextmanager
 from pretouch.cli.run.opened import Opened, network_units
 from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
+from pretouch.extras import need
 from pretouch.hardware.address import HOST
+from pretouch.hardware.franka.client import need_library
 from pretouch.robot.model import RobotModel
 from pretouch.session.session import NoUnits
+
+
+def need_extra(command: Run) -> None:
+    """Refuse an arm whose libraries are not installed, before anything imports them."""
+    match command.robot.robot:
+        case "franka":
+            need_library(command.robot.arm)
+        case "ros2":
+            need("ros2", "An arm on ROS 2")
 
 
 @contextmanager

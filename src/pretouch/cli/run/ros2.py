@@ -8,7 +8,6 @@ from pretouch.cli.run.opened import Opened
 from pretouch.cli.run.options import RobotOptions, Run
 from pretouch.cli.run.parts import Parts
 from pretouch.errors import HardwareError
-from pretouch.hardware.ros2.extra import check_extra
 from pretouch.hardware.ros2.params import ArmParams, Frame, NodeParams, OutputParams, Sign, SkinParams
 
 _PATIENCE_S = 10.0
@@ -17,7 +16,6 @@ _PATIENCE_S = 10.0
 @contextmanager
 def ros2(command: Run, parts: Parts) -> Iterator[Opened]:
     """Join the others on ROS 2, hear arm and units, and publish each control step."""
-    check_extra()
     from pretouch.hardware.ros2.node import Ros2Node
     from pretouch.hardware.ros2.output import Ros2Output
     from pretouch.hardware.ros2.robot import Ros2Robot

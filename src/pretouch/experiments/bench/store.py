@@ -4,10 +4,7 @@ import json
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import as_completed
-from dataclasses import asdict, dataclass
-from functools import cache
-from hashlib import sha256
-from importlib.resources import files
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +15,6 @@ from pretouch.errors import ExperimentError
 from pretouch.experiments.bench.scenario_files import checksums
 from pretouch.experiments.results_file import failure_said, write_json
 from pretouch.experiments.workers import interrupt_held_back, workers
-from pretouch.params import Profile
 from pretouch.types import FloatArray
 
 Row = dict[str, Any]
@@ -120,17 +116,3 @@ def read_rows(tasks: Iterable[Task]) -> list[Row]:
         except ValueError as error:
             raise ExperimentError(f"The file {task.file} is damaged ({error}): delete it and run again.") from error
     return rows
-
-
-def fingerprint(profile: Profile, *parts: str) -> str:
-    """Digest of a profile's parameters and of the code of some parts of the package: another, and results differ."""
-    parameters = json.dumps(asdict(profile), sort_keys=True, default=repr).encode()
-    return sha256(parameters + b"".join(_code(part) for part in parts)).hexdigest()[:12]
-
-
-@cache
-def _code(part: str) -> bytes:
-    """Digest of a module or all modules of a package inside this one."""
-    place = Path(str(files("pretouch"))) / part
-    modules = [place] if place.is_file() else sorted(place.rglob("*.py"))
-    return sha256(b"".join(module.read_bytes() for module in modules)).digest()

@@ -111,12 +111,8 @@ class _Watch:
 @contextmanager
 def _client(address: str) -> "Iterator[Client]":
     """Connect to a scheduler for as long as the context lasts."""
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise ExperimentError(
-            "A cluster needs the package distributed: pip install 'pretouch[sweep]', or leave --scheduler out."
-        ) from error
+    from distributed import Client
+
     client: Any = None
     try:
         client = Client(address, timeout=CONNECT_S, set_as_default=False)

@@ -23,8 +23,8 @@ def written(run: Run) -> dict[str, Any]:
     found = indices(run)
     played = [r for cell in {c.key: c for c in run.cells}.values() if (r := run.results.get(cell.key))]
     about = {
-        "version": __version__, "code": code(), "sweep": run.sweep.described(), "points": len(run.points),
-        "cells": len({cell.key for cell in run.cells}), "failed": len(run.failed),
+        "version": __version__, "code": code(run.sweep.experiment), "sweep": run.sweep.described(),
+        "points": len(run.points), "cells": len({cell.key for cell in run.cells}), "failed": len(run.failed),
         "processor_s": round(sum(r.seconds for r in played), 1), "metrics": found,
     }  # fmt: skip
     write_table(run, run.folder / "results.parquet")

@@ -45,7 +45,7 @@ def write_table(run: Run, path: Path) -> None:
     columns["status"] = [("ok" if r.metrics is not None else "failed") if r else "missing" for r in results]
     columns["reason"] = [r.reason if r else "" for r in results]
     types = dict.fromkeys(run.sweep.measure.metrics, pa.float64()) | {"seconds": pa.float64()}
-    about = json.dumps({"version": __version__, "code": code(), "sweep": run.sweep.described()})
+    about = json.dumps({"version": __version__, "code": code(run.sweep.experiment), "sweep": run.sweep.described()})
     arrays = {name: pa.array(values, types.get(name)) for name, values in columns.items()}
     table = pa.table(arrays).replace_schema_metadata({"pretouch": about})
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")

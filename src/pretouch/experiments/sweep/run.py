@@ -9,10 +9,10 @@ from pretouch.experiments.results_file import write_json
 from pretouch.experiments.sweep.cluster import run_on_cluster
 from pretouch.experiments.sweep.definition import Sweep
 from pretouch.experiments.sweep.design import Point, points
-from pretouch.experiments.sweep.extra import check_extra
 from pretouch.experiments.sweep.local import run_local
 from pretouch.experiments.sweep.store import Damaged, Result, Store, unwritable
 from pretouch.experiments.sweep.work import Cell, Job, cell_of, jobs_of
+from pretouch.extras import need
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Run:
 
 def opened(sweep: Sweep, out: Path) -> Run:
     """Take a sweep up in a folder, with what was played before; a damaged file is told and its cell played again."""
-    check_extra()
+    need("sweep", "A sweep")
     chosen = points(sweep)
     run = Run(sweep, out / sweep.name, chosen, [cell_of(sweep, point) for point in chosen])
     store = _store(run)
@@ -111,7 +111,6 @@ def play(run: Run, where: Where, progress: Callable[[float], None]) -> None:
         progress(job.cost_s)
 
     if where.scheduler:
-        check_extra(cluster=True)
         run_on_cluster(where.scheduler, jobs, done, lost)
     else:
         run_local(jobs, where.processes or os.cpu_count() or 1, done, lost)

@@ -3,39 +3,26 @@
 import json
 import time
 from dataclasses import dataclass
-from functools import cache
 from hashlib import sha256
 from threading import Lock
 from typing import Any
 
-from pretouch import __version__
 from pretouch.checks import Checked
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.experiments.bench.store import fingerprint
+from pretouch.experiments.result_key import result_key
 from pretouch.experiments.sweep.definition import Sweep
 from pretouch.experiments.sweep.design import Point
 from pretouch.experiments.sweep.registry import measure
 from pretouch.experiments.sweep.setting import Setting, Values, built, world_digest
-from pretouch.params import Profile
 
-_PARTS = (
-    "checks.py", "compiled.py", "contact", "control", "controller.py", "events.py", "faults.py", "loop.py", "modes.py",
-    "params", "perception", "robot", "sensing", "sim", "types.py", "experiments/avoidance.py", "experiments/cell.py",
-    "experiments/dynamic.py", "experiments/metrics.py", "experiments/pushes.py", "experiments/static.py",
-    "experiments/trial.py", "experiments/placement.py", "experiments/claims/free_run.py",
-    "experiments/bench/dense_skin.py", "experiments/bench/detection", "experiments/bench/scenario_files.py",
-    "experiments/sweep/measures.py", "experiments/sweep/setting.py", "experiments/sweep/streams.py",
-    "experiments/sweep/trying.py",
-)  # fmt: skip
-"""Parts of the package that decide what is measured."""
 _ONE_AT_A_TIME = Lock()
 """Threads of a cluster's worker share the models that MuJoCo computes in."""
 
 
-@cache
-def code() -> str:
-    """Digest of the version and the code that decide what is measured."""
-    return sha256(f"{__version__} {fingerprint(Profile(), *_PARTS)}".encode()).hexdigest()[:12]
+def code(experiment: str) -> str:
+    """Return the key of what decides the numbers of an experiment, its parameters aside."""
+    what = measure(experiment)
+    return result_key(what.run, *([what.shared] if what.shared else []), built)
 
 
 @dataclass(frozen=True)
@@ -68,13 +55,14 @@ class Job:
     def written(self) -> str:
         """Return what a worker is handed."""
         cells = [{"key": cell.key, "values": cell.values, "seed": cell.seed} for cell in self.cells]
-        return json.dumps({"experiment": self.experiment, "profile": self.profile, "code": code(), "cells": cells})
+        about = {"experiment": self.experiment, "profile": self.profile, "code": code(self.experiment)}
+        return json.dumps({**about, "cells": cells})
 
 
 def cell_of(sweep: Sweep, point: Point) -> Cell:
     """Return a design point as a cell to play."""
     values = dict(sorted((sweep.fixed | point.values).items()))
-    whole = [sweep.experiment, sweep.profile, code(), values, point.seed, world_digest(values)]
+    whole = [sweep.experiment, sweep.profile, code(sweep.experiment), values, point.seed, world_digest(values)]
     key = sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()[:24]
     return Cell(key, values, point.seed, sweep.measure.cost_s(sweep.setting(point.values, point.seed)))
 
@@ -97,8 +85,12 @@ def jobs_of(sweep: Sweep, wanted: list[Cell]) -> list[Job]:
 def work(text: str) -> str:
     """Play the cells of a job; what fails is told with its reason, and stops no other."""
     job = json.loads(text)
-    if job["code"] != code():
-        reason = f"The worker has another version of pretouch ({code()}, not {job['code']}): install the same there."
+    here = code(job["experiment"])
+    if job["code"] != here:
+        reason = (
+            f"The worker has another version of pretouch or of a library ({here}, not {job['code']}): install the same"
+            " there."
+        )
         return json.dumps([{"key": cell["key"], "reason": reason, "seconds": 0.0} for cell in job["cells"]])
     with _ONE_AT_A_TIME:
         return json.dumps(_play(job), allow_nan=False)

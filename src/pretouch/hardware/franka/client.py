@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, Protocol, Self
 
 from pretouch.errors import RobotError
+from pretouch.extras import need
 from pretouch.hardware.franka.collision import CollisionBehavior
 from pretouch.hardware.franka.only_one import OnlyOne
 from pretouch.hardware.franka.state import FrankaState
@@ -22,8 +23,8 @@ PORT = 1337
 ANSWER_S = 3.0
 """Longest wait for the arm to take a connection [s]."""
 _REALTIME_KERNEL = Path("/sys/kernel/realtime")
-_LIBRARIES = {"panda": ("panda_py", "panda"), "fr3": ("pylibfranka", "fr3")}
-"""The vendor's library for each arm, and our module that speaks with it. They cannot share a process."""
+_LIBRARIES = {"panda": "panda_py", "fr3": "pylibfranka"}
+"""The vendor's library for each arm; our module of the arm's name speaks with it. They cannot share a process."""
 
 
 class Client(Protocol):
@@ -75,6 +76,11 @@ class Client(Protocol):
         ...
 
 
+def need_library(kind: Kind) -> None:
+    """Refuse to go on without the vendor's library for an arm, or what our own part needs: a MissingExtraError."""
+    need("franka", "A Franka arm", _LIBRARIES[kind], "ruckig")
+
+
 def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
     """Connect to an arm; what stands in the way is a RobotError.
 
@@ -86,11 +92,7 @@ def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
         kind: which arm it is.
         real_time: whether to refuse a kernel without real-time capabilities, as the vendor's libraries do.
     """
-    library, module = _LIBRARIES[kind]
-    try:
-        import_module(library)
-    except ImportError as error:
-        raise RobotError("Franka arms need the extra 'franka': pip install 'pretouch[franka]'") from error
+    need_library(kind)
     if real_time and not has_real_time_kernel():
         raise RobotError(
             "The kernel of this machine has no real-time capabilities: boot one with PREEMPT_RT, or connect without"
@@ -98,7 +100,7 @@ def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
         )
     lock = OnlyOne(reachable(address))
     try:
-        opened: Client = import_module(f"pretouch.hardware.franka.{module}").open_client(address, real_time, lock)
+        opened: Client = import_module(f"pretouch.hardware.franka.{kind}").open_client(address, real_time, lock)
     except BaseException:
         lock.release()
         raise

@@ -23,14 +23,10 @@ _BY_ASKING = (
 """The loopback has no multicast: each of 33 participants is asked by itself, as rmw_cyclonedds does."""
 
 
-class _Domain(Domain):
-    """A domain of this process, with what it was made with."""
-
-    xml = ""
-
-
-_DOMAINS: WeakValueDictionary[int, _Domain] = WeakValueDictionary()
+_DOMAINS: WeakValueDictionary[int, Domain] = WeakValueDictionary()
 """DDS has one network a domain and process: nodes share it."""
+_MADE_WITH: dict[int, str] = {}
+"""The configuration that the domain of a number was last made with."""
 
 
 def domain_of(params: NodeParams, environment: Mapping[str, str] = os.environ) -> int:
@@ -84,9 +80,8 @@ def _configuration(interface: str) -> str:
 def _domain(number: int, xml: str) -> Domain:
     domain = _DOMAINS.get(number)
     if domain is None:
-        domain = _Domain(number, xml)
-        domain.xml = xml
-        _DOMAINS[number] = domain
-    if domain.xml != xml:
+        domain = Domain(number, xml)
+        _DOMAINS[number], _MADE_WITH[number] = domain, xml
+    if _MADE_WITH[number] != xml:
         raise RobotError(f"Domain {number} is in use by this program with another interface: use one for both.")
     return domain

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -12,20 +12,12 @@ from pretouch.experiments.bench.avoidance.contenders import ABLATED, ABLATED_IN,
 from pretouch.experiments.bench.avoidance.scenario import Scenario, scenarios
 from pretouch.experiments.bench.avoidance.trial import keep_trial
 from pretouch.experiments.bench.scenario_files import SeedRange
-from pretouch.experiments.bench.store import Row, Task, fingerprint, open_bench, read_rows, run_tasks
+from pretouch.experiments.bench.store import Row, Task, open_bench, read_rows, run_tasks
+from pretouch.experiments.result_key import result_key
 from pretouch.experiments.worlds import told
 from pretouch.params import profile
 
 NAME = "avoidance"
-_PARTS = (
-    "controller.py", "control", "perception", "contact", "params", "sim", "robot", "modes.py", "faults.py",
-    "experiments/trial.py", "experiments/static.py", "experiments/pushes.py",
-    *(
-        f"experiments/bench/avoidance/{module}.py"
-        for module in ("livelock", "measures", "obstacle", "scenario", "setting", "trial", "truth")
-    ),
-)  # fmt: skip
-"""Code whose change makes other results, so that a contender's trials are played again."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +68,7 @@ def _task(out: Path, scene: Scenario, contender: str, seed: int, world: str) -> 
     text = profile_text(contender)
     digest = sha256(f"{contender} {scene.name}".encode()).hexdigest()[:6]
     plain = re.sub(r"[^A-Za-z0-9.-]+", "-", f"{scene.name}_{contender}")[:60]
-    file = out / "trials" / f"{plain}_{digest}_{_code(text)}_{seed:04d}.json"
+    file = out / "trials" / f"{plain}_{digest}_{_key(text)}_{seed:04d}.json"
     return Task(file, partial(keep_trial, scene.name, contender, seed, world), _cost(scene, contender))
 
 
@@ -91,14 +83,10 @@ _COST = 0.15
 _SOON = ("blind", "pretouch", *ABLATED)
 
 
-_codes: dict[str, str] = {}
-
-
-def _code(text: str) -> str:
-    """Digest of a contender's parameters and of the code that plays it."""
-    if text not in _codes:
-        _codes[text] = fingerprint(profile(text), *_PARTS)
-    return _codes[text]
+@cache
+def _key(text: str) -> str:
+    """Return the key of the trials of a profile."""
+    return result_key(keep_trial, profile=profile(text))
 
 
 def open_run(request: Request, out: Path) -> None:

@@ -12,21 +12,14 @@ from pretouch.experiments.bench.detection.free import FreeCell, free_cells, reco
 from pretouch.experiments.bench.detection.judge import judge_contacts, judge_free
 from pretouch.experiments.bench.detection.stream import PROFILE
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario
-from pretouch.experiments.bench.store import Row, Task, fingerprint, open_bench, read_rows, run_tasks
+from pretouch.experiments.bench.store import Row, Task, open_bench, read_rows, run_tasks
+from pretouch.experiments.result_key import result_key
 from pretouch.experiments.worlds import told
 from pretouch.params import profile
 
 NAME = "detection"
-_HERE = "experiments/bench/detection"
-_RECORDED_BY = (
-    "control", "perception", "sensing", "sim", "robot", "contact/observer.py",
-    *(f"{_HERE}/{module}.py" for module in ("arm", "contacts", "free", "stream")),
-)  # fmt: skip
-"""Parts of the package that decide what a stream holds."""
-_JUDGED_BY = (*_RECORDED_BY, "contact", *(f"{_HERE}/{module}.py" for module in ("judge", "replay", "first_motion")))
-"""Parts that decide what a detector makes of a stream."""
-_MOVED_BY = (*_RECORDED_BY, "contact", "controller.py", "modes.py", "experiments/static.py", f"{_HERE}/boards.py")
-"""Parts that decide what happens in the closed loop."""
+_RECORD: dict[str, Callable[..., None]] = {"free": record_free, "contacts": record_contacts}
+"""What records the streams of a family."""
 _CONTACT_S = 3.5
 """Time a contact takes with the gap after it, about [s]."""
 _RECORDING_COST = {"free": 0.085, "contacts": 0.11}
@@ -67,7 +60,7 @@ class Bench:
         """Return the replays on streams of free motion."""
         return [
             Task(
-                self._row("free", cell.name, contender, _JUDGED_BY),
+                self._row("free", cell.name, contender, record_free, judge_free),
                 partial(judge_free, cell, contender, self._stream(cell)),
                 _replay_cost(contender) * _free_s(cell),
             )
@@ -79,7 +72,7 @@ class Bench:
         """Return the replays on streams with contacts."""
         return [
             Task(
-                self._row("contacts", cell.name, contender, _JUDGED_BY),
+                self._row("contacts", cell.name, contender, record_contacts, judge_contacts),
                 partial(judge_contacts, cell, contender, self._stream(cell)),
                 _replay_cost(contender) * _contacts_s(cell),
             )
@@ -90,7 +83,7 @@ class Bench:
     def boards(self) -> list[Task]:
         """Return the trials in the closed loop."""
         return [
-            Task(self._row("boards", cell.name, contender, _MOVED_BY), partial(meet_board, cell, contender), COST_S)
+            Task(self._row("boards", cell.name, contender, meet_board), partial(meet_board, cell, contender), COST_S)
             for cell in self._boards()
             for contender in CONTENDERS
         ]
@@ -120,13 +113,13 @@ class Bench:
 
     def _stream(self, cell: FreeCell | ContactCell) -> Path:
         family = "free" if isinstance(cell, FreeCell) else "contacts"
-        made_by = fingerprint(profile(PROFILE), *_RECORDED_BY)
+        made_by = result_key(_RECORD[family], profile=profile(PROFILE))
         return self.out / f"streams-{made_by}" / f"{family}_{cell.name}.npz"
 
-    def _row(self, family: str, cell: str, contender: Contender, parts: tuple[str, ...]) -> Path:
+    def _row(self, family: str, cell: str, contender: Contender, *made_by: Callable[..., None]) -> Path:
         """Where a row is kept: elsewhere as soon as the detector, or what it is given, is another."""
         name = contender.name.replace(" ", "-")
-        return self.out / family / f"{name}-{fingerprint(contender.profile, *parts)}" / f"{cell}.json"
+        return self.out / family / f"{name}-{result_key(*made_by, profile=contender.profile)}" / f"{cell}.json"
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,11 @@ from pathlib import Path
 from pretouch.experiments.bench.localization.contacts import TouchedCell, duration_s, record_touched, touched_cells
 from pretouch.experiments.bench.localization.judge import PROFILE, WITHOUT, judge_touched
 from pretouch.experiments.bench.scenario_files import SeedRange
-from pretouch.experiments.bench.store import Row, Task, fingerprint, open_bench, read_rows, run_tasks
+from pretouch.experiments.bench.store import Row, Task, open_bench, read_rows, run_tasks
+from pretouch.experiments.result_key import result_key
 from pretouch.params import profile
 
 NAME = "localization"
-_HERE = f"experiments/bench/{NAME}"
-_RECORDED_BY = (
-    "control", "perception", "sensing", "sim", "robot", "contact/observer.py", f"{_HERE}/contacts.py",
-    f"{_HERE}/motion.py", "experiments/bench/detection/contacts.py", "experiments/bench/detection/stream.py",
-)  # fmt: skip
-_JUDGED_BY = (*_RECORDED_BY, "contact", f"{_HERE}/judge.py", f"{_HERE}/limit.py")
 _RECORDING_COST, _REPLAY_COST = 0.075, 0.02
 """Processor time of a second of simulation, and of one replayed [s]."""
 SKINS = {"nominal": "32 units", "seven": "seven", "misplaced": "32 units, misplaced"}
@@ -50,7 +45,7 @@ class Bench:
         for cell in self._cells():
             without = WITHOUT if cell.sensing == "nominal" else ()
             for skin in (SKINS[cell.sensing], *without):
-                made = fingerprint(profile(PROFILE), *_JUDGED_BY)
+                made = result_key(record_touched, judge_touched, profile=profile(PROFILE))
                 file = self.out / f"replays-{made}" / f"{cell.name}_{skin.replace(', ', '-').replace(' ', '-')}.json"
                 work = partial(judge_touched, cell, skin, self._stream(cell))
                 tasks.append(Task(file, work, _REPLAY_COST * duration_s(cell)))
@@ -64,7 +59,7 @@ class Bench:
         return touched_cells(self.seeds, self.quick)
 
     def _stream(self, cell: TouchedCell) -> Path:
-        made_by = fingerprint(profile("paper"), *_RECORDED_BY)
+        made_by = result_key(record_touched, profile=profile("paper"))
         return self.out / f"streams-{made_by}" / f"{cell.name}.npz"
 
 

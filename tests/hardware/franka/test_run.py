@@ -8,7 +8,6 @@ import sys
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
 
@@ -25,11 +24,7 @@ from pretouch.session.franka import identity
 from pretouch.session.remembered import Remembered
 from pretouch.types import Mode
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.alone,
-    pytest.mark.skipif(not (find_spec("panda_py") and find_spec("pylibfranka")), reason="needs the extra franka"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
 _ARMS = {"panda": panda, "fr3": fr3}
 _number = count(1)
 _FOLLOWING = "--no-skin", "--profile", "blind", "--floor", "-0.2", "--yes", "--seconds", "25"
