@@ -72,7 +72,7 @@ def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
 
 def _row(request, out):
     from pretouch.experiments.campaign import trial_file
-    from pretouch.experiments.results_file import write_json
+    from pretouch.whole_file import write_json
 
     cell, seed = request.tasks()[0]
     row = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
@@ -225,7 +225,7 @@ def test_what_bench_cycle_measured_before_it_was_stopped_is_kept(capsys, tmp_pat
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
     from pretouch.cli.writing import check_writable
-    from pretouch.experiments.results_file import write_json
+    from pretouch.whole_file import write_json
 
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -239,7 +239,7 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
 
 
 def test_a_link_is_followed(tmp_path):
-    from pretouch.experiments.results_file import write_json
+    from pretouch.whole_file import write_json
 
     (tmp_path / "link").symlink_to(tmp_path / "real")
     write_json([1], tmp_path / "link")

@@ -23,9 +23,9 @@ from pretouch.experiments.campaign import (
     run_campaign,
     trial_file,
 )
-from pretouch.experiments.results_file import write_json
 from pretouch.params import PROFILES
 from pretouch.sensing.skin import PAPER_SKIN
+from pretouch.whole_file import write_json
 
 SMALL = Request(("static",), seeds=1, profiles=("blind",))
 

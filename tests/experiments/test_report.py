@@ -13,11 +13,11 @@ from pretouch.experiments.campaign import Request, open_folder, recording_file, 
 from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.registry import EXPERIMENTS, summarise
 from pretouch.experiments.report import write_report
-from pretouch.experiments.results_file import write_json
-from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trace import Trace, read_trace, trace_of
 from pretouch.experiments.trial import record_of
 from pretouch.recording.reader import open_recording
+from pretouch.text_table import TextTable
+from pretouch.whole_file import write_json
 
 LINE = ("line", "-y")
 

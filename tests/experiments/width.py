@@ -1,6 +1,6 @@
 """How wide a table is in a terminal."""
 
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 
 def width(table: TextTable) -> int:

@@ -63,7 +63,7 @@ def _report(request: "Request", out: Path, json_file: Path, docs: Path | None) -
     from pretouch.experiments.bench.avoidance.run import rows_of
     from pretouch.experiments.bench.avoidance.summary import results, summarise
     from pretouch.experiments.bench.avoidance.tables import tables
-    from pretouch.experiments.results_file import write_json
+    from pretouch.whole_file import write_json
 
     rows, asked = rows_of(request, out), len(request.tasks(out))
     if not rows:

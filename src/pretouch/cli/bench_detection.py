@@ -31,8 +31,8 @@ def bench_detection(command: Detection) -> None:
     from pretouch.experiments.bench.detection.campaign import NAME, Bench, run_bench
     from pretouch.experiments.bench.detection.published import summary_of
     from pretouch.experiments.bench.documents import DOCUMENT, around
-    from pretouch.experiments.results_file import write_json
     from pretouch.experiments.worlds import sentence
+    from pretouch.whole_file import write_json
 
     out, docs = command.folder("bench-detection"), command.documents
     json_file = Path(command.json) if command.json else out / "results.json"

@@ -32,7 +32,7 @@ def bench_localization(command: Localization) -> None:
     from pretouch.experiments.bench.localization.campaign import NAME, Bench, run_bench
     from pretouch.experiments.bench.localization.published import DOCUMENT, publish
     from pretouch.experiments.bench.localization.results import summary_of, tables_of
-    from pretouch.experiments.results_file import write_json
+    from pretouch.whole_file import write_json
 
     out, docs = command.folder("bench-localization"), command.documents
     json_file = Path(command.json) if command.json else out / "results.json"

@@ -21,7 +21,7 @@ from pretouch.experiments.campaign import (
 )
 from pretouch.experiments.registry import summarise, tables
 from pretouch.experiments.report import write_report
-from pretouch.experiments.results_file import write_json
+from pretouch.whole_file import write_json
 
 
 def run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) -> None:

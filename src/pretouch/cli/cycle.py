@@ -10,9 +10,9 @@ from rich.table import Table
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError
 from pretouch.experiments.cycle import CycleRequest, about, measure
-from pretouch.experiments.results_file import write_json
 from pretouch.experiments.workload import LARGEST_SKIN
 from pretouch.realtime import check_wishes
+from pretouch.whole_file import write_json
 
 Row = dict[str, Any]
 

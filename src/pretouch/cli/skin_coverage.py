@@ -18,13 +18,13 @@ from pretouch.coverage.suggest import Suggestions, suggest
 from pretouch.coverage.ways import Ways
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.experiments.coverage.measuring import Setting, coverage_of
-from pretouch.experiments.results_file import write_json
 from pretouch.importing.folder import SKIN
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
 from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.whole_file import write_json
 
 _FORMATS = (".png", ".pdf", ".svg")
 _SPOTS = 8

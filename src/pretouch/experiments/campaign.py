@@ -15,7 +15,7 @@ from pretouch.errors import ExperimentError, SkinError
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.placement import placement_for
 from pretouch.experiments.registry import EXPERIMENTS
-from pretouch.experiments.results_file import failure_said, write_json
+from pretouch.experiments.results_file import failure_said
 from pretouch.experiments.workers import interrupt_held_back, workers
 from pretouch.params import Orientation, RestrictionMode, profile
 from pretouch.robot.description import panda
@@ -23,6 +23,7 @@ from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
 from pretouch.sim.randomisation import world_set
+from pretouch.whole_file import write_json
 
 Recorded = Literal["first", "all"]
 """Trials to record: those of the first seed of which figures are drawn, or all."""

@@ -12,12 +12,13 @@ from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import cells_of
 from pretouch.experiments.metrics import mean_over, peak, rounded
 from pretouch.experiments.pushes import Holder, Push
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.sim.board import PANDA_SIDE
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Mode
 
 NAME = "clamp"

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pretouch.experiments.cell import Cell, Context, Grid
-from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trace import Trace
 from pretouch.experiments.trial import Record
+from pretouch.text_table import TextTable
 
 if TYPE_CHECKING:  # workers that only play trials need none of it
     from matplotlib.figure import Figure

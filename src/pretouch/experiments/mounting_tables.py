@@ -3,7 +3,8 @@
 from pretouch.experiments.experiment import Row
 from pretouch.experiments.groups import cells_of, grouped
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tables import TextTable, number, with_spread
+from pretouch.experiments.tables import number, with_spread
+from pretouch.text_table import TextTable
 
 NAME = "mounting"
 ROOM = "room"

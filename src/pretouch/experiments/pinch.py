@@ -11,7 +11,7 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import cells_of
 from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.robot.model import RobotModel
@@ -20,6 +20,7 @@ from pretouch.sim.hand import HandGoal
 from pretouch.sim.plant import Plant
 from pretouch.sim.posture import brought_to
 from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Mode
 
 NAME = "pinch"

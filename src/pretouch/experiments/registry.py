@@ -6,7 +6,6 @@ from pretouch.experiments import avoidance, clamp, dynamic, imu, mounting, pinch
 from pretouch.experiments.claims import anticipation, between, detectable, free_motion, noise
 from pretouch.experiments.coverage import study as coverage
 from pretouch.experiments.experiment import Experiment, Row
-from pretouch.experiments.tables import TextTable
 from pretouch.experiments.weaknesses import (
     creeping,
     dropout,
@@ -17,6 +16,7 @@ from pretouch.experiments.weaknesses import (
     tuned,
     views,
 )
+from pretouch.text_table import TextTable
 
 PAPER = (static.EXPERIMENT, avoidance.EXPERIMENT, dynamic.EXPERIMENT)
 CLAIMS = (

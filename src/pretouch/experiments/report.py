@@ -11,9 +11,9 @@ from pretouch.experiments.campaign import Request, recording_file
 from pretouch.experiments.cell import Cell
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.registry import GROUPS
-from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trace import Trace, read_trace
 from pretouch.experiments.worlds import sentence
+from pretouch.text_table import TextTable
 
 _PAGE = Template(
     """<!doctype html>

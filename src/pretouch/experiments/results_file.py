@@ -1,32 +1,11 @@
-"""Files of results: whole or not at all, and what is said where they could not be written."""
+"""What is said where results could not be written."""
 
-import json
-import os
 from collections.abc import Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from pretouch.errors import ExperimentError
-
-
-def write_json(value: Any, path: Path) -> None:
-    """Write a JSON file, whole or not at all; into a device or pipe as it is, never in its place."""
-    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
-    if path.exists() and not path.is_file() and not path.is_dir():
-        path.write_text(text, encoding="utf-8")
-        return
-    path = Path(os.path.realpath(path))
-    name = sha256(os.fsencode(path.name)).hexdigest()[:16]  # as short for a long name
-    temporary = path.with_name(f".{name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 @contextmanager

@@ -1,22 +1,10 @@
 """The summaries of the three experiments as tables, for the terminal and for the page."""
 
-from dataclasses import dataclass
 from typing import Any
 
+from pretouch.text_table import TextTable
+
 Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """A table of finished text."""
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str
-    names: int = 2
-    """How many columns at the left hold names, not numbers."""
-
 
 _STATIC = (
     ("impact_speed_m_s", "impact\n[m/s]", 3),

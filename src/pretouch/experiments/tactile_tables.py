@@ -9,8 +9,8 @@ from pretouch.experiments.experiment import Row
 from pretouch.experiments.groups import grouped
 from pretouch.experiments.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tables import TextTable
 from pretouch.experiments.tactile_kinds import INNER
+from pretouch.text_table import TextTable
 
 
 def summarise(rows: list[Row]) -> Row:

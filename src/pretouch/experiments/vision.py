@@ -16,13 +16,14 @@ from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import cells_of
 from pretouch.experiments.metrics import rounded
 from pretouch.experiments.pushes import Visitor
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.depth_camera import looking
 from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
 
 NAME = "vision"

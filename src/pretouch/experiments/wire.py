@@ -9,11 +9,12 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import cells_of
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import profile
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import network
+from pretouch.text_table import TextTable
 
 NAME = "wire"
 

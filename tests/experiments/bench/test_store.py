@@ -7,9 +7,9 @@ import pytest
 from pretouch.errors import ExperimentError
 from pretouch.experiments.bench.documents import begin_mark, end_mark, markdown, put
 from pretouch.experiments.bench.store import Task, fingerprint, missing, open_bench, read_rows, run_tasks, write_arrays
-from pretouch.experiments.results_file import write_json
-from pretouch.experiments.tables import TextTable
 from pretouch.params import profile
+from pretouch.text_table import TextTable
+from pretouch.whole_file import write_json
 
 
 def squared(number, file):

@@ -14,7 +14,7 @@ from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import CalibrationError
 from pretouch.experiments.calibration.study import study
 from pretouch.experiments.calibration.table import tables
-from pretouch.experiments.results_file import write_json
+from pretouch.whole_file import write_json
 
 
 def study_skins(command: Calibrate) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pretouch.errors import ExperimentError
 from pretouch.experiments.experiment import Picture
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 DOCUMENT = "benchmarks.md"
 """In a folder of documents."""

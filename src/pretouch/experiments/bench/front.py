@@ -3,7 +3,7 @@
 from pretouch.experiments.bench.bounds import short
 from pretouch.experiments.bench.goals import find
 from pretouch.experiments.bench.store import Row
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 _SHOWN = {"blind": "blind", "paper": "paper", "paper-off": "paper", "pretouch": "pretouch"}
 """Contenders of the closed loop, and the detector of each."""

@@ -7,7 +7,7 @@ from pretouch.experiments.bench.ablations import BASE
 from pretouch.experiments.bench.bounds import share_below, short
 from pretouch.experiments.bench.scenario_files import scenario
 from pretouch.experiments.bench.store import Row
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 PEAK_ESTIMATE, TRUE_PEAK, SOONER, SHORTER = 5.0, 4.0, 2.0, 0.3
 """Times the peaks are to be smaller and the first contact sooner; part by which a turn is to be shorter."""

@@ -16,10 +16,11 @@ import numpy as np
 from pretouch import __version__
 from pretouch.errors import ExperimentError
 from pretouch.experiments.bench.scenario_files import checksums
-from pretouch.experiments.results_file import failure_said, write_json
+from pretouch.experiments.results_file import failure_said
 from pretouch.experiments.workers import interrupt_held_back, workers
 from pretouch.params import Profile
 from pretouch.types import FloatArray
+from pretouch.whole_file import write_json
 
 Row = dict[str, Any]
 

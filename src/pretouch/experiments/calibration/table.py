@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.experiments.calibration.errors import Row
 from pretouch.experiments.calibration.study import OURS, WATANABE, WATANABE_UNBIASED, Study
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 ALL = "all"
 _ORDER = OURS, WATANABE, WATANABE_UNBIASED

@@ -7,9 +7,10 @@ import numpy as np
 from pretouch.contact.thresholds import obstacle_force
 from pretouch.experiments.claims.approach import DIRECTIONS
 from pretouch.experiments.metrics import rounded, spread
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.params import profile
 from pretouch.sim.scene import HandSpec
+from pretouch.text_table import TextTable
 
 PROFILE = "paper"
 DISTANCES_M = (0.8, 0.6, 0.4, 0.3, 0.2, 0.15, 0.1)

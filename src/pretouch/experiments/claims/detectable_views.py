@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from pretouch.experiments.experiment import Picture, Row, Sources
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,7 +3,8 @@
 from pretouch.experiments.claims.detectors import TABLE_I
 from pretouch.experiments.claims.free_run import rate_text
 from pretouch.experiments.experiment import Row
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
+from pretouch.text_table import TextTable
 
 
 def free_motion_tables(part: Row) -> list[TextTable]:

@@ -19,13 +19,13 @@ from pretouch.experiments.coverage.measuring import POINTS, Setting
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import grouped
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tables import TextTable
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
+from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
 
 NAME = "coverage"

@@ -9,7 +9,7 @@ from pretouch.experiments.experiment import Row
 from pretouch.experiments.impacts.kinds import GROUPS, KINDS
 from pretouch.experiments.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 ALL, LATER = "all", "alarm both ways"
 

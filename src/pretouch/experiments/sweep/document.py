@@ -6,13 +6,13 @@ from typing import Any
 from pretouch import __version__
 from pretouch.experiments.bench.documents import markdown, put, shown
 from pretouch.experiments.experiment import Picture
-from pretouch.experiments.results_file import write_json
 from pretouch.experiments.sweep.indices import indices
 from pretouch.experiments.sweep.results import write_table
 from pretouch.experiments.sweep.run import Run
 from pretouch.experiments.sweep.store import unwritable
 from pretouch.experiments.sweep.work import code
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
+from pretouch.whole_file import write_json
 
 DOCUMENT = "sensitivity.md"
 """In a folder of documents."""

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pretouch.experiments.results_file import write_json
 from pretouch.experiments.sweep.cluster import run_on_cluster
 from pretouch.experiments.sweep.definition import Sweep
 from pretouch.experiments.sweep.design import Point, points
@@ -13,6 +12,7 @@ from pretouch.experiments.sweep.extra import check_extra
 from pretouch.experiments.sweep.local import run_local
 from pretouch.experiments.sweep.store import Damaged, Result, Store, unwritable
 from pretouch.experiments.sweep.work import Cell, Job, cell_of, jobs_of
+from pretouch.whole_file import write_json
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from pretouch.errors import ExperimentError
-from pretouch.experiments.results_file import write_json
 from pretouch.experiments.sweep.measures import Measure
 from pretouch.experiments.sweep.work import Cell, Job
+from pretouch.whole_file import write_json
 
 LARGEST_ANSWER = 10_000_000
 """Characters of a worker's answer that are looked at."""

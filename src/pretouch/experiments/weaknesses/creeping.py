@@ -13,11 +13,12 @@ from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.groups import cells_of, grouped
 from pretouch.experiments.metrics import mean_over, peak, rounded
 from pretouch.experiments.pushes import Visit, Visitor
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray, Mode
 
 NAME = "creeping"

@@ -16,7 +16,7 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.groups import cells_of, grouped
 from pretouch.experiments.metrics import peak, rounded, spread
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import Profile, RestrictionMode, profile
 from pretouch.perception.obstacles import sensor_poses
@@ -25,6 +25,7 @@ from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import cone_rays
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import MODES, RangeFinders
+from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray, Mode, QpOutcome
 
 if TYPE_CHECKING:

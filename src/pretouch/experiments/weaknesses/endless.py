@@ -11,9 +11,10 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.groups import cells_of
 from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trace import Trace
 from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
+from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
 
 if TYPE_CHECKING:

@@ -13,12 +13,13 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment
 from pretouch.experiments.groups import cells_of, grouped
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.params import Profile, profile
 from pretouch.perception.closest import closest_points
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
+from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Obstacles, QpOutcome
 
 NAME = "infeasible"

@@ -11,10 +11,11 @@ from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.groups import grouped
 from pretouch.experiments.metrics import peak, rounded, spread
 from pretouch.experiments.pushes import FACES, Holder, Push, Pusher, against
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
 from pretouch.params import RestrictionMode, profile
 from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray, Mode
 
 if TYPE_CHECKING:

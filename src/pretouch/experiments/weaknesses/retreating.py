@@ -10,10 +10,11 @@ from pretouch.experiments.experiment import Experiment
 from pretouch.experiments.groups import cells_of
 from pretouch.experiments.metrics import rounded
 from pretouch.experiments.static import least_sensed
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.sim.scene import Box, SceneSpec
+from pretouch.text_table import TextTable
 
 NAME = "retreating"
 _MODES: tuple[RestrictionMode, ...] = ("off", "slack")

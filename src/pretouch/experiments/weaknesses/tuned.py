@@ -16,13 +16,14 @@ from pretouch.experiments.groups import cells_of, grouped
 from pretouch.experiments.metrics import mean_over, peak, rounded
 from pretouch.experiments.pushes import PALM, Push, way_round
 from pretouch.experiments.static import least_sensed
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import HandGoal, HandScript, point_on_arm
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray
 
 NAME = "tuned"

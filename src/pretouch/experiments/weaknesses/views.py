@@ -12,7 +12,7 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment
 from pretouch.experiments.groups import cells_of, grouped
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tables import TextTable, number
+from pretouch.experiments.tables import number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import Profile, profile
 from pretouch.perception.obstacles import sensor_poses
@@ -20,6 +20,7 @@ from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtur
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
 
 NAME = "views"

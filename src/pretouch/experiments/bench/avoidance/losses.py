@@ -3,7 +3,7 @@
 from pretouch.experiments.bench.ablations import BASE
 from pretouch.experiments.bench.store import Row
 from pretouch.experiments.groups import grouped
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 _LESS = (
     ("true_peak_20ms_n", "true 20 ms [N]", 1.0, 1),

@@ -4,7 +4,8 @@ from pretouch.experiments.bench.avoidance.losses import losses
 from pretouch.experiments.bench.avoidance.scenario import scenarios
 from pretouch.experiments.bench.store import Row
 from pretouch.experiments.groups import grouped
-from pretouch.experiments.tables import TextTable, with_spread
+from pretouch.experiments.tables import with_spread
+from pretouch.text_table import TextTable
 
 _COLUMNS = (
     ("least_distance_m", "least\n[mm]", 0),

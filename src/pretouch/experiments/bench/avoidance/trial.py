@@ -13,9 +13,9 @@ from pretouch.experiments.bench.avoidance.scenario import Scenario, scenarios
 from pretouch.experiments.bench.avoidance.setting import Setting, setting
 from pretouch.experiments.bench.avoidance.truth import Truth, truth_of
 from pretouch.experiments.bench.store import Row
-from pretouch.experiments.results_file import write_json
 from pretouch.experiments.trial import Record, play
 from pretouch.params import profile
+from pretouch.whole_file import write_json
 
 _D_MAX_M = 0.8
 _COURSE_EVERY = 5

@@ -11,9 +11,9 @@ from pretouch.experiments.bench.detection.arm import Sensing, model, sensing_of
 from pretouch.experiments.bench.detection.contenders import Contender
 from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_of
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.results_file import write_json
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.sensing.skin import paper_skin
+from pretouch.whole_file import write_json
 
 COST_S = 1.0
 """Processor time of a trial, about [s]."""

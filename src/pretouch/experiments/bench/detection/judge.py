@@ -15,9 +15,9 @@ from pretouch.experiments.bench.detection.stream import Stream, load_stream
 from pretouch.experiments.bench.scenario_files import scenario
 from pretouch.experiments.bench.store import Row
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.results_file import write_json
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray
+from pretouch.whole_file import write_json
 
 PERIOD_S = TaskParams().control_period_s
 BUSY = -1.0

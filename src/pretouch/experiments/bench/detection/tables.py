@@ -5,7 +5,7 @@ from pretouch.experiments.bench.bounds import short
 from pretouch.experiments.bench.detection.results import ABLATED_CONTACTS, ABLATED_FREE, GOAL_CONTACTS, GOAL_FREE
 from pretouch.experiments.bench.scenario_files import scenario
 from pretouch.experiments.bench.store import Row
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 
 def detection_tables(results: Row) -> list[TextTable]:

@@ -17,10 +17,10 @@ from pretouch.experiments.bench.localization.limit import position_limit
 from pretouch.experiments.bench.scenario_files import scenario
 from pretouch.experiments.bench.store import Row
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.results_file import write_json
 from pretouch.params import profile
 from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, IntArray, Touched
+from pretouch.whole_file import write_json
 
 PROFILE = "pretouch"
 WITHOUT = ("none", "none, nothing learnt")

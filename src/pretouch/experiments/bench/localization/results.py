@@ -9,7 +9,7 @@ from pretouch.experiments.bench.localization.campaign import NAME, Bench
 from pretouch.experiments.bench.scenario_files import scenario
 from pretouch.experiments.bench.store import Row
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 TWO = "two at once"
 """In place of a link, for two contacts at once."""
