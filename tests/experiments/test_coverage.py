@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pretouch.coverage.figure import coverage_figure
+from pretouch.coverage.measuring import Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.workspace import postures
 from pretouch.errors import ExperimentError
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.coverage import study
 from pretouch.experiments.coverage.comers import Coming
-from pretouch.experiments.coverage.measuring import Setting, coverage_of
-from pretouch.experiments.coverage.workspace import postures
-from pretouch.experiments.figures.coverage import coverage_figure
 from pretouch.importing.ready import ever_apart
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.sim.scene import SceneSpec, fixtures

@@ -3,6 +3,7 @@ import pytest
 
 from pretouch.experiments import dynamic
 from pretouch.experiments.cell import Cell
+from pretouch.sim.paper_scenes import dynamic_pushes
 from tests.experiments.limits import assert_within_limits
 
 PAPER = Cell(dynamic.NAME, "paper", {"restrictions": "slack"})
@@ -41,7 +42,7 @@ def test_no_command_exceeds_a_limit(trial, panda_model):
 
 def test_pushes_are_as_long_and_as_strong_as_said():
     for seed in range(20):
-        pushes = dynamic.pushes(seed)
+        pushes = dynamic_pushes(seed)
         assert [p.start for p in pushes] >= [4.0, 13.0, 22.0]
         for push in pushes:
             assert 15.0 <= push.force <= 30.0
@@ -51,7 +52,7 @@ def test_pushes_are_as_long_and_as_strong_as_said():
 
 def test_the_three_pushes_come_from_different_faces():
     faces = {tuple(np.abs(p.inwards).argmax() * np.sign(p.inwards[np.abs(p.inwards).argmax()]) for p in [q])
-             for q in dynamic.pushes(7)}  # fmt: skip
+             for q in dynamic_pushes(7)}  # fmt: skip
     assert len(faces) == 3
 
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from pretouch.experiments.metrics import angle_deg, mean_over, peak, spread
+from pretouch.experiments.metrics import angle_deg, peak, spread
+from pretouch.traces import mean_over
 
 
 def test_moving_mean_by_numbers():

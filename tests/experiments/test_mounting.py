@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from pretouch.experiments import mounting
 from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.figures.mounting import mounting_figure
-from pretouch.experiments.misplacement import Misplacement, misplaced
 from pretouch.experiments.mounting import EXACT
 from pretouch.experiments.mounting_tables import NAME, ROOM, summarise, tables
 from pretouch.experiments.trial import Setup, play
@@ -16,6 +15,7 @@ from pretouch.params import profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.robot.description import panda
+from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.scene import Box, SceneSpec
 from tests.experiments.rows import made_up
 from tests.experiments.width import width
@@ -105,8 +105,8 @@ def one_step(setup: Setup, steps: int = 3):
 
 def test_units_measure_where_they_are_and_the_controller_believes_what_it_is_told(panda_model, paper_skin):
     believed, _ = misplaced(paper_skin, panda_model, Misplacement(50.0, 20.0), seed=1)
-    path = mounting.static.path("line", "+y")
-    scene = mounting.static.scene("line", "+y", 25e3, 1)
+    path = mounting.static_path("line", "+y")
+    scene = mounting.static_scene("line", "+y", 25e3, 1)
     setup = Setup(panda_model, paper_skin, profile("paper"), scene, path, 1)
     right, wrong = one_step(setup), one_step(replace(setup, believed=believed))
     assert wrong.steps[0].range_distance.tolist() == pytest.approx(right.steps[0].range_distance.tolist(), nan_ok=True)
@@ -123,7 +123,7 @@ def test_units_measure_where_they_are_and_the_controller_believes_what_it_is_tol
 
 def test_what_an_arm_believes_of_its_units_is_what_it_replays_by(panda_model, paper_skin, tmp_path):
     believed, _ = misplaced(paper_skin, panda_model, Misplacement(20.0, 5.0), seed=1)
-    place, path = tmp_path / "told-wrong.mcap", mounting.static.path("line", "+y")
+    place, path = tmp_path / "told-wrong.mcap", mounting.static_path("line", "+y")
     setup = Setup(panda_model, paper_skin, profile("paper"), SceneSpec(), path, 1, believed=believed, recording=place)
     made = one_step(setup)
     recorded = open_recording(place)
@@ -134,7 +134,7 @@ def test_what_an_arm_believes_of_its_units_is_what_it_replays_by(panda_model, pa
 
 
 def test_an_arm_that_believes_the_truth_does_as_if_it_were_told_nothing(panda_model, paper_skin):
-    setup = Setup(panda_model, paper_skin, profile("paper"), SceneSpec(), mounting.static.path("line", "+y"), 2)
+    setup = Setup(panda_model, paper_skin, profile("paper"), SceneSpec(), mounting.static_path("line", "+y"), 2)
     same = replace(setup, believed=misplaced(paper_skin, panda_model, EXACT, 2)[0])
     commands = [[s.command.tobytes() for s in one_step(s, 30).steps] for s in (setup, same)]
     assert commands[0] == commands[1]
@@ -179,8 +179,8 @@ def test_units_in_their_place_miss_nothing(exact):
 def test_readings_that_are_taken_for_nothing_are_missed(exact, context):
     _, record = exact
     setup = Setup(
-        context.model, context.skin, profile("paper"), mounting.static.scene("line", "+y", 25e3, 1),
-        mounting.static.path("line", "+y"), 1,
+        context.model, context.skin, profile("paper"), mounting.static_scene("line", "+y", 25e3, 1),
+        mounting.static_path("line", "+y"), 1,
     )  # fmt: skip
     seen = [s for s in record.steps if len(s.obstacles.unit)]
     cut = replace(record, steps=[_without_obstacles(s) if i % 2 else s for i, s in enumerate(seen)])

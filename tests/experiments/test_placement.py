@@ -1,23 +1,23 @@
 import pytest
 
 from pretouch.control.path import Circle
+from pretouch.coverage.placement import hand_side, placement_for
 from pretouch.errors import ExperimentError
-from pretouch.experiments import static
 from pretouch.experiments.campaign import Request
-from pretouch.experiments.placement import Placement, hand_side, placement_for
 from pretouch.sim.board import PANDA_SIDE, HandSide
+from pretouch.sim.paper_scenes import Placement, static_path, static_scene
 
 
 def test_the_panda_has_the_papers_paths(panda_model):
     placement = placement_for(panda_model)
     assert placement == Placement()
-    assert static.path("circle", "-y", placement) == Circle()
+    assert static_path("circle", "-y", placement) == Circle()
     assert placement.face(0.2371, "+y") == 0.2371
 
 
 def test_another_arm_has_them_scaled_and_moved():
     placement = Placement(0.8, -0.1, 0.15, left=HandSide(0.05, 0.01))
-    circle = static.path("circle", "+y", placement)
+    circle = static_path("circle", "+y", placement)
     assert circle.center == pytest.approx((0.3, 0.0, 0.35))
     assert circle.radius == pytest.approx(0.2)
     # the hand is as far out when it meets the board's face, in terms of the circle, as the Panda's
@@ -28,7 +28,7 @@ def test_another_arm_has_them_scaled_and_moved():
 
 def test_the_board_stands_where_the_hand_meets_it():
     placement = Placement(0.8, 0.0, 0.0, left=HandSide(0.05, 0.01))
-    board = static.scene("line", "+y", 25e3, 0, placement).boxes[0]
+    board = static_scene("line", "+y", 25e3, 0, placement).boxes[0]
     face = board.center[1] - board.half_size[1]
     assert 0.8 * (0.25 - 0.05 - PANDA_SIDE.aside) + 0.05 <= face <= 0.8 * (0.3 - PANDA_SIDE.aside) + 0.05
 

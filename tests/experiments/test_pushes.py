@@ -1,6 +1,6 @@
 import numpy as np
 
-from pretouch.experiments.pushes import way_round
+from pretouch.sim.pushes import way_round
 
 
 def test_the_way_to_the_other_side_leads_in_front_of_the_arm():

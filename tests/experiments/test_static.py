@@ -3,6 +3,7 @@ import pytest
 
 from pretouch.experiments import static
 from pretouch.experiments.cell import Cell
+from pretouch.sim.paper_scenes import static_path, static_scene
 from tests.experiments.limits import assert_within_limits
 
 ROW = {
@@ -56,13 +57,13 @@ def test_no_command_exceeds_a_limit(pair, panda_model):
 
 
 def test_the_board_stands_on_its_side_and_moves_with_the_seed():
-    walls = [static.scene("line", "-y", 25e3, seed).boxes[0] for seed in range(5)]
+    walls = [static_scene("line", "-y", 25e3, seed).boxes[0] for seed in range(5)]
     faces = [wall.center[1] + wall.half_size[1] for wall in walls]
     assert all(-0.3 <= face <= -0.2 for face in faces)
     assert len(set(faces)) == 5
     assert max(faces) - min(faces) > 0.02
     assert len({wall.center[0] for wall in walls}) == len({wall.center[2] for wall in walls}) == 5
-    mirrored = static.scene("line", "+y", 25e3, 3).boxes[0]
+    mirrored = static_scene("line", "+y", 25e3, 3).boxes[0]
     assert mirrored.center[1] == pytest.approx(-walls[3].center[1])
 
 
@@ -77,7 +78,7 @@ def test_the_impact_speed_is_the_true_one_of_what_touches(pair):
 @pytest.mark.parametrize("side", static.SIDES)
 def test_paths_begin_away_from_the_object_and_run_towards_it(trajectory, side):
     sign = 1.0 if side == "+y" else -1.0
-    path = static.path(trajectory, side)
+    path = static_path(trajectory, side)
     assert path.point(0.0)[1] * sign < 0
     assert max(path.point(s)[1] * sign for s in np.linspace(0, path.length, 50)) > 0.2
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
-from pretouch.experiments import static
-from pretouch.experiments.pushes import Holder, Push
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch.sim.pushes import Holder, Push
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import Mode
 
@@ -64,7 +64,7 @@ def test_pushed_against_a_board_it_opens_and_holds(panda_model, paper_skin):
 def test_a_board_that_stays_is_given_up(panda_model, paper_skin):
     params = profile("pretouch:restriction.mode=off")
     params = replace(params, reaction=replace(params.reaction, give_up_contacts=2, patience_s=1.0))
-    scene, path = static.scene("line", "+y", 25_000.0, SEED), static.path("line", "+y")
+    scene, path = static_scene("line", "+y", 25_000.0, SEED), static_path("line", "+y")
     record = play(Setup(panda_model, paper_skin, params, scene, path, SEED), lambda step, _: step.stamp > 16.0)
     assert len(record.reactions()) == 2
     assert record.steps[-1].mode is Mode.HOLD

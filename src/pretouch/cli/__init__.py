@@ -272,9 +272,9 @@ def _serve_fci(command: ServeFci) -> None:
 
 
 def _warm_up() -> None:
-    from pretouch.experiments.cycle import CycleRequest, warmed_up
+    from pretouch.cli.warm_up import compile_step
 
-    kept = warmed_up(CycleRequest())
+    kept = compile_step()
     print(
         f"Compiled, and kept in {kept}." if kept else "Compiled, but there is nowhere to keep it: HOME is not writable."
     )

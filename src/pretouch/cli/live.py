@@ -38,7 +38,7 @@ def live(command: Live) -> None:
     skin = load_skin(command.skin, model) if command.skin else paper_skin(model)
     believed = skin
     if command.world:
-        from pretouch.experiments.misplacement import Misplacement, misplaced
+        from pretouch.sim.misplacement import Misplacement, misplaced
         from pretouch.sim.randomisation import drawn, world_set
 
         world = drawn(world_set(command.world), command.seed)

@@ -9,13 +9,13 @@ from pretouch.control.path import Circle
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.pushes import Visit, Visitor
 from pretouch.experiments.summary import avoidance_summary
 from pretouch.experiments.tables import avoidance_tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel
+from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import FloatArray
 

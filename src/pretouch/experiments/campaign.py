@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from pretouch import __version__
+from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.experiments.cell import Cell, Context, Grid
-from pretouch.experiments.placement import placement_for
 from pretouch.experiments.registry import EXPERIMENTS
 from pretouch.experiments.results_file import failure_said
 from pretouch.experiments.workers import interrupt_held_back, workers

@@ -6,10 +6,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import cast
 
-from pretouch.experiments.placement import Placement
 from pretouch.params import Orientation, Profile, RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams
 

@@ -10,15 +10,16 @@ from pretouch.control.path import Circle
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import cells_of
-from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.pushes import Holder, Push
+from pretouch.experiments.metrics import peak, rounded
 from pretouch.experiments.tables import number
-from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
+from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.sim.board import PANDA_SIDE
-from pretouch.sim.plant import Plant
+from pretouch.sim.plant import TOUCH_N, Plant
+from pretouch.sim.pushes import Holder, Push
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable
+from pretouch.traces import mean_over
 from pretouch.types import FloatArray, Mode
 
 NAME = "clamp"

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.compiled import kept_in
 from pretouch.controller import STAGES, Controller, ControllerState
 from pretouch.errors import ExperimentError
 from pretouch.experiments.workload import UNIT_RATE, Workload
@@ -101,16 +100,6 @@ def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = la
         "tracking": float(steps.tracking.mean()),
         "travelled_m": steps.travelled,
     }
-
-
-def warmed_up(request: CycleRequest) -> str:
-    """Compile a control step, in each restriction mode, and say where that is kept; '' for nowhere."""
-    model = RobotModel(panda())
-    for mode in ("", ":restriction.mode=hard", ":restriction.mode=off"):
-        params = at_rate(profile(request.profile + mode), request.rate)
-        work = Workload(model, 7, params, request.seed)
-        warm_up(Controller(model, work.skin, no_fixtures(), work.path, params), work.inputs().robot)
-    return kept_in()
 
 
 @dataclass(frozen=True)

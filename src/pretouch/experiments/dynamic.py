@@ -7,22 +7,21 @@ import numpy as np
 from pretouch.control.path import Circle
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
-from pretouch.experiments.metrics import angle_deg, mean_over, peak, rounded
-from pretouch.experiments.pushes import FACES, Push, Pusher, against
+from pretouch.experiments.metrics import angle_deg, peak, rounded
 from pretouch.experiments.summary import dynamic_summary
 from pretouch.experiments.tables import dynamic_tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
+from pretouch.sim.paper_scenes import dynamic_pushes
+from pretouch.sim.pushes import Push, Pusher
 from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 
 NAME = "dynamic"
 DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
 
 _DURATION_S = 30.0
-_STARTS_S = (4.0, 13.0, 22.0)
-_FORCE_N = (15.0, 30.0)
-_LASTING_S = (0.2, 0.5)
 _NOTICE_S = 0.3
 """A reaction up to this long after the release still answers the push [s]."""
 _REBOUND_S = 3.0
@@ -37,19 +36,9 @@ def cells(grid: Grid) -> list[Cell]:
     ]
 
 
-def pushes(seed: int) -> tuple[Push, ...]:
-    """Three pushes against different faces, in an order, direction, size and length the seed decides."""
-    rng = np.random.default_rng([seed, 11])
-    planned = []
-    for start, which in zip(_STARTS_S, rng.permutation(len(FACES)), strict=True):
-        inwards = against(FACES[which], rng)
-        planned.append(Push(start + rng.uniform(0, 2), inwards, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S)))
-    return tuple(planned)
-
-
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
-    person, hand = Pusher(context.model, pushes(seed)), HandSpec()
+    person, hand = Pusher(context.model, dynamic_pushes(seed)), HandSpec()
     setup = Setup(
         model=context.model,
         skin=context.skin,

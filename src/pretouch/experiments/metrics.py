@@ -15,13 +15,6 @@ def peak(values: FloatArray) -> float:
     return float(values.max(initial=0.0))
 
 
-def mean_over(values: FloatArray, samples: int) -> FloatArray:
-    """Moving mean (T - samples + 1,) of values (T,)."""
-    if len(values) < samples:
-        return np.array([float(values.mean())]) if len(values) else np.zeros(0)
-    return np.convolve(values, np.full(samples, 1.0 / samples), mode="valid")
-
-
 def angle_deg(a: FloatArray, b: FloatArray) -> float | None:
     """Angle between two vectors (3,) [deg], None if one of them is zero."""
     sizes = float(np.linalg.norm(a) * np.linalg.norm(b))

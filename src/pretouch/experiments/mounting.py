@@ -8,7 +8,6 @@ from pretouch.experiments import static
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.misplacement import Misplacement, misplaced
 from pretouch.experiments.mounting_tables import NAME, ROOM, summarise, tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.experiments.weaknesses import views
@@ -17,6 +16,8 @@ from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import expected_range
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed
+from pretouch.sim.misplacement import Misplacement, misplaced
+from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import FloatArray
 
@@ -79,14 +80,14 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     )
     believed, refused = misplaced(context.skin, context.model, error, seed)
     empty = side == ROOM
-    scene = SceneSpec() if empty else static.scene(trajectory, side, _STIFFNESS_N_PER_M, seed)
+    scene = SceneSpec() if empty else static_scene(trajectory, side, _STIFFNESS_N_PER_M, seed)
     setup = Setup(
         model=context.model,
         skin=context.skin,
         believed=believed,
         profile=context.profile(cell),
         scene=scene,
-        path=views.path(trajectory) if empty else static.path(trajectory, side),
+        path=views.path(trajectory) if empty else static_path(trajectory, side),
         seed=seed,
         world=context.world,
         recording=context.recording,

@@ -7,20 +7,21 @@ import mujoco
 import numpy as np
 
 from pretouch.control.path import WayPoints
+from pretouch.control.posture import brought_to
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import cells_of
-from pretouch.experiments.metrics import mean_over, peak, rounded
+from pretouch.experiments.metrics import peak, rounded
 from pretouch.experiments.tables import number
-from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
+from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
 from pretouch.sim.hand import HandGoal
-from pretouch.sim.plant import Plant
-from pretouch.sim.posture import brought_to
+from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
+from pretouch.traces import mean_over
 from pretouch.types import FloatArray, Mode
 
 NAME = "pinch"

@@ -2,22 +2,20 @@
 
 from collections.abc import Callable
 from itertools import product
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from pretouch.control.path import Path
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
-from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.placement import Placement
+from pretouch.experiments.metrics import peak, rounded
 from pretouch.experiments.summary import static_summary
 from pretouch.experiments.tables import shown_controllers, static_tables
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
-from pretouch.sim.board import FACE_M, Side, board_beside, sign_of
+from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant
-from pretouch.sim.scene import SceneSpec
+from pretouch.traces import mean_over
 from pretouch.types import ControlStep
 
 NAME = "static"
@@ -27,13 +25,8 @@ DEFAULT_RESTRICTIONS: RestrictionMode = "off"
 TRAJECTORIES = ("circle", "line")
 SIDES = ("-y", "+y")
 
-_FACE_SPREAD_M = 0.05
-"""The seed moves the board's face by up to this [m]."""
-_CENTER_SPREAD_M = 0.02
-"""The seed moves the board along x and z by up to this [m]."""
 _TIME_LIMIT_S = 40.0
 _AFTER_DETECTION_S = 1.0
-_PAPER = Placement()
 
 
 def cells(grid: Grid) -> list[Cell]:
@@ -50,21 +43,6 @@ def cells(grid: Grid) -> list[Cell]:
     ]
 
 
-def path(trajectory: str, side: str, placement: Placement = _PAPER) -> Path:
-    """Return the paper's path, begun on the side away from the object so that the arm runs into it at speed."""
-    return placement.path(trajectory, sign_of(cast(Side, side)))
-
-
-def scene(trajectory: str, side: str, stiffness: float, seed: int, placement: Placement = _PAPER) -> SceneSpec:
-    """Return a board on one side, at another place with each seed."""
-    rng, on = np.random.default_rng([seed, 10]), cast(Side, side)
-    face = FACE_M + _FACE_SPREAD_M * rng.uniform(-1, 1)
-    aside, above = _CENTER_SPREAD_M * rng.uniform(-1, 1, 2)
-    way = path(trajectory, side, placement)
-    board = board_beside(way, on, stiffness, placement.face(face, on), aside, above, placement.hand(on))
-    return SceneSpec(boxes=(board,))
-
-
 def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
     """Run one trial; return its row of results and what it left behind."""
     trajectory, side = str(cell.where["trajectory"]), str(cell.where["side"])
@@ -72,8 +50,8 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         model=context.model,
         skin=context.skin,
         profile=context.profile(cell),
-        scene=scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed, context.placement),
-        path=path(trajectory, side, context.placement),
+        scene=static_scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed, context.placement),
+        path=static_path(trajectory, side, context.placement),
         seed=seed,
         world=context.world,
         plant=context.arm,

@@ -10,6 +10,7 @@ import numpy as np
 
 from pretouch import ports
 from pretouch.control.path import Path
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.experiments.worlds import Parts, in_world
@@ -25,16 +26,13 @@ from pretouch.serving.fleet import FleetParams
 from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.depth_camera import DepthCamera, DepthCameraParams
 from pretouch.sim.hand import Hand, HandScript, PersonArm
-from pretouch.sim.plant import Plant, PlantClock, Touch
+from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, described, fixtures
 from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
 
-TOUCH_N = 1.0
-"""True force above which there is a contact [N]."""
 SETTLE_S = 0.2
 """Time the arm stands before the controller starts [s]: the observer's transient is over."""
 

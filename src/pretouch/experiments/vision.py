@@ -6,7 +6,6 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle, Path
-from pretouch.experiments import static
 from pretouch.experiments.avoidance import visits
 from pretouch.experiments.bench.avoidance.measures import contact
 from pretouch.experiments.bench.avoidance.obstacle import Ball, Cuboid, Shape, nearest
@@ -15,13 +14,14 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import cells_of
 from pretouch.experiments.metrics import rounded
-from pretouch.experiments.pushes import Visitor
 from pretouch.experiments.tables import number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.depth_camera import looking
+from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch.sim.pushes import Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
@@ -85,10 +85,10 @@ def scene_of(name: str, seed: int) -> Scene:
     In the room and with the hand the arm follows the circle; it begins away from the board.
     """
     if name == "board":
-        spec = static.scene("circle", _SIDE, _STIFFNESS_N_PER_M, seed)
+        spec = static_scene("circle", _SIDE, _STIFFNESS_N_PER_M, seed)
         (board,) = spec.boxes
         shape = Cuboid(np.array(board.center), np.array(board.half_size))
-        return Scene(spec, static.path("circle", _SIDE), shape)
+        return Scene(spec, static_path("circle", _SIDE), shape)
     hand = HandSpec()
     return Scene(SceneSpec(hand=hand), Circle(), hand.radius) if name == "hand" else Scene(SceneSpec(), Circle(), None)
 

@@ -14,6 +14,7 @@ from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import profile
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import network
+from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.text_table import TextTable
 
 NAME = "wire"
@@ -49,8 +50,8 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         model=context.model,
         skin=context.skin,
         profile=context.profile(cell),
-        scene=static.scene(trajectory, side, _STIFFNESS_N_PER_M, seed),
-        path=static.path(trajectory, side),
+        scene=static_scene(trajectory, side, _STIFFNESS_N_PER_M, seed),
+        path=static_path(trajectory, side),
         seed=seed,
         world=context.world,
         wire=None if loss is None else FleetParams(network(loss)),

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 
-from pretouch.experiments.misplacement import Misplacement, misplaced
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.randomisation import SETS, WorldSet, drawn, world_set
 from pretouch.sim.range_finder import RangeFinderParams

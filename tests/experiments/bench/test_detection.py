@@ -9,6 +9,7 @@ import pytest
 from pretouch.contact.detect import Detection
 from pretouch.contact.reaction import reaction_velocity
 from pretouch.control.path import Circle
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.experiments.bench.detection import campaign, contacts, free, judge
 from pretouch.experiments.bench.detection.arm import AWAY, model
@@ -31,7 +32,6 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import Contact, RobotState, Thresholds

@@ -77,7 +77,7 @@ def test_nothing_touches_and_the_arm_stands_still(trials, panda_model):
 @pytest.mark.parametrize("name", DIRECTIONS)
 @pytest.mark.parametrize("seed", [100, 101])
 def test_the_way_in_is_straight_clear_and_ends_three_centimetres_off(panda_model, name, seed):
-    from pretouch.sim.posture import brought_to
+    from pretouch.control.posture import brought_to
 
     way = approach(panda_model, name, seed)
     assert np.cross(way.start - way.end, outwards(name)) == pytest.approx(np.zeros(3), abs=1e-12)

@@ -7,12 +7,12 @@ import pytest
 from tests.experiments.limits import assert_within_limits
 from tests.experiments.width import width
 
-from pretouch.experiments import static
+from pretouch.control.posture import brought_to
 from pretouch.experiments.cell import Cell, Grid
 from pretouch.experiments.weaknesses import dropout
+from pretouch.sim.paper_scenes import static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.types import Mode
 
 
@@ -26,7 +26,7 @@ def test_lost_readings_are_counted_by_the_gaps_in_what_came_through():
 
 def test_the_units_that_see_a_board_are_those_on_its_side(panda_model, paper_skin):
     for side, expected in (("-y", "hand_right"), ("+y", "hand_left")):
-        scene = static.scene("line", side, 25e3, 100)
+        scene = static_scene("line", side, 25e3, 100)
         plant = Plant(panda_model, scene, PlantParams(), brought_to(panda_model, np.array([0.4, 0.0, 0.5])), 100)
         names = {paper_skin.ids[unit] for unit in dropout.facing(plant, paper_skin, "object")}
         assert expected in names

@@ -8,9 +8,9 @@ from tests.experiments.limits import assert_within_limits
 from tests.experiments.width import width
 
 from pretouch.experiments.cell import Cell, Grid
-from pretouch.experiments.pushes import Push
 from pretouch.experiments.trial import Record
 from pretouch.experiments.weaknesses import release
+from pretouch.sim.pushes import Push
 from pretouch.types import Mode
 
 PUSH = {

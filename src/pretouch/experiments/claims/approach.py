@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.experiments.pushes import PALM
+from pretouch.control.posture import brought_to
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import HandGoal
 from pretouch.sim.plant import Plant
-from pretouch.sim.posture import brought_to
+from pretouch.sim.pushes import PALM
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import FloatArray
 

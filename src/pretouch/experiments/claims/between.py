@@ -8,10 +8,10 @@ from pretouch.control.path import Circle
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.metrics import rounded, spread
-from pretouch.experiments.pushes import FACES, Push, Pusher, against
 from pretouch.experiments.tables import controller, number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
+from pretouch.sim.pushes import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep

@@ -8,6 +8,7 @@ import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.coverage.measure import covered
+from pretouch.coverage.measuring import POINTS, Setting
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import candidates, suggest
 from pretouch.coverage.surface import surface_of
@@ -15,7 +16,6 @@ from pretouch.coverage.ways import Ways, seen_by
 from pretouch.experiments.bench.bounds import share_below
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.coverage.comers import EVERY_S, PARKED, START_S, Comers, Coming
-from pretouch.experiments.coverage.measuring import POINTS, Setting
 from pretouch.experiments.experiment import Experiment, Row
 from pretouch.experiments.groups import grouped
 from pretouch.experiments.metrics import rounded

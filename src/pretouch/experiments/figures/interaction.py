@@ -4,19 +4,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.experiments.figures.marks import (
-    AXES,
-    TOUCH_N,
-    Y,
-    distances,
-    force_with_thresholds,
-    shade,
-    slowed,
-    spans,
-    touching,
-)
+from pretouch.experiments.figures.marks import AXES, Y, distances, force_with_thresholds, shade, slowed, touching
 from pretouch.experiments.trace import Trace
 from pretouch.params import Profile
+from pretouch.sim.plant import TOUCH_N
+from pretouch.traces import spans
 
 
 def interaction_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -> Figure:

@@ -8,13 +8,14 @@ from matplotlib.axes import Axes
 
 from pretouch.experiments.trace import Trace
 from pretouch.params import Profile
+from pretouch.sim.plant import TOUCH_N
+from pretouch.traces import spans
 from pretouch.types import BoolArray, FloatArray
 
 BLIND, SENSING, OURS = "tab:blue", "tab:red", "tab:green"
 AXES = "xyz"
 Y = 1
 """The axis the paper's figures show."""
-TOUCH_N = 1.0
 _SLOWED = 0.99
 _UNITS = (
     ("black", "-", ""), ("tab:blue", "--", ""), ("tab:orange", "-", "o"), ("tab:green", ":", "s"),
@@ -29,12 +30,6 @@ def labels(panels: Iterable[Axes]) -> tuple[list[Any], list[str]]:
     """Handles and labels of all panels, each label once: not every panel has all of them."""
     found = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     return list(found.values()), list(found)
-
-
-def spans(flags: BoolArray) -> list[tuple[int, int]]:
-    """First and one past the last index of each run of true flags."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def shade(axes: Axes, time: FloatArray, flags: BoolArray, colour: str, hatch: str = "", label: str = "") -> None:

@@ -21,8 +21,8 @@ from pretouch.params import Profile
 _PARTS = (
     "checks.py", "compiled.py", "contact", "control", "controller.py", "events.py", "faults.py", "loop.py", "modes.py",
     "params", "perception", "robot", "sensing", "sim", "types.py", "experiments/avoidance.py", "experiments/cell.py",
-    "experiments/dynamic.py", "experiments/metrics.py", "experiments/pushes.py", "experiments/static.py",
-    "experiments/trial.py", "experiments/placement.py", "experiments/claims/free_run.py",
+    "experiments/dynamic.py", "experiments/metrics.py", "experiments/static.py",
+    "experiments/trial.py", "coverage/placement.py", "experiments/claims/free_run.py",
     "experiments/bench/dense_skin.py", "experiments/bench/detection", "experiments/bench/scenario_files.py",
     "experiments/sweep/measures.py", "experiments/sweep/setting.py", "experiments/sweep/streams.py",
     "experiments/sweep/trying.py",

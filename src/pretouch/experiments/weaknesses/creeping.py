@@ -11,14 +11,15 @@ from pretouch.experiments.avoidance import gaps
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.groups import cells_of, grouped
-from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.pushes import Visit, Visitor
+from pretouch.experiments.metrics import peak, rounded
 from pretouch.experiments.tables import number
-from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
+from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode
-from pretouch.sim.plant import Plant
+from pretouch.sim.plant import TOUCH_N, Plant
+from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
+from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray, Mode
 
 NAME = "creeping"

@@ -23,6 +23,7 @@ from pretouch.perception.obstacles import sensor_poses
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import cone_rays
+from pretouch.sim.paper_scenes import static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import MODES, RangeFinders
 from pretouch.text_table import TextTable
@@ -124,7 +125,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     side, gap = static.SIDES[rng.integers(2)], rng.uniform(*_GAP_M)
     begin = _BEGIN_S + rng.uniform(0, _PERIOD_S)
     loss = Loss(context.skin, begin, begin + float(cell.where["readings"]) * _PERIOD_S)
-    scene, sign = static.scene("line", side, _STIFFNESS_N_M, seed), 1.0 if side == "+y" else -1.0
+    scene, sign = static_scene("line", side, _STIFFNESS_N_M, seed), 1.0 if side == "+y" else -1.0
     board = scene.boxes[0]
     setup = Setup(
         model=context.model,

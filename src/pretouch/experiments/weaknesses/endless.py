@@ -10,11 +10,14 @@ from pretouch.experiments import static
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.groups import cells_of
-from pretouch.experiments.metrics import mean_over, peak, rounded
+from pretouch.experiments.metrics import peak, rounded
 from pretouch.experiments.tables import number
 from pretouch.experiments.trace import Trace
-from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
+from pretouch.experiments.trial import Record, Setup, play
+from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch.sim.plant import TOUCH_N
 from pretouch.text_table import TextTable
+from pretouch.traces import mean_over
 from pretouch.types import FloatArray
 
 if TYPE_CHECKING:
@@ -42,8 +45,8 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         model=context.model,
         skin=context.skin,
         profile=context.profile(cell),
-        scene=static.scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
-        path=static.path(trajectory, side),
+        scene=static_scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
+        path=static_path(trajectory, side),
         seed=seed,
         world=context.world,
         recording=context.recording,

@@ -10,10 +10,11 @@ from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Row, Sources
 from pretouch.experiments.groups import grouped
 from pretouch.experiments.metrics import peak, rounded, spread
-from pretouch.experiments.pushes import FACES, Holder, Push, Pusher, against
 from pretouch.experiments.tables import number
-from pretouch.experiments.trial import TOUCH_N, Record, Setup, play
+from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
+from pretouch.sim.plant import TOUCH_N
+from pretouch.sim.pushes import FACES, Holder, Push, Pusher, against
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray, Mode

@@ -13,17 +13,19 @@ from pretouch.experiments import static
 from pretouch.experiments.cell import Cell, Context, Grid
 from pretouch.experiments.experiment import Experiment, Picture, Sources
 from pretouch.experiments.groups import cells_of, grouped
-from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.pushes import PALM, Push, way_round
+from pretouch.experiments.metrics import peak, rounded
 from pretouch.experiments.static import least_sensed
 from pretouch.experiments.tables import number
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.params import RestrictionMode, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import HandGoal, HandScript, point_on_arm
+from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant
+from pretouch.sim.pushes import PALM, Push, way_round
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
+from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 
 NAME = "tuned"
@@ -98,8 +100,8 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
         model=context.model,
         skin=context.skin,
         profile=context.profile(cell),
-        scene=static.scene(where, side, _STIFFNESS_N_PER_M, seed) if still else SceneSpec(hand=HandSpec()),
-        path=static.path(where, side) if still else standing(),
+        scene=static_scene(where, side, _STIFFNESS_N_PER_M, seed) if still else SceneSpec(hand=HandSpec()),
+        path=static_path(where, side) if still else standing(),
         seed=seed,
         world=context.world,
         recording=context.recording,

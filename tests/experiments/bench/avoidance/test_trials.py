@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pretouch.control.posture import brought_to
 from pretouch.experiments.bench.avoidance.run import Request, rows_of, run
 from pretouch.experiments.bench.avoidance.scenario import FAMILIES, scenarios
 from pretouch.experiments.bench.avoidance.setting import setting
@@ -15,7 +16,6 @@ from pretouch.experiments.bench.store import missing
 from pretouch.experiments.trial import Record
 from pretouch.params import profile
 from pretouch.perception.closest import closest_points
-from pretouch.sim.posture import brought_to
 
 QUICK = [next(s for s in scenarios().values() if s.family == f and s.quick) for f in FAMILIES]
 

@@ -10,9 +10,11 @@ from pretouch.control.qp import manipulability
 from pretouch.experiments.bench.avoidance.setting import Setting
 from pretouch.experiments.bench.avoidance.truth import Truth
 from pretouch.experiments.experiment import Row
-from pretouch.experiments.metrics import mean_over, peak, rounded
-from pretouch.experiments.trial import TOUCH_N, Record
+from pretouch.experiments.metrics import peak, rounded
+from pretouch.experiments.trial import Record
 from pretouch.robot.model import RobotModel
+from pretouch.sim.plant import TOUCH_N
+from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray, Mode, QpOutcome
 
 _CLAMP_S = 0.5

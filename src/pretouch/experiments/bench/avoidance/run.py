@@ -19,7 +19,7 @@ from pretouch.params import profile
 NAME = "avoidance"
 _PARTS = (
     "controller.py", "control", "perception", "contact", "params", "sim", "robot", "modes.py", "faults.py",
-    "experiments/trial.py", "experiments/static.py", "experiments/pushes.py",
+    "experiments/trial.py", "experiments/static.py", "sim/pushes.py",
     *(
         f"experiments/bench/avoidance/{module}.py"
         for module in ("livelock", "measures", "obstacle", "scenario", "setting", "trial", "truth")

@@ -7,20 +7,20 @@ from functools import cache
 import numpy as np
 
 from pretouch.control.path import Circle, Path, line
-from pretouch.experiments import static
 from pretouch.experiments.bench.avoidance.obstacle import Ball, Cuboid, Shape, Walker
 from pretouch.experiments.bench.avoidance.scenario import Scenario, Table
 from pretouch.experiments.bench.scenario_files import scenario_path
-from pretouch.experiments.misplacement import Misplacement, misplaced
-from pretouch.experiments.pushes import Visit, Visitor
 from pretouch.experiments.trial import Setup
 from pretouch.params import Profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.sim.hand import HandScript, PersonArm
+from pretouch.sim.misplacement import Misplacement, misplaced
+from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray
@@ -81,7 +81,7 @@ def path_of(told: Table) -> Path:
         x, y, z = told["point"]
         return line((x, y, z), (x, y, z + _HELD_M))
     if "side" in told:
-        return static.path(told["kind"], told["side"])
+        return static_path(told["kind"], told["side"])
     return Circle()
 
 
@@ -108,7 +108,7 @@ def _obstacle(says: Table, seed: int) -> _Placed:
     match told["kind"]:
         case "board":
             way = says["path"]
-            return _standing(static.scene(way["kind"], way["side"], stiffness, seed).boxes[0])
+            return _standing(static_scene(way["kind"], way["side"], stiffness, seed).boxes[0])
         case "box":
             (x, y, z), (a, b, c) = told["center"], told["half_size"]
             return _standing(Box("object", (x, y, z), (a, b, c), stiffness))

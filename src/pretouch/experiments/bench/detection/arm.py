@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle, Path, WayPoints
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.experiments.bench.detection.stream import PROFILE, Stream, StreamRecorder
 from pretouch.experiments.bench.scenario_files import scenario, scenario_path
 from pretouch.experiments.claims.free_run import Standing
-from pretouch.experiments.misplacement import Misplacement, misplaced
 from pretouch.experiments.trial import SETTLE_S
 from pretouch.experiments.worlds import Parts, in_world
 from pretouch.loop import Cycle, run
@@ -21,9 +21,9 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.sim.ghost import Ghost
+from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import FloatArray

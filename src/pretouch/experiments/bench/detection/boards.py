@@ -13,6 +13,7 @@ from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_
 from pretouch.experiments.metrics import rounded
 from pretouch.experiments.trial import Record, Setup, play
 from pretouch.sensing.skin import paper_skin
+from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.whole_file import write_json
 
 COST_S = 1.0
@@ -63,8 +64,8 @@ def meet_board(cell: BoardCell, contender: Contender, file: Path) -> None:
         skin=sensing.skin,
         believed=None if sensing.believed is sensing.skin else sensing.believed,
         profile=replace(found, restriction=replace(found.restriction, mode="off")),
-        scene=static.scene(cell.trajectory, cell.side, cell.stiffness_n_per_m, cell.seed),
-        path=static.path(cell.trajectory, cell.side),
+        scene=static_scene(cell.trajectory, cell.side, cell.stiffness_n_per_m, cell.seed),
+        path=static_path(cell.trajectory, cell.side),
         seed=cell.seed,
         world=cell.world,
         ranging=sensing.ranging,

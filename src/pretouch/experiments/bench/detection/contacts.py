@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.control.posture import brought_to
 from pretouch.experiments.bench.dense_skin import gap, surface
 from pretouch.experiments.bench.detection.arm import (
     AWAY,
@@ -22,7 +23,6 @@ from pretouch.experiments.bench.scenario_files import SeedRange, scenario, seed_
 from pretouch.robot.vectors import placed
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.types import FloatArray
 
 _TRIES = 400

@@ -1,11 +1,10 @@
 """The paper's paths and board brought into the reach of another arm than a Panda."""
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from pretouch.control.path import Circle, Path, line
+from pretouch.control.path import Path
 from pretouch.control.task import rotation_error
 from pretouch.errors import ExperimentError
 from pretouch.importing.reaching import Pace, reached
@@ -13,11 +12,11 @@ from pretouch.importing.ready import ever_apart, reach_of
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
-from pretouch.sim.board import PANDA_SIDE, HandSide, Side, sign_of
+from pretouch.sim.board import HandSide, Side, sign_of
+from pretouch.sim.paper_scenes import Placement
 from pretouch.types import FloatArray
 
 _SIDES: tuple[Side, Side] = ("+y", "-y")
-_LINE_END_Y, _LINE_X, _LINE_Z = 0.5, 0.4, 0.5
 _SHRINK = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 _SHIFT_M = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15, 0.2, -0.2)
 """What is tried, the nearest to the paper first: parts of the scale by reach, shifts along x and z."""
@@ -25,47 +24,6 @@ _PLACES = 48
 _TO_START, _ONWARD = Pace(300, 0.1, 1e-6, 0.05), Pace(30, 0.1, 1e-6, 0.05)
 _SINGULAR, _LIMIT_RAD, _CLEAR_M = 0.05, 0.05, 0.01
 """What the arm has to keep all along: smallest singular value, distance from joint limits, and from itself."""
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Where the paper's paths are for an arm: p = scale * p_paper + (shift_x, 0, shift_z), in the base frame."""
-
-    scale: float = 1.0
-    shift_x: float = 0.0
-    """[m]"""
-    shift_z: float = 0.0
-    """[m]"""
-    left: HandSide = PANDA_SIDE
-    """Where the hand meets a board at +y."""
-    right: HandSide = PANDA_SIDE
-    """Where the hand meets a board at -y."""
-
-    def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """Return where a point of the paper is for this arm [m]."""
-        return self.scale * x + self.shift_x, self.scale * y, self.scale * z + self.shift_z
-
-    def path(self, trajectory: str, sign: float) -> Path:
-        """Return the paper's circle or line, begun on the side away from a board on the side `sign` (1: +y)."""
-        if trajectory == "circle":
-            center, radius = self.point(0.5, 0.0, 0.25), 0.25 * self.scale
-            return Circle(center, radius, np.pi if sign > 0 else 0.0)
-        return line(self.point(_LINE_X, -_LINE_END_Y * sign, _LINE_Z), self.point(_LINE_X, _LINE_END_Y * sign, _LINE_Z))
-
-    def hand(self, side: Side) -> HandSide:
-        """Return where the hand is met on a side."""
-        return self.left if side == "+y" else self.right
-
-    def face(self, face: float, side: Side) -> float:
-        """Return the distance of a board's face from the plane y = 0 [m] at which it is met where the paper's is."""
-        return self.scale * face + (self.hand(side).aside - self.scale * PANDA_SIDE.aside)
-
-    def sentence(self, arm: str) -> str:
-        """Say what was done to the paper's paths."""
-        return (
-            f"The paper's paths for {arm}: {self.scale:.3g} times as large, moved by {self.shift_x:+.2f} m in x and"
-            f" {self.shift_z:+.2f} m in z; the board is met on the same part of them."
-        )
 
 
 def placement_for(model: RobotModel) -> Placement:

@@ -8,7 +8,7 @@ from pretouch.coverage.measure import Coverage, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import Ways, seen_by, ways_to
-from pretouch.experiments.coverage.workspace import postures
+from pretouch.coverage.workspace import postures
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

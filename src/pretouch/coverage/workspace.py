@@ -2,14 +2,15 @@
 
 import numpy as np
 
+from pretouch.control.posture import brought_to
+from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError
-from pretouch.experiments.placement import Placement, placement_for
 from pretouch.importing.ready import ever_apart
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.robot.vectors import placed
-from pretouch.sim.posture import brought_to
+from pretouch.sim.paper_scenes import Placement
 from pretouch.types import FloatArray
 
 KINDS = ("circle", "line", "paths", "joints")

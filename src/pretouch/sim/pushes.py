@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import ARM_STIFFNESS_N_M, HandGoal, point_on_arm
-from pretouch.sim.plant import Plant
+from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.types import FloatArray
 
 _HOME = np.array([1.2, 0.0, 0.8])
@@ -17,7 +17,6 @@ _SPEED_M_S = 0.35
 """Speed of a reaching hand relative to the arm [m/s]."""
 _FREE_N = 60.0
 """Force a person moves the free hand with [N]."""
-_TOUCH_N = 1.0
 PALM = np.array([0.0, 0.0, 0.045])
 """Point of the robot's hand the person aims at, in its frame [m]."""
 _LEAD_S = 4.0
@@ -105,7 +104,7 @@ class Pusher:
 
     def _watch(self, time: float, push: Push, plant: Plant) -> None:
         """Notice the touch, and end the push after its time or when the person loses patience."""
-        if self._touch is None and np.linalg.norm(plant.true_force) > _TOUCH_N:
+        if self._touch is None and np.linalg.norm(plant.true_force) > TOUCH_N:
             self._touch = time
         if self._touch is not None and time > self._touch + push.duration:
             self.contacts.append((self._touch, time))
