@@ -11,7 +11,7 @@ from numba import njit
 Function = TypeVar("Function", bound=Callable[..., object])
 
 _NOT_COMPILED = (
-    "cli", "reporting", "viewer", "experiments", "foreign", "serving", "hardware", "recording", "calibration",
+    "cli", "reporting", "viewer", "foreign", "serving", "hardware", "recording", "calibration",
     "importing", "coverage", "session", "traces.py",
 )  # fmt: skip
 

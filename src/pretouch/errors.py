@@ -54,3 +54,11 @@ class CalibrationError(PretouchError, ValueError):
 
 class ViewerError(PretouchError, RuntimeError):
     """The page cannot be shown."""
+
+
+class MissingExtraError(PretouchError, ImportError):
+    """Something was asked for that needs an extra which is not installed."""
+
+
+class PluginError(PretouchError, RuntimeError):
+    """A part that another distribution adds is missing, or cannot be loaded."""

@@ -7,7 +7,6 @@ import numpy as np
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
-from pretouch.experiments.trial import Record
 from pretouch.loop import run
 from pretouch.params import profile as find_profile
 from pretouch.recording.truth import Truth
@@ -28,6 +27,7 @@ from pretouch.types import (
     RobotState,
     Thresholds,
 )
+from pretouch_lab.trial import Record
 
 SETTLE_S = 0.2
 
