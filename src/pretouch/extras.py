@@ -6,7 +6,7 @@ from pretouch.errors import MissingExtraError
 
 EXTRAS = {
     "figures": ("matplotlib",),
-    "bags": ("rosbags", "lz4"),
+    "bags": ("rosbags",),
     "ros2": ("cyclonedds", "rosbags"),
 }
 """Modules of each extra."""

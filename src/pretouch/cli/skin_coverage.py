@@ -18,6 +18,7 @@ from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, suggest
 from pretouch.coverage.ways import Ways
 from pretouch.errors import ExperimentError, ParameterError, SkinError
+from pretouch.extras import need
 from pretouch.importing.folder import SKIN
 from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.description import fr3, panda
@@ -97,6 +98,8 @@ def _check_outputs(command: Asked, source: Path | None) -> None:
         raise ParameterError(f"The seed is {command.seed}: give 0 or more.")
     if command.figure and Path(command.figure).suffix not in _FORMATS:
         raise ExperimentError(f"The figure {command.figure} ends in none of {', '.join(_FORMATS)}: name it so.")
+    if command.figure:
+        need("figures", "Figures")
     places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
     given = [(what, Path(text)) for what, text in places if text]
     for i, (what, place) in enumerate(given):

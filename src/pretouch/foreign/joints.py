@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.errors import RecordingError
+from pretouch.extras import need
 from pretouch.foreign.csv import UNITS, listed, read_rows, read_table, relative_time
 from pretouch.foreign.samples import BAGS, OUT_OF_RANGE_RAD, TABLES
 from pretouch.foreign.source import Series, in_order
@@ -132,6 +133,7 @@ def _factor(place: Path, name: str, unit: str, quantity: str) -> float:
 
 
 def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tuple[str, ...]]:
+    need("bags", "Bags and MCAP files")
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 

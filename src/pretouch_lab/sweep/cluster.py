@@ -115,7 +115,7 @@ def _client(address: str) -> "Iterator[Client]":
         from distributed import Client
     except ImportError as error:
         raise ExperimentError(
-            "A cluster needs the package distributed: pip install 'pretouch[sweep]', or leave --scheduler out."
+            "A cluster needs the package distributed: pip install 'pretouch-lab[sweep]', or leave --scheduler out."
         ) from error
     client: Any = None
     try:

@@ -12,4 +12,4 @@ def check_extra(cluster: bool = False) -> None:
     wanted = [*_NEEDED, *(["distributed"] if cluster else [])]
     missing = [name for name in wanted if find_spec(name) is None]
     if missing:
-        raise ExperimentError(f"Sweeps need {', '.join(missing)}: pip install 'pretouch[sweep]'.")
+        raise ExperimentError(f"Sweeps need {', '.join(missing)}: pip install 'pretouch-lab[sweep]'.")
