@@ -58,7 +58,7 @@ def test_without_the_extra_the_command_names_it(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(extra, "find_spec", lambda name: None)
     code, said = run(capsys, "ishigami", *X, "--out", str(tmp_path))
     assert code == 2
-    assert "Sweeps need SALib, pyarrow: pip install 'pretouch[sweep]'." in said.err
+    assert "Sweeps need SALib, pyarrow: pip install 'pretouch-lab[sweep]'." in said.err
 
 
 @pytest.mark.parametrize(
