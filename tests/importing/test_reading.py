@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.importing.made import BOX, joint, link, six_axis, written
 
-from pretouch.errors import MissingExtraError, RobotModelError
+from pretouch.errors import RobotModelError
 from pretouch.importing.chain import arm_of
 from pretouch.importing.limits import limits_of
 from pretouch.importing.meshes import read_mesh

@@ -7,12 +7,12 @@ from rich.console import Console
 from pretouch.cli.robot_commands import Check
 from pretouch.cli.tables import show
 from pretouch.errors import RobotModelError
-from pretouch.experiments.tables import TextTable
 from pretouch.importing.folder import SKIN
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
 from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
+from pretouch.text_table import TextTable
 
 
 def check_arm(command: Check) -> None:

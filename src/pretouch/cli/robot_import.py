@@ -13,12 +13,12 @@ from pretouch.cli.tables import show
 from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ParameterError
-from pretouch.experiments.results_file import write_json
-from pretouch.experiments.tables import TextTable
 from pretouch.importing.body import FARTHEST, FitError
 from pretouch.importing.folder import check_free, write_folder
 from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
+from pretouch.text_table import TextTable
+from pretouch.whole_file import write_json
 
 _NEGLIGIBLE = 0.001
 """What sticks out less is not spoken of [m]."""

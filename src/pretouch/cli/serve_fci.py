@@ -17,6 +17,7 @@ from pretouch.cli.ending import ended
 from pretouch.cli.serve_fci_command import ServeFci
 from pretouch.control.path import Circle
 from pretouch.control.path import Path as ArmPath
+from pretouch.control.posture import brought_to
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import load_keys
 from pretouch.robot.model import RobotModel
@@ -28,7 +29,7 @@ from pretouch.serving.fci.server import FciServer
 from pretouch.serving.fci.units import UnitsSetup
 from pretouch.serving.simulate import Visitor
 from pretouch.sim.hand import HandScript
-from pretouch.sim.posture import brought_to
+from pretouch.sim.paper_scenes import dynamic_pushes, static_path, static_scene
 from pretouch.sim.scene import HandSpec, SceneSpec
 
 _say = partial(print, flush=True)
@@ -99,15 +100,14 @@ def _setup(c: ServeFci) -> ArmSetup:
 
 def _scene(c: ServeFci, model: RobotModel) -> tuple[SceneSpec, HandScript | None, ArmPath]:
     """Return what is there, what its hand does, and the path of the end-effector."""
-    from pretouch.experiments import dynamic, static
-    from pretouch.experiments.pushes import Pusher
+    from pretouch.sim.pushes import Pusher
 
     match c.scene:
         case "static":
-            return static.scene(c.trajectory, c.side, c.stiffness, c.seed), None, static.path(c.trajectory, c.side)
+            return static_scene(c.trajectory, c.side, c.stiffness, c.seed), None, static_path(c.trajectory, c.side)
         case "dynamic":
-            return SceneSpec(hand=HandSpec()), Pusher(model, dynamic.pushes(c.seed)), Circle()
-    path = static.path(c.trajectory, c.side)
+            return SceneSpec(hand=HandSpec()), Pusher(model, dynamic_pushes(c.seed)), Circle()
+    path = static_path(c.trajectory, c.side)
     if c.hand:
         return SceneSpec(hand=HandSpec(start=Visitor.away)), Visitor(model.ee), path
     return SceneSpec(), None, path

@@ -13,18 +13,19 @@ from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.coverage.blind import BlindSpot, blind_spots
 from pretouch.coverage.measure import Coverage, Share, covered
+from pretouch.coverage.measuring import Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, suggest
 from pretouch.coverage.ways import Ways
 from pretouch.errors import ExperimentError, ParameterError, SkinError
-from pretouch.experiments.coverage.measuring import Setting, coverage_of
-from pretouch.experiments.results_file import write_json
+from pretouch.extras import FIGURES
 from pretouch.importing.folder import SKIN
+from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
-from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.whole_file import write_json
 
 _FORMATS = (".png", ".pdf", ".svg")
 _SPOTS = 8
@@ -36,7 +37,7 @@ def skin_coverage(command: Asked) -> None:
     model, skin, source = _arm_and_skin(command)
     _check_outputs(command, source)
     setting = Setting(
-        model, fixtures(SceneSpec(floor_height=command.floor)), _params(command), command.workspace,
+        model, floor_and_pedestal(command.floor), _params(command), command.workspace,
         command.postures, command.seed,
     )  # fmt: skip
     ways = setting.ways()
@@ -97,6 +98,8 @@ def _check_outputs(command: Asked, source: Path | None) -> None:
         raise ParameterError(f"The seed is {command.seed}: give 0 or more.")
     if command.figure and Path(command.figure).suffix not in _FORMATS:
         raise ExperimentError(f"The figure {command.figure} ends in none of {', '.join(_FORMATS)}: name it so.")
+    if command.figure:
+        FIGURES.need("A figure")
     places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
     given = [(what, Path(text)) for what, text in places if text]
     for i, (what, place) in enumerate(given):
@@ -131,7 +134,7 @@ def _suggested(
 
 
 def _draw(file: str, ways: Ways, found: Coverage, skin: Skin, new: frozenset[str]) -> None:
-    from pretouch.experiments.figures.coverage import coverage_figure
+    from pretouch.coverage.figure import coverage_figure
 
     with unwritable_said("figure", Path(file)):
         coverage_figure(ways, found, skin, new).savefig(file, dpi=110)

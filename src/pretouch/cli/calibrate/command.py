@@ -25,11 +25,6 @@ def calibrate_skin(command: Calibrate) -> int:
 
 def _calibrated(command: Calibrate) -> int:
     way = way_of(command)
-    if way == "simulate":
-        from pretouch.cli.calibrate.study import study_skins
-
-        study_skins(command)
-        return 0
     if way == "plan":
         write_motion(command)
         return 0

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pretouch.cli.run.opened import Opened, network_units
 from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
-from pretouch.extras import need
+from pretouch.extras import ROS2
 from pretouch.hardware.address import HOST
 from pretouch.hardware.franka.client import need_library
 from pretouch.robot.model import RobotModel
@@ -19,7 +19,7 @@ def need_extra(command: Run) -> None:
         case "franka":
             need_library(command.robot.arm)
         case "ros2":
-            need("ros2", "An arm on ROS 2")
+            ROS2.need("An arm on ROS 2")
 
 
 @contextmanager
