@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from pretouch.cli.commands import Live
 from pretouch.cli.ending import ended
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.extras import VIEWER
@@ -16,10 +15,11 @@ from pretouch.viewer.server import ServeOptions, check_port
 from pretouch.viewer.settings import LiveSettings, PathName
 
 if TYPE_CHECKING:
+    from pretouch.cli.commands import Live
     from pretouch.viewer.real_units import RealUnits
 
 
-def live(command: Live) -> None:
+def live(command: "Live") -> None:
     """Serve the page until interrupted."""
     options = ServeOptions(command.host, command.port)
     VIEWER.need("The page")
@@ -54,7 +54,7 @@ def live(command: Live) -> None:
 
 
 @contextmanager
-def _units(command: Live, ids: Sequence[str]) -> Iterator["RealUnits | None"]:
+def _units(command: "Live", ids: Sequence[str]) -> Iterator["RealUnits | None"]:
     """Hear the real units of a skin, if there is a file of their keys."""
     if not command.keys:
         yield None

@@ -3,12 +3,11 @@
 import re
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from pretouch.cli.robot_check import joint_table, ready_said
-from pretouch.cli.robot_commands import Import
 from pretouch.cli.tables import show
 from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, unwritable_said
@@ -20,11 +19,14 @@ from pretouch.importing.robot_import import Imported, ImportOptions, import_robo
 from pretouch.text_table import TextTable
 from pretouch.whole_file import write_json
 
+if TYPE_CHECKING:
+    from pretouch.cli.robot_commands import Import
+
 _NEGLIGIBLE = 0.001
 """What sticks out less is not spoken of [m]."""
 
 
-def import_arm(command: Import) -> None:
+def import_arm(command: "Import") -> None:
     """Import an arm, print what came of it, and write its folder."""
     options = ImportOptions(
         ee=command.ee,

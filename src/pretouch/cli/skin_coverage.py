@@ -2,12 +2,11 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from pretouch.cli.calibrate.outputs import check_free, same_file
-from pretouch.cli.skin_coverage_options import Coverage as Asked
 from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, unwritable_said
@@ -27,12 +26,15 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
 from pretouch.whole_file import write_json
 
+if TYPE_CHECKING:
+    from pretouch.cli.skin_coverage_options import Coverage as Asked
+
 _FORMATS = (".png", ".pdf", ".svg")
 _SPOTS = 8
 """Blind spots that are printed; the file of numbers has all."""
 
 
-def skin_coverage(command: Asked) -> None:
+def skin_coverage(command: "Asked") -> None:
     """Measure, print and write what is asked for."""
     model, skin, source = _arm_and_skin(command)
     _check_outputs(command, source)
@@ -65,7 +67,7 @@ def skin_coverage(command: Asked) -> None:
         console.print(f"Numbers: {command.json}", markup=False, soft_wrap=True)
 
 
-def _arm_and_skin(command: Asked) -> tuple[RobotModel, Skin, Path | None]:
+def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path | None]:
     """Return the arm, its skin, and the skin's file if one was named."""
     folder = None if command.arm in ("panda", "fr3") else Path(command.arm)
     if folder is None:
@@ -80,7 +82,7 @@ def _arm_and_skin(command: Asked) -> tuple[RobotModel, Skin, Path | None]:
     return model, load_skin(own, model), own
 
 
-def _params(command: Asked) -> CoverageParams:
+def _params(command: "Asked") -> CoverageParams:
     return CoverageParams(
         object_radius_m=command.object_radius, object_speed_m_s=command.speed, arm_speed_m_s=command.arm_speed,
         deceleration_m_s2=command.deceleration, rate_hz=command.rate, latency_s=command.latency,
@@ -88,7 +90,7 @@ def _params(command: Asked) -> CoverageParams:
     )  # fmt: skip
 
 
-def _check_outputs(command: Asked, source: Path | None) -> None:
+def _check_outputs(command: "Asked", source: Path | None) -> None:
     """Refuse, before anything is computed, what could not be done or would be lost."""
     if command.suggest < 0:
         raise SkinError(f"{command.suggest} more units are asked for: give 1 or more, or leave out --suggest.")
@@ -140,7 +142,7 @@ def _draw(file: str, ways: Ways, found: Coverage, skin: Skin, new: frozenset[str
         coverage_figure(ways, found, skin, new).savefig(file, dpi=110)
 
 
-def _numbers(command: Asked, setting: Setting, found: Coverage, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
+def _numbers(command: "Asked", setting: Setting, found: Coverage, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
     return {
         "asked": asdict(command),
         "parameters": asdict(setting.params) | {"warning_m": setting.params.warning_m},

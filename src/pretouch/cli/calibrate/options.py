@@ -89,7 +89,7 @@ class Calibrate:
         """Calibrate, and show and write the answer."""
         from pretouch.cli.calibrate.command import calibrate_skin
 
-        return calibrate_skin(self)
+        return calibrate_skin(self, way_of(self))
 
 
 Way = Literal["recording", "plan", "robot"]

@@ -126,6 +126,7 @@ class Run:
         """Move the arm. Where a signal ended the run in order, its code is the exit code."""
         from pretouch.cli.run.command import run
 
+        check_options(self)
         return run(self) or None
 
 
