@@ -17,12 +17,6 @@ import numpy as np
 
 from pretouch.contact.feel import feel, feel_init
 from pretouch.control.path import WayPoints
-from pretouch.experiments.trial import Setup, play
-from pretouch.foreign.free_motion import read_free_motion
-from pretouch.foreign.usual import usual_of
-from pretouch.identification.arm_file import arm_toml
-from pretouch.identification.identify import identify
-from pretouch.identification.samples import ArmSamples
 from pretouch.params import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -32,6 +26,12 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import Obstacles, RobotState
+from pretouch_lab.identification.arm_file import arm_toml
+from pretouch_lab.identification.free_motion import read_free_motion
+from pretouch_lab.identification.identify import identify
+from pretouch_lab.identification.samples import ArmSamples
+from pretouch_lab.identification.usual import usual_of
+from pretouch_lab.trial import Setup, play
 
 PATH = WayPoints(
     np.array([[0.4, 0.45, 0.5], [0.6, 0.2, 0.3], [0.5, -0.1, 0.7], [0.35, -0.45, 0.35], [0.55, -0.2, 0.55]]),

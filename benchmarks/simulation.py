@@ -12,6 +12,7 @@ import sys
 import time
 
 from pretouch.control.path import Circle
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
 from pretouch.params import profile
@@ -20,7 +21,6 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, fixtures
 

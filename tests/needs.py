@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pretouch import extras
+from pretouch.extras import Extra
 
 NEEDS = "needs: "
 """What the reason of such a skip begins with; the command follows."""
@@ -18,19 +18,19 @@ def skip_for(command: str) -> None:
     pytest.skip(NEEDS + command)
 
 
-def skip_without(extra: str) -> None:
+def skip_without(extra: Extra) -> None:
     """Skip the test that runs where an extra is not installed."""
-    if extras.missing(extra):
-        skip_for(f"make {extra}")
+    if extra.missing():
+        skip_for(f"make {extra.target}")
 
 
-def modules_with(extra: str) -> Callable[[Path, pytest.Collector], pytest.Collector | None]:
+def modules_with(extra: Extra) -> Callable[[Path, pytest.Collector], pytest.Collector | None]:
     """Return the hook `pytest_pycollect_makemodule` for a folder whose modules cannot be imported without an extra."""
 
     def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-        if not extras.missing(extra):
+        if not extra.missing():
             return None
-        return Unimported.from_parent(parent, path=module_path, command=f"make {extra}")
+        return Unimported.from_parent(parent, path=module_path, command=f"make {extra.target}")
 
     return pytest_pycollect_makemodule
 

@@ -3,11 +3,13 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
-from pretouch import cli
-from pretouch.errors import ExperimentError
+from pretouch import cli, plugins
+from pretouch.cli.registry import GROUP, LAB, OWN
 
 
 def run(capsys, *args):
@@ -18,29 +20,6 @@ def run(capsys, *args):
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (("reproduce", "statik"), "The experiment 'statik' is unknown"),
-        (("reproduce", "static", "--profiles", "paper,brave"), "The profile 'brave' is unknown"),
-        (("reproduce", "static", "--restrictions", "firm"), "The restriction mode 'firm' is unknown"),
-        (("reproduce", "static", "--stiffness", "25,soft"), "The stiffness is 'soft': give numbers in N/m"),
-        (("reproduce", "static", "--profiles", "paper:reaction.decay=3"), "The parameter 'reaction.decay' is unknown"),
-        (("reproduce", "static", "--orientation", "up"), "The orientation 'up' is unknown: choose from free, hold"),
-        (("reproduce", "static", "--seeds", "-1"), "The number of seeds is -1"),
-        (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
-        (("reproduce", "static", "--out", "/dev/null/x"), "/dev/null/x cannot be used"),
-        (("reproduce", "static", "--out", "OUT", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
-        (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "cannot be written: Is a directory"),
-        (("reproduce", "static", "--out", "OUT", "--json", "x" * 256), "cannot be written: File name too long"),
-        (("demo", "--seeds", "0"), "The number of seeds is 0"),
-        (("bench", "cycle", "--points", "7,x"), "The numbers of points are '7,x': give whole numbers"),
-        (("bench", "cycle", "--points", ""), "The numbers of points are '': give whole numbers"),
-        (("bench", "cycle", "--points", "7,0"), "The number of points is 0: give 1 to 10000"),
-        (("bench", "cycle", "--rate", "10"), "The rate is 10 Hz: give more than 20 and up to 10000 Hz"),
-        (("bench", "cycle", "--rate", "nan"), "The rate is nan Hz"),
-        (("bench", "cycle", "--cycles", "0"), "The number of cycles is 0"),
-        (("bench", "cycle", "--profile", "brave"), "The profile 'brave' is unknown"),
-        (("bench", "cycle", "--priority", "100"), "The real-time priority is 100: give 1 to 99"),
-        (("bench", "cycle", "--cpu", "-1"), "Processor -1 is none this process may use: choose from"),
-        (("bench", "cycle", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
         (("live", "--port", "0"), "The port is 0: give one from 1 to 65535"),
         (("live", "--path", "square"), "The path is 'square': choose circle or line"),
         (("replay", "/nowhere.mcap", "--no-page"), "/nowhere.mcap cannot be read: there is none"),
@@ -48,73 +27,26 @@ def run(capsys, *args):
         (("recover", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
         (("report", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
         (("detect", "/nowhere.csv"), "/nowhere.csv cannot be read: there is none"),
-        (("reproduce", "static", "--record", "some"), "The choice of trials to record 'some' is unknown"),
     ],
 )
-def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, args, words):
-    code, said = run(capsys, *(str(tmp_path / "out") if arg == "OUT" else arg for arg in args))
+def test_bad_input_ends_with_one_sentence_and_code_2(capsys, args, words):
+    code, said = run(capsys, *args)
     assert code == 2
     assert words in said.err
     assert said.err.count("\n") == 1
     assert said.out == ""
 
 
-@pytest.mark.parametrize("name", ["run.json", "trials/x.json", "recordings/a/b.json", "trials", "../link/run.json"])
-def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
-    out = tmp_path / "out"
-    (tmp_path / "link").symlink_to(out)
-    code, said = run(capsys, "reproduce", "static", "--out", str(out), "--json", str(out / name))
-    assert code == 2
-    assert "would take the place of the run's own" in said.err
-    assert said.err.count("\n") == 1
-    assert not out.exists()
-
-
-def _row(request, out):
-    from pretouch.experiments.campaign import trial_file
-    from pretouch.experiments.results_file import write_json
-
-    cell, seed = request.tasks()[0]
-    row = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
-    write_json(row, trial_file(out, cell, seed))
-
-
-@pytest.mark.parametrize("error", [RuntimeError("crash"), ExperimentError("full"), KeyboardInterrupt()])
-def test_finished_trials_are_kept_whatever_ends_a_run(capsys, tmp_path, monkeypatch, error):
-    def play(request, out, _progress):
-        _row(request, out)
-        raise error
-
-    monkeypatch.setattr("pretouch.cli.campaigns.run_campaign", play)
-    monkeypatch.setattr("pretouch.cli.campaigns.summarise", len)
-    args = ("reproduce", "static", "--out", str(tmp_path))
-    if isinstance(error, RuntimeError):
-        with pytest.raises(RuntimeError, match="crash"):
-            cli.main(list(args))
-    else:
-        code, said = run(capsys, *args)
-        assert code == (2 if isinstance(error, ExperimentError) else 130)
-        assert "full\n" in said.err or "the 1 finished trials are in" in said.err
-    assert len(json.loads((tmp_path / "results.json").read_text())["trials"]) == 1
-
-
-def test_results_that_cannot_be_written_at_the_end_are_said(capsys, tmp_path, monkeypatch):
-    def full(_value, _path):
-        raise OSError(28, "No space left on device")
-
-    def play(request, out, _progress):
-        monkeypatch.setattr("pretouch.cli.campaigns.write_json", full)
-
-    monkeypatch.setattr("pretouch.cli.campaigns.run_campaign", play)
-    code, said = run(capsys, "reproduce", "static", "--out", str(tmp_path))
-    assert code == 2
-    assert "results.json cannot be written: No space left on device" in said.err
-
-
 def test_help_needs_none_of_the_heavy_packages():
     heavy = ("numpy", "scipy", "numba", "mujoco", "matplotlib")
-    code = f"import sys, pretouch.cli; sys.exit(', '.join(m for m in {heavy} if m in sys.modules) or 0)"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    code = f"""
+import sys, pretouch.cli
+try:
+    pretouch.cli.main(["--help"])
+except SystemExit:
+    sys.exit(', '.join(m for m in {heavy} if m in sys.modules) or 0)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
 
 def test_ctrl_c_while_words_are_read_ends_in_order(monkeypatch):
@@ -122,18 +54,18 @@ def test_ctrl_c_while_words_are_read_ends_in_order(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli.tyro, "cli", stop)
-    assert cli.main(["demo"]) == 130
+    assert cli.main(["warm-up"]) == 130
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_signals_that_end_a_process_end_it_in_order(monkeypatch, number):
     before = signal.getsignal(number)
     monkeypatch.setattr(cli.tyro, "cli", lambda *_args, **_options: signal.raise_signal(number))
-    assert cli.main(["demo"]) == 128 + number
+    assert cli.main(["warm-up"]) == 128 + number
     assert signal.getsignal(number) is before
 
 
-@pytest.mark.parametrize("args", [(), ("dance",), ("reproduce", "--seeds", "many"), ("demo", "--nothing")])
+@pytest.mark.parametrize("args", [(), ("dance",), ("live", "--seed", "many"), ("recover", "--nothing"), ("skin",)])
 def test_words_it_does_not_know_end_with_code_2(capsys, args):
     with pytest.raises(SystemExit) as stop:
         cli.main(list(args))
@@ -145,87 +77,13 @@ def test_help_names_the_commands(capsys):
         cli.main(["--help"])
     assert stop.value.code == 0
     said = capsys.readouterr().out
-    assert "demo" in said
-    assert "reproduce" in said
-
-
-@pytest.mark.slow
-def test_a_run_writes_what_it_says(capsys, tmp_path):
-    out, numbers = tmp_path / "out", tmp_path / "numbers.json"
-    args = ("reproduce", "static", "--seeds", "1", "--out", str(out), "--json", str(numbers))
-    code, said = run(capsys, *args)
-    assert code == 0
-    for words in ("Static object", "circle", "line", "ratio", str(out / "index.html"), str(numbers)):
-        assert words in said.out
-    results = json.loads(numbers.read_text())
-    assert len(results["trials"]) == 8
-    assert len(results["summary"]["static"]["cells"]) == 8
-    ratios = results["summary"]["static"]["ratios"]
-    assert [r["of"] for r in ratios] == ["blind/paper"] * 4
-    assert all(r["peak_estimate_n"]["median"] > 1 for r in ratios)
-    assert max(len(line) for line in said.out.splitlines() if str(tmp_path) not in line) <= 80
-    code, said = run(capsys, *args[:-4], "--out", str(out), "--stiffness", "2000")
-    assert code == 2
-    assert "holds a run with stiffness = [25000.0], not [2000.0]" in said.err
-
-
-def test_a_new_demo_gets_a_new_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "runs" / "demo-1").mkdir(parents=True)
-    assert str(cli._new_folder("demo")) == "runs/demo-2"
-
-
-def test_bench_free_motion_is_a_campaign(monkeypatch):
-    runs = []
-    monkeypatch.setattr("pretouch.cli.campaigns.run_all", lambda *given: runs.append(given))
-    assert cli.main(["bench", "free-motion", "--seeds", "3"]) == 0
-    (((request, out),), folder, numbers) = runs[0]
-    assert (request.experiments, request.seeds) == (("free-motion",), 3)
-    assert str(out) == str(folder) == "runs/bench-free-motion"
-    assert str(numbers) == "runs/bench-free-motion/results.json"
-
-
-def test_bench_cycle_shows_and_writes_what_it_measured(capsys, tmp_path):
-    file = tmp_path / "cycle.json"
-    code, said = run(capsys, "bench", "cycle", "--points", "3,5", "--cycles", "20", "--json", str(file))
-    assert code == 0
-    for words in ("Time of a control step, 20 cycles [us]", "wall at 1000 Hz", "overruns", "[%]", str(file)):
-        assert words in said.out
-    assert max(len(line) for line in said.out.splitlines() if str(tmp_path) not in line) <= 80
-    written = json.loads(file.read_text())
-    assert written["about"]["rate_hz"] == 1000
-    assert written["about"]["versions"]["numba"]
-    assert [row["points"] for row in written["rows"]] == [3, 5]
-    asked = ["points", "median_us", "p99_us", "p999_us", "max_us", "overruns", "stages"]
-    assert all(list(row)[: len(asked)] == asked for row in written["rows"])
-
-
-def test_what_bench_cycle_measured_before_it_was_stopped_is_kept(capsys, tmp_path, monkeypatch):
-    from pretouch.cli import cycle
-
-    measure = cycle.measure
-
-    def once(points, request, tell):
-        if points == 5:
-            raise KeyboardInterrupt
-        tell("No priority.")
-        return measure(points, request, tell)
-
-    monkeypatch.setattr(cycle, "measure", once)
-    file = tmp_path / "cycle.json"
-    code, said = run(capsys, "bench", "cycle", "--points", "3,5", "--cycles", "20", "--json", str(file))
-    assert code == 130
-    assert "No priority." in said.out
-    written = json.loads(file.read_text())
-    assert [row["points"] for row in written["rows"]] == [3]
-    assert written["about"]["asked"] == [3, 5]
-    assert "Stopped: 1 of 2 numbers of points were measured." in said.err
-    assert written["about"]["missing"] == ["No priority."]
+    for name in (*OWN, *LAB):
+        assert f"• {name} " in said
 
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
     from pretouch.cli.writing import check_writable
-    from pretouch.experiments.results_file import write_json
+    from pretouch.whole_file import write_json
 
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -239,9 +97,78 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
 
 
 def test_a_link_is_followed(tmp_path):
-    from pretouch.experiments.results_file import write_json
+    from pretouch.whole_file import write_json
 
     (tmp_path / "link").symlink_to(tmp_path / "real")
     write_json([1], tmp_path / "link")
     assert (tmp_path / "link").is_symlink()
     assert json.loads((tmp_path / "real").read_text()) == [1]
+
+
+@pytest.fixture
+def installed(monkeypatch):
+    """Install distributions: entry points by name, each with what it names."""
+
+    def install(**points):
+        found = EntryPoints(EntryPoint(name.replace("_", "-"), value, GROUP) for name, value in points.items())
+        monkeypatch.setattr(plugins, "_points", lambda _group: found)
+
+    return install
+
+
+@pytest.mark.parametrize("name", LAB)
+def test_a_command_of_the_lab_that_is_not_there_is_said_with_what_installs_it(installed, capsys, name):
+    installed()
+    code, said = run(capsys, name, "--seeds", "3")
+    assert code == 2
+    assert said.err == (
+        f"`pretouch {name}` is a command of the lab, which is not installed: in a clone `make setup` installs it,"
+        " elsewhere `pip install pretouch-lab`.\n"
+    )
+
+
+@dataclass(frozen=True)
+class Added:
+    """Add a number."""
+
+    number: int = 3
+
+    def run(self) -> int:
+        return self.number
+
+
+def test_a_command_can_be_added(installed, capsys):
+    installed(added=f"{__name__}:Added")
+    assert run(capsys, "added", "--number", "4")[0] == 4
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    assert "Add a number." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("nowhere.at_all:Command", "cannot be loaded from nowhere.at_all:Command (ModuleNotFoundError: No module"),
+        ("pretouch.cli:Nothing", "cannot be loaded from pretouch.cli:Nothing (AttributeError: "),
+        ("pretouch.cli:main", "is given by an entry point that names no class with run()"),
+    ],
+)
+def test_a_broken_entry_point_is_a_sentence_and_leaves_the_others(installed, capsys, value, said):
+    installed(broken=value)
+    code, told = run(capsys, "broken")
+    assert code == 2
+    assert said in told.err
+    assert told.err.count("\n") == 1
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    told = capsys.readouterr()
+    assert said in told.err
+    assert "warm-up" in told.out
+
+
+def test_a_command_of_two_distributions_is_refused(monkeypatch, capsys):
+    two = EntryPoints(EntryPoint("twice", value, GROUP) for value in ("a:A", "b:B"))
+    monkeypatch.setattr(plugins, "_points", lambda _group: two)
+    code, said = run(capsys, "twice")
+    assert code == 2
+    assert "uninstall one of them" in said.err

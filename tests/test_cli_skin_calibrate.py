@@ -1,7 +1,6 @@
-"""`pretouch skin calibrate`: what goes together, the study in simulation, and the motion for one's own driver."""
+"""`pretouch skin calibrate`: what goes together, and the motion for one's own driver."""
 
 import csv
-import json
 import re
 import socket
 import subprocess
@@ -12,19 +11,12 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.calibrate import live
-from pretouch.cli.calibrate import study as study_way
-from pretouch.experiments.calibration.study import OURS, Study, Trial
 from pretouch.foreign.joints import read_joints
 from pretouch.robot.self_distance import capsule_ends, kinematics_of
 from pretouch.serving.simulated_arm import SimulatedArm
 
 ASIDE = np.array([-1.2, 0, 0, 0, 0, 0, 0])
 """From the ready posture to where the arm of a test stands [rad]: to its right."""
-ROW = {
-    "skin": 0, "unit": "on_panda_hand", "link": "panda_hand", "accepted": True, "position_error_m": 0.0002,
-    "orientation_error_deg": 0.004, "position_sigma_m": 0.0001, "orientation_sigma_deg": 0.003, "nees_position": 3.0,
-    "nees_orientation": 3.0, "nees_pose": 6.0, "clock_error_s": 0.0007, "link_found": True,
-}  # fmt: skip
 
 
 def calibrate(*words):
@@ -34,20 +26,14 @@ def calibrate(*words):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "Nothing says what to calibrate from: give --simulate, --recording FILE, --plan FILE, or --robot ARM."),
+        ((), "Nothing says what to calibrate from: give --recording FILE, --plan FILE, or --robot ARM."),
         (("--keys", "k.toml"), "Nothing says what to calibrate from"),
-        (("--simulate", "--recording", "x.mcap"), "--simulate and --recording are given: choose one of them."),
         (("--plan", "m.csv", "--robot", "simulated"), "--plan and --robot are given: choose one of them."),
-        (("--simulate", "--joints", "x.csv"), "--joints does not go with --simulate: leave it out."),
-        (("--simulate", "--out", "s.toml", "--yes"), "--out, --yes do not go with --simulate: leave them out."),
-        (("--recording", "x.mcap", "--find-links"), "--find-links does not go with --recording: leave it out."),
+        (("--recording", "x.mcap", "--keys", "k"), "--keys does not go with --recording: leave it out."),
         (("--recording", "x.mcap", "--duration", "30"), "--duration does not go with --recording"),
         (("--recording", "x.mcap", "--seed", "1"), "--seed does not go with --recording"),
         (("--plan", "m.csv", "--units-port", "1"), "--units-port does not go with --plan"),
         (("--robot", "simulated", "--joints", "x"), "--joints does not go with --robot"),
-        (("--simulate", "--skins", "0"), "The number of skins is 0"),
-        (("--simulate", "--seed", "-1"), "The seed is -1: it must be at least 0."),
-        (("--simulate", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
         (("--recording", "/nowhere.mcap"), "The recording /nowhere.mcap cannot be read: there is none."),
         (("--recording", "x.mcap", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--recording", "x.mcap", "--out", "/dev/null/x.toml"), "/dev/null/x.toml cannot be written"),
@@ -181,30 +167,6 @@ def test_nobody_who_reads_on_ends_the_command_quietly_with_the_motion_written(tm
     assert (tmp_path / "m.csv").stat().st_size > 1e6
 
 
-def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, monkeypatch):
-    asked = []
-
-    def study(model, skins, seed, compared, links_known, plan, progress):
-        asked.append((model.description.name, skins, seed, compared, links_known, plan))
-        progress(1, 1)
-        return Study([Trial(0, OURS, OURS, [ROW], 1.5)], {OURS: 60.0})
-
-    monkeypatch.setattr(study_way, "study", study)
-    place = tmp_path / "new" / "rows.json"
-    for _ in range(2):
-        assert calibrate("--simulate", "--skins", 20, "--json", place) == 0
-        assert asked.pop() == ("panda", 20, 0, False, True, None)
-    told = json.loads(place.read_text())
-    assert told["rows"] == [ROW]
-    assert (told["motion_s"], told["compute_s"]) == (60.0, 1.5)
-    said = capsys.readouterr().out
-    assert "Where units sit, found in 60 s of motion" in said
-    assert "panda_hand" in said
-    assert f"Numbers: {place}" in said
-    assert calibrate("--simulate", "--compared", "--find-links", "--seed", 3, "--arm", "fr3") == 0
-    assert asked == [("fr3", 20, 3, True, False, None)]
-
-
 def test_the_motion_is_written_for_another_driver_with_what_it_is_good_for(panda_model, tmp_path, capsys):
     place = tmp_path / "motion.csv"
     assert calibrate("--plan", place, "--duration", 45) == 0
@@ -229,13 +191,6 @@ def test_a_rehearsal_ends_with_its_motion_and_takes_no_duration(tmp_path, capsys
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
-def test_a_study_of_one_skin_finds_all_units_to_a_millimetre(tmp_path):
-    place = tmp_path / "rows.json"
-    assert calibrate("--simulate", "--skins", 1, "--find-links", "--json", place) == 0
-    told = json.loads(place.read_text())
-    assert len(told["rows"]) == 7
-    assert told["motion_s"] <= 90.0
-    for row in told["rows"]:
-        assert row["position_error_m"] < 0.001
-        assert row["orientation_error_deg"] < 0.1
+def test_the_study_in_simulation_has_another_name(capsys):
+    assert calibrate("--simulate", "--skins", 20) == 2
+    assert "is `pretouch bench calibration` now" in capsys.readouterr().err

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from pretouch.experiments.registry import EXPERIMENTS
+from pretouch_lab.registry import EXPERIMENTS
 
 ROOT = Path(__file__).parents[1]
 ROWS = re.findall(

@@ -62,3 +62,7 @@ class CalibrationError(PretouchError, ValueError):
 
 class ViewerError(PretouchError, RuntimeError):
     """The page cannot be shown."""
+
+
+class PluginError(PretouchError, RuntimeError):
+    """A part that another distribution adds is missing, or cannot be loaded."""

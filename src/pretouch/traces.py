@@ -1,6 +1,8 @@
 """What was measured over some time: arrays by instant."""
 
-from pretouch.types import FloatArray
+import numpy as np
+
+from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
 
@@ -24,3 +26,16 @@ class JointTrace:
     """(T,) [s]."""
     q: FloatArray
     """(T, n) [rad]."""
+
+
+def spans(flags: BoolArray) -> list[tuple[int, int]]:
+    """First and one past the last index of each run of true flags (T,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def mean_over(values: FloatArray, samples: int) -> FloatArray:
+    """Moving mean (T - samples + 1,) of values (T,); of fewer than `samples` values, their mean (1,)."""
+    if len(values) < samples:
+        return np.array([float(values.mean())]) if len(values) else np.zeros(0)
+    return np.convolve(values, np.full(samples, 1.0 / samples), mode="valid")

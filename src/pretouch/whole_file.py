@@ -1,8 +1,11 @@
 """A text file that is replaced whole or not at all."""
 
+import json
 import os
 import shutil
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 
 def write_whole(path: Path, text: str) -> None:
@@ -14,7 +17,8 @@ def write_whole(path: Path, text: str) -> None:
     if place.exists() and not place.is_file() and not place.is_dir():
         place.write_text(text, encoding="utf-8")
         return
-    unfinished = place.with_name(f".pretouch.{os.getpid()}.tmp")  # as short for a long name
+    name = sha256(os.fsencode(place.name)).hexdigest()[:16]  # as short for a long name
+    unfinished = place.with_name(f".{name}.{os.getpid()}.tmp")
     try:
         with unfinished.open("w", encoding="utf-8") as file:
             file.write(text)
@@ -26,3 +30,8 @@ def write_whole(path: Path, text: str) -> None:
     except BaseException:
         unfinished.unlink(missing_ok=True)
         raise
+
+
+def write_json(value: Any, path: Path) -> None:
+    """Write a value as a JSON file by `write_whole`. Raises OSError, and ValueError for numbers that are not finite."""
+    write_whole(path, json.dumps(value, indent=1, allow_nan=False) + "\n")

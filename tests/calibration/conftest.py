@@ -3,9 +3,9 @@
 import pytest
 
 from pretouch.calibration.data import CalibrationData
-from pretouch.experiments.calibration.random_skin import random_skin
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch_lab.studies.calibration.random_skin import random_skin
 from tests.calibration.made import MovingArm
 
 

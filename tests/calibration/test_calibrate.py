@@ -9,9 +9,9 @@ import pytest
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.data import CalibrationData
 from pretouch.errors import CalibrationError, RobotModelError
-from pretouch.experiments.calibration.random_skin import random_skin
 from pretouch.sensing.skin import Skin
 from pretouch.traces import ImuTrace
+from pretouch_lab.studies.calibration.random_skin import random_skin
 from tests.calibration import made
 from tests.calibration.faulty import joints_late, on_the_table, slipped, without_joints
 from tests.calibration.made import EXACT, MovingArm, Noise, pose_error, turned

@@ -9,10 +9,10 @@ from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.data import CalibrationData
 from pretouch.calibration.identify import rigid_bodies
 from pretouch.calibration.params import CalibrationParams
-from pretouch.experiments.calibration.random_skin import random_skin
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.traces import ImuTrace, JointTrace
+from pretouch_lab.studies.calibration.random_skin import random_skin
 from tests.calibration.faulty import swapped, unit_of
 from tests.calibration.made import MovingArm
 

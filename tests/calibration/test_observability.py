@@ -6,8 +6,8 @@ import pytest
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.observability import Axis, observability
 from pretouch.calibration.params import CalibrationParams
-from pretouch.experiments.calibration.random_skin import random_skin
 from pretouch.sensing.skin import Skin
+from pretouch_lab.studies.calibration.random_skin import random_skin
 from tests.calibration.made import MovingArm
 
 PARAMS = CalibrationParams()

@@ -7,6 +7,7 @@ import pytest
 
 from pretouch.calibration.stamps import instants, retimed
 from pretouch.control.path import Circle
+from pretouch.control.posture import brought_to
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.serving.fleet import FleetParams
@@ -15,7 +16,6 @@ from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.imu import ImuParams, Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 

@@ -7,9 +7,9 @@ import pytest
 
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.result import UnitCalibration
-from pretouch.experiments.calibration.random_skin import random_skin
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch_lab.studies.calibration.random_skin import random_skin
 from tests.calibration.faulty import slipped
 from tests.calibration.made import MovingArm, turned
 

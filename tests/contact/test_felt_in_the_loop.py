@@ -8,16 +8,16 @@ import pytest
 from pretouch.contact.feel import learnt
 from pretouch.control.path import Circle, line
 from pretouch.controller import Controller
-from pretouch.experiments.bench.detection.arm import AWAY, Alone, path_of, record, sensing_of
-from pretouch.experiments.bench.detection.contenders import CONTENDERS
-from pretouch.experiments.bench.detection.replay import replay
-from pretouch.experiments.claims.forces import Event, apply
-from pretouch.experiments.trial import Setup, play
 from pretouch.params import profile
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec, fixtures
 from pretouch.types import Inputs, Mode, RangeReadings, RobotState
+from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, path_of, record, sensing_of
+from pretouch_lab.benchmarks.detection.contenders import CONTENDERS
+from pretouch_lab.benchmarks.detection.replay import replay
+from pretouch_lab.paper.claims.forces import Event, apply
+from pretouch_lab.trial import Setup, play
 
 NONE = RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
 

@@ -8,11 +8,11 @@ from functools import partial
 from types import ModuleType
 
 from pretouch.controller import Controller
-from pretouch.experiments import clamp, dynamic, pinch, static, vision
-from pretouch.experiments.cell import Cell, Context
-from pretouch.experiments.workload import Workload
 from pretouch.params import profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch_lab import clamp, dynamic, pinch, static, vision
+from pretouch_lab.benchmarks.workload import Workload
+from pretouch_lab.cell import Cell, Context
 from tests.golden.fields import Values, values_of
 from tests.golden.streams import model, skin
 

@@ -9,15 +9,15 @@ import pytest
 from tests.importing.test_robot_import import assert_same_mechanics, stripped
 from tests.needs import skip_for
 
-from pretouch.experiments import static
-from pretouch.experiments.campaign import Request
-from pretouch.experiments.cell import Cell
 from pretouch.importing.body import whole_arm_error
 from pretouch.importing.capsule_fit import Rods
 from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, _checked_at, import_robot
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
+from pretouch_lab.campaign import Request
+from pretouch_lab.cell import Cell
+from pretouch_lab.paper import static
 
 
 def robot(name: str) -> Path:

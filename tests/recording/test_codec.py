@@ -21,7 +21,7 @@ from pretouch.recording.codec import (
     encode_step,
     encode_truth,
 )
-from pretouch.recording.messages import OWN, PACKAGE, decoded, definition, own_definition, typestore
+from pretouch.recording.messages import OWN, PACKAGE, decoded, definition, fields_of, own_definition
 from pretouch.recording.truth import Truth
 from pretouch.types import (
     Contact,
@@ -41,6 +41,7 @@ from pretouch.types import (
     untouched,
 )
 from tests.fuzz.invariants import same
+from tests.recording.oracle import typestore
 
 NUMBER = st.floats(allow_nan=False)  # NaN with a payload is compared as NaN elsewhere
 NAN_TOO = st.one_of(NUMBER, st.just(float("nan")))
@@ -233,18 +234,18 @@ def test_messages_mirror_the_types_field_by_field():
     beside = {"touch", "imu", "points"}  # of Inputs: in messages of their own, so that older recordings open
     for kind in mirrored:
         name = {"ControlStep": "Step"}.get(kind.__name__, kind.__name__)
-        there = {field for field, _ in typestore().get_msgdef(f"{PACKAGE}/msg/{name}").fields}
+        there = {field.name for field in fields_of(f"{PACKAGE}/msg/{name}")}
         assert there - own == {f.name for f in fields(kind)} - beside
-    touch = {field for field, _ in typestore().get_msgdef(f"{PACKAGE}/msg/Touch").fields}
+    touch = {field.name for field in fields_of(f"{PACKAGE}/msg/Touch")}
     assert touch - {"sequence", "step_stamp"} == {f.name for f in fields(TouchReadings)}
-    points = {field for field, _ in typestore().get_msgdef(f"{PACKAGE}/msg/SeenPoints").fields}
+    points = {field.name for field in fields_of(f"{PACKAGE}/msg/SeenPoints")}
     assert points - own == {f.name for f in fields(SeenPoints)} | {"same_as"}
 
 
 def test_the_rows_of_the_thresholds_have_their_names():
     step = replace(decode_step(encode_step(0, some_step()))[1], thresholds=Thresholds(np.arange(18.0).reshape(6, 3)))
     message = decoded(STEP, encode_step(0, step)).thresholds
-    for name, _ in typestore().get_msgdef(f"{PACKAGE}/msg/Thresholds").fields:
+    for name, _, _ in fields_of(f"{PACKAGE}/msg/Thresholds"):
         assert getattr(message, name).tobytes() == getattr(step.thresholds, name).tobytes()
 
 

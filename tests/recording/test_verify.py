@@ -7,6 +7,7 @@ import pytest
 
 from pretouch.contact.window import window_init
 from pretouch.control.path import line
+from pretouch.control.posture import brought_to
 from pretouch.loop import Cycle, turn
 from pretouch.params import PROFILES
 from pretouch.recording import verify as verifying
@@ -21,7 +22,6 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import Mode

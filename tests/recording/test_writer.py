@@ -12,11 +12,12 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from pretouch.errors import RecordingError
-from pretouch.recording.messages import TOPICS, typestore
+from pretouch.recording.messages import TOPICS
 from pretouch.recording.reader import open_recording
 from pretouch.recording.truth import Truth
 from pretouch.recording.writer import Recording
 from tests.fuzz.invariants import same
+from tests.recording.oracle import typestore
 from tests.recording.runs import Run, controller_of, recorded_run
 
 

@@ -5,15 +5,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pretouch.control.path import Circle
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
-from pretouch.experiments import static
-from pretouch.experiments.trial import Record
 from pretouch.loop import run
 from pretouch.params import profile as find_profile
 from pretouch.recording.truth import Truth
+from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import fixtures
 from pretouch.types import (
@@ -28,6 +27,7 @@ from pretouch.types import (
     RobotState,
     Thresholds,
 )
+from pretouch_lab.trial import Record
 
 SETTLE_S = 0.2
 
@@ -86,7 +86,7 @@ def played(model, skin, profile="paper", side="-y", seed=0, seconds=6.0, until_r
     """One trial of the static experiment: what it recorded, and what it left behind by the experiment's own record."""
     used = find_profile(profile)
     used = replace(used, restriction=replace(used.restriction, mode="off"))
-    scene, path = static.scene("line", side, 25_000.0, seed), static.path("line", side)
+    scene, path = static_scene("line", side, 25_000.0, seed), static_path("line", side)
     plant = Plant(model, scene, PlantParams(), brought_to(model, path.point(0.0)), seed)
     units = RangeFinders(plant, skin, RangeFinderParams(), seed)
     recorder = Recorder(plant)

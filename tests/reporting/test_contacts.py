@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from pretouch.experiments import static
 from pretouch.reporting.course import Truth
 from pretouch.reporting.measures import measure
 from pretouch.reporting.touches import touches_of
 from pretouch.types import Mode
+from pretouch_lab.paper import static
 from tests.reporting import made
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
+from pretouch.control.posture import brought_to
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.wire import (
     HELLO_SIZE,
@@ -25,7 +26,6 @@ from pretouch.serving.fleet import FleetParams
 from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import TouchStatus

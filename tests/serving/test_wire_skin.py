@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError
 from pretouch.loop import turn
@@ -16,7 +17,6 @@ from pretouch.serving.wire_skin import WireSkin, made_keys
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import ControlStep, Mode, RangeStatus

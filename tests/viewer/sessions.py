@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
-from tests.experiments.limits import assert_within_limits
+from tests.lab.limits import assert_within_limits
 
 from pretouch.types import ControlStep, Mode
 from pretouch.viewer.simulation import LiveSimulation

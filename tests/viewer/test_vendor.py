@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from tests.needs import skip_without
 
-from pretouch import extras
+from pretouch.extras import MESHES
 from pretouch.robot.model import RobotModel
 from pretouch.viewer import vendor
 from pretouch.viewer.vendor import coarse, vendor_surfaces
@@ -37,11 +37,11 @@ def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(
     monkeypatch.setattr(vendor, "_folder", lambda: None)
     found, said = vendor_surfaces(panda_model)
     assert found == {}
-    assert said == f"The arm is drawn by its capsules: for the vendor's surfaces, run {extras.command('meshes')}"
+    assert said == f"The arm is drawn by its capsules: for the vendor's surfaces, run {MESHES.command}"
 
 
 def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model: RobotModel) -> None:
-    skip_without("meshes")
+    skip_without(MESHES)
     found, said = vendor_surfaces(panda_model)
     assert said == ""
     for link in np.unique(panda_model.capsules.link):

@@ -13,8 +13,8 @@ from rich.table import Table
 
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ParameterError, RecordingError
+from pretouch.extras import FIGURES
 from pretouch.foreign.detect import detect_foreign, units_topics
-from pretouch.foreign.figure import decisions_figure
 from pretouch.foreign.samples import Foreign, read_foreign
 from pretouch.foreign.source import Choice
 from pretouch.foreign.summary import Summary, findings, guidance, summary
@@ -55,6 +55,8 @@ def detect(
         raise ParameterError("No profile is given: name one or more, separated by commas.")
     if out and out.suffix not in _ENDINGS:
         raise RecordingError(f"The figure {out} has no ending that says its format: use {', '.join(_ENDINGS)}.")
+    if out:
+        FIGURES.need("A figure")
     for what, target in (("figure", out), ("file", json_file)):
         if target:
             check_writable(what, target)
@@ -63,6 +65,8 @@ def detect(
     columns = [(p, d, summary(d, p)) for p in used for d in [detect_foreign(foreign, p, skin)]]
     notes = list(dict.fromkeys([*foreign.notes, *_unheard(skin, foreign), *_said(foreign, columns, skin)]))
     if out:
+        from pretouch.foreign.figure import decisions_figure
+
         image = BytesIO()
         figure = decisions_figure([d for _, d, _ in columns], place.name)
         figure.savefig(image, format=out.suffix[1:], dpi=_DOTS_PER_INCH)

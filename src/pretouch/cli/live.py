@@ -6,23 +6,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from pretouch.cli.commands import Live
 from pretouch.cli.ending import ended
 from pretouch.errors import HardwareError, ParameterError
-from pretouch.extras import need
+from pretouch.extras import VIEWER
 from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.params import profile as find_profile
 from pretouch.viewer.server import ServeOptions, check_port
 from pretouch.viewer.settings import LiveSettings, PathName
 
 if TYPE_CHECKING:
+    from pretouch.cli.commands import Live
     from pretouch.viewer.real_units import RealUnits
 
 
-def live(command: Live) -> None:
+def live(command: "Live") -> None:
     """Serve the page until interrupted."""
     options = ServeOptions(command.host, command.port)
-    need("viewer", "The page")
+    VIEWER.need("The page")
     check_port(options)  # before the seconds that the simulation takes to begin
     if command.path not in ("circle", "line"):
         raise ParameterError(f"The path is {command.path!r}: choose circle or line.")
@@ -39,7 +39,7 @@ def live(command: Live) -> None:
     skin = load_skin(command.skin, model) if command.skin else paper_skin(model)
     believed = skin
     if command.world:
-        from pretouch.experiments.misplacement import Misplacement, misplaced
+        from pretouch.sim.misplacement import Misplacement, misplaced
         from pretouch.sim.randomisation import drawn, world_set
 
         world = drawn(world_set(command.world), command.seed)
@@ -54,7 +54,7 @@ def live(command: Live) -> None:
 
 
 @contextmanager
-def _units(command: Live, ids: Sequence[str]) -> Iterator["RealUnits | None"]:
+def _units(command: "Live", ids: Sequence[str]) -> Iterator["RealUnits | None"]:
     """Hear the real units of a skin, if there is a file of their keys."""
     if not command.keys:
         yield None

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from pretouch.cli.detect import axes_shown
 from pretouch.cli.ending import ended
-from pretouch.extras import need
+from pretouch.extras import VIEWER
 from pretouch.params import profile as find_profile
 from pretouch.recording import recover as recovering
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
@@ -38,7 +38,7 @@ def replay(
     if page and not verify:  # what keeps it from being shown is said before the work for it
         from pretouch.viewer.server import ServeOptions, check_port
 
-        need("viewer", "The page")
+        VIEWER.need("The page")
         check_port(ServeOptions(host, port))
     recorded = open_recording(place)
     if recorded.said:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import RecordingError
+from pretouch.extras import FIGURES
 from pretouch.recording.reader import open_recording
 from pretouch.reporting.measures import Measures, measure
 from pretouch.reporting.orientation import ISO_TS_15066, load_limits
-from pretouch.reporting.page import page
 
 
 def write_page(files: Sequence[Path], out: Path, limits: Path | None = None) -> Path:
@@ -28,7 +28,10 @@ def write_page(files: Sequence[Path], out: Path, limits: Path | None = None) -> 
     if out.resolve() in [place.resolve() for place in files]:
         raise RecordingError(f"The report {out} would be written over the recording: give another --out.")
     regions = load_limits(limits) if limits else ISO_TS_15066
+    FIGURES.need("A report")
     check_writable("report", out)
+    from pretouch.reporting.page import page  # needs the extra
+
     text = page(_measured(files), regions)
     with unwritable_said("report", out):
         out.write_bytes(text.encode("utf-8", errors="replace"))  # a file name may be no text

@@ -1,21 +1,24 @@
 """Checking an imported arm on the command line."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from pretouch.cli.robot_commands import Check
 from pretouch.cli.tables import show
 from pretouch.errors import RobotModelError
-from pretouch.experiments.tables import TextTable
 from pretouch.importing.folder import SKIN
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
 from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
+from pretouch.text_table import TextTable
+
+if TYPE_CHECKING:
+    from pretouch.cli.robot_commands import Check
 
 
-def check_arm(command: Check) -> None:
+def check_arm(command: "Check") -> None:
     """Load an arm and its skin, and print what is known of them; what is wrong is an error of this package."""
     folder = Path(command.folder)
     description = load_description(folder)

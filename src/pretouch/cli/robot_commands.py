@@ -41,6 +41,12 @@ class Import:
     json: str = ""
     """File for the numbers of the fit."""
 
+    def run(self) -> None:
+        """Import the arm."""
+        from pretouch.cli.robot_import import import_arm
+
+        import_arm(self)
+
 
 @dataclass(frozen=True)
 class Check:
@@ -51,9 +57,19 @@ class Check:
     skin: str = ""
     """Skin file; by default the folder's own."""
 
+    def run(self) -> None:
+        """Check the arm."""
+        from pretouch.cli.robot_check import check_arm
+
+        check_arm(self)
+
 
 @dataclass(frozen=True)
 class Robot:
     """Arms of your own: import one from its URDF or MJCF file, or check one that was changed by hand."""
 
     what: Annotated[Import, tyro.conf.subcommand("import")] | Annotated[Check, tyro.conf.subcommand("check")]
+
+    def run(self) -> None:
+        """Run the command."""
+        self.what.run()

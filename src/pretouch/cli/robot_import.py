@@ -3,28 +3,30 @@
 import re
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from pretouch.cli.robot_check import joint_table, ready_said
-from pretouch.cli.robot_commands import Import
 from pretouch.cli.tables import show
 from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ParameterError
-from pretouch.experiments.results_file import write_json
-from pretouch.experiments.tables import TextTable
 from pretouch.importing.body import FARTHEST, FitError
 from pretouch.importing.folder import check_free, write_folder
 from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
+from pretouch.text_table import TextTable
+from pretouch.whole_file import write_json
+
+if TYPE_CHECKING:
+    from pretouch.cli.robot_commands import Import
 
 _NEGLIGIBLE = 0.001
 """What sticks out less is not spoken of [m]."""
 
 
-def import_arm(command: Import) -> None:
+def import_arm(command: "Import") -> None:
     """Import an arm, print what came of it, and write its folder."""
     options = ImportOptions(
         ee=command.ee,

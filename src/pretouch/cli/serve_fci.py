@@ -8,15 +8,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
 from pretouch.cli.arms import arm_model
 from pretouch.cli.ending import ended
-from pretouch.cli.serve_fci_command import ServeFci
 from pretouch.control.path import Circle
 from pretouch.control.path import Path as ArmPath
+from pretouch.control.posture import brought_to
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import load_keys
 from pretouch.robot.model import RobotModel
@@ -28,15 +28,18 @@ from pretouch.serving.fci.server import FciServer
 from pretouch.serving.fci.units import UnitsSetup
 from pretouch.serving.simulate import Visitor
 from pretouch.sim.hand import HandScript
-from pretouch.sim.posture import brought_to
+from pretouch.sim.paper_scenes import dynamic_pushes, static_path, static_scene
 from pretouch.sim.scene import HandSpec, SceneSpec
+
+if TYPE_CHECKING:
+    from pretouch.cli.serve_fci_command import ServeFci
 
 _say = partial(print, flush=True)
 _STIFFEST = 1e6
 """Largest stiffness of the board [N/m]."""
 
 
-def serve_fci(command: ServeFci) -> None:
+def serve_fci(command: "ServeFci") -> None:
     """Serve until interrupted, or, if asked to, until the first client has gone."""
     c = command
     drop = drop_of(c.drop) if c.drop else None
@@ -84,7 +87,7 @@ class TypedPushes:
         return False
 
 
-def _setup(c: ServeFci) -> ArmSetup:
+def _setup(c: "ServeFci") -> ArmSetup:
     model = arm_model(c.robot)
     if c.hand and c.scene != "empty":
         raise ParameterError(f"--hand goes with --scene empty: in {c.scene} there is what the experiment has.")
@@ -97,23 +100,22 @@ def _setup(c: ServeFci) -> ArmSetup:
     return ArmSetup(model, c.robot, q, scene, hand, tuple(map(push_of, c.push)), _units(c, model), c.seed)
 
 
-def _scene(c: ServeFci, model: RobotModel) -> tuple[SceneSpec, HandScript | None, ArmPath]:
+def _scene(c: "ServeFci", model: RobotModel) -> tuple[SceneSpec, HandScript | None, ArmPath]:
     """Return what is there, what its hand does, and the path of the end-effector."""
-    from pretouch.experiments import dynamic, static
-    from pretouch.experiments.pushes import Pusher
+    from pretouch.sim.pushes import Pusher
 
     match c.scene:
         case "static":
-            return static.scene(c.trajectory, c.side, c.stiffness, c.seed), None, static.path(c.trajectory, c.side)
+            return static_scene(c.trajectory, c.side, c.stiffness, c.seed), None, static_path(c.trajectory, c.side)
         case "dynamic":
-            return SceneSpec(hand=HandSpec()), Pusher(model, dynamic.pushes(c.seed)), Circle()
-    path = static.path(c.trajectory, c.side)
+            return SceneSpec(hand=HandSpec()), Pusher(model, dynamic_pushes(c.seed)), Circle()
+    path = static_path(c.trajectory, c.side)
     if c.hand:
         return SceneSpec(hand=HandSpec(start=Visitor.away)), Visitor(model.ee), path
     return SceneSpec(), None, path
 
 
-def _units(c: ServeFci, model: RobotModel) -> UnitsSetup | None:
+def _units(c: "ServeFci", model: RobotModel) -> UnitsSetup | None:
     if not c.units:
         return None
     host, _, port = c.units.rpartition(":")

@@ -50,3 +50,9 @@ class ServeFci:
     """Commands to lose, as 3/50: the first 3 of every 50."""
     once: bool = False
     """End when the first client has gone."""
+
+    def run(self) -> None:
+        """Serve until interrupted."""
+        from pretouch.cli.serve_fci import serve_fci
+
+        serve_fci(self)

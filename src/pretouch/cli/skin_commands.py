@@ -38,6 +38,12 @@ class Monitor:
     json: str = ""
     """File for the numbers at the end."""
 
+    def run(self) -> int:
+        """Watch the units."""
+        from pretouch.cli.skin_monitor import monitor
+
+        return monitor(self)
+
 
 @dataclass(frozen=True)
 class Provision:
@@ -73,6 +79,13 @@ class Provision:
     replace: bool = False
     """Go on if the unit has another number or key already."""
 
+    def run(self) -> int:
+        """Set the unit up."""
+        from pretouch.cli.skin_provision import provision_unit
+
+        provision_unit(self)
+        return 0
+
 
 @dataclass(frozen=True)
 class Keys:
@@ -82,6 +95,13 @@ class Keys:
     """File of the units' keys; it is made if it is not there, for your eyes only."""
     new: str = ""
     """Names of units to add, separated by commas."""
+
+    def run(self) -> int:
+        """List the units, with those that are added."""
+        from pretouch.cli.skin_keys import keys_file, list_keys
+
+        list_keys(keys_file(self.keys), self.new)
+        return 0
 
 
 @dataclass(frozen=True)
@@ -128,19 +148,27 @@ class Simulate:
     duration: float = 0.0
     """Time to simulate [s]; 0: until Ctrl-C."""
 
+    def run(self) -> int:
+        """Simulate the units."""
+        from pretouch.cli.skin_simulate import simulate_units
 
-SkinCommand = (
-    Annotated[Monitor, tyro.conf.subcommand("monitor")]
-    | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
-    | Annotated[Coverage, tyro.conf.subcommand("coverage")]
-    | Annotated[Simulate, tyro.conf.subcommand("simulate")]
-    | Annotated[Provision, tyro.conf.subcommand("provision")]
-    | Annotated[Keys, tyro.conf.subcommand("keys")]
-)
+        simulate_units(self)
+        return 0
 
 
 @dataclass(frozen=True)
 class Skin:
     """Sensor units: watch them, set them up, find where they sit, what they see in time, or simulate them."""
 
-    what: SkinCommand
+    what: (
+        Annotated[Monitor, tyro.conf.subcommand("monitor")]
+        | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
+        | Annotated[Coverage, tyro.conf.subcommand("coverage")]
+        | Annotated[Simulate, tyro.conf.subcommand("simulate")]
+        | Annotated[Provision, tyro.conf.subcommand("provision")]
+        | Annotated[Keys, tyro.conf.subcommand("keys")]
+    )
+
+    def run(self) -> int:
+        """Run the command."""
+        return self.what.run()

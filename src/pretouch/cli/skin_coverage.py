@@ -2,41 +2,44 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from pretouch.cli.calibrate.outputs import check_free, same_file
-from pretouch.cli.skin_coverage_options import Coverage as Asked
 from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.coverage.blind import BlindSpot, blind_spots
 from pretouch.coverage.measure import Coverage, Share, covered
+from pretouch.coverage.measuring import Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, suggest
 from pretouch.coverage.ways import Ways
 from pretouch.errors import ExperimentError, ParameterError, SkinError
-from pretouch.experiments.coverage.measuring import Setting, coverage_of
-from pretouch.experiments.results_file import write_json
+from pretouch.extras import FIGURES
 from pretouch.importing.folder import SKIN
+from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
-from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.whole_file import write_json
+
+if TYPE_CHECKING:
+    from pretouch.cli.skin_coverage_options import Coverage as Asked
 
 _FORMATS = (".png", ".pdf", ".svg")
 _SPOTS = 8
 """Blind spots that are printed; the file of numbers has all."""
 
 
-def skin_coverage(command: Asked) -> None:
+def skin_coverage(command: "Asked") -> None:
     """Measure, print and write what is asked for."""
     model, skin, source = _arm_and_skin(command)
     _check_outputs(command, source)
     setting = Setting(
-        model, fixtures(SceneSpec(floor_height=command.floor)), _params(command), command.workspace,
+        model, floor_and_pedestal(command.floor), _params(command), command.workspace,
         command.postures, command.seed,
     )  # fmt: skip
     ways = setting.ways()
@@ -64,7 +67,7 @@ def skin_coverage(command: Asked) -> None:
         console.print(f"Numbers: {command.json}", markup=False, soft_wrap=True)
 
 
-def _arm_and_skin(command: Asked) -> tuple[RobotModel, Skin, Path | None]:
+def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path | None]:
     """Return the arm, its skin, and the skin's file if one was named."""
     folder = None if command.arm in ("panda", "fr3") else Path(command.arm)
     if folder is None:
@@ -79,7 +82,7 @@ def _arm_and_skin(command: Asked) -> tuple[RobotModel, Skin, Path | None]:
     return model, load_skin(own, model), own
 
 
-def _params(command: Asked) -> CoverageParams:
+def _params(command: "Asked") -> CoverageParams:
     return CoverageParams(
         object_radius_m=command.object_radius, object_speed_m_s=command.speed, arm_speed_m_s=command.arm_speed,
         deceleration_m_s2=command.deceleration, rate_hz=command.rate, latency_s=command.latency,
@@ -87,7 +90,7 @@ def _params(command: Asked) -> CoverageParams:
     )  # fmt: skip
 
 
-def _check_outputs(command: Asked, source: Path | None) -> None:
+def _check_outputs(command: "Asked", source: Path | None) -> None:
     """Refuse, before anything is computed, what could not be done or would be lost."""
     if command.suggest < 0:
         raise SkinError(f"{command.suggest} more units are asked for: give 1 or more, or leave out --suggest.")
@@ -97,6 +100,8 @@ def _check_outputs(command: Asked, source: Path | None) -> None:
         raise ParameterError(f"The seed is {command.seed}: give 0 or more.")
     if command.figure and Path(command.figure).suffix not in _FORMATS:
         raise ExperimentError(f"The figure {command.figure} ends in none of {', '.join(_FORMATS)}: name it so.")
+    if command.figure:
+        FIGURES.need("A figure")
     places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
     given = [(what, Path(text)) for what, text in places if text]
     for i, (what, place) in enumerate(given):
@@ -131,13 +136,13 @@ def _suggested(
 
 
 def _draw(file: str, ways: Ways, found: Coverage, skin: Skin, new: frozenset[str]) -> None:
-    from pretouch.experiments.figures.coverage import coverage_figure
+    from pretouch.coverage.figure import coverage_figure
 
     with unwritable_said("figure", Path(file)):
         coverage_figure(ways, found, skin, new).savefig(file, dpi=110)
 
 
-def _numbers(command: Asked, setting: Setting, found: Coverage, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
+def _numbers(command: "Asked", setting: Setting, found: Coverage, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
     return {
         "asked": asdict(command),
         "parameters": asdict(setting.params) | {"warning_m": setting.params.warning_m},

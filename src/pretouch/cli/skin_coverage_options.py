@@ -50,3 +50,10 @@ class Coverage:
     """File for the numbers."""
     replace: bool = False
     """Go on if a file to write is there already."""
+
+    def run(self) -> int:
+        """Measure, show, and write what is asked for."""
+        from pretouch.cli.skin_coverage import skin_coverage
+
+        skin_coverage(self)
+        return 0

@@ -4,11 +4,11 @@ import numpy as np
 
 from pretouch.coverage.blind import BLIND, BlindSpot
 from pretouch.coverage.measure import Coverage, Share
+from pretouch.coverage.measuring import Setting
 from pretouch.coverage.suggest import Suggestions
 from pretouch.coverage.ways import Ways
-from pretouch.experiments.coverage.measuring import Setting
-from pretouch.experiments.tables import TextTable
 from pretouch.sensing.skin import Skin
+from pretouch.text_table import TextTable
 from pretouch.types import BoolArray
 
 

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from functools import cache
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -17,7 +17,6 @@ from rich.live import Live
 
 from pretouch.cli.arms import arm_model
 from pretouch.cli.ending import Terminated
-from pretouch.cli.skin_commands import Monitor
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_record import record
 from pretouch.cli.skin_table import line, thrown_away, view
@@ -36,12 +35,15 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
 from pretouch.types import FloatArray
 
+if TYPE_CHECKING:
+    from pretouch.cli.skin_commands import Monitor
+
 _ONCE_S = 5.0
 _SECOND_S = 1.0
 _INTERRUPTED = 130
 
 
-def monitor(command: Monitor) -> int:
+def monitor(command: "Monitor") -> int:
     """Watch units; return 1 if one is faulty after a given time or recording failed, 130 after Ctrl-C, or else 0."""
     duration = _duration(command)
     json_file = Path(command.json) if command.json else None
@@ -78,13 +80,13 @@ def monitor(command: Monitor) -> int:
     return code or int(bool(recording and recording.trouble))
 
 
-def _duration(command: Monitor) -> float:
+def _duration(command: "Monitor") -> float:
     if not (math.isfinite(command.duration) and command.duration >= 0):
         raise HardwareError(f"The duration is {command.duration:g} s: give 0 or more.")
     return command.duration or (_ONCE_S if command.once else math.inf)
 
 
-def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[tuple[str, ...], Posture | None]:
+def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[tuple[str, ...], Posture | None]:
     """Names of the units to watch, and the posture they are to agree with, if one is given."""
     if command.skin and command.units:
         raise HardwareError("Both --skin and --units are given: leave one of them out.")

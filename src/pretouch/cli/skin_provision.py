@@ -4,16 +4,19 @@ import getpass
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from pretouch.cli.skin_commands import Provision
 from pretouch.cli.skin_keys import free_number, keys_file, keys_or_none
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey, new_key, save_keys
 from pretouch.hardware.provision import Network, differs, fingerprint, greet, provision
 from pretouch.hardware.serial_line import SerialLine
 
+if TYPE_CHECKING:
+    from pretouch.cli.skin_commands import Provision
 
-def provision_unit(command: Provision) -> None:
+
+def provision_unit(command: "Provision") -> None:
     """Make a key if the unit has none, tell the unit, and check what it then says it is."""
     place = keys_file(command.keys)
     keys = keys_or_none(place)
@@ -53,7 +56,7 @@ def _unit(keys: Keys, name: str, number: int, place: Path) -> UnitKey:
     return keys[name]
 
 
-def _password(command: Provision) -> str:
+def _password(command: "Provision") -> str:
     if not command.password_file:
         try:
             with warnings.catch_warnings():

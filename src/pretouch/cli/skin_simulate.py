@@ -2,11 +2,11 @@
 
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.cli.arms import arm_model
-from pretouch.cli.skin_commands import Simulate
 from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
 from pretouch.errors import HardwareError
@@ -20,10 +20,13 @@ from pretouch.serving.simulated_arm import SimulateOptions
 from pretouch.sim.imu import ImuParams
 from pretouch.types import RobotState
 
+if TYPE_CHECKING:
+    from pretouch.cli.skin_commands import Simulate
+
 _say = partial(print, flush=True)
 
 
-def simulate_units(command: Simulate) -> None:
+def simulate_units(command: "Simulate") -> None:
     """Simulate until interrupted, or for the given time."""
     c = command
     if c.calibration_joints and c.duration:

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pretouch.experiments.tables import TextTable
+from pretouch.text_table import TextTable
 
 
 def show(console: Console, tables: Iterable[TextTable]) -> None:

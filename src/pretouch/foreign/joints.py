@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pretouch import extras
 from pretouch.errors import RecordingError
 from pretouch.foreign.csv import UNITS, listed, read_rows, read_table, relative_time
 from pretouch.foreign.samples import BAGS, OUT_OF_RANGE_RAD, TABLES
@@ -132,6 +133,7 @@ def _factor(place: Path, name: str, unit: str, quantity: str) -> float:
 
 
 def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tuple[str, ...]]:
+    extras.BAGS.need("A bag or MCAP file")
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pretouch import extras
 from pretouch.errors import RecordingError
 from pretouch.foreign.source import Choice, RangeTopic, Series, Source, in_order, interpolated
 from pretouch.robot.description import fr3, panda
@@ -76,6 +77,7 @@ def _read(place: Path, choice: Choice) -> Source:
     if place.is_dir() or ending in BAGS:
         if place.is_dir() and not (place / "metadata.yaml").is_file():
             raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
+        extras.BAGS.need("A bag or MCAP file")
         from pretouch.foreign.bag import read_bag
 
         return read_bag(place, choice)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.extras import need
+from pretouch.extras import MESHES
 from pretouch.types import FloatArray, IntArray
 
 _SCHEMES = ("package://", "model://")
@@ -165,7 +165,7 @@ def _obj(data: bytes) -> Surface:
 
 
 def _collada(path: Path) -> Surface:
-    need("meshes", f"The mesh {path}, a COLLADA file,")
+    MESHES.need(f"The mesh {path}, a COLLADA file,")
     import trimesh
 
     try:

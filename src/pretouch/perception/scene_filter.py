@@ -52,6 +52,19 @@ def no_fixtures() -> Fixtures:
     return Fixtures(np.zeros((0, 4)), Capsules(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)))
 
 
+def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:
+    """Return what every arm stands on: a floor at a height [m], base frame, and a pedestal of a radius [m]."""
+    return Fixtures(
+        planes=np.array([[0.0, 0.0, 1.0, floor]]),
+        capsules=Capsules(
+            link=np.zeros(1, np.int64),
+            a=np.array([[0.0, 0.0, floor]]),
+            b=np.array([[0.0, 0.0, -radius]]),
+            radius=np.array([radius]),
+        ),
+    )
+
+
 def expected_range(
     kin: Kinematics,
     position: FloatArray,

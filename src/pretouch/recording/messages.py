@@ -6,13 +6,9 @@ from importlib.resources import files
 from itertools import chain
 from typing import Any, NamedTuple
 
-import numpy as np
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
-
 import pretouch
 from pretouch.errors import RecordingError
+from pretouch.recording.cdr import Codec, DecodeError, Field, parsed
 
 FORMAT = 1
 """Version of our messages: a change that older programs cannot read raises it."""
@@ -31,12 +27,8 @@ TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in _ON_T
 TOPICS["/pretouch/imu"] = f"{PACKAGE}/msg/ImuReadings"
 """Type of the messages on each of our topics."""
 
-_HEAD = 4
-"""Bytes of the encapsulation header before a CDR message."""
-_PARTS = {
-    "Inputs": ("RobotState", "RangeReadings"),
-    "Step": ("Obstacles", "Thresholds", "Contact", "QpSolution", "Touched"),
-}
+_SECTION = f"{'=' * 80}\nMSG: "
+"""Stands before the name of each further type in a definition (encoding `ros2msg`)."""
 
 
 class Item(NamedTuple):
@@ -57,31 +49,41 @@ def own_definition(name: str) -> str:
 
 
 @cache
-def typestore() -> Typestore:
-    """Return the types of ROS 2 Jazzy, and ours. Since Iron, sensor_msgs/Range has a variance."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    for name in OWN:
-        store.register(get_types_from_msg(own_definition(name), f"{PACKAGE}/msg/{name}"))
-    return store
+def _standard() -> dict[str, str]:
+    """Return the definitions of the types of ROS 2 Jazzy that are used, by name; since Iron, Range has a variance."""
+    sections = own_definition("standard").split(_SECTION)[1:]
+    return {name.replace("/", "/msg/"): text for name, _, text in (section.partition("\n") for section in sections)}
+
+
+def _text(kind: str) -> str:
+    """Return the definition of one type alone."""
+    package, _, name = kind.split("/")
+    return own_definition(name) if package == PACKAGE else _standard()[kind]
+
+
+@cache
+def fields_of(kind: str) -> tuple[Field, ...]:
+    """Return the fields of a type."""
+    return parsed(_text(kind), kind.partition("/")[0])
+
+
+_CODEC = Codec(fields_of)
 
 
 def definition(kind: str) -> str:
     """Return the full definition of a type as MCAP embeds it (encoding `ros2msg`): its own, and that of its parts."""
-    package, _, name = kind.split("/")
-    if package != PACKAGE:
-        return typestore().generate_msgdef(kind, ros_version=2)[0]
-    parts = [f"{'=' * 80}\nMSG: {PACKAGE}/{part}\n{own_definition(part)}" for part in _PARTS.get(name, ())]
-    return "".join([own_definition(name), *parts])
+    parts = (f"{_SECTION}{part.replace('/msg/', '/')}\n{_text(part)}" for part in _CODEC.parts(kind))
+    return "".join([_text(kind), *parts])
 
 
-def make(kind: str, *fields: Any) -> Any:
+def make(kind: str, *values: Any) -> Any:
     """Make a message of a type from its fields, in order."""
-    return typestore().types[kind](*fields)
+    return _CODEC.type(kind)(*values)
 
 
 def encoded(kind: str, message: Any) -> bytes:
     """Return a message as CDR."""
-    return bytes(typestore().serialize_cdr(message, kind, little_endian=True))
+    return _CODEC.encoded(kind, message)
 
 
 def decoded(kind: str, data: bytes) -> Any:
@@ -89,19 +91,16 @@ def decoded(kind: str, data: bytes) -> Any:
 
     Raises RecordingError for bytes that hold none.
     """
-    # arrays are views into the buffer: four bytes in front of the header align them
-    room = np.zeros(_HEAD + len(data), dtype=np.uint8)
-    room[_HEAD:] = np.frombuffer(data, dtype=np.uint8)
     try:
-        return typestore().deserialize_cdr(memoryview(room.data)[_HEAD:], kind)
-    except SerdeError as error:
+        return _CODEC.decoded(kind, data)
+    except DecodeError as error:
         raise RecordingError(f"A message of the type {kind} in the recording cannot be read: {error}") from error
 
 
 def prepare(*kinds: Iterable[str]) -> None:
-    """Have the code made that encodes types: at the first message, it would keep a control loop waiting."""
+    """Make ready to encode types: at the first message, that would keep a control loop waiting."""
     for kind in chain(*kinds):
-        typestore().get_msgdef(kind)
+        _CODEC.prepare(kind)
 
 
 def plain_text(text: str) -> str:

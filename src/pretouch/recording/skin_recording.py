@@ -13,7 +13,7 @@ import numpy as np
 
 from pretouch.recording.disk import Disk
 from pretouch.recording.joints import check_joints, joint_items
-from pretouch.recording.messages import PACKAGE, Item, encoded, make, plain_text, prepare, typestore
+from pretouch.recording.messages import PACKAGE, Item, encoded, fields_of, make, plain_text, prepare
 from pretouch.recording.standard import IMU, JOINT_STATE, RANGE, header, imu_items, nanoseconds, range_item, topic_name
 from pretouch.types import FloatArray
 
@@ -70,7 +70,7 @@ class SkinRecording:
         """Datagrams that were kept."""
         self._time = 0
         prepare((UNIT_SAMPLE, RANGE, IMU, JOINT_STATE, DIAGNOSTICS))
-        self._fields = [name for name, _ in typestore().get_msgdef(UNIT_SAMPLE).fields[_OURS:-1]]
+        self._fields = [field.name for field in fields_of(UNIT_SAMPLE)[_OURS:-1]]
         self._sentence = ""
         self._disk = Disk(self.place)
         atexit.register(self.close)

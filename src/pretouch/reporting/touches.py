@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.experiments.figures.marks import spans
-from pretouch.experiments.metrics import mean_over
-from pretouch.experiments.trial import TOUCH_N
 from pretouch.reporting.course import Truth
+from pretouch.sim.plant import TOUCH_N
+from pretouch.traces import mean_over, spans
 from pretouch.types import FloatArray
 
 BOUNCE_S = 0.1

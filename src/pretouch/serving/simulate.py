@@ -11,6 +11,7 @@ import numpy as np
 
 from pretouch.calibration.motion.perform import PerformParams, perform
 from pretouch.calibration.motion.plan import Plan
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError
 from pretouch.loop import Cycle
@@ -20,7 +21,6 @@ from pretouch.serving.real_time import RealTime
 from pretouch.serving.simulated_arm import CATCH_UP_S, SimulatedArm, SimulateOptions
 from pretouch.sim.hand import Hand, HandGoal
 from pretouch.sim.plant import Plant
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
 from pretouch.types import FloatArray, RobotState

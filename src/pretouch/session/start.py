@@ -6,11 +6,11 @@ from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.route import approach
 from pretouch.control.path import Path
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import CalibrationError, ExperimentError, RobotError
 from pretouch.robot.model import RobotModel
 from pretouch.session.finding import Finding
-from pretouch.sim.posture import brought_to
 from pretouch.types import FloatArray
 
 _SPEED_M_S = 0.15

@@ -16,6 +16,8 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import ArmError, SceneSpec, build, stiffen
 from pretouch.types import FloatArray, RobotState
 
+TOUCH_N = 1.0
+"""True force above which there is a contact [N]."""
 _NO_FORCE = np.zeros(3)
 _Past = tuple[float, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 """Time, q, qd, q_d, qd_d and external torques of an instant."""

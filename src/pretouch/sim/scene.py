@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from pretouch.perception.scene_filter import Fixtures
-from pretouch.robot.body import Capsules
+from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
@@ -77,16 +76,7 @@ def described(spec: SceneSpec) -> dict[str, object]:
 
 def fixtures(spec: SceneSpec) -> Fixtures:
     """What of a scene is declared to the controller: floor and pedestal, not the objects."""
-    radius, height = spec.pedestal_radius, spec.floor_height
-    return Fixtures(
-        planes=np.array([[0.0, 0.0, 1.0, height]]),
-        capsules=Capsules(
-            link=np.zeros(1, np.int64),
-            a=np.array([[0.0, 0.0, height]]),
-            b=np.array([[0.0, 0.0, -radius]]),
-            radius=np.array([radius]),
-        ),
-    )
+    return floor_and_pedestal(spec.floor_height, spec.pedestal_radius)
 
 
 @dataclass(frozen=True)

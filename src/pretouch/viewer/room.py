@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 
 from pretouch.control.path import Circle, Path, WayPoints
+from pretouch.control.posture import brought_to
 from pretouch.errors import ParameterError
 from pretouch.ports import Skin as UnitPort
 from pretouch.robot.model import RobotModel
@@ -13,7 +14,6 @@ from pretouch.sensing.skin import Skin
 from pretouch.sim.board import Side, board_beside
 from pretouch.sim.hand import Hand
 from pretouch.sim.plant import Plant, PlantClock
-from pretouch.sim.posture import brought_to
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors

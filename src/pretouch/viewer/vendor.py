@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.extras import command, missing
+from pretouch.extras import MESHES
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
 from pretouch.viewer.surface import Mesh, normals_of
@@ -26,8 +26,8 @@ def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
     if model.description.name != "panda":
         return {}, f"The arm is drawn by its capsules: there are no surfaces for {model.description.name}."
     folder = _folder()
-    if folder is None or missing("meshes"):
-        return {}, f"The arm is drawn by its capsules: for the vendor's surfaces, run {command('meshes')}"
+    if folder is None or MESHES.missing():
+        return {}, f"The arm is drawn by its capsules: for the vendor's surfaces, run {MESHES.command}"
 
     import trimesh
 

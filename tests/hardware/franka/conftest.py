@@ -3,12 +3,13 @@ from pathlib import Path
 
 import pytest
 
+from pretouch.extras import FRANKA
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from tests.hardware.franka.served import Served
 from tests.needs import modules_with
 
-pytest_pycollect_makemodule = modules_with("franka")
+pytest_pycollect_makemodule = modules_with(FRANKA)
 
 
 @pytest.fixture(scope="session")

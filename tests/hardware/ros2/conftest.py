@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from pretouch.extras import ROS2
 from pretouch.hardware.ros2.params import NodeParams
 from tests.needs import modules_with
 
 if TYPE_CHECKING:
     from pretouch.hardware.ros2.node import Ros2Node
 
-pytest_pycollect_makemodule = modules_with("ros2")
+pytest_pycollect_makemodule = modules_with(ROS2)
 
 # beyond 101 its ports are those that the system gives to anybody
 _DOMAINS = range(20, 101)

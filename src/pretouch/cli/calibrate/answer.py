@@ -14,9 +14,9 @@ from pretouch.cli.calibrate.numbers import numbers
 from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.cli.writing import unwritable_said
 from pretouch.errors import CalibrationError
-from pretouch.experiments.results_file import write_json
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, save_skin
+from pretouch.whole_file import write_json
 
 _COLUMNS = (
     "unit", "link", "position\n[mm]", "sigma\n[mm]", "sigma\n[deg]", "clock\n[ms]", "residual\n[m/s^2]", "verdict",

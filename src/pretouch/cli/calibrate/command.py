@@ -3,18 +3,21 @@
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pretouch.cli.arms import arm_model
 from pretouch.cli.calibrate.motion import write_motion
-from pretouch.cli.calibrate.options import Calibrate, way_of
 from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.cli.calibrate.recording import Sources, calibrate_recording
 
+if TYPE_CHECKING:
+    from pretouch.cli.calibrate.options import Calibrate, Way
 
-def calibrate_skin(command: Calibrate) -> int:
+
+def calibrate_skin(command: "Calibrate", way: "Way") -> int:
     """Calibrate; return 1 if a unit was refused, the motion was not finished, or nobody reads on, or else 0."""
     try:
-        code = _calibrated(command)
+        code = _calibrated(command, way)
         sys.stdout.flush()
     except BrokenPipeError:
         with open(os.devnull, "w") as nowhere:  # what is still in the buffer goes there
@@ -23,13 +26,7 @@ def calibrate_skin(command: Calibrate) -> int:
     return code
 
 
-def _calibrated(command: Calibrate) -> int:
-    way = way_of(command)
-    if way == "simulate":
-        from pretouch.cli.calibrate.study import study_skins
-
-        study_skins(command)
-        return 0
+def _calibrated(command: "Calibrate", way: "Way") -> int:
     if way == "plan":
         write_motion(command)
         return 0

@@ -6,6 +6,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 from shlex import join
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -17,7 +18,6 @@ from pretouch.calibration.motion.report import report_on
 from pretouch.calibration.motion.route import approach
 from pretouch.cli.arms import arm_model
 from pretouch.cli.calibrate.motion import planned
-from pretouch.cli.calibrate.options import Calibrate, MotionOptions
 from pretouch.cli.calibrate.outputs import Outputs, check_free, same_file
 from pretouch.cli.calibrate.recording import Sources, calibrate_recording
 from pretouch.cli.calibrate.session import Session
@@ -33,10 +33,13 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin
 from pretouch.serving.simulated_arm import CATCH_UP_S, SimulatedArm, SimulateOptions
 
+if TYPE_CHECKING:
+    from pretouch.cli.calibrate.options import Calibrate, MotionOptions
+
 _ROBOTS = ("simulated",)
 
 
-def calibrate_live(command: Calibrate, outputs: Outputs) -> int:
+def calibrate_live(command: "Calibrate", outputs: Outputs) -> int:
     """Calibrate the units of an arm that is moved; return 1 if a unit was refused or the motion ended early, or 0."""
     if command.live.robot not in _ROBOTS:
         raise HardwareError(
@@ -68,7 +71,7 @@ def calibrate_live(command: Calibrate, outputs: Outputs) -> int:
         raise
 
 
-def _recording_place(command: Calibrate, outputs: Outputs) -> Path:
+def _recording_place(command: "Calibrate", outputs: Outputs) -> Path:
     """Return the recording to write, which is not there yet."""
     out, others = Path(command.out), [file for file in (outputs.skin, outputs.json) if file]
     beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
@@ -80,7 +83,7 @@ def _recording_place(command: Calibrate, outputs: Outputs) -> Path:
 
 
 @contextmanager
-def _session(command: Calibrate, model: RobotModel) -> Iterator[Session]:
+def _session(command: "Calibrate", model: RobotModel) -> Iterator[Session]:
     """Hear the units of a simulated arm."""
     skin = load_skin(Path(command.skin), model) if command.skin else paper_skin(model)
     keys = keys_for(keys_file(command.live.keys), skin)
@@ -94,7 +97,7 @@ def _session(command: Calibrate, model: RobotModel) -> Iterator[Session]:
             print(f"This machine is too slow by {arm.clock.left_out:.1f} s for the simulation: its data have gaps.")
 
 
-def _ways(session: Session, model: RobotModel, options: MotionOptions) -> list[Plan]:
+def _ways(session: Session, model: RobotModel, options: "MotionOptions") -> list[Plan]:
     """Return the motion, with the way to its start before it if the arm is elsewhere, and print the room for both."""
     plan, params = planned(model, options)
     print(report_on(model, plan, params), flush=True)
@@ -154,7 +157,7 @@ def _progress(bar: Progress, task: TaskID, since: float) -> None:
     bar.update(task, completed=since)
 
 
-def _again(command: Calibrate, place: Path) -> str:
+def _again(command: "Calibrate", place: Path) -> str:
     """Say how to calibrate from the recording alone."""
     words = ["pretouch", "skin", "calibrate", "--recording", str(place), "--arm", command.arm, "--out", command.out]
     for option, value in (("--skin", command.skin), ("--json", command.json)):

@@ -1,19 +1,22 @@
 """What `pretouch skin calibrate --plan` does: the motion for one's own driver."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import plan_motion
 from pretouch.calibration.motion.report import report_on
 from pretouch.cli.arms import arm_model
-from pretouch.cli.calibrate.options import Calibrate, MotionOptions
 from pretouch.cli.calibrate.outputs import check_free
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.robot.model import RobotModel
 
+if TYPE_CHECKING:
+    from pretouch.cli.calibrate.options import Calibrate, MotionOptions
 
-def plan_params(options: MotionOptions) -> PlanParams:
+
+def plan_params(options: "MotionOptions") -> PlanParams:
     """Return what is asked of the motion."""
     return PlanParams(
         duration_s=options.duration, variant=options.variant, reach_rad=options.reach, speed_m_s=options.speed,
@@ -21,16 +24,16 @@ def plan_params(options: MotionOptions) -> PlanParams:
     )  # fmt: skip
 
 
-def planned(model: RobotModel, options: MotionOptions) -> tuple[Plan, PlanParams]:
+def planned(model: RobotModel, options: "MotionOptions") -> tuple[Plan, PlanParams]:
     """Plan the motion, and say so, for it takes some seconds."""
     params = plan_params(options)
     print("The motion is being planned.", flush=True)
     return plan_motion(model, params), params
 
 
-def write_motion(command: Calibrate) -> None:
+def write_motion(command: "Calibrate") -> None:
     """Plan the motion, write it as CSV, and print what it is good for and the room it takes."""
-    place = Path(command.motion.plan)
+    place = Path(command.plan)
     check_free("motion", place, command.replace)
     check_writable("file", place)
     model = arm_model(command.arm)

@@ -9,20 +9,6 @@ from pretouch.hardware.address import HOST, PORT
 
 
 @dataclass(frozen=True)
-class StudyOptions:
-    """In simulation: units on random skins, and how far they are found from where they sit."""
-
-    simulate: bool = False
-    """Calibrate random skins in simulation, and show the errors."""
-    skins: int = 20
-    """How many; each has a unit on each link from the second on."""
-    compared: bool = False
-    """Also with the method and the motion of Watanabe et al. (arXiv 2110.14516); takes longer."""
-    find_links: bool = False
-    """Do not tell the calibration which links the units sit on."""
-
-
-@dataclass(frozen=True)
 class RecordingOptions:
     """From what was recorded while the arm made a calibration motion."""
 
@@ -57,9 +43,6 @@ class LiveOptions:
 class MotionOptions:
     """The motion: it begins and ends in the arm's ready posture."""
 
-    plan: str = ""
-    """CSV file to write the motion to, for your own driver (time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s),
-    instead of making it."""
     duration: float = 60.0
     """How long it takes [s], at most 90."""
     variant: int = 0
@@ -82,17 +65,19 @@ class Calibrate:
     The exit code is 1 if a unit was refused.
     """
 
-    study: StudyOptions = field(default_factory=StudyOptions)
     recorded: RecordingOptions = field(default_factory=RecordingOptions)
     live: LiveOptions = field(default_factory=LiveOptions)
     motion: MotionOptions = field(default_factory=MotionOptions)
+    plan: str = ""
+    """CSV file to write the motion to, for your own driver (time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s),
+    instead of making it."""
     skin: str = ""
     """Skin file that names the units and their links as you believe them, to be checked; without it, links are found.
     A simulated arm has its units there, without it the seven that come with the package."""
     out: str = ""
     """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
     json: str = ""
-    """File for all numbers. With --simulate it is written over, as other commands do with theirs."""
+    """File for all numbers."""
     replace: bool = False
     """Write over files that are there."""
     arm: Literal["panda", "fr3"] = "panda"
@@ -100,12 +85,17 @@ class Calibrate:
     seed: int = 0
     """Decides all that is random in a simulation."""
 
+    def run(self) -> int:
+        """Calibrate, and show and write the answer."""
+        from pretouch.cli.calibrate.command import calibrate_skin
 
-Way = Literal["simulate", "recording", "plan", "robot"]
+        return calibrate_skin(self, way_of(self))
+
+
+Way = Literal["recording", "plan", "robot"]
 _ANY = {"arm"}
 _MOTION = {"duration", "variant", "reach", "speed", "clearance", "floor"}
 _OPTIONS: dict[Way, set[str]] = {
-    "simulate": {"simulate", "skins", "compared", "find_links", "json", "seed"} | _MOTION | _ANY,
     "recording": {"recording", "joints", "topic", "skin", "out", "json", "replace"} | _ANY,
     "plan": {"plan", "replace"} | _MOTION | _ANY,
     "robot": {"robot", "keys", "units_host", "units_port", "record", "yes", "skin", "out", "json", "replace", "seed"}
@@ -120,7 +110,7 @@ def way_of(command: Calibrate) -> Way:
     ways = [way for way in _OPTIONS if way in given]
     if not ways:
         raise CalibrationError(
-            "Nothing says what to calibrate from: give --simulate, --recording FILE, --plan FILE, or --robot ARM."
+            "Nothing says what to calibrate from: give --recording FILE, --plan FILE, or --robot ARM."
         )
     if len(ways) > 1:
         raise CalibrationError(f"{' and '.join(map(_flag, ways))} are given: choose one of them.")

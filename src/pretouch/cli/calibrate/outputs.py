@@ -4,11 +4,13 @@ import os
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
-from pretouch.cli.calibrate.options import Calibrate
 from pretouch.cli.writing import check_writable
 from pretouch.errors import CalibrationError
+
+if TYPE_CHECKING:
+    from pretouch.cli.calibrate.options import Calibrate
 
 _WRITTEN = {"out", "json", "record"}
 
@@ -21,7 +23,7 @@ class Outputs:
     json: Path | None
 
     @classmethod
-    def of(cls, command: Calibrate) -> Self:
+    def of(cls, command: "Calibrate") -> Self:
         """Return what is asked for.
 
         CalibrationError or ExperimentError for what could not be written, or would take the place of another file.
@@ -51,7 +53,7 @@ def same_file(one: Path, other: Path) -> bool:
     return second.is_relative_to(first)
 
 
-def _check_apart(command: Calibrate) -> None:
+def _check_apart(command: "Calibrate") -> None:
     """Raise CalibrationError where a file to write is one to read, or another to write; --out may be --skin."""
     given = {
         "recording": command.recorded.recording, "joints": command.recorded.joints, "keys": command.live.keys,

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from pretouch.cli.run.asking import demand_yes, say
 from pretouch.cli.run.learnt import free_motion
 from pretouch.cli.run.moving import Way, moved
 from pretouch.cli.run.opened import Opened
-from pretouch.cli.run.options import Run, check_options
 from pretouch.cli.run.parts import Parts, parts
 from pretouch.cli.run.robots import need_extra, opened
 from pretouch.cli.writing import check_writable
@@ -27,13 +27,15 @@ from pretouch.session.signals import signals_noted
 from pretouch.session.standing import Standing
 from pretouch.session.start import way_to_start
 
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import Run
+
 PREFLIGHT, PUSH = PreflightParams(), PushParams()
 """What arm and pushes must be like."""
 
 
-def run(command: Run) -> int:
+def run(command: "Run") -> int:
     """Move an arm; return 1 if the run ended early or its recording failed, or else 0."""
-    check_options(command)
     check_wishes(command.priority, command.cpu)
     if command.record:
         _check_free(Path(command.record))
@@ -50,7 +52,7 @@ def run(command: Run) -> int:
             last.enter_context(signals_noted())  # until arm and units are closed
 
 
-def _run(command: Run, made: Parts, found: Opened, last: ExitStack) -> int:
+def _run(command: "Run", made: Parts, found: Opened, last: ExitStack) -> int:
     """Check, ask, and let the arm move; see `moved`."""
     remembered = Remembered(state_folder())
     known = found.identity is not None and remembered.knows(found.identity)  # a damaged file is found out first
@@ -92,7 +94,7 @@ def _confirm(session: Session, found: Opened, rest: Standing) -> None:
     GuidedPush(session.arm, session.clock, session.controller.model, ask, say, PUSH).confirm(rest)
 
 
-def _allowed(command: Run, session: Session, made: Parts, rest: Standing) -> Way:
+def _allowed(command: "Run", session: Session, made: Parts, rest: Standing) -> Way:
     """Say what the arm will do, and ask; return it if the arm may do it, and stands where it was checked."""
     approach = command.task.approach
     q = session.recheck(rest, PREFLIGHT, approach)

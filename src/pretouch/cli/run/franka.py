@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from pretouch.cli.run.asking import demand_yes, say
 from pretouch.cli.run.opened import Opened, network_units
-from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import CollisionParams, collision_behavior, largest_threshold
@@ -13,11 +13,14 @@ from pretouch.session.franka import FrankaSessionArm, identity
 from pretouch.session.session import NoUnits
 from pretouch.session.signals import children_undisturbed
 
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import Run
+
 _REFUSED = "The arm was not let recover"
 
 
 @contextmanager
-def franka(command: Run, parts: Parts) -> Iterator[Opened]:
+def franka(command: "Run", parts: Parts) -> Iterator[Opened]:
     """Connect to the arm, set its collision behaviour by the profile's thresholds, and hear its units."""
     kind, address = command.robot.arm, command.robot.ip
     known = identity(kind, address)

@@ -1,18 +1,21 @@
 """Which file of free motion a run begins with and keeps, by what was said on the command line."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pretouch.cli.run.asking import say
-from pretouch.cli.run.options import RobotOptions
 from pretouch.cli.writing import check_writable
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.session.free_motion import FreeMotion, Home, home_of
 from pretouch.session.remembered import state_folder
 
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import RobotOptions
+
 
 def free_motion(
-    options: RobotOptions, controller: Controller, robot: str, remembered: bool = True
+    options: "RobotOptions", controller: Controller, robot: str, remembered: bool = True
 ) -> FreeMotion | None:
     """Find what is known of a robot's free motion, and say it; None where none is kept.
 

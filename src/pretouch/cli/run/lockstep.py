@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.cli.run.asking import say
 from pretouch.cli.run.learnt import free_motion
-from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
 from pretouch.cli.skin_keys import keys_file
 from pretouch.errors import RobotError
@@ -26,8 +26,11 @@ from pretouch.session.start import check_start
 from pretouch.session.watching import Watcher
 from pretouch.types import ControlStep, RangeReadings
 
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import Run
 
-def run_lockstep(command: Run, parts: Parts) -> int:
+
+def run_lockstep(command: "Run", parts: Parts) -> int:
     """Let a controller move a simulated arm that waits for it; return 1 if that ended early, or else 0.
 
     Nobody is asked anything: nothing is real.
@@ -66,7 +69,7 @@ def _ended(error: Exception) -> Ending:
 
 
 @contextmanager
-def _units(command: Run, parts: Parts) -> Iterator[Callable[[float], RangeReadings]]:
+def _units(command: "Run", parts: Parts) -> Iterator[Callable[[float], RangeReadings]]:
     """Hear the units in the robot's time, if there are any."""
     if not len(parts.skin):
         nothing = NoUnits().read()

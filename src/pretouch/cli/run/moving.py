@@ -4,13 +4,13 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.run.asking import say
 from pretouch.cli.run.opened import Opened
-from pretouch.cli.run.options import Run
 from pretouch.errors import HardwareError, PretouchError
 from pretouch.loop import MonotonicClock
 from pretouch.session.finding import refusals
@@ -24,6 +24,9 @@ from pretouch.session.terminal import EnterKey, Narrator
 from pretouch.session.units import Units
 from pretouch.session.watching import Watcher
 from pretouch.types import ControlStep
+
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import Run
 
 _ALIVE_EVERY = 50
 """Control steps between two looks at whether the receiver of the units lives."""
@@ -39,7 +42,7 @@ class Way:
     """How long it follows the path [s]; infinite until it is stopped."""
 
 
-def moved(command: Run, session: Session, found: Opened, way: Way, learnt: FreeMotion | None, last: ExitStack) -> int:
+def moved(command: "Run", session: Session, found: Opened, way: Way, learnt: FreeMotion | None, last: ExitStack) -> int:
     """Let the arm move and report, whatever ends it; return 1 if it did not end as asked, or else 0.
 
     All that the run is kept in is opened first. From the report to the end of `last`, signals are only noted.
@@ -82,7 +85,7 @@ def _arrived(session: Session, approach: Plan | None, tell: Callable[[str], None
 
 
 def _follow(
-    command: Run, session: Session, way: Way, watcher: Watcher, enter: EnterKey, clock: MonotonicClock,
+    command: "Run", session: Session, way: Way, watcher: Watcher, enter: EnterKey, clock: MonotonicClock,
     tell: Callable[[str], None], ending: Ending, learnt: FreeMotion | None,
 ) -> None:  # fmt: skip
     """Let the controller move the arm."""

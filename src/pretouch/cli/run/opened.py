@@ -3,9 +3,8 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
 from pretouch.cli.skin_keys import keys_file
 from pretouch.controller import Controller
@@ -18,6 +17,9 @@ from pretouch.session.push import Direction
 from pretouch.session.remembered import Identity
 from pretouch.session.signals import children_undisturbed
 from pretouch.session.units import Units
+
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import Run
 
 
 class Output(Recorder, Protocol):
@@ -54,7 +56,7 @@ class Opened:
 
 
 @contextmanager
-def network_units(command: Run, parts: Parts, keys: Keys | None = None) -> Iterator[NetworkSkin | None]:
+def network_units(command: "Run", parts: Parts, keys: Keys | None = None) -> Iterator[NetworkSkin | None]:
     """Hear the units over the network, if there are any."""
     if not len(parts.skin):
         yield None

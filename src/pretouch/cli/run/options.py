@@ -122,6 +122,13 @@ class Run:
     yes: bool = False
     """Do not ask before the arm moves."""
 
+    def run(self) -> int | None:
+        """Move the arm. Where a signal ended the run in order, its code is the exit code."""
+        from pretouch.cli.run.command import run
+
+        check_options(self)
+        return run(self) or None
+
 
 def check_options(command: Run) -> None:
     """Raise an error for options that do not go together."""

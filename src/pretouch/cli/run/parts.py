@@ -2,23 +2,26 @@
 
 from dataclasses import dataclass
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.cli.arms import arm_model
-from pretouch.cli.run.options import Run, TaskOptions
 from pretouch.control.path import Circle, Path, line
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.limits import LimiterParams, planned
 from pretouch.params import Profile
 from pretouch.params import profile as find_profile
-from pretouch.perception.scene_filter import Fixtures
+from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
-from pretouch.sim.posture import brought_to
-from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
+
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import Run, TaskOptions
 
 _LINE = ((0.4, -0.5, 0.5), (0.4, 0.5, 0.5))
 _SHORTEST_M = 1e-5
@@ -39,7 +42,7 @@ class Parts:
     @property
     def fixtures(self) -> Fixtures:
         """What stands still around the arm: the floor, and what its base stands on."""
-        return fixtures(SceneSpec(floor_height=self.floor))
+        return floor_and_pedestal(self.floor)
 
     def controller(self, q: FloatArray) -> Controller:
         """Return the controller for an arm that stands at q (n,) [rad]."""
@@ -64,7 +67,7 @@ class Parts:
         return line((x, y, z), (x, y, z + _SHORTEST_M))
 
 
-def parts(command: Run) -> Parts:
+def parts(command: "Run") -> Parts:
     """Read files and parameters; what does not fit together is an error."""
     units, task, profile = command.units, command.task, find_profile(command.task.profile)
     model = arm_model(command.robot.arm)

@@ -2,28 +2,31 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from pretouch.cli.run.opened import Opened, network_units
-from pretouch.cli.run.options import Run
 from pretouch.cli.run.parts import Parts
-from pretouch.extras import need
+from pretouch.extras import ROS2
 from pretouch.hardware.address import HOST
 from pretouch.hardware.franka.client import need_library
 from pretouch.robot.model import RobotModel
 from pretouch.session.session import NoUnits
 
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import Run
 
-def need_extra(command: Run) -> None:
+
+def need_extra(command: "Run") -> None:
     """Refuse an arm whose libraries are not installed, before anything imports them."""
     match command.robot.robot:
         case "franka":
             need_library(command.robot.arm)
         case "ros2":
-            need("ros2", "An arm on ROS 2")
+            ROS2.need("An arm on ROS 2")
 
 
 @contextmanager
-def opened(command: Run, parts: Parts) -> Iterator[Opened]:
+def opened(command: "Run", parts: Parts) -> Iterator[Opened]:
     """Open the arm that the command names, and hear its units."""
     match command.robot.robot:
         case "simulated":
@@ -41,7 +44,7 @@ def opened(command: Run, parts: Parts) -> Iterator[Opened]:
 
 
 @contextmanager
-def _simulated(command: Run, parts: Parts) -> Iterator[Opened]:
+def _simulated(command: "Run", parts: Parts) -> Iterator[Opened]:
     from pretouch.serving.simulated_arm import SimulateOptions
     from pretouch.serving.wire_skin import made_keys
     from pretouch.session.simulated import SimulatedSessionArm

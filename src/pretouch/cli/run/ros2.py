@@ -2,19 +2,21 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from pretouch.cli.run.opened import Opened
-from pretouch.cli.run.options import RobotOptions, Run
 from pretouch.cli.run.parts import Parts
 from pretouch.errors import HardwareError
 from pretouch.hardware.ros2.params import ArmParams, Frame, NodeParams, OutputParams, Sign, SkinParams
+
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import RobotOptions, Run
 
 _PATIENCE_S = 10.0
 
 
 @contextmanager
-def ros2(command: Run, parts: Parts) -> Iterator[Opened]:
+def ros2(command: "Run", parts: Parts) -> Iterator[Opened]:
     """Join the others on ROS 2, hear arm and units, and publish each control step."""
     from pretouch.hardware.ros2.node import Ros2Node
     from pretouch.hardware.ros2.output import Ros2Output
@@ -42,7 +44,7 @@ def ros2(command: Run, parts: Parts) -> Iterator[Opened]:
         )  # fmt: skip
 
 
-def _params(robot: RobotOptions) -> tuple[NodeParams, ArmParams]:
+def _params(robot: "RobotOptions") -> tuple[NodeParams, ArmParams]:
     sign, frame = cast(Sign, robot.ros_sign), cast(Frame, robot.ros_frame)  # the options were checked for ''
     node = NodeParams(robot.ros_distribution, robot.ros_domain, robot.ros_interface)
     return node, ArmParams(

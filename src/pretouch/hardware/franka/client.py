@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal, Protocol, Self
 
 from pretouch.errors import RobotError
-from pretouch.extras import need
+from pretouch.extras import FRANKA
 from pretouch.hardware.franka.collision import CollisionBehavior
 from pretouch.hardware.franka.only_one import OnlyOne
 from pretouch.hardware.franka.state import FrankaState
@@ -78,7 +78,7 @@ class Client(Protocol):
 
 def need_library(kind: Kind) -> None:
     """Refuse to go on without the vendor's library for an arm, or what our own part needs: a MissingExtraError."""
-    need("franka", "A Franka arm", _LIBRARIES[kind], "ruckig")
+    FRANKA.need("A Franka arm", _LIBRARIES[kind], "ruckig")
 
 
 def connect(address: str, kind: Kind, real_time: bool = False) -> Client:

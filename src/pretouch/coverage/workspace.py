@@ -1,0 +1,95 @@
+"""The postures that coverage is averaged over: on the paper's paths, in a box, or in the joints' whole range."""
+
+import numpy as np
+
+from pretouch.control.posture import brought_to
+from pretouch.coverage.placement import placement_for
+from pretouch.errors import ExperimentError
+from pretouch.importing.ready import ever_apart
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.robot.model import RobotModel
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.vectors import placed
+from pretouch.sim.paper_scenes import Placement
+from pretouch.types import FloatArray
+
+KINDS = ("circle", "line", "paths", "joints")
+_DRAWN = 40
+"""Postures drawn at most for each that is wanted: many meet the arm itself or the floor."""
+
+
+def postures(model: RobotModel, room: Fixtures, workspace: str, count: int, rng: np.random.Generator) -> FloatArray:
+    """Draw postures (count, n) [rad] of a workspace.
+
+    `circle` and `line` are the paper's, `paths` both, the hand upright; `joints` is the whole range of the joints,
+    where the arm is clear of itself and of the room; six numbers with commas are opposite corners of a box of hand
+    positions [m], the hand upright. Raises ExperimentError for anything else, and where the arm cannot be.
+    """
+    if count < 2:
+        raise ExperimentError(f"The number of postures is {count}: give at least 2.")
+    if workspace == "joints":
+        return _anywhere(model, room, count, rng)
+    if workspace in KINDS:
+        place = placement_for(model)
+        names = ("circle", "line") if workspace == "paths" else (workspace,)
+        parts = np.array_split((np.arange(count) + rng.uniform(size=count)) / count, len(names))
+        q = [_along(model, place, name, part * len(names) % 1.0) for name, part in zip(names, parts, strict=True)]
+        return np.vstack(q)
+    low, high = _corners(workspace)
+    return _in_box(model, low, high, count, rng)
+
+
+def _along(model: RobotModel, place: Placement, name: str, phases: FloatArray) -> FloatArray:
+    path = place.path(name, 1.0)
+    return np.array([brought_to(model, path.point(phase * path.length)) for phase in phases])
+
+
+def _corners(text: str) -> tuple[FloatArray, FloatArray]:
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        numbers = np.zeros(0)
+    if len(numbers) != 6 or not np.isfinite(numbers).all():
+        raise ExperimentError(
+            f"The workspace is {text!r}: give {', '.join(KINDS)}, or opposite corners of a box of hand positions as"
+            " x,y,z,x,y,z in metres."
+        )
+    ends = numbers.reshape(2, 3)
+    return ends.min(axis=0), ends.max(axis=0)
+
+
+def _in_box(model: RobotModel, low: FloatArray, high: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
+    found: list[FloatArray] = []
+    for _ in range(2 * count):
+        try:
+            found.append(brought_to(model, rng.uniform(low, high)))
+        except ExperimentError:
+            continue
+        if len(found) == count:
+            return np.array(found)
+    raise ExperimentError(
+        f"The hand, upright as in q_ready, reaches less than half of the box from {low.tolist()} to {high.tolist()}:"
+        " give a smaller one."
+    )
+
+
+def _anywhere(model: RobotModel, room: Fixtures, count: int, rng: np.random.Generator) -> FloatArray:
+    half = np.minimum((model.q_max - model.q_min) / 2, np.pi)
+    apart, found = ever_apart(model), list[FloatArray]()
+    for _ in range(_DRAWN * count):
+        q = model.q_mid + half * rng.uniform(-1, 1, model.n)
+        between = self_distances(model, capsule_ends(model, kinematics_of(model, q[None])))[0, apart]
+        if between.min(initial=np.inf) > 0 and _above(model, room, q):
+            found.append(q)
+        if len(found) == count:
+            return np.array(found)
+    raise ExperimentError(
+        f"{model.description.name} is clear of itself and the floor in too few postures: name another workspace."
+    )
+
+
+def _above(model: RobotModel, room: Fixtures, q: FloatArray) -> bool:
+    """Whether the moving part of an arm is on the free side of all planes."""
+    ends = np.stack(placed(model.body, model.kinematics(q)))
+    heights = ends @ room.planes[:, :3].T - room.planes[:, 3]
+    return bool(np.all(heights > model.body.radius[:, None]))

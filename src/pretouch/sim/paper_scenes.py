@@ -1,0 +1,89 @@
+"""What the arm meets in the paper's experiments: a board beside its path (IV-A), a person who pushes it (IV-C)."""
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from pretouch.control.path import Circle, Path, line
+from pretouch.sim.board import FACE_M, PANDA_SIDE, HandSide, Side, board_beside, sign_of
+from pretouch.sim.pushes import FACES, Push, against
+from pretouch.sim.scene import SceneSpec
+
+_LINE_END_Y, _LINE_X, _LINE_Z = 0.5, 0.4, 0.5
+_FACE_SPREAD_M = 0.05
+"""The seed moves the board's face by up to this [m]."""
+_CENTER_SPREAD_M = 0.02
+"""The seed moves the board along x and z by up to this [m]."""
+_STARTS_S = (4.0, 13.0, 22.0)
+_FORCE_N = (15.0, 30.0)
+_LASTING_S = (0.2, 0.5)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the paper's paths are for an arm: p = scale * p_paper + (shift_x, 0, shift_z), in the base frame."""
+
+    scale: float = 1.0
+    shift_x: float = 0.0
+    """[m]"""
+    shift_z: float = 0.0
+    """[m]"""
+    left: HandSide = PANDA_SIDE
+    """Where the hand meets a board at +y."""
+    right: HandSide = PANDA_SIDE
+    """Where the hand meets a board at -y."""
+
+    def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """Return where a point of the paper is for this arm [m]."""
+        return self.scale * x + self.shift_x, self.scale * y, self.scale * z + self.shift_z
+
+    def path(self, trajectory: str, sign: float) -> Path:
+        """Return the paper's circle or line, begun on the side away from a board on the side `sign` (1: +y)."""
+        if trajectory == "circle":
+            center, radius = self.point(0.5, 0.0, 0.25), 0.25 * self.scale
+            return Circle(center, radius, np.pi if sign > 0 else 0.0)
+        return line(self.point(_LINE_X, -_LINE_END_Y * sign, _LINE_Z), self.point(_LINE_X, _LINE_END_Y * sign, _LINE_Z))
+
+    def hand(self, side: Side) -> HandSide:
+        """Return where the hand is met on a side."""
+        return self.left if side == "+y" else self.right
+
+    def face(self, face: float, side: Side) -> float:
+        """Return the distance of a board's face from the plane y = 0 [m] at which it is met where the paper's is."""
+        return self.scale * face + (self.hand(side).aside - self.scale * PANDA_SIDE.aside)
+
+    def sentence(self, arm: str) -> str:
+        """Say what was done to the paper's paths."""
+        return (
+            f"The paper's paths for {arm}: {self.scale:.3g} times as large, moved by {self.shift_x:+.2f} m in x and"
+            f" {self.shift_z:+.2f} m in z; the board is met on the same part of them."
+        )
+
+
+_UNMOVED = Placement()
+
+
+def static_path(trajectory: str, side: str, placement: Placement = _UNMOVED) -> Path:
+    """Return the paper's path, begun on the side away from the object so that the arm runs into it at speed."""
+    return placement.path(trajectory, sign_of(cast(Side, side)))
+
+
+def static_scene(trajectory: str, side: str, stiffness: float, seed: int, placement: Placement = _UNMOVED) -> SceneSpec:
+    """Return a board on one side, at another place with each seed."""
+    rng, on = np.random.default_rng([seed, 10]), cast(Side, side)
+    face = FACE_M + _FACE_SPREAD_M * rng.uniform(-1, 1)
+    aside, above = _CENTER_SPREAD_M * rng.uniform(-1, 1, 2)
+    way = static_path(trajectory, side, placement)
+    board = board_beside(way, on, stiffness, placement.face(face, on), aside, above, placement.hand(on))
+    return SceneSpec(boxes=(board,))
+
+
+def dynamic_pushes(seed: int) -> tuple[Push, ...]:
+    """Three pushes against different faces, in an order, direction, size and length the seed decides."""
+    rng = np.random.default_rng([seed, 11])
+    planned = []
+    for start, which in zip(_STARTS_S, rng.permutation(len(FACES)), strict=True):
+        inwards = against(FACES[which], rng)
+        planned.append(Push(start + rng.uniform(0, 2), inwards, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S)))
+    return tuple(planned)

@@ -1,0 +1,1 @@
+"""What proves Pretouch: the paper's experiments, weaknesses, benchmarks, sweeps and studies."""

@@ -1,0 +1,135 @@
+"""What many trials come to: spreads over seeds, ratios on the same seeds, and the benchmark's JSON rows."""
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from pretouch import __version__
+from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
+from pretouch_lab.benchmarks.avoidance.paired import REFERENCES, paired
+from pretouch_lab.benchmarks.store import EMPTY, Row
+from pretouch_lab.groups import grouped
+from pretouch_lab.metrics import rounded
+
+SPREAD = (
+    "least_distance_m", "true_peak_20ms_n", "true_peak_n", "clamping_force_n", "peak_estimate_n", "impact_speed_m_s",
+    "first_contact_s", "tracking_rms_m", "off_path_max_m", "speed_m_s", "jerk_max_rad_s3", "jerk_max_per_second_rad_s3",
+    "jerk_rms_rad_s3", "manipulability_ee_least", "manipulability_point", "mobility_point_m", "seen_fraction", "held_s",
+    "livelock_s",
+)  # fmt: skip
+"""Measures of which median and 10-90 % over the seeds are given; a trial without one is left out."""
+TOTALS = (
+    "holds", "livelocks", "reactions", "false_reactions", "towards_person", "solver_failures", "infeasible",
+)  # fmt: skip
+RATIOS = (
+    "true_peak_20ms_n",
+    "clamping_force_n",
+    "peak_estimate_n",
+    "first_contact_s",
+    "cycle_time_s",
+    "tracking_rms_m",
+)
+"""Measures that are compared seed by seed."""
+
+
+def summarise(rows: list[Row]) -> Row:
+    """Bring trials together.
+
+    Returns:
+        `cells`, one for each scenario and contender; `families`, all scenarios of a family together; `ablations`, cells
+        of `pretouch` with each switch off alone and as it is, on the same seeds; `ratios` to each reference; `paired`.
+    """
+    whole = [row for row in rows if not row["contender"].startswith(WITHOUT)]
+    return {
+        "cells": _cells(whole, ("scenario", "family", "contender")),
+        "families": _cells(whole, ("family", "contender")),
+        "ablations": _cells(_ablated(rows), ("scenario", "family", "contender")),
+        "ratios": _ratios(whole),
+        "paired": paired(whole),
+    }
+
+
+def _cells(rows: list[Row], by: tuple[str, ...]) -> list[Row]:
+    return [_cell(key, group) for key, group in grouped(rows, by)]
+
+
+def _ablated(rows: list[Row]) -> list[Row]:
+    """Return the trials of ablations, and those of `pretouch` in the same scenarios with the same seeds."""
+    off = [row for row in rows if row["contender"].startswith(WITHOUT)]
+    played = {(row["scenario"], row["seed"]) for row in off}
+    return [row for row in rows if row["contender"] == BASE and (row["scenario"], row["seed"]) in played] + off
+
+
+def _cell(key: Row, group: list[Row]) -> Row:
+    """Summarise the trials of one contender in one scenario."""
+    reasons: Counter[str] = Counter()
+    for row in group:
+        reasons.update(row["hold_reasons"])
+    return {
+        **key,
+        "trials": len(group),
+        "contacts": sum(row["contact"] for row in group),
+        **{name: spread([row[name] for row in group]) for name in SPREAD},
+        "cycle_time_s": spread([np.inf if row["cycle_time_s"] is None else row["cycle_time_s"] for row in group])
+        if group[0]["timed"]
+        else None,
+        **{name: sum(row[name] or 0 for row in group) for name in TOTALS},
+        "hold_reasons": dict(reasons),
+    }
+
+
+def spread(values: list[Any]) -> dict[str, float | int | None] | None:
+    """Median and 10-90 % of what is not None; None of none. What was not over in time is infinite, and written None."""
+    known = [float(v) for v in values if v is not None]
+    if not known:
+        return None
+    # the nearest of the values, where interpolation with an infinite one would make none
+    low, middle, high = np.percentile(known, [10, 50, 90], method="nearest" if np.isinf(known).any() else "linear")
+    numbers = {"median": middle, "p10": low, "p90": high}
+    return {**{k: rounded(v, 4) if np.isfinite(v) else None for k, v in numbers.items()}, "n": len(known)}
+
+
+def _ratios(rows: list[Row]) -> list[Row]:
+    """Ratios reference / contender over the seeds that both have, for every scenario, and where both are above 0."""
+    of = {(row["scenario"], row["contender"], row["seed"]): row for row in rows}
+    found = []
+    for reference in REFERENCES:
+        for key, group in grouped(rows, ("scenario", "family", "contender")):
+            pairs = [(of.get((row["scenario"], reference, row["seed"])), row) for row in group]
+            both = [(theirs, mine) for theirs, mine in pairs if theirs is not None]
+            if not both or key["contender"] == reference:
+                continue
+            ratio = {name: spread([_ratio(theirs[name], mine[name]) for theirs, mine in both]) for name in RATIOS}
+            found.append({**key, "reference": reference, **ratio})
+    return found
+
+
+def _ratio(theirs: float | None, mine: float | None) -> float | None:
+    return theirs / mine if theirs and mine else None
+
+
+_MEDIANS = ("peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_time_s")
+"""Keys all benchmarks share, of which the rows have the median over the seeds."""
+
+
+def results(summary: Row, seeds: str, quick: bool, world: str = "") -> Row:
+    """Return what the JSON file holds: what was run, a row for each contender and scenario, and ratios to some."""
+    about: Row = {"bench": "avoidance", "version": __version__, "quick": quick, "seeds": seeds}
+    if world:
+        about["world"] = world
+    kept = {key: summary[key] for key in ("families", "ablations", "ratios", "paired")}
+    return {"about": about, "rows": json_rows(summary), **kept}
+
+
+def json_rows(summary: Row) -> list[Row]:
+    """Return one row a cell with the keys all benchmarks share, medians over the seeds, then this benchmark's own."""
+    return [
+        {
+            **EMPTY,
+            **cell,
+            **{name: cell[name]["median"] if cell[name] else None for name in _MEDIANS},
+            "spread": {name: cell[name] for name in _MEDIANS},
+        }
+        for cell in summary["cells"]
+    ]

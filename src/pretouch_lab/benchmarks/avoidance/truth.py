@@ -1,0 +1,34 @@
+"""What truly happened between arm and obstacle in a trial, step by step: no sensor is asked."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.types import FloatArray
+from pretouch_lab.benchmarks.avoidance.obstacle import Nearest, nearest
+from pretouch_lab.benchmarks.avoidance.setting import Setting
+from pretouch_lab.trial import Record
+
+Seen = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """S control steps."""
+
+    nearest: list[Nearest]
+    """True closest points of arm and obstacle at each step."""
+    distance: FloatArray
+    """(S,) distance of the surfaces, negative in contact [m]."""
+    ee_distance: FloatArray
+    """(S,) distance of the obstacle's surface from the end-effector's origin [m]."""
+
+
+def truth_of(record: Record, setting: Setting) -> Truth:
+    """Work out from true joint positions and the obstacle's true place how near they were."""
+    model, found, of_ee = setting.setup.model, [], []
+    for step, hand in zip(record.steps, record.hand_position, strict=True):
+        kin, shape = model.kinematics(step.q), setting.shape(hand)
+        found.append(nearest(kin, model.body, shape))
+        of_ee.append(float(shape.closest(kin.position[model.ee])[0]))
+    return Truth(found, np.array([n.distance for n in found]), np.array(of_ee))

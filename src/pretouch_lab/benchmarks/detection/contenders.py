@@ -1,0 +1,73 @@
+"""The detectors that are held against each other: each a profile, so that all go through the same `feel`."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pretouch.contact.detect import Detection
+from pretouch.contact.feel import FeelState
+from pretouch.params import Profile, ThresholdParams, profile
+from pretouch.types import FloatArray
+from pretouch_lab.benchmarks.ablations import ablations
+
+Sweep = Literal["f_base_n", "scale"]
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A detector by name, and what is swept of it."""
+
+    name: str
+    profile_text: str
+    """As `pretouch.params.profile` reads it."""
+    sweep: Sweep
+    """Base force of the paper's thresholds [N], or a factor on the evidence that makes an alarm."""
+
+    @property
+    def profile(self) -> Profile:
+        """Return its parameters."""
+        return profile(self.profile_text)
+
+    @property
+    def default(self) -> float:
+        """Return the value of the sweep that the profile itself has."""
+        return self.profile.threshold.f_base_n if self.sweep == "f_base_n" else 1.0
+
+    def statistic(
+        self, found: Detection, after: FeelState, wrench: FloatArray | None, params: ThresholdParams
+    ) -> float:
+        """Return the largest value of the sweep at which a step would still be an alarm; -inf where none would.
+
+        With the paper's thresholds that is exact: neither window, F_sigma nor F_obs depends on F_b. Other detectors say
+        how much evidence they have; held against a factor that is exact as long as nothing they remember depends on
+        their own alarms.
+        """
+        if not found.armed:
+            return -np.inf
+        if self.sweep == "scale":
+            return found.evidence
+        if wrench is None:
+            return -np.inf
+        limits = found.thresholds
+        force = after.window.newest if params.compare == "filtered" else wrench[:3]
+        return float(np.max(np.maximum(force - limits.upper, limits.lower - force))) + params.f_base_n
+
+
+CONTENDERS = (
+    Contender("blind", "blind", "f_base_n"),
+    Contender("fixed", "fixed", "scale"),
+    Contender("observer", "observer", "scale"),
+    Contender("paper", "paper", "f_base_n"),
+    Contender("paper-raw", "paper:threshold.compare=raw", "f_base_n"),
+    Contender("pretouch", "pretouch", "scale"),
+)
+"""The detectors; `pretouch` last."""
+
+
+def ablated() -> tuple[Contender, ...]:
+    """Return `pretouch` with each switch of its detection off alone; the paper's thresholds are swept by F_b."""
+    return tuple(
+        Contender(a.name, a.profile_text, "f_base_n" if a.switch == "detection.method" else "scale")
+        for a in ablations(of_detection=True)
+    )

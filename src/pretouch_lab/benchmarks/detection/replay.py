@@ -1,0 +1,78 @@
+"""A detector given a recorded stream: what it would have taken for contacts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.contact.cues import Cues
+from pretouch.contact.feel import feel, feel_init
+from pretouch.params import ReactionParams
+from pretouch.perception.closest import no_obstacles
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched
+from pretouch_lab.benchmarks.detection.contenders import Contender
+from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
+from pretouch_lab.benchmarks.detection.stream import Stream
+
+NOTHING = no_obstacles()
+"""What a profile without proximity is shown."""
+REST = ReactionParams().decay_cycles
+"""Control cycles for which an alarm is answered, and no other is looked for."""
+
+
+Said = Callable[[int, Kinematics], Cues | None]
+"""Gives what units said of a touch, by the number of a step and the arm's posture in it."""
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What a detector made of S steps."""
+
+    stamp: FloatArray
+    """(S,) [s]."""
+    alarm: BoolArray
+    """(S,) whether a contact was found."""
+    force: FloatArray
+    """(S, 3) force it was taken for [N], NaN where none was found."""
+    motion: FloatArray
+    """(S, n) joint velocities with which the arm would begin to move in answer to an alarm [rad/s], else NaN."""
+    statistic: FloatArray
+    """(S,) see `Contender.statistic`."""
+    touched: list[Touched]
+    """Where the arm was said to be touched in each of these steps."""
+
+    def onsets(self, value: float | None = None) -> list[int]:
+        """Return the steps at which an alarm begins; with another value of the sweep than the detector's, if given."""
+        return begun(self.alarm if value is None else self.statistic > value)
+
+
+def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
+    """Steps at which an alarm begins, given those (S,) with one: each is answered for `rest` steps."""
+    at, found, i = np.flatnonzero(alarm), [], 0
+    while i < len(at):
+        found.append(int(at[i]))
+        i = int(np.searchsorted(at, at[i] + rest))
+    return found
+
+
+def replay(stream: Stream, contender: Contender, model: RobotModel, said: Said = lambda step, kin: None) -> Replayed:
+    """Give a detector each step of a stream, from its beginning, and what units said of a touch."""
+    params = contender.profile
+    sees = params.perception.enabled
+    state, steps = feel_init(model, params), len(stream.count)
+    alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
+    force, touched = np.full((steps, 3), np.nan), [NOT_TOUCHED] * steps
+    motion, first = np.full((steps, model.n), np.nan), FirstMotion(model, params, stream.robot["q"][0], REST)
+    for i, (robot, obstacles, reacting, watched) in enumerate(stream.steps()):
+        near = obstacles if sees else NOTHING
+        kin = model.kinematics(robot.q)
+        found, state = feel(state, model, kin, robot, near, reacting, params, sees and watched, said(i, kin))
+        touched[i] = found.touched
+        statistic[i] = contender.statistic(found, state, robot.wrench, params.threshold)
+        if found.contact is not None:
+            alarm[i], force[i] = True, found.contact.force
+        begins = first.step(kin, robot, found, near)
+        if begins is not None:
+            motion[i] = begins
+    return Replayed(stream.stamp, alarm, force, motion, statistic, touched)

@@ -1,0 +1,119 @@
+"""What an arm's interface and skin said, step by step, kept so that any detector can be given the same again."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pretouch.errors import ExperimentError
+from pretouch.loop import Cycle
+from pretouch.params import profile
+from pretouch.sim.plant import Plant
+from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState
+from pretouch_lab.benchmarks.store import write_arrays
+
+PROFILE = "paper:threshold.f_base_n=1000:reduction.enabled=no:restriction.mode=off:perception.closing_speed=yes"
+"""Of the arms that are recorded: proximity is sensed, but no force is a contact and nothing near changes the motion.
+Closing speeds are there for the detectors that use them; nothing else that is sensed depends on them."""
+
+_ROBOT = tuple(f.name for f in fields(RobotState))
+_OBSTACLES = tuple(f.name for f in fields(Obstacles))
+
+
+@dataclass(frozen=True)
+class Stream:
+    """S control steps of one arm."""
+
+    robot: dict[str, FloatArray]
+    """Each field of `RobotState`, (S, ...); a missing wrench is NaN."""
+    reacting: FloatArray
+    """(S,) 1 where the arm moved with a contact, 0 elsewhere."""
+    watched: FloatArray
+    """(S,) 1 where a skin watched, all of its units heard, 0 elsewhere."""
+    count: IntArray
+    """(S,) how many obstacles there were."""
+    obstacles: dict[str, Any]
+    """Each field of `Obstacles` of all steps, one after the other, (sum of counts, ...)."""
+    truth: dict[str, FloatArray] = field(default_factory=dict)
+    """What else is known of the trial, by name."""
+
+    @property
+    def stamp(self) -> FloatArray:
+        """Instants (S,) of the robot's states [s]."""
+        return self.robot["stamp"]
+
+    def steps(self) -> Iterator[tuple[RobotState, Obstacles, bool, bool]]:
+        """Give each step as the controller had it: robot, obstacles, whether it was reacting, and a skin watched."""
+        ends = np.cumsum(self.count)
+        wrench = self.robot["wrench"]
+        for i, (end, number) in enumerate(zip(ends.tolist(), self.count.tolist(), strict=True)):
+            values: dict[str, Any] = {name: self.robot[name][i] for name in _ROBOT}
+            values["stamp"] = float(values["stamp"])
+            values["wrench"] = None if np.isnan(wrench[i, 0]) else wrench[i]
+            near = {name: self.obstacles[name][end - number : end] for name in _OBSTACLES}
+            yield RobotState(**values), Obstacles(**near), bool(self.reacting[i]), bool(self.watched[i])
+
+    def obstacle_points(self, step: int) -> FloatArray:
+        """Return the obstacle points (K, 3) [m] of a step."""
+        end = int(self.count[: step + 1].sum())
+        return np.asarray(self.obstacles["point"][end - int(self.count[step]) : end])
+
+
+class StreamRecorder:
+    """Keeps of each turn of the loop what detection is given; the plant's own log is thrown away as it comes."""
+
+    def __init__(self, plant: Plant, look: Callable[[Cycle], None] = lambda cycle: None) -> None:
+        """Take the plant, and what else is to be called with each cycle."""
+        self._plant, self._look = plant, look
+        self._patience = profile(PROFILE).perception.slow_after_s
+        self._robot: list[RobotState] = []
+        self._obstacles: list[Obstacles] = []
+        self._reacting: list[bool] = []
+        self._watched: list[bool] = []
+
+    def record(self, cycle: Cycle) -> None:
+        """Keep one turn of the loop."""
+        self._plant.take_log()
+        self._robot.append(cycle.after.watch.robot)
+        self._obstacles.append(cycle.step.obstacles)
+        self._reacting.append(cycle.before.mode.mode is Mode.REACT)
+        heard = cycle.after.tracks.heard
+        self._watched.append(len(heard) > 0 and cycle.step.stamp - float(heard.min()) <= self._patience)
+        self._look(cycle)
+
+    def stream(self, truth: dict[str, FloatArray] | None = None) -> Stream:
+        """Return all that was kept."""
+        robot = {name: np.array([getattr(state, name) for state in self._robot]) for name in _ROBOT if name != "wrench"}
+        nothing = np.full(6, np.nan)
+        robot["wrench"] = np.array([nothing if s.wrench is None else s.wrench for s in self._robot])
+        near = {name: np.concatenate([getattr(o, name) for o in self._obstacles]) for name in _OBSTACLES}
+        count = np.array([len(o.unit) for o in self._obstacles], dtype=np.int64)
+        reacting, watched = (np.array(flags, dtype=np.float64) for flags in (self._reacting, self._watched))
+        return Stream(robot, reacting, watched, count, near, truth or {})
+
+
+def save_stream(stream: Stream, path: Path) -> None:
+    """Write a stream to an .npz file, whole or not at all."""
+    arrays: dict[str, FloatArray] = {"reacting": stream.reacting, "watched": stream.watched, "count": stream.count}  # type: ignore[dict-item]
+    for part in ("robot", "obstacles", "truth"):
+        arrays |= {f"{part}.{name}": values for name, values in getattr(stream, part).items()}
+    write_arrays(arrays, path)
+
+
+def load_stream(path: Path) -> Stream:
+    """Read a stream; a file that cannot be read is an ExperimentError."""
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            arrays = dict(kept)
+        parts: dict[str, dict[str, FloatArray]] = {"robot": {}, "obstacles": {}, "truth": {}}
+        for name, values in arrays.items():
+            part, _, what = name.partition(".")
+            if what:
+                parts[part][what] = values
+        if set(parts["robot"]) != set(_ROBOT) or set(parts["obstacles"]) != set(_OBSTACLES):
+            raise ValueError("other versions recorded other fields")
+        return Stream(**parts, reacting=arrays["reacting"], watched=arrays["watched"], count=arrays["count"])
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise ExperimentError(f"The stream {path} cannot be read ({error}): delete it and run again.") from error

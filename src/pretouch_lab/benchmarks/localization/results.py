@@ -1,0 +1,127 @@
+"""What all replays of the localisation benchmark say together."""
+
+from typing import Any
+
+import numpy as np
+
+from pretouch import __version__
+from pretouch.text_table import TextTable
+from pretouch_lab.benchmarks.localization.campaign import NAME, Bench
+from pretouch_lab.benchmarks.scenario_files import scenario
+from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.metrics import rounded
+
+TWO = "two at once"
+"""In place of a link, for two contacts at once."""
+
+
+def summary_of(bench: Bench, replays: list[Row]) -> Row:
+    """Return what the JSON file holds: what was run, and a row for each skin and rigid body."""
+    about = {"bench": NAME, "version": __version__, "quick": bench.quick, "seeds": bench.seeds}
+    return {"about": about, "rows": rows_of(replays)}
+
+
+def rows_of(replays: list[Row]) -> list[Row]:
+    """Return a row for each skin and rigid body, and one for two contacts at once."""
+    rows = []
+    for skin in dict.fromkeys(replay["skin"] for replay in replays):
+        own = [replay for replay in replays if replay["skin"] == skin]
+        rate = rounded(1.0 / max(replay["p99_s"] for replay in own), 1)
+        singles = [found for replay in own if replay["contacts"] == 1 for found in replay["found"]]
+        for link in sorted({found["link"] for found in singles}, key=_order):
+            rows.append(_of_body(skin, link, [found for found in singles if found["link"] == link], rate))
+        pairs = [found for replay in own if replay["contacts"] == 2 for found in replay["found"]]
+        if pairs:
+            rows.append(_of_pairs(skin, pairs, rate))
+    return rows
+
+
+def _order(link: str) -> tuple[bool, str]:
+    return link == "hand", link
+
+
+def _of_body(skin: str, link: str, found: list[Row], rate: float) -> Row:
+    row: Row = {"skin": skin, "link": link, "contacts": len(found)}
+    for when in ("", "_end"):
+        felt = [one for one in found if one[f"felt{when}"]]
+        row |= {
+            f"felt{when}": len(felt),
+            f"right_link{when}": rounded(sum(one[f"right{when}"] for one in found) / len(found), 4),
+            f"median_error{when}_m": _at([one[f"error{when}_m"] for one in felt], 50),
+            f"p90_error{when}_m": _at([one[f"error{when}_m"] for one in felt], 90),
+            f"said_two{when}": sum(one[f"two{when}"] for one in found),
+            f"median_sigma{when}_m": _at([one[f"sigma{when}_m"] for one in felt], 50),
+        }
+    taken = [one["taken_for"] for one in found if one["felt"] and not one["right"]]
+    row["taken_for"] = {name: taken.count(name) for name in sorted(set(taken), key=_order)}
+    return row | {"median_limit_m": _at([one["limit_m"] for one in found], 50), "rate_hz": rate}
+
+
+def _of_pairs(skin: str, found: list[Row], rate: float) -> Row:
+    errors = [value for one in found if one["errors_m"] for value in one["errors_m"]]
+    return {
+        "skin": skin, "link": TWO, "contacts": len(found), "felt": sum(one["felt"] for one in found),
+        "recognised": rounded(sum(one["two"] for one in found) / len(found), 4),
+        "right_link": rounded(sum(one["right"] for one in found) / len(found), 4),
+        "median_error_m": _at(errors, 50), "p90_error_m": _at(errors, 90), "rate_hz": rate,
+    }  # fmt: skip
+
+
+def _at(values: list[float], percent: float) -> float | None:
+    return rounded(float(np.percentile(values, percent)), 4) if values else None
+
+
+def tables_of(results: Row) -> list[TextTable]:
+    """Return the tables of what `summary_of` returned."""
+    judged = scenario("localization")["judged"]
+    singles = [row for row in results["rows"] if row["link"] != TWO]
+    pairs = [row for row in results["rows"] if row["link"] == TWO]
+    lines = tuple(
+        (
+            row["skin"], row["link"], str(row["contacts"]), str(row["felt"]), _percent(row["right_link"]),
+            _said(row["taken_for"]), _cm(row["median_error_m"]), _cm(row["p90_error_m"]), _cm(row["median_limit_m"]),
+            str(row["said_two"]), _percent(row["right_link_end"]), _cm(row["median_error_end_m"]),
+            str(row["said_two_end"]),
+        )
+        for row in singles
+    )  # fmt: skip
+    rates = ", ".join(f"{skin} {rate:.0f} Hz" for skin, rate in {r["skin"]: r["rate_hz"] for r in singles}.items())
+    made = [
+        TextTable(
+            "Where a contact is said to be",
+            ("skin", "body", "contacts", "felt", "right\nbody", "taken for", "median\n[cm]", "90 %\n[cm]",
+             "limit\n[cm]", "said\ntwo", "right\nat end", "median\nat end [cm]", "two\nat end"),
+            lines,
+            f"Judged {1000 * judged['after_s']:.0f} ms after the force began to rise, or at its end if that is earlier,"
+            " and once more at its end. Error: from the true place, both on the body in that posture, of what was felt,"
+            " whichever body it was taken for; what was not felt is not right. hand: link 7, flange and hand, which the"
+            " same joints move. Limit: what the torques alone could tell at best, the bound of Cramer and Rao, median."
+            f" An inference takes so long that 99 of 100 would keep up with: {rates}.",
+        )
+    ]  # fmt: skip
+    if pairs:
+        made.append(TextTable(
+            "Two contacts at once",
+            ("skin", "pairs", "felt", "taken\nfor two", "both bodies\nright", "median\n[cm]", "90 %\n[cm]"),
+            tuple(
+                (row["skin"], str(row["contacts"]), str(row["felt"]), _percent(row["recognised"]),
+                 _percent(row["right_link"]), _cm(row["median_error_m"]), _cm(row["p90_error_m"]))
+                for row in pairs
+            ),
+            f"Judged {1000 * judged['pair_after_s']:.0f} ms after the second one began, on two bodies drawn at random."
+            " Errors: of both places, where two were said. The skin sees the hand of the first one only.",
+            1,
+        ))  # fmt: skip
+    return made
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.0f} %"
+
+
+def _cm(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.1f}"
+
+
+def _said(taken: dict[str, Any]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in taken.items()) or "-"

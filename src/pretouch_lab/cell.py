@@ -1,0 +1,97 @@
+"""What tells one trial from another, and what all trials of a run share."""
+
+import re
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import cast
+
+from pretouch.params import Orientation, Profile, RestrictionMode, profile
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sim.paper_scenes import Placement
+from pretouch.sim.plant_params import PlantParams, plant_params_of
+from pretouch.sim.range_finder import RangeFinderParams
+
+_ITS_OWN = ("braking", "flacco", "ding")
+"""Restriction modes that make a profile what it is."""
+_SAFE = {"-y": "minus-y", "+y": "plus-y"}
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What a run varies: each experiment makes its cells of that part of it which concerns it."""
+
+    profiles: tuple[str, ...]
+    restrictions: tuple[RestrictionMode, ...] = ()
+    """Restriction modes; none: each experiment's own."""
+    stiffness: tuple[float, ...] = (25_000.0,)
+    """Contact stiffnesses of static objects [N/m]."""
+
+    def controllers(self, restrictions: RestrictionMode) -> list[tuple[str, str]]:
+        """Profiles with restriction modes; `restrictions` is the experiment's own.
+
+        Without proximity the mode is `off`; a profile that is named with a mode keeps it, and so does one whose mode
+        is not of the paper's equations.
+        """
+        pairs = []
+        for name in self.profiles:
+            found = profile(name)
+            fixed = not found.perception.enabled or ":restriction.mode=" in name or found.restriction.mode in _ITS_OWN
+            modes = (found.restriction.mode,) if fixed else self.restrictions or (restrictions,)
+            pairs += [(name, mode) for mode in modes]
+        return list(dict.fromkeys(pairs))
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of an experiment's table: all its trials differ by their seed only."""
+
+    experiment: str
+    profile: str
+    where: dict[str, str | float] = field(default_factory=dict)
+    """What else tells the cell from the others, in the order of the table."""
+
+    @property
+    def name(self) -> str:
+        """Name for files: safe characters only. Where two names could become one, a digest tells them apart."""
+        parts = [
+            f"{value:.12g}" if isinstance(value, float) else _SAFE.get(value, value) for value in self.where.values()
+        ]
+        exact = "_".join([self.experiment, *parts, self.profile])
+        safe = re.sub(r"[^A-Za-z0-9._-]", "-", exact)
+        plain = safe == re.sub(r"[:=]", "-", exact)
+        return safe if plain else f"{safe}-{sha256(exact.encode()).hexdigest()[:8]}"
+
+
+@dataclass(frozen=True)
+class Context:
+    """What all trials of a run share."""
+
+    model: RobotModel
+    skin: Skin
+    orientation: Orientation | None = None
+    """Whether the hand's orientation is free or held, or None for the profile's own."""
+    placement: Placement = field(default_factory=Placement)
+    """Where the paper's paths are for this arm: the static experiment's."""
+    world: str = ""
+    """Set of worlds of which each trial's seed draws its own, or none."""
+    recording: Path | None = None
+    """File to record the trial in, if it is to be recorded."""
+    plant: PlantParams | None = None
+    """How far the arm is from its model; none, and as far as real arms are (`plant_params_of`)."""
+    ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    """How the skin's units err."""
+
+    @property
+    def arm(self) -> PlantParams:
+        """How far the arm is from its model."""
+        return self.plant or plant_params_of(self.model.description)
+
+    def profile(self, cell: Cell) -> Profile:
+        """Return a cell's profile with the restriction mode of the cell, if it names one, as this run has it."""
+        found = profile(cell.profile)
+        if "restrictions" in cell.where:
+            mode = cast(RestrictionMode, cell.where["restrictions"])
+            found = replace(found, restriction=replace(found.restriction, mode=mode))
+        return replace(found, task=replace(found.task, orientation=self.orientation or found.task.orientation))

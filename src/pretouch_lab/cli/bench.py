@@ -1,0 +1,90 @@
+"""`pretouch bench`: its docstrings are the help."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from pretouch.cli.words import words
+from pretouch.errors import ParameterError
+from pretouch_lab.cli.bench_avoidance import Avoidance
+from pretouch_lab.cli.bench_both import Both
+from pretouch_lab.cli.bench_calibration import Calibration
+from pretouch_lab.cli.bench_detection import Detection
+from pretouch_lab.cli.bench_localization import Localization
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """How far the force estimate of an arm left alone is off, and which detectors take that for a contact."""
+
+    seeds: int = 10
+    """Simulated arms; each is left alone for twenty minutes, a quarter of them standing."""
+    out: str = ""
+    """Folder for results, figures and page; by default runs/bench-free-motion."""
+    json: str = ""
+    """File for all trials and their summary; by default results.json in the folder."""
+
+    def run(self) -> None:
+        """Run what is missing, with results, figures and page."""
+        from pretouch_lab.campaign import Request
+        from pretouch_lab.cli.campaigns import run_all
+
+        out = Path(self.out or "runs/bench-free-motion")
+        request = Request(("free-motion",), self.seeds)
+        run_all([(request, out)], out, Path(self.json) if self.json else out / "results.json")
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """How long a control step takes: processor and wall time at a rate, overruns, and the share of each stage."""
+
+    points: str = "7,32,128,1000"
+    """Numbers of sensed points, separated by commas, each shown by a unit 50 times a second."""
+    rate: float = 1000.0
+    """Cycles a second; everything the profile counts in cycles is brought to it."""
+    cycles: int = 20_000
+    """Steps measured for each number of points."""
+    profile: str = "paper"
+    """Profile of the controller, or PROFILE:GROUP.FIELD=VALUE."""
+    json: str = ""
+    """File for the numbers; by default they are only shown."""
+    priority: int | None = None
+    """Real-time priority, 1 to 99 (80 is usual); by default the process keeps its own."""
+    cpu: int | None = None
+    """Number of the processor to stay on; by default the system decides."""
+
+    def run(self) -> None:
+        """Measure, show, and write the numbers if a file is given."""
+        from pretouch_lab.benchmarks.cycle import CycleRequest
+        from pretouch_lab.cli.bench_cycle import bench_cycle
+
+        request = CycleRequest(self.rate, self.cycles, self.profile, self.priority, self.cpu)
+        bench_cycle(_counts(self.points), request, Path(self.json) if self.json else None)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measure something: detectors, ways to avoid people, places of contacts, force estimates, or a step's time."""
+
+    what: (
+        Annotated[Detection, tyro.conf.subcommand("detection")]
+        | Annotated[Avoidance, tyro.conf.subcommand("avoidance")]
+        | Annotated[Localization, tyro.conf.subcommand("localization")]
+        | Annotated[Both, tyro.conf.subcommand("both")]
+        | Annotated[FreeMotion, tyro.conf.subcommand("free-motion")]
+        | Annotated[Cycle, tyro.conf.subcommand("cycle")]
+        | Annotated[Calibration, tyro.conf.subcommand("calibration")]
+    )
+
+    def run(self) -> int | None:
+        """Run the benchmark."""
+        return self.what.run()
+
+
+def _counts(text: str) -> tuple[int, ...]:
+    numbers = words(text)
+    if not numbers or not all(number.isdecimal() for number in numbers):
+        raise ParameterError(f"The numbers of points are {text!r}: give whole numbers, separated by commas.")
+    return tuple(map(int, numbers))

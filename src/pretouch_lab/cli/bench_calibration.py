@@ -1,0 +1,76 @@
+"""`pretouch bench calibration`: random skins calibrated in simulation, and how far the answers are off."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from pretouch.cli.calibrate.options import MotionOptions
+from pretouch.errors import CalibrationError
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """How far units on random skins are found from where they sit, by `pretouch skin calibrate` in simulation."""
+
+    skins: int = 20
+    """How many; each has a unit on each link from the second on."""
+    compared: bool = False
+    """Also with the method and the motion of Watanabe et al. (arXiv 2110.14516); takes longer."""
+    find_links: bool = False
+    """Do not tell the calibration which links the units sit on."""
+    motion: MotionOptions = field(default_factory=MotionOptions)
+    arm: Literal["panda", "fr3"] = "panda"
+    """The arm."""
+    json: str = ""
+    """File for all numbers."""
+    seed: int = 0
+    """Decides all that is random."""
+
+    def run(self) -> None:
+        """Run it, with tables and numbers."""
+        bench_calibration(self)
+
+
+def bench_calibration(command: Calibration) -> None:
+    """Calibrate random skins, show how far the answers are off, and write them down."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    from pretouch.calibration.motion.planner import plan_motion
+    from pretouch.cli.arms import arm_model
+    from pretouch.cli.calibrate.motion import plan_params
+    from pretouch.cli.tables import show
+    from pretouch.cli.writing import check_writable, unwritable_said
+    from pretouch.whole_file import write_json
+    from pretouch_lab.studies.calibration.study import study
+    from pretouch_lab.studies.calibration.table import tables
+
+    json_file = Path(command.json) if command.json else None
+    if command.skins < 1:
+        raise CalibrationError(f"The number of skins is {command.skins}: give at least 1.")
+    if command.seed < 0:
+        raise CalibrationError(f"The seed is {command.seed}: it must be at least 0.")
+    if json_file:
+        check_writable("file", json_file)
+    model = arm_model(command.arm)
+    plan = None if command.motion == MotionOptions() else plan_motion(model, plan_params(command.motion))
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
+    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task("simulations", total=command.skins * (1 + command.compared))
+        found = study(
+            model, command.skins, command.seed, command.compared, not command.find_links, plan,
+            progress=lambda done, _total: bar.update(task, completed=done),
+        )  # fmt: skip
+    console = Console(highlight=False)
+    show(console, tables(found))
+    if json_file:
+        with unwritable_said("file", json_file):
+            write_json(found.as_json(), json_file)
+        console.print(f"Numbers: {json_file}", soft_wrap=True, markup=False)

@@ -1,0 +1,99 @@
+"""What `pretouch bench cycle` does: measure for each number of points, and show tables."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.errors import ExperimentError
+from pretouch.realtime import check_wishes
+from pretouch.whole_file import write_json
+from pretouch_lab.benchmarks.cycle import CycleRequest, about, measure
+from pretouch_lab.benchmarks.workload import LARGEST_SKIN
+
+Row = dict[str, Any]
+
+_SPREAD = {"median": "median_us", "99 %": "p99_us", "99.9 %": "p999_us", "largest": "max_us"}
+
+
+def bench_cycle(points: tuple[int, ...], request: CycleRequest, json_file: Path | None) -> None:
+    """Measure the control step, show what it takes, and write the numbers if a file is given.
+
+    What was measured before something ended the run is shown and written all the same.
+    """
+    wrong = [n for n in points if not 1 <= n <= LARGEST_SKIN]
+    if wrong:
+        raise ExperimentError(f"The number of points is {wrong[0]}: give 1 to {LARGEST_SKIN}.")
+    check_wishes(request.priority, request.cpu)
+    if json_file:
+        check_writable("file", json_file)
+    rows: list[Row] = []
+    said: list[str] = []
+    try:
+        for n in points:
+            seconds = request.cycles / request.rate
+            print(f"{n} points: {request.cycles} cycles, {seconds:.0f} s or more.", file=sys.stderr)
+            rows.append(measure(n, request, said.append))
+    finally:
+        if rows:
+            missing = list(dict.fromkeys(said))
+            if json_file:  # first, for the terminal may be gone
+                with unwritable_said("file", json_file):
+                    facts = {**about(request), "missing": missing, "asked": list(points)}
+                    write_json({"about": facts, "rows": rows}, json_file)
+            _show(rows, request, missing)
+        if len(rows) < len(points):
+            print(f"Stopped: {len(rows)} of {len(points)} numbers of points were measured.", file=sys.stderr)
+    if json_file:
+        Console(highlight=False).print(f"Numbers: {json_file}", soft_wrap=True, markup=False)
+
+
+def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
+    console = Console(highlight=False)
+    title = f"\nTime of a control step, {request.cycles} cycles [us]"
+    console.print(title, style="bold", markup=False)
+    console.print(_times(rows, request.rate))
+    console.print(
+        "CPU: steps back to back, a reading of each unit 50 times a second; all new: every reading in every step; at a"
+        " rate: the processor sleeps between steps, and its caches cool. Overruns: steps that took longer than the"
+        " period. Restricting: points within reach of eq. 7, median.\n",
+        style="dim", markup=False,
+    )  # fmt: skip
+    console.print("Share of each stage [%]", style="bold", markup=False)
+    console.print(_shares(rows))
+    console.print()
+    for sentence in missing:
+        console.print(sentence, soft_wrap=True, markup=False)
+    idle = [str(row["points"]) for row in rows if row["tracking"] < 1]
+    if idle:
+        console.print(f"With {', '.join(idle)} points the arm did not follow its path in every cycle.", markup=False)
+
+
+def _times(rows: list[Row], rate: float) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("points", justify="right")
+    table.add_column("")
+    for name in (*_SPREAD, "overruns", "restricting"):
+        table.add_column(name, justify="right")
+    runs = {"CPU": "", "CPU, all new": "all_new_", f"CPU at {rate:g} Hz": "at_rate_", f"wall at {rate:g} Hz": "wall_"}
+    for row in rows:
+        for name, prefix in runs.items():
+            took = [f"{row[prefix + key]:.0f}" for key in _SPREAD.values()]
+            first = str(row["points"]) if not prefix else ""
+            overruns = str(row["overruns"]) if prefix == "wall_" else ""
+            restricting = f"{row['restricting_median']:.0f}" if not prefix else ""
+            table.add_row(first, name, *took, overruns, restricting)
+    return table
+
+
+def _shares(rows: list[Row]) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("points", justify="right")
+    for row in rows:
+        table.add_column(str(row["points"]), justify="right")
+    for stage in rows[0]["stages"]:
+        table.add_row(stage, *(f"{100 * row['stages'][stage]:.0f}" for row in rows))
+    return table

@@ -1,0 +1,134 @@
+"""`pretouch demo`, `reproduce` and `figure`: their docstrings are the help."""
+
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from pretouch.cli.words import words
+from pretouch.errors import ParameterError
+
+_DEMONSTRATED = ("blind", "paper", "pretouch")
+
+
+@dataclass(frozen=True)
+class Demo:
+    """Play a small part of the paper's three experiments: blind, as the paper, and as we do it, side by side."""
+
+    seeds: int = 4
+    """Trials of each cell of the static experiment; the other two take one."""
+    out: str = ""
+    """Folder for results, figures and page; by default a new one under runs/."""
+
+    def run(self) -> None:
+        """Play it, with results, figures and page."""
+        from pretouch_lab.campaign import Request
+        from pretouch_lab.cli.campaigns import run_all
+
+        out = Path(self.out) if self.out else new_folder("demo")
+        few = Request(("avoidance", "dynamic"), seeds=1, profiles=_DEMONSTRATED)
+        many = Request(("static",), seeds=self.seeds, profiles=_DEMONSTRATED)
+        run_all([(many, out / "static"), (few, out / "people")], out, out / "results.json")
+
+
+@dataclass(frozen=True)
+class Reproduce:
+    """Run the paper's experiments in full. A run that was stopped goes on where it was, with the same parameters."""
+
+    experiment: tyro.conf.Positional[str] = "all"
+    """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), one of the studies of its claims and weaknesses, or all of
+    them, which takes about an hour and a quarter on two processors."""
+    seeds: int = 12
+    """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
+    first_seed: int = 0
+    """The first of them; only seed 0 is recorded and drawn unasked."""
+    profiles: str = "blind,paper"
+    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. With `all`,
+    and where only the force estimate is studied, the studies have their own."""
+    restrictions: str = ""
+    """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
+    orientation: str = ""
+    """free or hold: whether the task keeps the hand's orientation; by default the profile's own, hold."""
+    stiffness: str = "25000"
+    """Contact stiffness of the static object [N/m], or several, separated by commas."""
+    skin: str = ""
+    """Skin file; by default the seven units that come with the package."""
+    arm: str = ""
+    """Folder of an arm that `pretouch robot import` wrote, for the static experiment; by default the Panda. The paper's
+    paths are scaled and moved into its reach, and the skin is the folder's own."""
+    world: str = ""
+    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
+    draws its own; by default the usual ones."""
+    record: str = "first"
+    """first: record the trials of the first seed of which figures are drawn; all: record every trial."""
+    out: str = ""
+    """Folder for results, recordings, figures and page; by default runs/reproduce-EXPERIMENT."""
+    json: str = ""
+    """File for all trials and their summary; by default results.json in the folder."""
+
+    def run(self) -> None:
+        """Run the experiments, with results, recordings, figures and page."""
+        from pretouch_lab.campaign import Request
+        from pretouch_lab.cli.campaigns import run_all
+        from pretouch_lab.paper.whole import whole_paper
+        from pretouch_lab.registry import EXPERIMENTS
+        from pretouch_lab.worlds import folder_part
+
+        everything = self.experiment == "all"
+        request = Request(
+            experiments=tuple(EXPERIMENTS) if everything else (self.experiment,),
+            seeds=self.seeds,
+            profiles=words(self.profiles),
+            restrictions=words(self.restrictions),
+            orientation=self.orientation or None,
+            stiffness=tuple(map(_number, words(self.stiffness))),
+            skin=self.skin or None,
+            record=self.record,
+            arm=self.arm or None,
+            first_seed=self.first_seed,
+            world=self.world or None,
+        )
+        if request.arm and not everything:
+            context = request.context()
+            print(context.placement.sentence(context.model.description.name))
+        out = Path(self.out or f"runs/reproduce-{self.experiment}{folder_part(self.world)}")
+        runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
+        run_all(runs, out, Path(self.json) if self.json else out / "results.json")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Draw one figure of the paper, from a run that is there or from trials played for it."""
+
+    name: tyro.conf.Positional[str]
+    """circle (Fig. 4), interaction (Fig. 5), close-up (Fig. 6), force-difference (Fig. 7) or framework (Fig. 2)."""
+    run_folder: Annotated[str, tyro.conf.arg(name="run")] = ""
+    """Folder of a run of `reproduce` or `demo` to draw it from; by default what is needed is played first."""
+    out: str = ""
+    """File to write, ending in .png, .pdf or .svg; by default NAME.png."""
+    profile: str = "paper"
+    """Profile that is shown."""
+    seed: int = 0
+    """Seed of the trials that are played; runs keep the course of seed 0."""
+
+    def run(self) -> None:
+        """Draw the figure."""
+        from pretouch_lab.cli.figure import draw_figure
+
+        run = Path(self.run_folder) if self.run_folder else None
+        out = Path(self.out or f"{self.name}.png")
+        print(f"Figure: {draw_figure(self.name, run, out, self.profile, self.seed)}")
+
+
+def new_folder(name: str) -> Path:
+    """Return a folder under runs/ that is not there yet."""
+    return next(path for n in count(1) if not (path := Path("runs") / f"{name}-{n}").exists())
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError(f"The stiffness is {text!r}: give numbers in N/m, separated by commas.") from None

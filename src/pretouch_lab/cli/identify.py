@@ -1,0 +1,186 @@
+"""`pretouch identify`: from recordings of free motion to a simulated arm like it, as table, figure and file."""
+
+import json
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import tyro
+
+if TYPE_CHECKING:  # the help is to need none of the heavy packages
+    from pretouch.robot.model import RobotModel
+    from pretouch_lab.identification.identify import Identified
+
+
+@dataclass(frozen=True)
+class Identify:
+    """Estimate an arm's offsets, friction, ripple, masses and noise from free motion, for the simulation to be like it.
+
+    Nothing may touch the arm; two minutes along smooth paths that turn all joints, below 0.5 m/s, are good. What cannot
+    be told from the recording keeps its usual value, and the file says so.
+    """
+
+    file: tyro.conf.Positional[str]
+    """Recording of ours, or .csv with time_s, q1_rad ..., qd1_rad_s ... if there are any, and tau_ext1_Nm ... or
+    tau1_Nm ... (measured torques, at 400 Hz or more)."""
+    arm: str = ""
+    """panda, fr3, or the folder of an arm that `pretouch robot import` wrote; by default what a recording of ours says,
+    or a Panda."""
+    # the choices of pretouch_lab.identification.free_motion, spelt out: the help is to need none of the heavy packages
+    sign: Literal["on-robot", "by-robot"] = "on-robot"
+    """Whose the external torques of a CSV file are: on the robot by its environment, or by the robot."""
+    out: str = ""
+    """TOML file for the arm, for --world of `live`, `reproduce` and `bench`."""
+    figure: str = ""
+    """Figure to write, ending in .png, .pdf or .svg: what is explained over time, and the autocorrelation."""
+    json: str = ""
+    """File for the numbers."""
+
+    def run(self) -> None:
+        """Identify the arm, and show and write what was found."""
+        identify_arm(self)
+
+
+def identify_arm(command: Identify) -> None:
+    """Read, identify, show, and write what is asked for."""
+    from pretouch.cli.writing import check_writable, unwritable_said
+    from pretouch.errors import RecordingError
+    from pretouch.sim.plant_params import plant_params_of
+    from pretouch.whole_file import write_whole
+    from pretouch_lab.identification.arm_file import arm_toml
+    from pretouch_lab.identification.free_motion import read_free_motion
+    from pretouch_lab.identification.identify import identify
+    from pretouch_lab.identification.usual import usual_of
+
+    out, figure, json_file = (Path(text) if text else None for text in (command.out, command.figure, command.json))
+    if figure and figure.suffix not in (".png", ".pdf", ".svg"):
+        raise RecordingError(f"The figure {figure} has no ending that says its format: use .png, .pdf or .svg.")
+    for what, place in (("file", out), ("figure", figure), ("file", json_file)):
+        if place:
+            check_writable(what, place)
+    samples, model, said = read_free_motion(Path(command.file), _model(command.arm), command.sign)
+    found = identify(samples, model, usual_of(plant_params_of(model.description)))
+    if json_file:
+        with unwritable_said("file", json_file):
+            write_whole(json_file, json.dumps(_numbers(found, model, command.file), indent=1, allow_nan=False) + "\n")
+    if figure:
+        image = BytesIO()
+        _figure(found, model, command.file).savefig(image, format=figure.suffix[1:], dpi=120)
+        with unwritable_said("figure", figure):
+            figure.write_bytes(image.getvalue())
+    if out:
+        with unwritable_said("file", out):
+            write_whole(out, arm_toml(found, model, Path(command.file).name))
+    _show(found, model, said)
+    for what, place in (("Arm", out), ("Figure", figure), ("Numbers", json_file)):
+        if place:
+            print(f"{what}: {place}")
+
+
+def _model(arm: str) -> "RobotModel | None":
+    from pretouch.robot.description import fr3, panda
+    from pretouch.robot.description_file import load_description
+    from pretouch.robot.model import RobotModel
+
+    if not arm:
+        return None
+    known = {"panda": panda, "fr3": fr3}
+    return RobotModel(known[arm]() if arm in known else load_description(arm))
+
+
+def _show(found: "Identified", model: "RobotModel", said: str) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, soft_wrap=True, width=20 * (model.n + 2))
+    console.print(f"{said}. {found.seconds:.0f} s of free motion are used.", markup=False)
+    for note in found.notes:
+        console.print(note, markup=False)
+    rows = joint_rows(found, model)
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("")
+    for joint in model.joints:
+        table.add_column(joint, justify="right", no_wrap=True)
+    for name, values, errors, told in rows:
+        table.add_row(name, *(_shown(*each) for each in zip(values, errors, told, strict=True)))
+    console.print(table)
+    payload, error = float(found.fit.numbers[-2]), float(found.fit.errors[-2])
+    console.print(f"Payload {payload:.3f} +- {error:.3f} kg.", markup=False)
+    noise = found.noise
+    if noise.velocity_rad_s == noise.velocity_rad_s:
+        console.print(
+            f"Velocity noise {noise.velocity_rad_s:.4f} rad/s; observer gain {found.fit.gain:.1f} +-"
+            f" {found.fit.errors[-1]:.1f} 1/s, by the autocorrelation {noise.gain_1_s:.0f} +-"
+            f" {noise.gain_error_1_s:.0f} 1/s.",
+            markup=False,
+        )
+    else:
+        console.print("Without velocities neither their noise nor the observer's gain is told.", markup=False)
+    console.print(
+        "In brackets: the recording hardly tells it, and it stays near what is usual. Errors are standard errors. Of"
+        " the friction only what the robot does not compensate shows. In simulation offsets, ripple and"
+        " payload were off by two and a half times as much.",
+        markup=False,
+    )
+
+
+def _shown(number: float, error: float, told: bool) -> str:
+    text = f"{number:.3g} +- {error:.1g}"
+    return text if told else f"({text})"
+
+
+def joint_rows(found: "Identified", model: "RobotModel") -> list[tuple[str, Any, Any, Any]]:
+    """Return name, values, standard errors and whether the recording tells it, of what each joint has."""
+    import numpy as np
+
+    own, errors = found.fit.of_joints(found.fit.numbers), found.fit.of_joints(found.fit.errors)
+    told = found.fit.of_joints(found.known().astype(np.float64)) > 0.5
+    ripple, ripple_error, _ = found.ripple()
+    n, first = model.n, own.size
+    mass = slice(first, first + n)
+    steep = np.exp(own[:, 2])
+    seen = np.isfinite(found.noise.velocity_rad_s)  # else the noise of velocities is in that of torques
+    return [
+        ("offset [Nm]", own[:, 0], errors[:, 0], told[:, 0]),
+        ("friction F1, not compensated [Nm]", own[:, 1], errors[:, 1], told[:, 1]),
+        ("friction F2 [s/rad]", steep, steep * errors[:, 2], told[:, 2]),
+        ("friction F3 [rad/s]", own[:, 3], errors[:, 3], told[:, 3]),
+        ("ripple [Nm]", ripple, ripple_error, ripple > 3.0 * ripple_error),
+        ("mass error of its links", found.fit.numbers[mass], found.fit.errors[mass], found.known()[mass]),
+        (
+            "torque noise [Nm]",
+            found.noise.torque_nm,
+            found.noise.torque_errors_nm,
+            seen & (found.noise.torque_nm > 0.0),
+        ),
+        ("spread about the mean [Nm]", found.noise.total_nm, 0.0 * ripple, ripple > -1.0),
+    ]
+
+
+def _numbers(found: "Identified", model: "RobotModel", source: str) -> dict[str, Any]:
+    noise = found.noise
+    velocity = noise.velocity_rad_s if noise.velocity_rad_s == noise.velocity_rad_s else None
+    return {
+        "recording": source, "arm": model.description.name, "joints": list(model.joints), "used_s": found.seconds,
+        "notes": list(found.notes), "contact_spans_s": [list(span) for span in found.spans],
+        "of_joints": [
+            {
+                "name": name, "values": values.tolist(), "standard_errors": errors.tolist(),
+                "told": [bool(t) for t in told],
+            }
+            for name, values, errors, told in joint_rows(found, model)
+        ],
+        "payload_kg": [float(found.fit.numbers[-2]), float(found.fit.errors[-2])],
+        "velocity_noise_rad_s": velocity,
+        "observer_gain_1_s": [found.fit.gain, float(found.fit.errors[-1])] if velocity else None,
+        "observer_gain_by_autocorrelation_1_s": [noise.gain_1_s, noise.gain_error_1_s],
+        "correlation": noise.correlation.tolist(), "lag_s": noise.period_s,
+        "autocorrelation": noise.autocorrelation.tolist(),
+    }  # fmt: skip
+
+
+def _figure(found: "Identified", model: "RobotModel", title: str) -> Any:
+    from pretouch_lab.identification.residual_figure import residual_figure
+
+    return residual_figure(found, model, title)

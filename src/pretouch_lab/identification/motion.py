@@ -1,0 +1,149 @@
+"""How an arm moved: positions, speeds and accelerations from samples with noise and uneven stamps.
+
+A cubic is fitted to the samples around each instant of a regular grid, near ones counting more (local polynomial
+regression; Savitzky and Golay's filter where samples are evenly spaced). Lost samples and stamps that are off only make
+it less sure: each estimate is a weighted sum of samples, so its noise follows from theirs. How wide the fit is follows
+from the noise: as narrow as that allows, for a wide one rounds a path's corners.
+"""
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from pretouch.types import BoolArray, FloatArray
+from pretouch.values import value
+from pretouch_lab.identification.samples import joint_scale
+
+GRID_S = 0.01
+"""Spacing of the instants at which the motion is estimated [s]."""
+HALVES_S = (0.06, 0.09, 0.13, 0.18, 0.25)
+"""Half the widths of the fit that are tried [s]: cutoffs of about 13 to 3 Hz."""
+_LEAST = 6
+"""Samples that a cubic is fitted to at least; where they are sparse, as in a gap, the fit is wider."""
+_SURE_RAD_S, _SURE_RAD_S2 = 0.002, 0.8
+"""Noise of speeds [rad/s] and accelerations [rad/s^2] that is strived for: a quarter of the noise of velocities that an
+arm measures, and a fifth of what is quick."""
+_QUICK_RAD_S2 = 4.0
+"""Where a joint's speed changes faster than this [rad/s^2], as at a corner of a path, its speed is not told well."""
+_ROUNDED_RAD_S = 0.005
+"""A fit of half the width may tell a speed that differs by this [rad/s]: half of the noise of measured velocities."""
+_SIGMAS = 6.0
+"""What is off by this many standard deviations is no noise [1]."""
+_DEGREE = 3
+
+
+@value
+class Motion:
+    """How an arm with n joints moved in one stretch without a gap, at G instants, `GRID_S` apart."""
+
+    at: FloatArray
+    """(G,) [s]."""
+    q: FloatArray
+    """(G, n) [rad]."""
+    qd: FloatArray
+    """(G, n) [rad/s]."""
+    qdd: FloatArray
+    """(G, n) [rad/s^2]."""
+    quick: BoolArray
+    """(G,) where a speed changes faster than the fit follows, or where too few samples tell it."""
+    half_s: float
+    """Half the width of the fit [s]."""
+    noise: FloatArray
+    """(n,) standard deviation of the positions, errors of the stamps in it [rad]."""
+    speed_noise: FloatArray
+    """(n,) that of the speeds, usually [rad/s]."""
+
+    def between(self) -> CubicHermiteSpline:
+        """Positions as a function of time, and by its derivative speeds."""
+        return CubicHermiteSpline(self.at, self.q, self.qd)
+
+
+def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[Motion]:
+    """Estimate the motion in stretches with stamps (N,) [s] and positions (N, n) [rad], all by a fit of one width."""
+    grids = [time[0] + GRID_S * np.arange(int((time[-1] - time[0]) / GRID_S) + 2) for time in times]
+    given = list(zip(times, positions, grids, strict=True))
+    noise = position_noise(times, positions, HALVES_S[0])
+    for half in HALVES_S:
+        fits = [local_cubic(*each, half) for each in given]
+        gain = np.median(np.concatenate([gains for _, gains in fits]), axis=0)
+        if noise.max() * gain[1] <= _SURE_RAD_S and noise.max() * gain[2] <= _SURE_RAD_S2:
+            break
+    narrow = [local_cubic(*each, 0.5 * half)[0][1] for each in given]
+    differs = [speed - fitted[1] for speed, (fitted, _) in zip(narrow, fits, strict=True)]
+    allowed = _ROUNDED_RAD_S + _SIGMAS * joint_scale(np.concatenate(differs))
+    quick = [
+        _quick(fitted[2], gains[:, 2, None] * noise) | np.any(np.abs(off) > allowed, axis=1)
+        for (fitted, gains), off in zip(fits, differs, strict=True)
+    ]
+    rows = zip(grids, fits, quick, strict=True)
+    return [
+        Motion(at, fitted[0], fitted[1], fitted[2], unsure, half, noise, gain[1] * noise)
+        for at, (fitted, _), unsure in rows
+    ]
+
+
+def _quick(qdd: FloatArray, noise: FloatArray) -> BoolArray:
+    """Say where (G,) accelerations (G, n) are beyond doubt too quick, or hardly known."""
+    beyond = np.abs(qdd) - 0.5 * _SIGMAS * noise > _QUICK_RAD_S2
+    return np.asarray(np.any(beyond | (noise > _QUICK_RAD_S2), axis=1))
+
+
+def position_noise(times: list[FloatArray], positions: list[FloatArray], half: float) -> FloatArray:
+    """Robust standard deviation (n,) [rad] of what a local cubic leaves, what it takes away of the noise put back."""
+    rows = []
+    for time, q in zip(times, positions, strict=True):
+        (fitted, _, _), gains = local_cubic(time, q, time, half)
+        rows.append((q - fitted) / np.sqrt(np.maximum(1.0 - 2.0 * gains[:, 3] + gains[:, 0] ** 2, 0.01))[:, None])
+    return joint_scale(np.concatenate(rows))
+
+
+def local_cubic(time: FloatArray, values: FloatArray, at: FloatArray, half: float) -> tuple[FloatArray, FloatArray]:
+    """Fit a cubic to the samples around each instant, by weighted least squares.
+
+    Args:
+        time: (N,) increasing stamps [s].
+        values: (N, c) samples.
+        at: (G,) increasing instants [s].
+        half: samples nearer than this count [s]; where there are fewer than a handful, farther ones do.
+
+    Returns:
+        Value, first and second derivative (3, G, c), and (G, 4) the standard deviations of these three where that of
+        the samples is 1, and the weight of a sample at the very instant in the value.
+    """
+    reach = np.maximum(half, 1.05 * _nearest(time, at))
+    first, last = np.searchsorted(time, at - reach), np.searchsorted(time, at + reach)
+    size = _DEGREE + 1
+    moments, squares = np.zeros((2 * size - 1, len(at))), np.zeros((2 * size - 1, len(at)))
+    right = np.zeros((size, len(at), values.shape[1]))
+    middle = values[np.clip(first, 0, len(time) - 1)]  # near to it sums lose no digits
+    for k in range(int((last - first).max())):
+        there = np.minimum(first + k, len(time) - 1)
+        x = (time[there] - at) / reach
+        weight = np.where(first + k < last, np.maximum(1.0 - x**2, 0.0) ** 2, 0.0)
+        off = values[there] - middle
+        power = np.ones(len(at))
+        for m in range(2 * size - 1):
+            moments[m] += weight * power
+            squares[m] += weight**2 * power
+            if m < size:
+                right[m] += (weight * power)[:, None] * off
+            power = power * x
+    index = np.add.outer(np.arange(size), np.arange(size))
+    inverse = np.linalg.inv(np.moveaxis(moments[index], 2, 0) + 1e-12 * np.eye(size))
+    fitted = np.einsum("gij,jgc->igc", inverse, right)
+    spread = np.einsum("gij,jkg,gki->gi", inverse, squares[index], inverse)
+    scale = np.stack([np.ones(len(at)), 1.0 / reach, 2.0 / reach**2])
+    result = fitted[:3] * scale[:, :, None]
+    result[0] += middle
+    gains = np.sqrt(np.maximum(spread[:, :3], 0.0)) * scale.T
+    return result, np.column_stack([gains, inverse[:, 0, 0]])
+
+
+def _nearest(time: FloatArray, at: FloatArray) -> FloatArray:
+    """Distance (G,) [s] within which `_LEAST` samples are, or all."""
+    count = min(_LEAST, len(time))
+    place = np.searchsorted(time, at)
+    ways = []
+    for k in range(count + 1):
+        begin = np.clip(place - k, 0, len(time) - count)
+        ways.append(np.maximum(np.abs(time[begin] - at), np.abs(time[begin + count - 1] - at)))
+    return np.asarray(np.min(ways, axis=0))

@@ -1,0 +1,132 @@
+"""The noise of an arm's residual: of velocities and torque sensors, how fast it changes, and what joints share."""
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from pretouch.errors import CalibrationError
+from pretouch.types import BoolArray, FloatArray
+from pretouch.values import value
+from pretouch_lab.identification.columns import Columns
+from pretouch_lab.identification.fit import Fit
+from pretouch_lab.identification.params import IdentifyParams, Usual
+from pretouch_lab.identification.samples import Usable, joint_scale
+
+LAGS = 20
+"""Lags of the autocorrelation that are kept."""
+_FITTED = 10
+_LEAST_BLOCKS = 8
+_LEAST_VELOCITY_RAD_S = 1e-5
+"""Least noise of measured velocities that is told [rad/s]."""
+
+
+@value
+class Noise:
+    """Of n joints."""
+
+    total_nm: FloatArray
+    """(n,) robust standard deviation of what the mean leaves [Nm]."""
+    torque_nm: FloatArray
+    """(n,) standard deviation of the torque sensors' noise before the observer [Nm]."""
+    torque_errors_nm: FloatArray
+    """(n,) its standard error."""
+    velocity_rad_s: float
+    """Standard deviation of the velocities' noise [rad/s]; NaN without velocities."""
+    velocity_error_rad_s: float
+    gain_1_s: float
+    """Gain of the observer [1/s] by the autocorrelation alone."""
+    gain_error_1_s: float
+    correlation: FloatArray
+    """(n, n) between the joints, of what the mean leaves."""
+    autocorrelation: FloatArray
+    """(LAGS + 1, n) of what the mean leaves."""
+    left_autocorrelation: FloatArray
+    """(LAGS + 1, n) of what the velocities' noise leaves of that."""
+    period_s: float
+    """Of one lag [s]."""
+
+
+def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usual: Usual, p: IdentifyParams) -> Noise:
+    """Take the noise apart."""
+    total = found.samples.tau - fitted.expected
+    left = total - fitted.kicked
+    blocks = _blocks(found, left, used, p.block_s)
+    if len(blocks) < _LEAST_BLOCKS:
+        raise CalibrationError(
+            f"There are {len(blocks)} stretches of {p.block_s:g} s without a break: the noise needs {_LEAST_BLOCKS}."
+            " Record longer, along smoother paths, with nothing touching the arm."
+        )
+    covariance = blocks.mean(axis=0)
+    without = (len(blocks) * covariance - blocks) / (len(blocks) - 1)  # each with one block left out: the jackknife
+    seen = found.samples.qd is not None
+    noise = columns.velocity_noise[used]
+    velocity = np.nan
+    if seen:  # the derivatives' noise is in what differs, too
+        square = float(np.mean(joint_scale(noise) ** 2 - columns.motion[0].speed_noise ** 2))
+        velocity = float(np.sqrt(max(square, _LEAST_VELOCITY_RAD_S**2)))
+    torque = _torque_noise(covariance[0], velocity, columns, fitted, usual)
+    again = np.array([_torque_noise(sample[0], velocity, columns, fitted, usual) for sample in without])
+    gains = np.array([_gain_of(sample, found.period, usual) for sample in without])
+    return Noise(
+        total_nm=joint_scale(total[used]), torque_nm=torque, torque_errors_nm=_jackknife(again),
+        velocity_rad_s=velocity, velocity_error_rad_s=1.17 * velocity / np.sqrt(2.0 * noise.size),
+        gain_1_s=_gain_of(covariance, found.period, usual), gain_error_1_s=float(_jackknife(gains)),
+        correlation=np.atleast_2d(np.corrcoef(total[used].T)),
+        autocorrelation=_normalised(_blocks(found, total, used, p.block_s).mean(axis=0)),
+        left_autocorrelation=_normalised(covariance), period_s=found.period,
+    )  # fmt: skip
+
+
+def _jackknife(again: FloatArray) -> FloatArray:
+    """Standard error of what came out with each block (B, ...) left out."""
+    return np.asarray(np.sqrt(len(again) - 1.0) * again.std(axis=0))
+
+
+def _normalised(covariance: FloatArray) -> FloatArray:
+    return np.asarray(covariance / np.maximum(covariance[0], 1e-12))
+
+
+def _blocks(found: Usable, left: FloatArray, used: BoolArray, block_s: float) -> FloatArray:
+    """Autocovariances (B, LAGS + 1, n) of blocks that are used whole, about the mean of all [Nm^2]."""
+    # what is five deviations off is cut: one outlier would be most of a variance
+    bound = 5.0 * joint_scale(left[used])
+    centred = np.clip(left - np.median(left[used], axis=0), -bound, bound)
+    length, rows = max(round(block_s / found.period), 2 * LAGS), []
+    for a, b in found.segments:
+        for begin in range(a, b - length - LAGS, length):
+            if used[begin : begin + length + LAGS].all():
+                first = centred[begin : begin + length]
+                rows.append([(first * centred[begin + k : begin + length + k]).mean(axis=0) for k in range(LAGS + 1)])
+    return np.array(rows)
+
+
+def _torque_noise(variance: FloatArray, velocity: float, columns: Columns, fitted: Fit, usual: Usual) -> FloatArray:
+    """Standard deviation (n,) [Nm] of the torque sensors' noise that leaves such a variance behind the observer.
+
+    A first-order noise of corner a through the discrete low-pass of the observer, alpha = K dt / (1 + K dt), keeps the
+    part alpha / (2 - alpha) (1 + rho (1 - alpha)) / (1 - rho (1 - alpha)) of its variance, rho = exp(-a dt). What
+    earlier noise of the velocities left in the integral is taken off: K'^2 (M M^T)_jj alpha / (2 - alpha) of it; and
+    so is what the noise of the positions' derivatives, which is in what was taken for noise of the velocities, leaves.
+    """
+    dt, gain = usual.period_s, fitted.gain
+    alpha, rho = gain * dt / (1.0 + gain * dt), np.exp(-2.0 * np.pi * usual.torque_noise_hz * dt)
+    late = rho * (1.0 - alpha)
+    part = alpha / (2.0 - alpha) * (1.0 + late) / (1.0 - late)
+    own = np.zeros(len(variance))
+    if not np.isnan(velocity):
+        unknown = columns.motion[0].speed_noise ** 2
+        unknown = unknown * velocity**2 / (unknown + velocity**2)
+        shares = velocity**2 * alpha / (2.0 - alpha) + unknown
+        own = (alpha / dt) ** 2 * columns.mass_square @ shares
+    return np.sqrt(np.maximum(variance - own, 0.0) / part)
+
+
+def _gain_of(covariance: FloatArray, period: float, usual: Usual) -> float:
+    """Gain [1/s] whose low-pass of first-order noise has the joints' autocorrelation, all joints counting alike."""
+    rho, lag = _normalised(covariance)[1 : _FITTED + 1].mean(axis=1), period * np.arange(1, _FITTED + 1)
+    a = 2.0 * np.pi * usual.torque_noise_hz
+
+    def misfit(gain: float) -> float:
+        shape = (a * np.exp(-gain * lag) - gain * np.exp(-a * lag)) / (a - gain)
+        return float(((rho - shape) ** 2).sum())
+
+    return float(minimize_scalar(misfit, bounds=(5.0, 0.9 * a), method="bounded").x)

@@ -1,0 +1,1 @@
+"""The paper's three experiments, its claims, and its figures."""

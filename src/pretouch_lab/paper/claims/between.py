@@ -1,0 +1,224 @@
+"""Paper V-C, threshold close-up: a person stands on one side of the circle and pushes the arm from the other."""
+
+from typing import Any
+
+import numpy as np
+
+from pretouch.control.path import Circle
+from pretouch.params import RestrictionMode, profile
+from pretouch.sim.pushes import FACES, Push, Pusher, against
+from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch.text_table import TextTable
+from pretouch.types import ControlStep
+from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.metrics import rounded, spread
+from pretouch_lab.tables import controller, number
+from pretouch_lab.trial import Record, Setup, play
+
+NAME = "between"
+DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+
+_DURATION_S = 12.0
+_REACH_M = 0.25
+"""The circle's end-effector comes this far in y [m]."""
+_BEYOND_M = (0.3, 0.4)
+"""Distance of the body's surface from there [m]."""
+_BODY_HALF_SIZE_M = (0.2, 0.12, 0.75)
+"""Half the size of a person's trunk and legs [m]; they stand on the floor."""
+_BODY_STIFFNESS_N_PER_M = 25_000.0
+"""Contact stiffness of a chest [N/m] (ISO/TS 15066, annex A)."""
+_ASIDE_M = 0.05
+"""The seed moves the body along x by up to this [m]."""
+_START_S = (5.0, 7.0)
+"""When the person reaches for the arm [s]."""
+_FACE = FACES[0]
+"""The right face of the robot's hand is pushed: along +y of the base."""
+_FORCE_N = (15.0, 30.0)
+_LASTING_S = (0.2, 0.5)
+_NOTICE_S = 0.3
+"""A reaction up to this long after the release still answers the push [s]."""
+_REBOUND_S = 3.0
+"""A later reaction up to this long after the release is the push's echo [s]."""
+_Y = 1
+_WIDTHS = ("upper_free_n", "upper_least_n", "lower_free_n", "lower_least_n")
+_MEASURES = ("both_lowered_s", "detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n")
+
+
+def cells(grid: Grid) -> list[Cell]:
+    """One cell for each controller."""
+    return [
+        Cell(NAME, name, {"restrictions": restrictions})
+        for name, restrictions in grid.controllers(DEFAULT_RESTRICTIONS)
+    ]
+
+
+def interaction(seed: int) -> tuple[Box, Push]:
+    """Where the body stands at +y, and how the hand pushes from -y: both vary with the seed."""
+    rng = np.random.default_rng([seed, 61])
+    face = _REACH_M + rng.uniform(*_BEYOND_M)
+    center = (
+        0.5 + _ASIDE_M * rng.uniform(-1, 1),
+        face + _BODY_HALF_SIZE_M[1],
+        SceneSpec.floor_height + _BODY_HALF_SIZE_M[2],
+    )
+    inwards = against(_FACE, rng)
+    push = Push(rng.uniform(*_START_S), inwards, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S))
+    return Box("body", center, _BODY_HALF_SIZE_M, _BODY_STIFFNESS_N_PER_M), push
+
+
+def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+    """Run one trial; return its row of results and what it left behind."""
+    body, push = interaction(seed)
+    person = Pusher(context.model, (push,))
+    setup = Setup(
+        model=context.model,
+        skin=context.skin,
+        profile=context.profile(cell),
+        scene=SceneSpec(boxes=(body,), hand=HandSpec()),
+        path=Circle(),
+        seed=seed,
+        world=context.world,
+        recording=context.recording,
+        hand=person,
+    )
+    record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
+    touched = person.contacts[0] if person.contacts else None
+    row = {
+        "experiment": NAME,
+        **cell.where,
+        "profile": cell.profile,
+        "seed": seed,
+        "body_m": rounded(body.center[_Y] - body.half_size[_Y]),
+        "push_n": rounded(push.force),
+        "push_s": rounded(push.duration),
+        **results(record, touched),
+    }
+    return row, record
+
+
+def results(record: Record, touched: tuple[float, float] | None) -> dict[str, Any]:
+    """Numbers of one trial; `touched` are touch and release [s] of the push, None if it never touched.
+
+    Widths of the band are T_u - mu and mu - T_l of the three axes [N].
+    """
+    touch, release = touched or (np.inf, np.inf)
+    before = [s for s in record.steps if s.armed and s.stamp < touch]
+    lowered = [s for s in before if lowered_on_both_sides(s)]
+    answer = next((s for s in record.reactions() if touch <= s.stamp <= release + _NOTICE_S), None)
+    period = float(np.median(np.diff(record.times())))
+    return {
+        "contact": touched is not None,
+        **widths(before),
+        "both_lowered": bool(lowered),
+        "both_lowered_s": rounded(period * len(lowered)),
+        "both_lowered_at_touch": lowered_on_both_sides(before[-1]) if touched and before else None,
+        "felt": answer is not None,
+        "detection_delay_s": None if answer is None else rounded(answer.stamp - touch, 4),
+        "filtered_at_detection_n": None if answer is None else rounded(float(answer.filtered_force[_Y])),
+        "raw_at_detection_n": None if answer is None else rounded(float(answer.force[_Y])),
+        "false_detections": sum(not touch <= s.stamp <= release + _REBOUND_S for s in record.reactions()),
+        "held": record.held(),
+    }
+
+
+def widths(steps: list[ControlStep]) -> dict[str, list[float | None]]:
+    """Least width of the band above and below the mean of each axis [N], and its median while that bound is free.
+
+    A bound is free while nothing sensed lowers it; None where it never is.
+    """
+    if not steps:
+        return {name: [None] * 3 for name in _WIDTHS}
+    limits = [s.thresholds for s in steps]
+    made: dict[str, list[float | None]] = {}
+    for name, width, lowered in (
+        ("upper", np.array([t.upper - t.mean for t in limits]), np.array([t.obstacle_negative for t in limits])),
+        ("lower", np.array([t.mean - t.lower for t in limits]), np.array([t.obstacle_positive for t in limits])),
+    ):
+        free = [width[lowered[:, axis] == 0, axis] for axis in range(3)]
+        made[f"{name}_free_n"] = [rounded(np.median(values)) if len(values) else None for values in free]
+        made[f"{name}_least_n"] = [rounded(value) for value in width.min(axis=0)]
+    return made
+
+
+def lowered_on_both_sides(step: ControlStep) -> bool:
+    """Whether objects on both sides narrow the band along y from above and from below."""
+    return bool(step.thresholds.obstacle_positive[_Y] > 0 and step.thresholds.obstacle_negative[_Y] > 0)
+
+
+def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Cells: how far the band along y was narrowed before the push, and whether the push was felt."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault((row["profile"], row["restrictions"]), []).append(row)
+    return {"cells": [_cell(*key, group) for key, group in groups.items()]}
+
+
+def _cell(profile: str, restrictions: str, group: list[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        "profile": profile,
+        "restrictions": restrictions,
+        "trials": len(group),
+        "contacts": sum(row["contact"] for row in group),
+        "felt": sum(row["felt"] for row in group),
+        "both_lowered": sum(row["both_lowered"] for row in group),
+        "both_lowered_at_touch": sum(bool(row["both_lowered_at_touch"]) for row in group),
+        "false_detections": sum(row["false_detections"] for row in group),
+        "held": sum(row["held"] for row in group),
+        **{f"{name}_y": spread([row[name][_Y] for row in group if row[name][_Y] is not None]) for name in _WIDTHS},
+        **{name: spread([row[name] for row in group if row[name] is not None]) for name in _MEASURES},
+    }
+
+
+def tables(part: dict[str, Any]) -> list[TextTable]:
+    """How far the band was narrowed from both sides, and what was felt of the push."""
+    rows = tuple(
+        (
+            controller(cell, part["cells"]),
+            *(number(cell[f"{name}_y"], 1) for name in _WIDTHS),
+            f"{cell['both_lowered']}/{cell['trials']}",
+            f"{cell['both_lowered_at_touch']}/{cell['contacts']}",
+            f"{cell['felt']}/{cell['contacts']}",
+            number(cell["detection_delay_s"], 0, 1000),
+            number(cell["filtered_at_detection_n"], 1),
+            str(cell["false_detections"]),
+        )
+        for cell in part["cells"]
+    )
+    table = TextTable(
+        "A person stands at +y and pushes the arm from -y: medians, thresholds in N",
+        (
+            "profile",
+            "T_u\nfree",
+            "T_u\nleast",
+            "T_l\nfree",
+            "T_l\nleast",
+            "both\never",
+            "both at\ntouch",
+            "felt",
+            "delay\n[ms]",
+            "filtered\n[N]",
+            "false",
+        ),
+        rows,
+        "T_u: upper threshold above the window's mean along y; T_l: lower threshold below it. Free: median while"
+        " nothing sensed lowers that bound, in trials where it ever is free. Least: before the push. Both: trials in"
+        " which objects narrowed the band from above and below at once, ever before the push and when it touched."
+        " Felt: of the pushes that touched. Filtered (eq. 8): along y, at detection.",
+    )
+    return [table]
+
+
+def _draw(sources: Sources) -> list[Picture]:
+    from pretouch_lab.paper.figures.close_up import close_up_figure
+
+    for cell in sources.summary["cells"]:
+        if cell["profile"] != "blind":
+            trace = sources.trace(Cell(NAME, cell["profile"], {"restrictions": cell["restrictions"]}))
+            if trace is not None:
+                figure = close_up_figure(trace, sources.units, profile(cell["profile"]))
+                return [Picture("close-up", "Distances and thresholds with objects on both sides", figure)]
+    return []
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, summarise, tables, _draw)

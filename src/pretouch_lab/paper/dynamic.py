@@ -1,0 +1,150 @@
+"""Paper IV-C: thirty seconds with a person who pushes the moving arm three times from different directions."""
+
+from typing import Any
+
+import numpy as np
+
+from pretouch.control.path import Circle
+from pretouch.params import RestrictionMode, profile
+from pretouch.sim.paper_scenes import dynamic_pushes
+from pretouch.sim.pushes import Push, Pusher
+from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.traces import mean_over
+from pretouch.types import ControlStep, FloatArray
+from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.metrics import angle_deg, peak, rounded
+from pretouch_lab.summary import dynamic_summary
+from pretouch_lab.tables import dynamic_tables
+from pretouch_lab.trial import Record, Setup, play
+
+NAME = "dynamic"
+DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+
+_DURATION_S = 30.0
+_NOTICE_S = 0.3
+"""A reaction up to this long after the release still answers the push [s]."""
+_REBOUND_S = 3.0
+"""A later reaction up to this long after the release is the push's echo [s]."""
+
+
+def cells(grid: Grid) -> list[Cell]:
+    """One cell for each controller."""
+    return [
+        Cell(NAME, profile, {"restrictions": restrictions})
+        for profile, restrictions in grid.controllers(DEFAULT_RESTRICTIONS)
+    ]
+
+
+def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+    """Run one trial; return its row of results and what it left behind."""
+    person, hand = Pusher(context.model, dynamic_pushes(seed)), HandSpec()
+    setup = Setup(
+        model=context.model,
+        skin=context.skin,
+        profile=context.profile(cell),
+        scene=SceneSpec(hand=hand),
+        path=Circle(),
+        seed=seed,
+        world=context.world,
+        plant=context.arm,
+        ranging=context.ranging,
+        recording=context.recording,
+        hand=person,
+    )
+    record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
+    true = np.linalg.norm(record.true_force, axis=1)
+    beginnings, spans = record.beginnings(), [span for span in person.contacts if span is not None]
+    reactions = [step for step, _ in beginnings]
+    missing = [None] * (len(person.pushes) - len(person.contacts))
+    row = {
+        "experiment": NAME,
+        "trajectory": "circle",
+        "side": None,
+        "profile": cell.profile,
+        **cell.where,
+        "stiffness_n_per_m": hand.stiffness,
+        "seed": seed,
+        "contact": bool(spans),
+        "impact_speed_m_s": None,
+        **_at_detection(reactions, spans),
+        "contacts": [
+            _contact(record, beginnings, push, touched)
+            for push, touched in zip(person.pushes, [*person.contacts, *missing], strict=True)
+        ],
+        "peak_estimate_n": rounded(peak(_touched_estimate(record, spans))),
+        "true_peak_20ms_n": rounded(peak(mean_over(true, 20))),
+        "true_peak_n": rounded(peak(true)),
+        "false_detections": sum(not any(a <= s.stamp <= b + _REBOUND_S for a, b in spans) for s in reactions),
+        "held": record.held(),
+    }
+    return row, record
+
+
+def _at_detection(reactions: list[ControlStep], spans: list[tuple[float, float]]) -> dict[str, float | None]:
+    """Medians over the pushes that were felt: delay [s], and norms of the filtered and the raw estimate [N]."""
+    felt = [(s, next((a for a, b in spans if a <= s.stamp <= b + _NOTICE_S), None)) for s in reactions]
+    rows = [
+        (s.stamp - touch, float(np.linalg.norm(s.filtered_force)), float(np.linalg.norm(s.force)))
+        for s, touch in felt
+        if touch is not None
+    ]
+    names = ("detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n")
+    medians = np.median(np.array(rows), axis=0).tolist() if rows else [None] * len(names)
+    return {name: None if v is None else rounded(v, 4) for name, v in zip(names, medians, strict=True)}
+
+
+def _touched_estimate(record: Record, spans: list[tuple[float, float]]) -> FloatArray:
+    """Norm of the force estimate [N] in the control steps of the pushes, without those that have none."""
+    steps = [s for s in record.steps if any(a <= s.stamp <= b for a, b in spans)]
+    size = np.array([np.linalg.norm(s.force) for s in steps])
+    return size[np.isfinite(size)]
+
+
+def _contact(
+    record: Record, beginnings: list[tuple[ControlStep, FloatArray]], push: Push, touched: tuple[float, float] | None
+) -> dict[str, Any]:
+    """Judge how the arm answered one push."""
+    row: dict[str, Any] = {
+        "detected": False,
+        "delay_s": None,
+        "direction_error_deg": None,
+        "push_n": rounded(push.force),
+        "push_s": rounded(push.duration),
+        "reaction_towards_person": False,
+    }
+    if touched is None:
+        return row | {"push_s": 0.0}
+    touch, release = touched
+    answers = [(s, v) for s, v in beginnings if touch <= s.stamp <= release + _REBOUND_S]
+    pushed = _mean_force(record, touch, release)
+    row["reaction_towards_person"] = any(float(v @ pushed) < 0 for _, v in answers)
+    if answers and answers[0][0].stamp <= release + _NOTICE_S:
+        first, velocity = answers[0]
+        row["detected"] = True
+        row["delay_s"] = rounded(first.stamp - touch, 4)
+        before = _mean_force(record, max(touch, first.stamp - 0.05), first.stamp)
+        angle = angle_deg(velocity, before)
+        row["direction_error_deg"] = None if angle is None else rounded(angle, 2)
+    return row
+
+
+def _mean_force(record: Record, start: float, end: float) -> FloatArray:
+    """Mean true force (3,) [N] between two instants [s]."""
+    during = (record.true_time >= start) & (record.true_time <= end)
+    return np.asarray(record.true_force[during].mean(axis=0))
+
+
+def _draw(sources: Sources) -> list[Picture]:
+    from pretouch_lab.paper.figures.interaction import interaction_figure
+
+    for cell in sources.summary["cells"]:
+        if cell["profile"] != "blind":
+            trace = sources.trace(Cell(NAME, cell["profile"], {"restrictions": cell["restrictions"]}))
+            if trace is not None:
+                figure = interaction_figure(trace, sources.units, profile(cell["profile"]))
+                return [Picture("dynamic", "Distances, force with thresholds, velocity over thirty seconds", figure)]
+    return []
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, dynamic_summary, dynamic_tables, _draw)

@@ -1,0 +1,78 @@
+"""All experiments by name, and what is made of the trials of several."""
+
+from typing import Any
+
+from pretouch.text_table import TextTable
+from pretouch_lab.experiment import Experiment, Row
+from pretouch_lab.paper import avoidance, dynamic, static
+from pretouch_lab.paper.claims import anticipation, between, detectable, free_motion, noise
+from pretouch_lab.studies import clamp, imu, mounting, pinch, tactile, vision, wire
+from pretouch_lab.studies.coverage import study as coverage
+from pretouch_lab.weaknesses import (
+    creeping,
+    dropout,
+    endless,
+    infeasible,
+    release,
+    retreating,
+    tuned,
+    views,
+)
+
+PAPER = (static.EXPERIMENT, avoidance.EXPERIMENT, dynamic.EXPERIMENT)
+CLAIMS = (
+    between.EXPERIMENT,
+    anticipation.EXPERIMENT,
+    free_motion.EXPERIMENT,
+    noise.EXPERIMENT,
+    detectable.EXPERIMENT,
+)
+WEAKNESSES = (
+    tuned.EXPERIMENT,
+    release.EXPERIMENT,
+    endless.EXPERIMENT,
+    dropout.EXPERIMENT,
+    creeping.EXPERIMENT,
+    retreating.EXPERIMENT,
+    views.EXPERIMENT,
+    infeasible.EXPERIMENT,
+)
+HARDWARE = (wire.EXPERIMENT,)
+MOUNTING = (mounting.EXPERIMENT, coverage.EXPERIMENT)
+REACTION = (clamp.EXPERIMENT, pinch.EXPERIMENT)
+TOUCH = (tactile.EXPERIMENT,)
+IMPACTS = (imu.EXPERIMENT,)
+VISION = (vision.EXPERIMENT,)
+
+GROUPS = {
+    "The paper's experiments": PAPER,
+    "What the paper says of its method": CLAIMS,
+    "Its weaknesses": WEAKNESSES,
+    "Readings over the wire": HARDWARE,
+    "Where units sit": MOUNTING,
+    "Caught between two things": REACTION,
+    "Touch sensors of units": TOUCH,
+    "Impacts by the units' accelerometers": IMPACTS,
+    "A camera beside the skin": VISION,
+}
+"""All experiments by what they are for, in the order of the page."""
+EXPERIMENTS: dict[str, Experiment] = {e.name: e for group in GROUPS.values() for e in group}
+
+
+def summarise(trials: list[Row]) -> dict[str, Any]:
+    """Summaries of the experiments in a list of trials, by name."""
+    return {
+        name: experiment.summarise(rows)
+        for name, experiment in EXPERIMENTS.items()
+        if (rows := [t for t in trials if t["experiment"] == name])
+    }
+
+
+def tables(summary: dict[str, Any]) -> list[TextTable]:
+    """All tables of such summaries."""
+    return [
+        table
+        for name, experiment in EXPERIMENTS.items()
+        if name in summary
+        for table in experiment.tables(summary[name])
+    ]

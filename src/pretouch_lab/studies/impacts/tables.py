@@ -1,0 +1,172 @@
+"""The study of the units' accelerometers: its summary and tables."""
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from pretouch.text_table import TextTable
+from pretouch_lab.experiment import Row
+from pretouch_lab.metrics import rounded
+from pretouch_lab.studies.impacts.kinds import GROUPS, KINDS
+from pretouch_lab.studies.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
+
+ALL, LATER = "all", "alarm both ways"
+
+
+def summarise(rows: list[Row]) -> Row:
+    """Delays, misses and links of each way and kind, and of each kind and group of links; false alarms of each way."""
+    cells, free = [], []
+    for way, name in dict.fromkeys((row["way"], row["profile"]) for row in rows):
+        own = [row for row in rows if (row["way"], row["profile"]) == (way, name)]
+        for kind, group in product((ALL, *KINDS), (ALL, *GROUPS)):
+            found = [
+                c for row in own for c in row["contacts"] if kind in (ALL, c["kind"]) and group in (ALL, c["group"])
+            ]
+            if found:
+                where = {"way": way, "profile": name, "kind": kind, "group": group, "contacts": len(found)}
+                cells.append(where | {side: _measured([c[side] for c in found]) for side in SIDES} | _paired(found))
+        hours = rounded(sum(row["hours"] for row in own), 4)
+        free.append({"way": way, "profile": name, "hours": hours} | {side: _free(own, side) for side in SIDES})
+    return {"cells": cells, "where": _where(rows), "free": free}
+
+
+def _where(rows: list[Row]) -> list[Row]:
+    """Places said of firm contacts, of all that were felt, and of these a while after the alarm: by way and kind."""
+    found = []
+    for way, name in dict.fromkeys((row["way"], row["profile"]) for row in rows):
+        contacts = [c for row in rows if (row["way"], row["profile"]) == (way, name) for c in row["contacts"]]
+        for kind in (ALL, *KINDS):
+            own = [
+                c | {"where": {side: c[side]["where"] for side in SIDES}} for c in contacts if kind in (ALL, c["kind"])
+            ]
+            later = [{side: c[side].get("where_later") for side in SIDES} for c in own]
+            sets = {which: [c["where"] for c in chosen(own, which)] for which in (FIRM, FELT)}
+            sets[LATER] = [said for said in later if all(said.values())]
+            found += [
+                {"way": way, "profile": name, "kind": kind, "of": which} | compared(said)
+                for which, said in sets.items()
+                if said
+            ]
+    return found
+
+
+def _measured(contacts: list[Row]) -> Row:
+    delays = [c["delay_s"] for c in contacts if c["delay_s"] is not None]
+    median, late = np.percentile(delays, [50, 95]).tolist() if delays else (None, None)
+    return {
+        "median_s": None if median is None else rounded(median, 4),
+        "p95_s": None if late is None else rounded(late, 4),
+        "missed": len(contacts) - len(delays),
+        "cued": sum(c["cued"] for c in contacts),
+        **{key: _share(contacts, key) for key in ("by_imu", "by_imu_near", "by_both", "by_both_near")},
+    }
+
+
+def _share(contacts: list[Row], key: str) -> list[int]:
+    """How many are so, and of how many that is known."""
+    known = [c[key] for c in contacts if c.get(key) is not None]
+    return [sum(known), len(known)]
+
+
+def _paired(contacts: list[Row]) -> Row:
+    """Of contacts felt either way: how many were felt earlier and later with IMUs, and the mean of the difference."""
+    both = [(c["with"]["delay_s"], c["without"]["delay_s"]) for c in contacts]
+    gained = [a - b for a, b in both if a is not None and b is not None]
+    return {
+        "earlier": sum(g < 0 for g in gained),
+        "later": sum(g > 0 for g in gained),
+        "mean_change_s": rounded(float(np.mean(gained)), 5) if gained else None,
+        "found": sum(a is not None and b is None for a, b in both),
+        "lost": sum(a is None and b is not None for a, b in both),
+    }
+
+
+def _free(rows: list[Row], side: str) -> Row:
+    parts = [row[side] for row in rows]
+    return {
+        "alarms": sum(part["alarms"] for part in parts),
+        "cued": rounded(float(np.mean([part["cued"] for part in parts])), 5),
+        "mean_gain": rounded(float(np.mean([part["mean_gain"] for part in parts])), 4),
+    }
+
+
+def tables(part: Row) -> list[TextTable]:
+    """What the accelerometers change of delay, of the touched link, and of false alarms."""
+    pooled = [cell for cell in part["cells"] if cell["group"] == ALL]
+    first = part["cells"][0]["way"] if part["cells"] else ""
+    own = [c for c in part["cells"] if c["way"] == first]
+    return [
+        TextTable(
+            "Contacts with the units' accelerometers and without: delay and misses",
+            ("way", "contact", "n", "median\n[ms]", "95 %\n[ms]", "missed", "earlier", "later", "change\n[ms]"),
+            tuple((cell["way"], cell["kind"], *_delays(cell)) for cell in pooled),
+            "Each number without, then with. Way: usual, datagrams every 20 ms and a vibration of 0.3 m/s^2; calm 0.1,"
+            " shaken 0.5 m/s^2; at once, datagrams every 2.5 ms. Impact: a hand of 0.6 kg and 75 N/mm at 0.1 to 0.5"
+            " m/s. Push: 20 N, risen in 20 to 300 ms. Delay: from the true force passing 1 N. Change: mean of contacts"
+            " felt either way.",
+        ),
+        TextTable(
+            f"The same by group of links, way {first}",
+            ("links", "contact", "n", "median\n[ms]", "95 %\n[ms]", "missed", "earlier", "later", "change\n[ms]"),
+            tuple((c["group"], c["kind"], *_delays(c)) for c in own if c["group"] != ALL),
+            "As above.",
+        ),
+        TextTable(
+            f"The touched link, way {first}",
+            ("links", "contact", "cue", "IMU", "IMU\n+-1", "torques", "torques\n+-1", "both", "both\n+-1"),
+            tuple((c["group"], c["kind"], *_links(c)) for c in own),
+            "Cue: contacts with a gain of 2 or more within 100 ms. IMU: the link with the largest gain is the touched"
+            " one, of these. Torques: so is that of the sequential test's best force, 30 ms after its alarm, of the"
+            " contacts felt. Both: with the gains of the accelerometers. +-1: or a link next to it.",
+        ),
+        TextTable(
+            "Where contacts are said to be",
+            ("way", "contact", "of", *HEADER),
+            tuple((c["way"], c["kind"], c["of"], *columns(c)) for c in part["where"]),
+            f"{NOTE} An impact ends after 10 ms, and little is felt by then. Alarm both ways: contacts that gave one"
+            " without and with, each judged 30 ms after its own.",
+            names=3,
+        ),
+        TextTable(
+            "Free motion",
+            ("way", "profile", "hours", "alarms\nwithout", "alarms\nwith", "cue\n[%]", "mean\ngain"),
+            tuple(
+                (
+                    f["way"], f["profile"], f"{f['hours']:.2f}", str(f["without"]["alarms"]), str(f["with"]["alarms"]),
+                    f"{100 * f['with']['cued']:.2f}", f"{f['with']['mean_gain']:.2f}",
+                )
+                for f in part["free"]
+            ),
+            "Cue: steps with a gain of 2 or more on any link. Mean gain: over steps and links, 1 without.",
+        ),
+    ]  # fmt: skip
+
+
+def _delays(cell: Row) -> tuple[str, ...]:
+    change = cell["mean_change_s"]
+    return (
+        str(cell["contacts"]),
+        *(" / ".join(_ms(cell[side][key]) for side in SIDES) for key in ("median_s", "p95_s")),
+        f"{cell['without']['missed']} / {cell['with']['missed']}",
+        str(cell["earlier"]),
+        str(cell["later"]),
+        "-" if change is None else f"{1000 * change:+.1f}",
+    )
+
+
+def _links(cell: Row) -> tuple[str, ...]:
+    with_it, without = cell["with"], cell["without"]
+    shares = (
+        with_it["by_imu"], with_it["by_imu_near"], without["by_both"], without["by_both_near"], with_it["by_both"],
+        with_it["by_both_near"],
+    )  # fmt: skip
+    return (f"{with_it['cued']}/{cell['contacts']}", *(_percent(*share) for share in shares))
+
+
+def _percent(some: int, of: int) -> str:
+    return f"{100 * some / of:.0f} %" if of else "-"
+
+
+def _ms(value: Any) -> str:
+    return "-" if value is None else f"{1000 * value:.0f}"

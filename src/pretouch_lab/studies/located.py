@@ -1,0 +1,62 @@
+"""Whether cues of units tell better where a contact is: what two ways of feeling the same contacts said of places."""
+
+import numpy as np
+
+from pretouch_lab.experiment import Row
+from pretouch_lab.metrics import rounded
+
+SIDES = ("without", "with")
+"""The two ways in which each contact is felt."""
+LEAST_N, LEAST_S = 15.0, 0.1
+"""What a firm contact has at least: force [N] and duration [s]."""
+FIRM, FELT = f"{LEAST_N:g} N, {1000 * LEAST_S:g} ms and more", "all felt"
+"""Sets of contacts that are counted."""
+HEADER = ("n", "felt", "right\nbody", "said\ntwo", "both", "median\n[cm]", "90 %\n[cm]")
+"""Of the columns of `columns`."""
+NOTE = (
+    "Each pair without, then with. Judged 100 ms after the force began to rise, or at its end if earlier. Felt: a"
+    " place was said then. Right body: of all n; link 7, flange and hand are one. Median, 90 %: error of the place, of"
+    " those felt both ways (both)."
+)
+
+
+def firm(contact: Row) -> bool:
+    """Whether a contact is one of 15 N and more that lasts 100 ms and more."""
+    return bool(contact["force_n"] >= LEAST_N and contact["duration_s"] >= LEAST_S)
+
+
+def chosen(contacts: list[Row], name: str) -> list[Row]:
+    """Return those of a set, by its name; each contact has what was said of it each way as `where`."""
+    if name == FIRM:
+        return [contact for contact in contacts if firm(contact)]
+    return [contact for contact in contacts if any(contact["where"][side]["felt"] for side in SIDES)]
+
+
+def compared(said: list[Row]) -> Row:
+    """Count what was said of contacts each way; errors of those that were felt both ways, to compare the same ones."""
+    both = [one for one in said if all(one[side]["felt"] for side in SIDES)]
+    return {"contacts": len(said), "both": len(both)} | {
+        side: {
+            **{name: sum(one[side][name] for one in said) for name in ("felt", "right", "two")},
+            **{f"p{part}_m": _at([one[side]["error_m"] for one in both], part) for part in (50, 90)},
+        }
+        for side in SIDES
+    }
+
+
+def columns(found: Row) -> tuple[str, ...]:
+    """Return a row of a table of what `compared` returned, see `HEADER`."""
+    without, with_them = (found[side] for side in SIDES)
+    counts = {name: f"{without[name]} / {with_them[name]}" for name in ("felt", "right", "two")}
+    errors = tuple(f"{_cm(without[name])} / {_cm(with_them[name])}" for name in ("p50_m", "p90_m"))
+    return (
+        str(found["contacts"]), counts["felt"], counts["right"], counts["two"], str(found["both"]), *errors
+    )  # fmt: skip
+
+
+def _at(values: list[float], percent: float) -> float | None:
+    return rounded(float(np.percentile(values, percent)), 4) if values else None
+
+
+def _cm(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.1f}"

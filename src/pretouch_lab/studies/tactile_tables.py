@@ -1,0 +1,121 @@
+"""What came of contacts on arms with touch sensors, and of false touches, as tables."""
+
+from typing import Any
+
+import numpy as np
+
+from pretouch.text_table import TextTable
+from pretouch_lab.experiment import Row
+from pretouch_lab.groups import grouped
+from pretouch_lab.metrics import rounded
+from pretouch_lab.paper.claims.detectors import rate_bounds
+from pretouch_lab.studies.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
+from pretouch_lab.studies.tactile_kinds import INNER
+
+
+def summarise(rows: list[Row]) -> Row:
+    """Contacts by place, sight and force: missed and delay with each detector; alarms of free motion."""
+    contacts = [
+        {"place": row["place"], "hand": row["hand"], **contact} for row in rows for contact in row.get("contacts", [])
+    ]
+    for contact in contacts:
+        contact["busy"] = any(contact[name] is not None and contact[name] < 0 for name in SIDES)
+    judged = sorted((c for c in contacts if not c["busy"]), key=lambda c: float(c["force_n"]))
+    free = [row["free"] for row in rows if "free" in row]
+    together = [{**contact, "force_n": "all"} for contact in judged]
+    keys = ("place", "hand", "force_n")
+    return {
+        "where": _where(contacts),
+        "cells": [where | _cell(group) for where, group in grouped(judged + together, keys)],
+        "busy": sum(contact["busy"] for contact in contacts),
+        "free": {name: sum(row[name] for row in free) for name in ("hours", "false_touches", *SIDES)} if free else None,
+    }
+
+
+def _where(contacts: list[Row]) -> list[Row]:
+    """Places said of firm contacts and of all that were felt, by place and sight; of the inner links each alone too."""
+    every = [{**contact, "link": "all"} for contact in contacts]
+    inner = [contact for contact in contacts if contact["place"] == INNER]
+    return [
+        where | {"of": name} | compared([contact["where"] for contact in own])
+        for where, group in grouped(every + inner, ("place", "hand", "link"))
+        for name in (FIRM, FELT)
+        if (own := chosen(group, name))
+    ]
+
+
+def _cell(group: list[Row]) -> Row:
+    """Count what was missed; delays of the contacts that both found, so that they are compared on the same ones."""
+    both = [c for c in group if c["without"] is not None and c["with"] is not None]
+    found: dict[str, Any] = {
+        "contacts": len(group),
+        "felt": sum(c["felt_s"] is not None for c in group),
+        "felt_ms": _median([c["felt_s"] for c in group if c["felt_s"] is not None]),
+        "both": len(both),
+    }
+    for name in SIDES:
+        found[f"missed_{name}"] = sum(c[name] is None for c in group)
+        found[f"delay_{name}_ms"] = _median([c[name] for c in both])
+    return found
+
+
+def _median(seconds: list[float]) -> float | None:
+    return rounded(1000 * float(np.median(seconds)), 1) if seconds else None
+
+
+def tables(part: Row) -> list[TextTable]:
+    """What touch changes of delay and missed contacts, and of false alarms."""
+    made = []
+    if part["cells"]:
+        rows = tuple(
+            (
+                cell["place"], cell["hand"], cell["force_n"] if cell["force_n"] == "all" else f"{cell['force_n']:g}",
+                str(cell["contacts"]), str(cell["felt"]), _ms(cell["felt_ms"]),
+                *(str(cell[f"missed_{name}"]) for name in SIDES), *(_ms(cell[f"delay_{name}_ms"]) for name in SIDES),
+            )
+            for cell in part["cells"]
+        )  # fmt: skip
+        header = (
+            "place", "hand", "force\n[N]", "contacts", "felt", "felt in\n[ms]", "missed\nwithout", "missed\nwith",
+            "delay [ms]\nwithout", "delay [ms]\nwith",
+        )  # fmt: skip
+        note = (
+            "Contacts of 0.06 and 0.2 s on an arm on the circle at 0.3 m/s that does not react; profile pretouch"
+            " without and with use_touch on the same recorded arms. Felt: contacts that a unit's touch sensor told, and"
+            " how long after the force passed 1 N that was heard (median). Delays: medians over the contacts that both"
+            f" found. {part['busy']} contacts that began while an earlier alarm was still answered are left out."
+        )
+        made.append(TextTable("Contacts with touch sensors and without", header, rows, note, names=3))
+    if part["where"]:
+        made.append(TextTable(
+            "Where contacts are said to be, without touch and with",
+            ("place", "hand", "link", "contacts", *HEADER),
+            tuple((c["place"], c["hand"], c["link"], c["of"], *columns(c)) for c in part["where"]),
+            NOTE,
+            names=4,
+        ))  # fmt: skip
+    if part["free"]:
+        made.append(_free(part["free"]))
+    return made
+
+
+def _free(free: Row) -> TextTable:
+    """What false touches make of free motion."""
+    rows = tuple(
+        (name, f"{free['hours']:.2f}", str(free["false_touches"]), str(free[name]), f"{low:.1f} to {high:.1f}",
+         f"{1000 * free[name] / max(free['false_touches'], 1):.1f}")
+        for name in SIDES
+        for low, high in [rate_bounds(free[name], max(free["hours"], 1e-9))]
+    )  # fmt: skip
+    return TextTable(
+        "Free motion with false touches",
+        ("use of touch", "hours", "false\ntouches", "alarms", "alarms an hour\n95 %", "alarms in 1000\nfalse touches"),
+        rows,
+        "False touches of each unit at 600 an hour, so that they can be counted; a real one is assumed to have one"
+        " an hour at most.",
+        names=1,
+    )
+
+
+def _ms(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0f}"

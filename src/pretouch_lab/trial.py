@@ -1,0 +1,224 @@
+"""One trial: an arm in a scene under the controller, and everything it left behind."""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from pretouch import ports
+from pretouch.control.path import Path
+from pretouch.control.posture import brought_to
+from pretouch.controller import Controller
+from pretouch.errors import RecordingError
+from pretouch.hardware.traffic import UnitTraffic
+from pretouch.loop import Cycle, run
+from pretouch.params import Profile
+from pretouch.recording.reader import Recorded
+from pretouch.recording.truth import Truth, truth_of
+from pretouch.recording.writer import Recording
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.serving.fleet import FleetParams
+from pretouch.serving.wire_skin import WireSkin
+from pretouch.sim.depth_camera import DepthCamera, DepthCameraParams
+from pretouch.sim.hand import Hand, HandScript, PersonArm
+from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import SceneSpec, described, fixtures
+from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
+from pretouch.types import ControlStep, FloatArray, Mode
+from pretouch_lab.worlds import Parts, in_world
+
+SETTLE_S = 0.2
+"""Time the arm stands before the controller starts [s]: the observer's transient is over."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a trial is made of."""
+
+    model: RobotModel
+    skin: Skin
+    """Where the units truly sit: these measure."""
+    profile: Profile
+    scene: SceneSpec
+    path: Path
+    seed: int
+    believed: Skin | None = None
+    """Where the controller believes the same units to be, in the same order; none, and it knows the truth. A recording
+    holds what it believes."""
+    hand: HandScript | None = None
+    person: PersonArm = field(default_factory=PersonArm)
+    """What moves the hand."""
+    plant: PlantParams = field(default_factory=PlantParams)
+    ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    camera: FloatArray | None = None
+    """Pose T_O_camera (4, 4) of a depth camera; none, and the controller has the skin alone."""
+    seeing: DepthCameraParams = field(default_factory=DepthCameraParams)
+    """How the camera sees."""
+    wire: FleetParams | None = None
+    """Units and network for readings that come over UDP sockets; none, and they come within the process."""
+    recording: FilePath | None = None
+    """File to record it in; none, and it is not recorded."""
+    world: str = ""
+    """Set of worlds of which the seed draws one (`sim.randomisation`); none: plant, ranging and skin as they are."""
+    prepare: Callable[[Plant, RangeFinders], None] | None = None
+    """What else is to happen: may have things done before each physics step, to the arm or to its units."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a trial left behind."""
+
+    steps: list[ControlStep]
+    true_time: FloatArray
+    """(T,) instants of the physics [s]."""
+    true_force: FloatArray
+    """(T, 3) sum of the contact forces on the arm [N], base frame."""
+    touches: list[Touch]
+    """Each beginning of a contact of the arm."""
+    hand_position: FloatArray
+    """(S, 3) centre of the hand at each control step [m], NaN without a hand."""
+    reading_age: FloatArray | None = None
+    """(S, K) age of each unit's newest reading at each control step [s], infinite before its first; None if it was
+    read from a recording."""
+    traffic: tuple[UnitTraffic, ...] = ()
+    """What the receiver counted of each unit, if readings came over the wire."""
+
+    def times(self) -> FloatArray:
+        """Instants (S,) of the control steps [s]."""
+        return np.array([s.stamp for s in self.steps])
+
+    def forces(self) -> FloatArray:
+        """Estimated external forces (S, 3) [N]."""
+        return np.array([s.force for s in self.steps])
+
+    def first_contact(self, after: float = 0.0) -> float | None:
+        """Instant [s] at which the true force first passes 1 N after a time [s], or None."""
+        touching = np.flatnonzero((np.linalg.norm(self.true_force, axis=1) > TOUCH_N) & (self.true_time > after))
+        return float(self.true_time[touching[0]]) if len(touching) else None
+
+    def reactions(self) -> list[ControlStep]:
+        """Return the steps in which a reaction began."""
+        return [s for s in self.steps if s.contact is not None]
+
+    def beginnings(self) -> list[tuple[ControlStep, FloatArray]]:
+        """Return the steps in which a reaction began, each with the first velocity (3,) [m/s] that came of it.
+
+        That may be some steps later, where a joint at rest has to be torn loose; 0 if the arm never moved.
+        """
+        return [(s, _first_velocity(self.steps[i:])) for i, s in enumerate(self.steps) if s.contact is not None]
+
+    def held(self) -> bool:
+        """Whether the arm held for another reason than filling its window at the start."""
+        start = next((i for i, s in enumerate(self.steps) if s.mode is not Mode.HOLD), len(self.steps))
+        return any(s.mode is Mode.HOLD for s in self.steps[start:])
+
+
+def _first_velocity(steps: list[ControlStep]) -> FloatArray:
+    """Return the first velocity (3,) [m/s] of the reaction that begins with these steps."""
+    going = takewhile(lambda step: step.mode is Mode.REACT, steps)
+    return next((s.reaction_velocity for s in going if s.reaction_velocity.any()), np.zeros(3))
+
+
+def record_of(recorded: Recorded) -> Record:
+    """What a recorded trial left behind."""
+    kept = list(recorded)
+    truths = [cycle.truth for cycle in kept if cycle.truth is not None]
+    return Record(
+        [cycle.step for cycle in kept],
+        np.concatenate([np.zeros(0), *(t.time for t in truths)]),
+        np.vstack([np.zeros((0, 3)), *(t.force for t in truths)]),
+        [Touch(*touch) for t in truths for touch in t.touches],
+        np.array([np.full(3, np.nan) if cycle.truth is None else cycle.truth.hand for cycle in kept]),
+    )
+
+
+class _Recorder:
+    """Keeps each step, and where the hand was; all of it in a recording too, if there is one."""
+
+    def __init__(self, plant: Plant, hand: Hand | None, recording: Recording | None) -> None:
+        self._plant, self._hand, self._recording = plant, hand, recording
+        self._forces = self._touches = 0
+        self.steps: list[ControlStep] = []
+        self.hand_position: list[FloatArray] = []
+        self.reading_age: list[FloatArray] = []
+
+    def record(self, cycle: Cycle) -> None:
+        self.steps.append(cycle.step)
+        self.reading_age.append(cycle.step.stamp - cycle.inputs.readings.stamp)
+        self.hand_position.append(self._hand.position.copy() if self._hand else np.full(3, np.nan))
+        if self._recording:
+            self._recording.record(cycle, self._truth())
+
+    def _truth(self) -> Truth:
+        """What the physics did since the last cycle."""
+        plant = self._plant
+        forces, touches = plant.true_log[self._forces :], plant.touches[self._touches :]
+        self._forces, self._touches = len(plant.true_log), len(plant.touches)
+        return truth_of(forces, touches, self.hand_position[-1])
+
+
+@contextmanager
+def _recording(setup: Setup, controller: Controller) -> Iterator[Recording | None]:
+    """Open the recording of a trial, if there is to be one. One that could not be kept whole is a RecordingError."""
+    if setup.recording is None:
+        yield None
+        return
+    about = {"seed": setup.seed, "scene": described(setup.scene), **({"world": setup.world} if setup.world else {})}
+    with Recording(setup.recording, controller, about) as recording:
+        yield recording
+    if recording.trouble:
+        raise RecordingError(recording.trouble)
+
+
+def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
+    """Run a trial until `done` says so of a step."""
+    parts = in_world(
+        setup.world, setup.seed, setup.model, Parts(setup.plant, setup.ranging, setup.skin, setup.believed)
+    )
+    setup = replace(setup, plant=parts.plant, ranging=parts.ranging, believed=parts.believed)
+    model, scene, profile = setup.model, setup.scene, setup.profile
+    plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
+    with _mounted(setup, plant) as units:
+        finders, traffic = (units.range_finders, units.receiver.units) if isinstance(units, WireSkin) else (units, ())
+        who = setup.person
+        hand = Hand(plant, setup.hand, who.speed_max, who.stiffness, who.damping) if setup.hand else None
+        camera = None if setup.camera is None else DepthCamera(plant, setup.camera, setup.seeing, setup.seed)
+        if setup.prepare:
+            setup.prepare(plant, finders)
+        known = setup.skin if setup.believed is None else setup.believed
+        controller = Controller(model, known, fixtures(scene), setup.path, profile)
+        clock = PlantClock(plant, profile.task.control_period_s)
+        felt = _feeling(setup, plant, units)
+        plant.advance(SETTLE_S)
+        with _recording(setup, controller) as recording:
+            recorder = _Recorder(plant, hand, recording)
+            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant), points=camera)
+    return Record(
+        recorder.steps,
+        np.array([t for t, _ in plant.true_log]),
+        np.array([f for _, f in plant.true_log]),
+        plant.touches,
+        np.array(recorder.hand_position),
+        np.array(recorder.reading_age),
+        traffic,
+    )
+
+
+def _mounted(setup: Setup, plant: Plant) -> AbstractContextManager[RangeFinders | WireSkin]:
+    """Mount the skin's units on an arm, for as long as the context lasts."""
+    if setup.wire is None:
+        return nullcontext(RangeFinders(plant, setup.skin, setup.ranging, setup.seed))
+    return WireSkin(plant, setup.skin, setup.ranging, setup.wire, setup.seed)
+
+
+def _feeling(setup: Setup, plant: Plant, units: RangeFinders | WireSkin) -> ports.Skin:
+    """Return the units with their touch sensors, where the skin has such; over the wire they have them already."""
+    if isinstance(units, WireSkin) or not len(setup.skin.touching):
+        return units
+    return FeelingSkin(units, TouchSensors(plant, setup.skin, TouchSensorParams(), setup.seed))

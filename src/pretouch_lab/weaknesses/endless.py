@@ -1,0 +1,175 @@
+"""A static object on the path that nobody takes away: the arm touches it, gives way, comes back, for a minute."""
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch.sim.plant import TOUCH_N
+from pretouch.text_table import TextTable
+from pretouch.traces import mean_over
+from pretouch.types import FloatArray
+from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.experiment import Experiment, Picture, Row, Sources
+from pretouch_lab.groups import cells_of
+from pretouch_lab.metrics import peak, rounded
+from pretouch_lab.paper import static
+from pretouch_lab.tables import number
+from pretouch_lab.trace import Trace
+from pretouch_lab.trial import Record, Setup, play
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "endless"
+
+_DURATION_S = 60.0
+_APART_S = 0.2
+"""Touches with less time than this between them are one contact [s]."""
+_QUIET_S = 10.0
+"""Without a contact for this long at the end, the arm has ended it by itself [s]."""
+_KEYS = ("trajectory", "side", "stiffness_n_per_m", "restrictions", "profile")
+
+
+def cells(grid: Grid) -> list[Cell]:
+    """The cells of the static experiment."""
+    return [replace(cell, experiment=NAME) for cell in static.cells(grid)]
+
+
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
+    """Run one trial; return its row of results and what it left behind."""
+    trajectory, side = str(cell.where["trajectory"]), str(cell.where["side"])
+    setup = Setup(
+        model=context.model,
+        skin=context.skin,
+        profile=context.profile(cell),
+        scene=static_scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
+        path=static_path(trajectory, side),
+        seed=seed,
+        world=context.world,
+        recording=context.recording,
+    )
+    record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
+    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed, **results(record)}
+    return row, record
+
+
+def results(record: Record) -> Row:
+    """Numbers of one trial; peaks are those of the true force's mean over 20 ms."""
+    force = np.linalg.norm(record.true_force, axis=1)
+    found = contacts(record.true_time, force)
+    detected = [s.stamp for s in record.reactions()]
+    peaks = [peak(mean_over(force[first : last + 1], 20)) for first, last in found]
+    end = float(record.true_time[-1])
+    return {
+        "contacts": len(found),
+        "detections": len(detected),
+        "interval_s": rounded(float(np.median(np.diff(detected))), 3) if len(detected) > 1 else None,
+        "first_peak_n": rounded(peaks[0]) if peaks else None,
+        "last_peak_n": rounded(peaks[-1]) if peaks else None,
+        "highest_peak_n": rounded(max(peaks)) if peaks else None,
+        "touching_fraction": rounded(float((force > TOUCH_N).mean()), 4),
+        "ended": end - float(record.true_time[found[-1][1]]) > _QUIET_S if found else False,
+        "held": record.held(),
+    }
+
+
+def contacts(time: FloatArray, force: FloatArray) -> list[tuple[int, int]]:
+    """First and last index of each contact, given the size of the true force (T,) [N] at instants (T,) [s]."""
+    touching = np.flatnonzero(force > TOUCH_N)
+    if len(touching) == 0:
+        return []
+    new = np.flatnonzero(np.diff(time[touching]) >= _APART_S) + 1
+    edges = [0, *new.tolist(), len(touching)]
+    return [(int(touching[a]), int(touching[b - 1])) for a, b in pairwise(edges)]
+
+
+_MEASURES = (
+    "contacts", "detections", "interval_s", "first_peak_n", "last_peak_n", "highest_peak_n", "touching_fraction",
+)  # fmt: skip
+
+
+def summarise(rows: list[Row]) -> Row:
+    """Medians over the seeds of each cell."""
+    return {"cells": cells_of(rows, _KEYS, _MEASURES, totals=("ended", "held"))}
+
+
+def tables(part: Row) -> list[TextTable]:
+    """How often the arm touched one and the same object."""
+    rows = tuple(
+        (
+            f"{cell['trajectory']} {cell['side']}",
+            cell["profile"],
+            cell["restrictions"],
+            f"{cell['stiffness_n_per_m'] / 1000:g}",
+            number(cell["contacts"], 0),
+            number(cell["detections"], 0),
+            number(cell["interval_s"], 2),
+            number(cell["first_peak_n"], 1),
+            number(cell["last_peak_n"], 1),
+            number(cell["touching_fraction"], 0, 100),
+            f"{cell['ended']}/{cell['trials']}",
+        )
+        for cell in part["cells"]
+    )
+    table = TextTable(
+        f"A static object stays on the path for {_DURATION_S:g} s: medians",
+        (
+            "where",
+            "profile",
+            "mode",
+            "N/mm",
+            "con-\ntacts",
+            "detec-\ntions",
+            "every\n[s]",
+            "first\n[N]",
+            "last\n[N]",
+            "touch\n[%]",
+            "ended",
+        ),
+        rows,
+        f"Mode: of the restrictions. Contacts: touches at least {_APART_S:g} s apart. Every: time between detections."
+        " First, last: peak of the true force, 20 ms mean, in the first and the last contact. Touch: share of the time"
+        f" in contact. Ended: trials without a contact in the last {_QUIET_S:g} s.",
+    )
+    return [table]
+
+
+def _draw(sources: Sources) -> list[Picture]:
+    shown: dict[str, Trace] = {}
+    place = ""
+    for cell in sources.summary["cells"]:
+        where = {key: cell[key] for key in _KEYS if key != "profile"}
+        here = f"{cell['trajectory']}, object at {cell['side']}"
+        trace = sources.trace(Cell(NAME, cell["profile"], where)) if place in ("", here) else None
+        if trace is not None:
+            place = here
+            shown.setdefault(cell["profile"], trace)
+    if not shown:
+        return []
+    return [Picture("endless", "True force of an object that stays on the path", _figure(shown, place))]
+
+
+def _figure(traces: dict[str, Trace], place: str) -> "Figure":
+    """True force over the whole trial, with the detections, for each profile at one place."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 2.4 * len(traces) + 0.6), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(len(traces), 1, sharex=True, sharey=True))
+    for axes, (name, trace) in zip(panels, traces.items(), strict=True):
+        force = np.linalg.norm(trace.true_force, axis=1)
+        axes.plot(trace.time, force, color="black", lw=0.8, label="true force")
+        axes.plot(
+            trace.time[trace.detected], force[trace.detected], "v", color="tab:red", mec="black", label="detected"
+        )
+        axes.set(title=f"profile {name}", ylabel="force [N]")
+        axes.grid(alpha=0.3)
+    panels[0].legend(loc="upper right", fontsize="small")
+    panels[-1].set_xlabel("time [s]")
+    figure.suptitle(f"A static object stays on the path: {place}")
+    return figure
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, summarise, tables, _draw)

@@ -1,0 +1,162 @@
+"""Eq. 3 slows the arm whatever its direction: what that costs on the way back from an object beside the path's end."""
+
+from typing import Any
+
+import numpy as np
+
+from pretouch.control.path import WayPoints
+from pretouch.params import RestrictionMode
+from pretouch.sim.scene import Box, SceneSpec
+from pretouch.text_table import TextTable
+from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.groups import cells_of
+from pretouch_lab.metrics import rounded
+from pretouch_lab.paper.static import least_sensed
+from pretouch_lab.tables import number
+from pretouch_lab.trial import Record, Setup, play
+
+NAME = "retreating"
+_MODES: tuple[RestrictionMode, ...] = ("off", "slack")
+_OWN_PROFILE = "slowing-only"
+"""Run beside those asked for: the slow-down without what the thresholds do."""
+
+_STIFFNESS_N_PER_M = 25_000.0
+_CLEARANCE_M = (0.05, 0.10)
+"""Distance of the board from the side of the robot's hand at the end of the line, as the seed has it [m]."""
+_HALF_SIZE_M = (0.15, 0.02, 0.12)
+_HAND_HALF_WIDTH_M, _HAND_ABOVE_TCP_M = 0.102, 0.057
+"""Where the side of the robot's hand is from the end-effector's origin, hand upright [m]."""
+_OUTWARDS_M = 0.12
+"""The board's centre is this much farther from the base in x than the hand [m], out of the forearm's way."""
+_END_M, _BACK_M, _NEAR_M = 1.0, 2.0, 0.3
+"""Way to the end by the board, to the beginning again, and the stretch before the board that is compared [m]."""
+_CYCLE_M = (0.5, 2.5)
+"""Ways between which a cycle is timed: from the middle of the line to there again [m]."""
+_TIME_LIMIT_S = 40.0
+
+
+def cells(grid: Grid) -> list[Cell]:
+    """One cell for each controller, the slow-down alone among them; off and slack if the run names no restrictions."""
+    profiles = tuple(dict.fromkeys((*grid.profiles, _OWN_PROFILE)))
+    modes = Grid(profiles, grid.restrictions or _MODES)
+    return [Cell(NAME, profile, {"restrictions": mode}) for profile, mode in modes.controllers("off")]
+
+
+def path() -> WayPoints:
+    """Return the paper's line, to and fro."""
+    return WayPoints(np.array([(0.4, 0.5, 0.5), (0.4, -0.5, 0.5)]), closed=True)
+
+
+def scene(seed: int) -> SceneSpec:
+    """Return a board beyond the far end of the line, which the arm comes near but does not reach."""
+    rng = np.random.default_rng([seed, 42])
+    face = -0.5 - _HAND_HALF_WIDTH_M - rng.uniform(*_CLEARANCE_M)
+    center = (0.4 + _OUTWARDS_M, face - _HALF_SIZE_M[1], 0.5 + _HAND_ABOVE_TCP_M)
+    return SceneSpec(boxes=(Box("object", center, _HALF_SIZE_M, _STIFFNESS_N_PER_M),))
+
+
+def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+    """Run one trial; return its row of results and what it left behind."""
+    setup = Setup(
+        model=context.model,
+        skin=context.skin,
+        profile=context.profile(cell),
+        scene=scene(seed),
+        path=path(),
+        seed=seed,
+        world=context.world,
+        recording=context.recording,
+    )
+    record = play(setup, lambda step, _: step.path_phase >= _CYCLE_M[1] or step.stamp >= _TIME_LIMIT_S)
+    return {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed, **results(record)}, record
+
+
+def results(record: Record) -> dict[str, Any]:
+    """Numbers of one trial; None for what the arm did not come to do in the time."""
+    phase, times = np.array([s.path_phase for s in record.steps]), record.times()
+
+    def taken(start: float, end: float) -> float | None:
+        """Time [s] between two ways [m] along the path, each reached for the first time."""
+        if phase[-1] < end:
+            return None
+        first, last = np.searchsorted(phase, [start, end])
+        return float(times[last] - times[first])
+
+    approach, retreat = taken(_END_M - _NEAR_M, _END_M), taken(_END_M, _END_M + _NEAR_M)
+    way_back, cycle = taken(_END_M, _BACK_M), taken(*_CYCLE_M)
+    return {
+        "approach_m_s": None if approach is None else rounded(_NEAR_M / approach, 4),
+        "retreat_m_s": None if retreat is None else rounded(_NEAR_M / retreat, 4),
+        "way_back_s": None if way_back is None else rounded(way_back),
+        "cycle_s": None if cycle is None else rounded(cycle),
+        "short_of_end_m": rounded(max(0.0, _END_M - phase[-1]), 4),
+        "least_sensed_m": least_sensed(record),
+        "contact": record.first_contact() is not None,
+        "false_detections": len(record.reactions()),
+        "held": record.held(),
+    }
+
+
+_MEASURES = (
+    "approach_m_s", "retreat_m_s", "way_back_s", "cycle_s", "short_of_end_m", "least_sensed_m", "lost_s",
+    "lost_fraction",
+)  # fmt: skip
+
+
+def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Cells of the experiment; what the retreat loses is against `blind` with the same seed."""
+    blind = {row["seed"]: row for row in rows if row["profile"] == "blind"}
+    compared = [row | _lost(row, blind.get(row["seed"])) for row in rows]
+    totals = ("false_detections", "held")
+    return {"cells": cells_of(compared, ("profile", "restrictions"), _MEASURES, ("contact",), totals)}
+
+
+def _lost(row: dict[str, Any], blind: dict[str, Any] | None) -> dict[str, Any]:
+    """Time lost on the way back [s], and its share of the cycle; None where there is nothing to compare."""
+    back, cycle = row["way_back_s"], row["cycle_s"]
+    free = None if blind is None or row["profile"] == "blind" else blind["way_back_s"]
+    if back is None or cycle is None or free is None:
+        return {"lost_s": None, "lost_fraction": None}
+    return {"lost_s": rounded(back - free), "lost_fraction": rounded((back - free) / cycle, 4)}
+
+
+def tables(part: dict[str, Any]) -> list[TextTable]:
+    """Show speeds before and after the turn, and what the retreat costs."""
+    rows = tuple(
+        (
+            cell["profile"],
+            cell["restrictions"],
+            number(cell["approach_m_s"], 3),
+            number(cell["retreat_m_s"], 3),
+            number(cell["way_back_s"], 2),
+            number(cell["lost_s"], 2),
+            number(cell["cycle_s"], 2),
+            number(cell["lost_fraction"], 0, 100),
+            number(cell["short_of_end_m"], 2),
+            f"{100 * cell['contact_fraction']:.0f}",
+        )
+        for cell in part["cells"]
+    )
+    header = (
+        "profile", "mode", "to\n[m/s]", "from\n[m/s]", "back\n[s]", "lost\n[s]", "cycle\n[s]", "share\n[%]",
+        "short\n[m]", "hit\n[%]",
+    )  # fmt: skip
+    return [
+        TextTable(
+            "To and fro on the line, a board beyond one end but out of the way: medians",
+            header,
+            rows,
+            "To and from: mean speed in the last 0.3 m before the end by the board, and in the same 0.3 m on the way"
+            " back. Back: time from that end to the other. Lost: that against blind with the same seed. Cycle: there"
+            " and back. Share: of the lost time in the cycle. Short: how much is missing to the end after 40 s. A dash:"
+            " the arm did not get so far.",
+        )
+    ]
+
+
+def _cost(cell: Cell) -> float:
+    return 13.0 if cell.where["restrictions"] == "off" else _TIME_LIMIT_S
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, tables)

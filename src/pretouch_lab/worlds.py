@@ -1,0 +1,67 @@
+"""The world a trial is played in: what its seed draws of a named set, under what the experiment itself varies."""
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sim.misplacement import Misplacement, misplaced
+from pretouch.sim.plant_params import PlantParams, plant_params_of
+from pretouch.sim.randomisation import SETS, WorldSet, drawn, world_set
+from pretouch.sim.range_finder import RangeFinderParams
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What of a trial a world decides."""
+
+    plant: PlantParams
+    ranging: RangeFinderParams
+    skin: Skin
+    """Where the units truly sit."""
+    believed: Skin | None
+    """Where the controller believes them to be; None: it knows the truth."""
+
+
+@cache
+def _set(name: str) -> WorldSet:
+    return world_set(name)
+
+
+def in_world(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
+    """Return the parts of a trial in the world that its seed draws of a set; as they are with no name.
+
+    What the parts have otherwise than the usual arm, sensors and skin is what the experiment varies, and stays.
+    """
+    if not name:
+        return parts
+    usual = plant_params_of(model.description)
+    world = drawn(_set(name), seed, usual)
+    believed, off = parts.believed, Misplacement(world.position_mm, world.orientation_deg)
+    if believed is None and off != Misplacement() and len(parts.skin):
+        believed = misplaced(parts.skin, model, off, seed)[0]
+    return Parts(world.plant_with(parts.plant, usual), world.ranging_with(parts.ranging), parts.skin, believed)
+
+
+def folder_part(name: str) -> str:
+    """Return what a folder's name has of a world: nothing of none, so that worlds are kept apart."""
+    if not name:
+        return ""
+    if name in SETS:
+        return f"-{name}"
+    safe = re.sub(r"[^A-Za-z0-9.]+", "-", name.removesuffix(".toml")).strip("-.")[-40:]
+    return f"-{safe}-{sha256(name.encode()).hexdigest()[:6]}"
+
+
+def told(name: str) -> dict[str, str | None]:
+    """Return what a run's own file says of its world: the name, and the digest of what it names."""
+    return {"world": name or None, "world_sha256": _set(name).digest if name else None}
+
+
+def sentence(name: str) -> str:
+    """Say in which world something was played, or nothing of the usual one."""
+    return (
+        f"World {name}: other arms and sensors than those of the published tables. {_set(name).about}" if name else ""
+    )

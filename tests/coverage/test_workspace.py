@@ -1,0 +1,68 @@
+"""Postures of a workspace, and the coverage averaged over them."""
+
+import numpy as np
+import pytest
+
+from pretouch.coverage.figure import coverage_figure
+from pretouch.coverage.measuring import Setting, coverage_of
+from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.workspace import postures
+from pretouch.errors import ExperimentError
+from pretouch.importing.ready import ever_apart
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.sim.scene import SceneSpec, fixtures
+
+ROOM = fixtures(SceneSpec())
+
+
+def drawn(model, workspace, count=6):
+    return postures(model, ROOM, workspace, count, np.random.default_rng(1))
+
+
+def hands(model, q):
+    return np.array([model.kinematics(row).position[model.ee] for row in q])
+
+
+def test_the_hand_is_on_the_path_all_along_it(panda_model):
+    hand = hands(panda_model, drawn(panda_model, "circle", 8))
+    np.testing.assert_allclose(hand[:, 0], 0.5, atol=1e-5)
+    np.testing.assert_allclose(np.hypot(hand[:, 1], hand[:, 2] - 0.25), 0.25, atol=1e-5)
+    turn = np.sort(np.arctan2(hand[:, 1], hand[:, 2] - 0.25))
+    assert np.diff(turn).max() < 2 * 2 * np.pi / 8
+    both = hands(panda_model, drawn(panda_model, "paths", 6))
+    assert np.sum(np.isclose(both[:, 0], 0.4, atol=1e-5)) == 3, "half of them on the line"
+
+
+def test_a_box_and_the_whole_range_of_the_joints(panda_model):
+    hand = hands(panda_model, drawn(panda_model, "0.5,0.2,0.4,0.3,-0.2,0.5"))
+    assert np.all((hand > [0.3 - 1e-5, -0.2 - 1e-5, 0.4 - 1e-5]) & (hand < [0.5 + 1e-5, 0.2 + 1e-5, 0.5 + 1e-5]))
+    q = drawn(panda_model, "joints")
+    assert np.all((q >= panda_model.q_min) & (q <= panda_model.q_max))
+    gaps = self_distances(panda_model, capsule_ends(panda_model, kinematics_of(panda_model, q)))
+    assert gaps[:, ever_apart(panda_model)].min() > 0
+
+
+@pytest.mark.parametrize(
+    ("workspace", "count", "said"),
+    [
+        ("square", 4, "The workspace is 'square': give circle, line, paths, joints, or opposite corners"),
+        ("0,0,0,1,1", 4, "or opposite corners"),
+        ("2,0,0,3,1,1", 2, "reaches less than half of the box"),
+        ("circle", 1, "The number of postures is 1: give at least 2"),
+    ],
+)
+def test_a_workspace_that_is_none(panda_model, workspace, count, said):
+    with pytest.raises(ExperimentError, match=said):
+        drawn(panda_model, workspace, count)
+
+
+def test_the_same_seed_gives_the_same_numbers_and_the_figure_can_be_drawn(panda_model, paper_skin):
+    setting = Setting(panda_model, ROOM, CoverageParams(), "circle", 4, 1000, 400)
+    (one, _), (other, _) = (coverage_of(setting.ways(), paper_skin) for _ in range(2))
+    assert one.links == other.links
+    ways = setting.ways(1)
+    fresh, _ = coverage_of(ways, paper_skin)
+    assert fresh.arm.ways != one.arm.ways
+    figure = coverage_figure(ways, fresh, paper_skin, frozenset({"hand_left"}))
+    assert f"{100 * fresh.arm.ways.value:.0f} % of the ways" in figure.get_suptitle()
+    assert len(figure.axes) == 4

@@ -1,8 +1,0 @@
-import pytest
-
-from pretouch.experiments.cell import Context
-
-
-@pytest.fixture(scope="session")
-def context(panda_model, paper_skin):
-    return Context(panda_model, paper_skin)

@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+from pretouch_lab.benchmarks.avoidance.figures import figures
+from pretouch_lab.benchmarks.avoidance.page import section
+from pretouch_lab.benchmarks.avoidance.summary import json_rows, spread, summarise
+from pretouch_lab.benchmarks.avoidance.tables import tables
+
+KEYS = {
+    "contender", "scenario", "seen", "false_alarms_per_hour", "median_delay_s", "p95_delay_s", "missed", "contacts",
+    "peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_time_s",
+}  # fmt: skip
+"""Keys of the rows that all benchmarks write."""
+
+
+def row(contender, seed, scenario="drdo", family="drdo", **measures):
+    """A trial without a contact."""
+    numbers = dict.fromkeys(
+        (
+            "true_peak_20ms_n", "true_peak_n", "clamping_force_n", "tracking_rms_m", "off_path_max_m",
+            "jerk_max_rad_s3", "jerk_max_per_second_rad_s3", "jerk_rms_rad_s3", "held_s",
+        ),
+        0.0,
+    )  # fmt: skip
+    counts = dict.fromkeys(
+        ("holds", "livelocks", "reactions", "false_reactions", "towards_person", "solver_failures", "infeasible"), 0
+    )
+    absent = dict.fromkeys(("peak_estimate_n", "impact_speed_m_s", "first_contact_s", "seen_fraction", "cycle_time_s"))
+    usual = {
+        "contact": False, "least_distance_m": 0.1, "speed_m_s": 0.3, "way_m": 3.0, "livelock_s": 0.0, "timed": False,
+        "manipulability_ee_least": 0.1, "manipulability_point": 0.05, "mobility_point_m": 0.4,
+        "hold_reasons": {}, "duration_s": 14.0,
+        "course": {"time_s": [0.0, 1.0], "distance_m": [0.4, 0.1], "force_n": [0.0, 0.0], "way_m": [0.0, 0.3]},
+    }  # fmt: skip
+    names = {"contender": contender, "scenario": scenario, "family": family, "seed": seed}
+    return {**names, **numbers, **counts, **absent, **usual, **measures}
+
+
+def test_ratios_are_of_the_same_seeds():
+    rows = [
+        row("blind", 0, contact=True, true_peak_20ms_n=100.0),
+        row("blind", 1, contact=True, true_peak_20ms_n=10.0),
+        row("paper", 0, contact=True, true_peak_20ms_n=50.0),
+        row("paper", 1, contact=True, true_peak_20ms_n=20.0),
+        row("paper", 2, contact=True, true_peak_20ms_n=1.0),
+    ]
+    ratios = {(r["reference"], r["contender"]): r for r in summarise(rows)["ratios"]}
+    assert ratios["blind", "paper"]["true_peak_20ms_n"]["median"] == pytest.approx((2.0 + 0.5) / 2)
+    assert ratios["blind", "paper"]["true_peak_20ms_n"]["n"] == 2
+    assert ratios["paper", "blind"]["true_peak_20ms_n"]["median"] == pytest.approx(1.25)
+    assert ratios["blind", "paper"]["peak_estimate_n"] is None
+
+
+def test_a_turn_that_was_not_finished_counts_as_longer_than_all():
+    rows = [row("paper", s, "person +y", "person", timed=True, cycle_time_s=t) for s, t in enumerate([5.0, None, 7.0])]
+    cell = summarise(rows)["cells"][0]
+    assert cell["cycle_time_s"] == {"median": 7.0, "p10": 5.0, "p90": None, "n": 3}
+    assert "7.0\n5.0->" in tables(summarise(rows))[0].rows[0]
+
+
+def test_spread_of_nothing_and_of_what_never_ended():
+    assert spread([None, None]) is None
+    assert spread([np.inf, np.inf]) == {"median": None, "p10": None, "p90": None, "n": 2}
+
+
+def test_reasons_of_holds_are_added_up():
+    rows = [row("ding", s, hold_reasons={"Braking.": 2}, holds=2) for s in (0, 1)]
+    cell = summarise(rows)["cells"][0]
+    assert (cell["holds"], cell["hold_reasons"]) == (4, {"Braking.": 4})
+
+
+def test_rows_have_the_keys_all_benchmarks_share():
+    (found,) = json_rows(summarise([row("ding", 0, contact=True, first_contact_s=2.5)]))
+    assert set(found) >= KEYS
+    assert (found["contacts"], found["first_contact_s"], found["cycle_time_s"]) == (1, 2.5, None)
+
+
+def test_tables_figures_and_page_say_who_loses():
+    rows = [
+        row(c, s, contact=c == "ding", true_peak_20ms_n=70.0 * (c == "ding")) for c in ("paper", "ding") for s in (0, 1)
+    ]
+    summary = summarise(rows)
+    shown = tables(summary)[0]
+    assert [line[:3] for line in shown.rows] == [("drdo", "paper", "0/2"), ("drdo", "ding", "2/2")]
+    pictures = figures(summary, rows)
+    assert [p.name for p in pictures] == ["bench-avoidance-outcome", "bench-avoidance-drdo"]
+    text = section(summary, pictures, "development")
+    assert "4 trials with development seeds" in text
+    assert "images/bench-avoidance-drdo.png" in text
+    assert "| drdo | ding | 2/2 |" in text

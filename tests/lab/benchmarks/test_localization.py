@@ -1,0 +1,139 @@
+"""The localisation benchmark: its motion, its contacts, the limit of what torques tell, and what rows say."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pretouch.types import Touched, untouched
+from pretouch_lab.benchmarks.detection.arm import model
+from pretouch_lab.benchmarks.detection.contacts import Touching
+from pretouch_lab.benchmarks.localization.contacts import TouchedCell, planned, touched_cells
+from pretouch_lab.benchmarks.localization.judge import Said, _one, _two, name_of
+from pretouch_lab.benchmarks.localization.limit import LINK_M, position_limit
+from pretouch_lab.benchmarks.localization.motion import wandering
+from pretouch_lab.benchmarks.localization.results import TWO, rows_of, tables_of
+
+LEARNT = np.stack([np.stack([np.full(7, 0.25), np.full(7, 0.01)])] * 2)
+
+
+def touching(link: str, start: float = 1.0, force: float = 20.0) -> Touching:
+    arm = model()
+    index = arm.link_index(f"panda_{link}")
+    c = int(np.flatnonzero(arm.surface.link == index)[0])
+    point, normal = arm.surface.point[c], arm.surface.normal[c]
+    return Touching(index, 0, force, 0.02, 0.4, start, point, normal, -normal)
+
+
+def said_of(*touched: Touched) -> Said:
+    count = len(touched)
+    q = np.tile(model().description.q_ready, (count, 1))
+    return Said(1.0 + 0.1 * np.arange(count), list(touched), q, np.tile(LEARNT, (count, 1, 1, 1)), np.zeros(0))
+
+
+def true_place(touch: Touching) -> np.ndarray:
+    kin = model().kinematics(model().description.q_ready)
+    return kin.position[touch.link] + kin.rotation[touch.link] @ touch.point
+
+
+def test_the_arm_wanders_from_rest_to_rest_within_its_limits():
+    arm, course = model(), wandering(1000, 60.0)
+    times = np.arange(0.0, 60.0, 0.01)
+    q, qd = (np.array(part) for part in zip(*(course.at(t) for t in times), strict=True))
+    assert (q >= arm.q_min).all()
+    assert (q <= arm.q_max).all()
+    assert_allclose(np.gradient(q, times, axis=0)[1:-1], qd[1:-1], atol=0.01)
+    assert 0.2 < np.abs(qd).max() <= 0.61
+    assert (np.abs(qd).max(axis=1) == 0.0).mean() > 0.1  # it rests
+    assert np.ptp(q, axis=0).min() > 0.3
+    assert_allclose(wandering(1000, 60.0).q, course.q)  # the seed says which
+    assert np.abs(wandering(1001, 60.0).q[0] - course.q[0]).max() > 0.1
+
+
+def test_contacts_are_those_of_the_goals_and_two_at_once_overlap_on_two_bodies():
+    _, (hand,) = planned(TouchedCell(1, "nominal", 1000))
+    assert len(hand) == 40
+    assert min(touch.force_n for touch in hand) >= 15.0
+    assert min(touch.duration_s for touch in hand) >= 0.1
+    assert len({touch.link for touch in hand}) == 8
+    _, (first, second) = planned(TouchedCell(2, "nominal", 1024))
+    for a, b in zip(first, second, strict=True):
+        assert 0.0 <= b.start - a.start <= 0.05
+        assert model().rigid[a.link] != model().rigid[b.link]
+
+
+def test_an_arm_has_the_same_seed_with_each_skin():
+    cells = touched_cells("development", quick=True)
+    assert [(c.contacts, c.sensing, c.seed) for c in cells] == [
+        *[(1, sensing, seed) for seed in (1000, 1001) for sensing in ("nominal", "seven", "misplaced")],
+        (2, "nominal", 1024), (2, "seven", 1024),
+    ]  # fmt: skip
+    assert len(touched_cells("published", quick=False)) == 24 * 3 + 8 * 2
+
+
+def test_links_that_the_same_joints_move_are_one_body():
+    names = [name_of(model().link_index(f"panda_{link}")) for link in ("link3", "link7", "link8", "hand")]
+    assert names == ["link3", "hand", "hand", "hand"]
+
+
+def test_a_contact_is_judged_by_its_body_and_its_place():
+    touch = touching("link6")
+    at = true_place(touch)
+    right = Touched(
+        np.array([touch.link]), (at + np.array([0.0, 0.03, 0.0]))[None], np.ones((1, 3)), np.ones(1), np.ones(1)
+    )
+    wrong = Touched(np.array([model().ee]), at[None], np.ones((1, 3)), np.ones(1), np.ones(1))
+    row = _one(touch, said_of(untouched(), right, untouched(), untouched(), wrong))
+    assert row["right"]
+    assert row["error_m"] == pytest.approx(0.03)
+    assert not row["right_end"]
+    assert row["taken_for_end"] == "hand"
+    assert row["error_end_m"] == 0.0
+    missed = _one(touch, said_of(untouched(), untouched()))
+    assert (missed["felt"], missed["right"], missed["error_m"]) == (False, False, None)
+
+
+def test_two_contacts_are_matched_with_the_nearer_ones():
+    a, b = touching("link4"), touching("hand", start=1.0)
+    both = Touched(
+        np.array([b.link, a.link]), np.array([true_place(b), true_place(a) + np.array([0.02, 0.0, 0.0])]),
+        np.ones((2, 3)), np.ones(2), np.ones(2),
+    )  # fmt: skip
+    row = _two(a, b, said_of(untouched(), untouched(), both))
+    assert row["two"]
+    assert row["right"]
+    assert sorted(row["errors_m"]) == [0.0, pytest.approx(0.02)]
+    assert not _two(a, b, said_of(untouched(), untouched(), untouched()))["two"]
+
+
+def test_torques_tell_most_of_the_hand_and_hardly_anything_of_the_first_links():
+    limits = []
+    for link in ("link1", "link2", "link4", "link6", "hand"):
+        touch = touching(link, force=30.0)
+        q = model().description.q_ready
+        limits.append(position_limit(touch, model().kinematics(q), q, LEARNT))
+    assert limits[0] > limits[2] > limits[4]
+    assert limits[-1] < 0.03
+    assert max(limits) <= np.sqrt(2.0) * LINK_M
+    # a harder push tells more
+    q, soft, hard = model().description.q_ready, touching("link6", force=15.0), touching("link6", force=60.0)
+    kin = model().kinematics(q)
+    assert position_limit(hard, kin, q, LEARNT) < position_limit(soft, kin, q, LEARNT)
+
+
+def test_rows_say_what_was_found():
+    touch = touching("hand")
+    at = Touched(np.array([touch.link]), true_place(touch)[None] + 0.01, np.ones((1, 3)), np.ones(1), np.ones(1))
+    found = [_one(touch, said_of(untouched(), at, at, at, at)), _one(touch, said_of(untouched()))]
+    pair = _two(touch, touching("link4"), said_of(untouched()))
+    one = {"contacts": 1, "skin": "none", "found": found, "median_s": 0.0004, "p99_s": 0.001}
+    two = {"contacts": 2, "skin": "none", "found": [pair], "median_s": 0.0004, "p99_s": 0.002}
+    rows = rows_of([one, two])
+    assert [row["link"] for row in rows] == ["hand", TWO]
+    first = rows[0]
+    assert (first["skin"], first["contacts"], first["felt"], first["right_link"]) == ("none", 2, 1, 0.5)
+    assert first["median_error_m"] == pytest.approx(0.0173, abs=1e-4)
+    assert first["rate_hz"] == 500.0
+    assert rows[1]["recognised"] == 0.0
+    text = tables_of({"rows": rows})
+    assert text[0].rows[0][:4] == ("none", "hand", "2", "1")
+    assert len(text) == 2

@@ -1,0 +1,70 @@
+"""`pretouch bench calibration`: random skins calibrated in simulation."""
+
+import json
+
+import pytest
+
+from pretouch import cli
+from pretouch_lab.studies.calibration import study as study_module
+from pretouch_lab.studies.calibration.study import OURS, Study, Trial
+
+ROW = {
+    "skin": 0, "unit": "on_panda_hand", "link": "panda_hand", "accepted": True, "position_error_m": 0.0002,
+    "orientation_error_deg": 0.004, "position_sigma_m": 0.0001, "orientation_sigma_deg": 0.003, "nees_position": 3.0,
+    "nees_orientation": 3.0, "nees_pose": 6.0, "clock_error_s": 0.0007, "link_found": True,
+}  # fmt: skip
+
+
+def calibrate(*words):
+    return cli.main(["bench", "calibration", *map(str, words)])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--skins", "0"), "The number of skins is 0"),
+        (("--seed", "-1"), "The seed is -1: it must be at least 0."),
+        (("--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
+    ],
+)
+def test_what_makes_no_sense_is_said_in_one_sentence(capsys, words, said):
+    assert calibrate(*words) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1
+
+
+def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, monkeypatch):
+    asked = []
+
+    def study(model, skins, seed, compared, links_known, plan, progress):
+        asked.append((model.description.name, skins, seed, compared, links_known, plan))
+        progress(1, 1)
+        return Study([Trial(0, OURS, OURS, [ROW], 1.5)], {OURS: 60.0})
+
+    monkeypatch.setattr(study_module, "study", study)
+    place = tmp_path / "new" / "rows.json"
+    for _ in range(2):
+        assert calibrate("--skins", 20, "--json", place) == 0
+        assert asked.pop() == ("panda", 20, 0, False, True, None)
+    told = json.loads(place.read_text())
+    assert told["rows"] == [ROW]
+    assert (told["motion_s"], told["compute_s"]) == (60.0, 1.5)
+    said = capsys.readouterr().out
+    assert "Where units sit, found in 60 s of motion" in said
+    assert "panda_hand" in said
+    assert f"Numbers: {place}" in said
+    assert calibrate("--compared", "--find-links", "--seed", 3, "--arm", "fr3") == 0
+    assert asked == [("fr3", 20, 3, True, False, None)]
+
+
+@pytest.mark.slow
+def test_a_study_of_one_skin_finds_all_units_to_a_millimetre(tmp_path):
+    place = tmp_path / "rows.json"
+    assert calibrate("--skins", 1, "--find-links", "--json", place) == 0
+    told = json.loads(place.read_text())
+    assert len(told["rows"]) == 7
+    assert told["motion_s"] <= 90.0
+    for row in told["rows"]:
+        assert row["position_error_m"] < 0.001
+        assert row["orientation_error_deg"] < 0.1

@@ -1,0 +1,8 @@
+import pytest
+
+from pretouch_lab.cell import Context
+
+
+@pytest.fixture(scope="session")
+def context(panda_model, paper_skin):
+    return Context(panda_model, paper_skin)

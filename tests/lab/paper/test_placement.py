@@ -1,0 +1,45 @@
+import pytest
+
+from pretouch.control.path import Circle
+from pretouch.coverage.placement import hand_side, placement_for
+from pretouch.errors import ExperimentError
+from pretouch.sim.board import PANDA_SIDE, HandSide
+from pretouch.sim.paper_scenes import Placement, static_path, static_scene
+from pretouch_lab.campaign import Request
+
+
+def test_the_panda_has_the_papers_paths(panda_model):
+    placement = placement_for(panda_model)
+    assert placement == Placement()
+    assert static_path("circle", "-y", placement) == Circle()
+    assert placement.face(0.2371, "+y") == 0.2371
+
+
+def test_another_arm_has_them_scaled_and_moved():
+    placement = Placement(0.8, -0.1, 0.15, left=HandSide(0.05, 0.01))
+    circle = static_path("circle", "+y", placement)
+    assert circle.center == pytest.approx((0.3, 0.0, 0.35))
+    assert circle.radius == pytest.approx(0.2)
+    # the hand is as far out when it meets the board's face, in terms of the circle, as the Panda's
+    meets = placement.face(0.25, "+y") - 0.05
+    assert meets / 0.2 == pytest.approx((0.25 - PANDA_SIDE.aside) / 0.25)
+    assert "0.8 times as large, moved by -0.10 m in x and +0.15 m in z" in placement.sentence("mine")
+
+
+def test_the_board_stands_where_the_hand_meets_it():
+    placement = Placement(0.8, 0.0, 0.0, left=HandSide(0.05, 0.01))
+    board = static_scene("line", "+y", 25e3, 0, placement).boxes[0]
+    face = board.center[1] - board.half_size[1]
+    assert 0.8 * (0.25 - 0.05 - PANDA_SIDE.aside) + 0.05 <= face <= 0.8 * (0.3 - PANDA_SIDE.aside) + 0.05
+
+
+def test_the_side_of_the_pandas_hand_is_about_what_the_board_takes_it_for(panda_model):
+    for side in ("+y", "-y"):
+        found = hand_side(panda_model, side)
+        assert found.aside == pytest.approx(PANDA_SIDE.aside, abs=0.03)
+        assert found.above == pytest.approx(PANDA_SIDE.above, abs=0.03)
+
+
+def test_other_experiments_are_refused_for_another_arm(tmp_path):
+    with pytest.raises(ExperimentError, match="'avoidance' is laid out for the Panda: with --arm, choose static"):
+        Request(("avoidance",), 1, arm=str(tmp_path))

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from pretouch.robot.description import fr3
+from pretouch.robot.model import RobotModel
+from pretouch_lab.studies.calibration.random_skin import HEIGHT, mounted_links, random_skin
+
+LINKS = ("link2", "link3", "link4", "link5", "link6", "link7", "hand")
+
+
+def height(model, link: int, point: np.ndarray) -> float:
+    """Distance of a point in a link's frame to its capsules [m], by a search along their axes."""
+    own = model.capsules.of_links(np.array([link]))
+    axis = own.a[:, None] + np.linspace(0, 1, 2001)[None, :, None] * (own.b - own.a)[:, None]
+    return float((np.linalg.norm(axis - point, axis=2).min(axis=1) - own.radius).min())
+
+
+@pytest.fixture(scope="module")
+def fr3_model() -> RobotModel:
+    return RobotModel(fr3())
+
+
+def test_there_is_a_unit_on_each_link_from_the_second_to_the_hand(panda_model, fr3_model):
+    for model, prefix in ((panda_model, "panda_"), (fr3_model, "fr3_")):
+        assert [unit.link for unit in random_skin(model, 0).units] == [prefix + name for name in LINKS]
+
+
+def test_the_first_link_carries_one_on_request(panda_model):
+    assert mounted_links(panda_model, first_link=True) == ("panda_link1", *mounted_links(panda_model))
+    assert random_skin(panda_model, 0, first_link=True).units[0].link == "panda_link1"
+
+
+def test_units_sit_on_the_surface_and_look_away_from_it(panda_model):
+    for seed in range(20):
+        skin = random_skin(panda_model, seed)
+        for link, pose in zip(skin.link, skin.T_link_sensor, strict=True):
+            above = height(panda_model, link, pose[:3, 3])
+            assert 0.0 <= above <= HEIGHT + 1e-6
+            assert height(panda_model, link, pose[:3, 3] + 0.3 * pose[:3, 2]) > above
+
+
+def test_a_seed_always_makes_the_same_skin_and_another_a_different_one(panda_model):
+    first, again, other = (random_skin(panda_model, seed).T_link_sensor for seed in (3, 3, 4))
+    assert np.array_equal(first, again)
+    assert np.abs(first - other).max() > 0.05
+
+
+def test_units_are_turned_anyhow_about_their_beams(panda_model):
+    up = np.array([random_skin(panda_model, seed).T_link_sensor[:, 2, 0] for seed in range(30)])
+    assert up.min() < -0.9
+    assert up.max() > 0.9

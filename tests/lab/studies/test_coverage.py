@@ -1,0 +1,74 @@
+"""The study that holds coverage against the simulation."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pretouch.coverage.params import CoverageParams
+from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.studies.coverage import study
+from pretouch_lab.studies.coverage.comers import Coming
+
+ROOM = fixtures(SceneSpec())
+
+
+def test_cells_are_those_of_profiles_that_sense():
+    cells = study.cells(Grid(("blind", "pretouch")))
+    assert {cell.profile for cell in cells} == {"pretouch"}
+    assert [(c.where["arm"], c.where["skin"]) for c in cells][:3] == [
+        ("moving", "own"), ("moving", "suggested"), ("moving", "random")
+    ]  # fmt: skip
+
+
+def test_a_ball_is_seen_in_time_by_a_point_near_it_while_there_is_way_to_brake():
+    params = CoverageParams()
+    needed = params.braking_m + 0.016 * 0.8
+    ball = np.array([1.0, 0.0, 0.5])
+    coming = Coming(
+        1, np.zeros(3), np.zeros(3), np.zeros(3), True, {10: (needed + 0.01, ball), 20: (needed - 0.01, ball)}
+    )
+    beside, off = ball + np.array([0.149, 0.0, 0.0]), ball + np.array([0.151, 0.0, 0.0])
+    assert study.seen_in_time(coming, {10: np.array([off, beside])}, params)
+    assert not study.seen_in_time(coming, {10: off[None]}, params), "more than 0.1 m from its surface"
+    assert not study.seen_in_time(coming, {20: beside[None]}, params), "too late"
+    assert not study.seen_in_time(coming, {10: np.zeros((0, 3)), 11: beside[None]}, params)
+
+
+def test_numbers_and_table_of_the_study():
+    params = CoverageParams()
+    step = SimpleNamespace(stamp=0.01, obstacles=SimpleNamespace(point=np.zeros((1, 3))))
+    seen = Coming(1, np.zeros(3), np.zeros(3), np.zeros(3), True, {10: (0.5, np.zeros(3))}, 0.2)
+    blind = Coming(1, np.zeros(3), np.zeros(3), np.zeros(3), True, {10: (0.5, np.ones(3))}, -0.1)
+    row = study.results([seen, blind], SimpleNamespace(steps=[step]), params)
+    assert row == {"came": 2, "blind": 1, "foreseen_blind": 0, "agree": 1, "fast": 1, "towards_m_s": 0.1}
+    where = {"experiment": "coverage", "arm": "moving", "skin": "own", "profile": "pretouch", "predicted": 0.6}
+    part = study.summarise([where | {"seed": seed} | row for seed in (0, 1)])
+    (cell,) = part["cells"]
+    assert (cell["came"], cell["blind"], cell["predicted"]) == (4, 2, 0.6)
+    # Clopper and Pearson of 2 in 4
+    assert (cell["blind_low"], cell["blind_high"]) == (0.068, 0.932)
+    (table,) = study.tables(part)
+    assert table.rows[0][:4] == ("pretouch\nmoving", "own", "2/4", "50\n7-93")
+    assert len(table.rows[0]) == len(table.header)
+
+
+@pytest.mark.slow
+def test_a_short_trial_agrees_with_what_was_foreseen(panda_model, paper_skin, monkeypatch):
+    """The simulated range finders cast rays in MuJoCo; coverage knows nothing of them."""
+    monkeypatch.setattr(study, "COUNT", 3)
+    cell = Cell("coverage", "pretouch", {"arm": "standing", "skin": "suggested"})
+    row, _ = study.trial(cell, 1000, Context(panda_model, paper_skin))
+    assert row["came"] == 3
+    assert row["agree"] == 3
+    assert 0.6 < row["predicted"] < 0.8
+
+
+@pytest.mark.slow
+def test_units_put_anywhere_are_others_for_each_seed(panda_model, paper_skin):
+    one, other = (study.skin_of("random", panda_model, paper_skin, seed) for seed in (1000, 1001))
+    best = study.skin_of("suggested", panda_model, paper_skin, 1000)
+    assert len(one) == len(best) == 7 + study.MORE
+    assert one.ids[7:] != other.ids[7:]
+    assert study.skin_of("own", panda_model, paper_skin, 1000) is paper_skin

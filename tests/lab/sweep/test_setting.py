@@ -1,0 +1,114 @@
+from dataclasses import replace
+from hashlib import sha256
+from itertools import pairwise
+
+import pytest
+
+from pretouch.errors import ExperimentError, ParameterError
+from pretouch.params import profile
+from pretouch.sim.randomisation import drawn, world_set
+from pretouch_lab.benchmarks.dense_skin import UNITS, units_of
+from pretouch_lab.sweep.definition import sweep_of
+from pretouch_lab.sweep.measures import StaticScene
+from pretouch_lab.sweep.setting import built, skin_of, world_digest
+
+
+def test_each_value_arrives_where_its_name_says():
+    values = {
+        "threshold.f_base_n": 8.25, "restriction.mode": "floor", "reduction.enabled": False, "plant.mass_error": 0.1,
+        "plant.kind": "payload", "sensing.latency_s": 0.1, "sensing.rate_hz": 10.0, "skin.units": 3,
+        "scene.side": "+y",
+    }  # fmt: skip
+    made = built("paper", StaticScene(), values, 1003)
+    assert made.profile.threshold.f_base_n == 8.25
+    assert made.profile.restriction.mode == "floor"
+    assert not made.profile.reduction.enabled
+    assert (made.plant.mass_error, made.plant.payload_max_kg) == (0.1, 0.5)
+    assert (made.sensing.latency_s, made.sensing.period_s) == (0.1, 0.1)
+    assert (len(made.skin), made.scene.side, made.seed) == (3, "+y", 1003)
+
+
+def test_a_number_arrives_to_its_last_bit():
+    value = 1 / 3 + 1e-9
+    assert built("paper", StaticScene(), {"threshold.f_std_n": value}, 0).profile.threshold.f_std_n == value
+
+
+def test_nothing_varied_is_the_profile_and_the_arm_of_all_other_experiments():
+    made = built("paper", StaticScene(), {}, 0)
+    assert made.profile == profile("paper")
+    assert len(made.skin) == 7
+    assert made.sensing.period_s == 0.02
+
+
+def test_a_world_draws_arm_and_sensors_under_what_is_varied(tmp_path):
+    one = built("paper", StaticScene(), {"plant.world": "realistic", "plant.payload_max_kg": 0.3}, 1003)
+    other = built("paper", StaticScene(), {"plant.world": "realistic"}, 1004)
+    world = drawn(world_set("realistic"), 1003)
+    assert one.plant == replace(world.plant, payload_max_kg=0.3)
+    assert one.sensing == world.ranging
+    assert one.plant.torque_offset_nm != other.plant.torque_offset_nm
+    assert built("paper", StaticScene(), {"plant.world": "none"}, 1003) == built("paper", StaticScene(), {}, 1003)
+
+
+def test_a_cell_knows_the_file_its_world_is_of(tmp_path):
+    place = tmp_path / "arm.toml"
+    place.write_text("[plant]\npayload_max_kg = 0.25\n")
+    values = {"plant.world": str(place)}
+    assert built("paper", StaticScene(), values, 0).plant.payload_max_kg == 0.25
+    assert world_digest(values) == sha256(place.read_bytes()).hexdigest()
+    assert world_digest({"plant.world": "none"}) is None
+
+
+@pytest.mark.parametrize(
+    ("experiment", "vary", "error", "words"),
+    [
+        ("dance", {"a.b": "1:2"}, ExperimentError, "'dance' cannot be swept: choose from static, avoidance"),
+        ("static", {}, ExperimentError, "Nothing is varied: give --vary"),
+        ("static", {"f_base_n": "1:2"}, ExperimentError, "'f_base_n' is unknown: write GROUP.FIELD with a group of"),
+        ("static", {"threshold.f": "1:2"}, ExperimentError, "'threshold.f' is unknown: threshold has window_samples"),
+        ("static", {"scene.place": "1:2"}, ExperimentError, "scene has trajectory, side, stiffness_n_m"),
+        ("static", {"plant.ripple_nm": "1:2"}, ExperimentError, "one value a joint"),
+        ("static", {"threshold.f_base_n": "3:9"}, ExperimentError, "holds 3.0, which is not allowed.*than f_d_n"),
+        ("static", {"skin.units": "0:4"}, ExperimentError, "skin.units is 0: give 1 or more"),
+        ("static", {"skin.units": "1:65"}, ExperimentError, "holds 65, which is not allowed.*whole number to 64"),
+        ("static", {"plant.kind": "nominal,rusty"}, ExperimentError, "plant.kind=rusty is unknown"),
+        ("static", {"plant.world": "none,mars"}, ExperimentError, "'mars' is none of nominal, realistic, stress"),
+        ("contacts", {"reduction.d_max_m": "0.5:1"}, ExperimentError, "changes nothing in contacts: take one of thr"),
+    ],
+)
+def test_what_cannot_be_swept_is_said_with_the_way_out(experiment, vary, error, words):
+    with pytest.raises(error, match=words):
+        sweep_of(experiment, vary)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"design": "cube"}, "'cube' is unknown: choose from grid, lhs, sobol"),
+        ({"samples": 100}, "samples is 100: give a power of two, 128 for one"),
+        ({"arms": 0}, "arms is 0: give 1 to 1000"),
+        ({"metrics": ("force",)}, "does not measure 'force': choose from peak_estimate_n"),
+        ({"fix": {"threshold.alpha": "0.2"}}, "threshold.alpha is both varied and fixed"),
+        ({"name": "../x"}, "bad one for a folder"),
+        ({"profile_text": "brave"}, "'brave' is unknown"),
+    ],
+)
+def test_options_that_cannot_be_are_said(more, words):
+    with pytest.raises((ExperimentError, ParameterError), match=words):
+        sweep_of("static", {"threshold.alpha": "0:1"}, **more)
+
+
+def test_more_units_are_those_of_fewer_and_others():
+    counts = [units_of(n) for n in range(65)]
+    assert counts[32] == UNITS
+    assert counts[1]["hand"] == 1
+    for n, (fewer, more) in enumerate(pairwise(counts)):
+        assert sum(fewer.values()) == n
+        assert all(more[name] >= fewer[name] for name in UNITS)
+
+
+def test_sixty_four_units_find_their_places_and_three_are_among_them():
+    few, many = skin_of(3), skin_of(64)
+    places = {unit.id: unit.T_link_sensor.tolist() for unit in many.units}
+    assert len(places) == 64
+    assert all(places[unit.id] == unit.T_link_sensor.tolist() for unit in few.units)

@@ -1,0 +1,348 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import replace
+from multiprocessing.connection import wait
+from pathlib import Path
+
+import pytest
+
+from pretouch.errors import ExperimentError, ParameterError, SkinError
+from pretouch.params import PROFILES
+from pretouch.sensing.skin import PAPER_SKIN
+from pretouch.whole_file import write_json
+from pretouch_lab import campaign, workers
+from pretouch_lab.campaign import (
+    Request,
+    finished,
+    open_folder,
+    progress_of,
+    run_campaign,
+    trial_file,
+)
+
+SMALL = Request(("static",), seeds=1, profiles=("blind",))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"experiments": ("statik",)}, "'statik' is unknown: choose from static, avoidance, dynamic,"),
+        ({"seeds": 0}, "number of seeds is 0: give at least 1"),
+        ({"seeds": -3}, "number of seeds is -3"),
+        ({"profiles": ()}, "profiles are none"),
+        ({"profiles": ("paper", "paper")}, "name each wanted one once"),
+        ({"restrictions": ("off", "firm")}, "'firm' is unknown: choose from off, hard, slack, floor"),
+        ({"stiffness": (0.0,)}, "stiffness is 0 N/m"),
+        ({"stiffness": (25e3, float("nan"))}, "stiffness is nan N/m"),
+        ({"stiffness": ()}, "stiffnesses are none N/m: name each"),
+        ({"stiffness": (25e3, 25000.0)}, "name each wanted one once"),
+        ({"experiments": ("release",)}, "nothing to run: release is about proximity"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_a_sentence(change, words):
+    with pytest.raises(ExperimentError, match=words):
+        replace(SMALL, **change)
+
+
+def test_an_unknown_profile_is_refused():
+    with pytest.raises(ParameterError, match="'brave' is unknown: choose from paper, blind"):
+        replace(SMALL, profiles=("brave",))
+
+
+def test_a_bad_skin_is_refused_before_anything_runs(tmp_path):
+    with pytest.raises(SkinError, match=r"nowhere\.toml cannot be read"):
+        run_campaign(replace(SMALL, skin=str(tmp_path / "nowhere.toml")), tmp_path / "out", lambda *_: None)
+    assert not (tmp_path / "out").exists()
+
+
+def test_tasks_take_all_cells_seed_by_seed():
+    tasks = Request(("static", "dynamic"), seeds=2).tasks()
+    assert len(tasks) == 2 * (8 + 2)
+    assert [seed for _, seed in tasks] == [0] * 10 + [1] * 10
+    assert len({trial_file(Path("x"), *task) for task in tasks}) == 20
+
+
+def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
+    one = replace(SMALL, seeds=1)
+    seen = []
+    open_folder(one, tmp_path)
+    before = progress_of(one, tmp_path)
+    assert (before.done, before.total, before.cost_done) == (0, 4, 0.0)
+    run_campaign(one, tmp_path, seen.append)
+    assert sum(seen) == pytest.approx(before.cost_total)
+    assert progress_of(one, tmp_path).done == len(seen) == 4
+    rows = finished(one, tmp_path)
+    assert [row["seed"] for row in rows] == [0, 0, 0, 0]
+    files = sorted((tmp_path / "trials").glob("*/*.json"))
+    files[2].unlink()
+    kept = {file: file.stat().st_mtime_ns for file in files if file.exists()}
+    seen.clear()
+    assert progress_of(one, tmp_path).done == 3
+    run_campaign(one, tmp_path, seen.append)
+    assert len(seen) == 1
+    assert {file: file.stat().st_mtime_ns for file in kept} == kept
+    assert finished(one, tmp_path) == rows
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", None)
+    run_campaign(one, tmp_path, seen.append)
+    assert len(seen) == 1
+
+
+@pytest.mark.parametrize("change", [{"seeds": 5}, {"stiffness": (2000.0,)}, {"restrictions": ("floor",)}])
+def test_a_folder_of_another_run_is_not_touched(tmp_path, change):
+    open_folder(SMALL, tmp_path)
+    before = (tmp_path / "run.json").read_text()
+    (name,) = change
+    with pytest.raises(ExperimentError, match=rf"holds a run with {name} = .*: give another --out"):
+        open_folder(replace(SMALL, **change), tmp_path)
+    assert (tmp_path / "run.json").read_text() == before
+
+
+def test_a_changed_skin_file_is_noticed(tmp_path):
+    file, out = tmp_path / "skin.toml", tmp_path / "out"
+    file.write_bytes(PAPER_SKIN.read_bytes())
+    request = replace(SMALL, skin=str(file))
+    open_folder(request, out)
+    open_folder(request, out)
+    file.write_bytes(PAPER_SKIN.read_bytes().replace(b"-0.108", b"-0.109"))
+    with pytest.raises(ExperimentError, match="but the skin file has changed since: give another --out"):
+        open_folder(request, out)
+    file.unlink()
+    with pytest.raises(SkinError, match="cannot be read: No such file"):
+        open_folder(request, out)
+
+
+def test_a_changed_built_in_skin_is_noticed(tmp_path, monkeypatch):
+    open_folder(SMALL, tmp_path / "out")
+    (tmp_path / "skin.toml").write_text("")
+    monkeypatch.setattr(campaign, "PAPER_SKIN", tmp_path / "skin.toml")
+    with pytest.raises(ExperimentError, match="but the skin file has changed since"):
+        open_folder(SMALL, tmp_path / "out")
+
+
+def test_changed_parameters_of_a_profile_are_noticed(tmp_path, monkeypatch):
+    open_folder(SMALL, tmp_path)
+    for name in ("paper", "blind"):
+        task = replace(PROFILES[name].task, control_period_s=0.5 * PROFILES[name].task.control_period_s)
+        monkeypatch.setitem(PROFILES, name, replace(PROFILES[name], task=task))
+        if name == "paper":
+            open_folder(SMALL, tmp_path)  # not one that it asks for
+    with pytest.raises(ExperimentError, match="but the parameters of profile blind have changed since"):
+        open_folder(SMALL, tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"{", b"[]", b"3", b"\xff", b"[" * 100_000, b"9" * 5000])
+def test_a_damaged_folder_is_named(tmp_path, content):
+    (tmp_path / "run.json").write_bytes(content)
+    with pytest.raises(ExperimentError, match=r"run\.json is damaged"):
+        open_folder(SMALL, tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"{", b"{}", b"[]", b"\xff", b"[" * 100_000, b"", None])
+def test_a_damaged_trial_is_run_again(tmp_path, monkeypatch, content):
+    open_folder(SMALL, tmp_path)
+    first, *others = [trial_file(tmp_path, *task) for task in SMALL.tasks()]
+    for (cell, seed), file in zip(SMALL.tasks()[1:], others, strict=True):
+        write_json({"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}, file)
+    _damage(first, content)
+    assert len(finished(SMALL, tmp_path)) == 3
+    again = _play_with(monkeypatch, lambda *task: Future())
+    with pytest.raises(_EnoughError):
+        run_campaign(SMALL, tmp_path, lambda *_: None)
+    assert [trial_file(*args[1:]) for args in again] == [first]
+
+
+def _damage(file, content):
+    if content is None:
+        file.mkdir()
+    else:
+        file.write_bytes(content)
+
+
+class _EnoughError(Exception):
+    """Ends a run in a test."""
+
+
+def _play_with(monkeypatch, result):
+    """Let trials be played by `result`, in this process; return the list of what is asked for."""
+    asked = []
+
+    class Pool:
+        def __init__(self, *_args, **_options):
+            pass
+
+        def submit(self, _work, *args):
+            asked.append(args)
+            return result(*args)
+
+        def shutdown(self, **_options):
+            pass
+
+    def completed(futures):
+        if not any(f.done() for f in futures):
+            raise _EnoughError
+        return futures
+
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(campaign, "as_completed", completed)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (
+            BrokenProcessPool("a process ended"),
+            "A worker process was killed.*the same command with the same --out goes on",
+        ),
+        (OSError(28, "No space left on device"), r"could not be written .*\(No space left on device\).* goes on"),
+    ],
+)
+def test_what_ended_a_worker_is_said(tmp_path, monkeypatch, error, words):
+    def failed(*_task):
+        future = Future()
+        future.set_exception(error)
+        return future
+
+    _play_with(monkeypatch, failed)
+    with pytest.raises(ExperimentError, match=words):
+        run_campaign(SMALL, tmp_path, lambda *_: None)
+
+
+def test_a_trial_that_a_signal_ends_ends_its_worker_and_leaves_no_result(tmp_path, monkeypatch):
+    class Ended(Exception):
+        pass
+
+    def end(code):
+        raise Ended(code)
+
+    def terminated(*_args):
+        raise SystemExit(143)
+
+    monkeypatch.setattr(campaign.os, "_exit", end)
+    monkeypatch.setitem(campaign.EXPERIMENTS, "static", replace(campaign.EXPERIMENTS["static"], trial=terminated))
+    request = Request(("static",), seeds=1)
+    campaign.open_folder(request, tmp_path)
+    with pytest.raises(Ended, match="143"):
+        campaign._work(request, tmp_path, *request.tasks()[0])
+    assert list((tmp_path / "trials").glob("*/*")) == []
+
+
+@pytest.mark.parametrize(("record", "kept"), [("first", [0]), ("all", [0, 1])])
+def test_the_trials_that_are_wanted_are_recorded(tmp_path, monkeypatch, record, kept):
+    def played(_cell, seed, context):
+        if context.recording:
+            context.recording.write_text(str(seed))
+        return {}, None
+
+    monkeypatch.setitem(campaign.EXPERIMENTS, "static", replace(campaign.EXPERIMENTS["static"], trial=played))
+    request = Request(("static",), seeds=2, record=record)
+    campaign.open_folder(request, tmp_path)
+    cell = request.tasks()[0][0]
+    campaign.recording_file(tmp_path, cell, 0).with_suffix(".unfinished").write_text("of a killed worker")
+    for seed in (0, 1):
+        campaign._work(request, tmp_path, cell, seed)
+    assert [seed for seed in (0, 1) if campaign.recording_file(tmp_path, cell, seed).exists()] == kept
+    assert campaign.recording_file(tmp_path, cell, 0).read_text() == "0"
+    assert len(list((tmp_path / "recordings").iterdir())) == len(kept)
+
+
+def test_a_file_is_written_whole_or_not_at_all_however_long_its_name(tmp_path):
+    path = tmp_path / ("x" * 255)
+    write_json({"a": 1}, path)
+    assert json.loads(path.read_text()) == {"a": 1}
+    (tmp_path / "below").mkdir()
+    with pytest.raises(IsADirectoryError):
+        write_json({}, tmp_path / "below")
+    assert {p.name for p in tmp_path.iterdir()} == {path.name, "below"}
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ExperimentError, match="cannot be used: Not a directory: give another --out"):
+        open_folder(SMALL, tmp_path / "file" / "below")
+
+
+@contextmanager
+def started(out):
+    """A run of many trials as its own process and group."""
+    command = [sys.executable, "-m", "pretouch.cli", "reproduce", "static", "--seeds", "50", "--out", str(out)]
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        process_group=0,
+        # a background job of a shell inherits that Ctrl-C is ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    with process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def wait_for(process, happened):
+    deadline = time.monotonic() + 200
+    while not happened():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline
+        wait([process.stderr], 0.02)
+
+
+@pytest.fixture
+def long_run(tmp_path):
+    """A run of many trials, some of them finished."""
+    out = tmp_path / "out"
+    with started(out) as process:
+        wait_for(process, lambda: len(list((out / "trials").glob("*/[!.]*.json"))) >= 3)
+        yield process, out
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.1, 0.4, 0.8])
+def test_ctrl_c_while_workers_start_leaves_no_traceback(tmp_path, delay):
+    with started(tmp_path) as process:
+        wait_for(process, (tmp_path / "run.json").exists)
+        time.sleep(delay)
+        os.killpg(process.pid, signal.SIGINT)
+        said = process.communicate(timeout=100)[1]
+    assert process.returncode == 130
+    assert "Traceback" not in said
+
+
+def test_a_killed_worker_is_said_in_a_sentence(long_run):
+    process, out = long_run
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    workers = [pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    os.kill(int(workers[-1]), signal.SIGKILL)
+    said = process.communicate(timeout=100)[1]
+    assert process.returncode == 2
+    assert "A worker process was killed" in said
+    assert "Traceback" not in said
+    assert len(json.loads((out / "results.json").read_text())["trials"]) >= 3
+
+
+SLOWLY = [pytest.param(*ending, marks=pytest.mark.slow) for ending in ((signal.SIGTERM, 143), (signal.SIGKILL, -9))]
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), *SLOWLY])
+def test_a_stopped_run_leaves_whole_results(long_run, number, code):
+    process, out = long_run
+    process.send_signal(number)
+    said = process.communicate(timeout=100)[1]
+    assert process.returncode == code
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("*/[!.]*.json")]
+    assert len(rows) >= 3
+    assert all(row["experiment"] == "static" for row in rows)
+    if number != signal.SIGKILL:
+        assert "finished trials are in" in said
+        results = json.loads((out / "results.json").read_text())
+        assert len(results["trials"]) == len(rows)
+        assert "Traceback" not in said

@@ -1,0 +1,50 @@
+"""What a run is made of: cells, grids, and all of the paper."""
+
+from pretouch_lab.campaign import Request
+from pretouch_lab.cell import Cell, Grid
+from pretouch_lab.paper.whole import whole_paper
+from pretouch_lab.registry import EXPERIMENTS
+
+
+def test_files_of_different_cells_differ():
+    modes = ("off", "hard", "slack", "floor")
+    names = ("blind", "paper", "paper:restriction.beta=-10", "paper:restriction.beta=10", "paper:threshold.alpha=0.3")
+    grid = Grid(names[:3] + names[4:], modes, (2e3, 25e3))
+    cells = [cell for experiment in EXPERIMENTS.values() for cell in experiment.cells(grid)]
+    assert len({cell.name for cell in cells}) == len(cells)
+    assert all(
+        set(cell.name) <= set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_") for cell in cells
+    )
+    assert Cell("static", names[2]).name != Cell("static", names[3]).name
+    odd = ("paper:restriction.slack_weight=1e-3", "paper:restriction.slack_weight=1e+3")
+    assert Cell("static", odd[0]).name != Cell("static", odd[1]).name
+
+
+def test_a_cell_that_is_named_twice_runs_once():
+    tasks = Request(("release",), 1, profiles=("paper", "paper:reaction.decay_cycles=50")).tasks()
+    names = [cell.name for cell, _ in tasks]
+    assert len(names) == len(set(names))
+
+
+def test_a_grid_gives_each_profile_its_modes():
+    grid = Grid(("blind", "paper", "paper:restriction.mode=floor"), ("slack", "hard"))
+    assert grid.controllers("off") == [
+        ("blind", "off"), ("paper", "slack"), ("paper", "hard"), ("paper:restriction.mode=floor", "floor"),
+    ]  # fmt: skip
+    assert Grid(("paper",)).controllers("slack") == [("paper", "slack")]
+
+
+def test_the_whole_paper_runs_every_experiment_and_no_trial_twice():
+    runs = whole_paper(Request(tuple(EXPERIMENTS), seeds=2))
+    cells = [(cell.name, seed) for _, request in runs for cell, seed in request.tasks()]
+    assert len(cells) == len(set(cells))
+    assert {cell.experiment for _, request in runs for cell, _ in request.tasks()} == set(EXPERIMENTS)
+    assert len({name for name, _ in runs}) == len(runs)
+
+
+def test_the_whole_paper_with_less_is_less():
+    asked = Request(tuple(EXPERIMENTS), 1, profiles=("paper",), restrictions=("slack",), stiffness=(2e3,))
+    cells = [c for _, request in whole_paper(asked) for c, _ in request.tasks() if c.experiment == "static"]
+    assert [(c.profile, c.where["restrictions"], c.where["stiffness_n_per_m"]) for c in cells] == [
+        ("paper", "slack", 2e3)
+    ] * 4

@@ -1,0 +1,135 @@
+"""What each command says and does where an extra is missing: each is hidden in turn, in a process of its own."""
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pretouch import extras
+from pretouch.cli.registry import command_names
+from pretouch.errors import MissingExtraError
+from pretouch.extras import BAGS, EXTRAS, FIGURES, FRANKA, MESHES, ROS2, VIEWER
+from pretouch_lab.extras import SWEEP
+
+URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename="a.dae"/></geometry></collision></link>
+<link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+ARM = ("run", "--robot", "franka", "--ip", "127.0.0.1")
+LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")  # requires figures
+X = ("--vary", "scene.x1=0:1", "--vary", "scene.x2=0:1", "--samples", "2", "--processes", "1")
+# what is asked for, and the extra it needs; the others end for another reason, beyond all imports
+ASKED = [
+    (("live", "--path", "spiral"), VIEWER),
+    (("replay", "gone.mcap"), VIEWER),
+    (("replay", "gone.mcap", "--no-page"), None),
+    (ARM, "franka"),
+    ((*ARM, "--arm", "fr3"), FRANKA),
+    ((*ARM, "--lockstep", "--seconds", "1"), FRANKA),
+    (
+        ("run", "--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--no-skin", "--profile", "blind"),
+        "ros2",
+    ),
+    (("run", "--skin", "gone.toml"), None),
+    (("sweep", "ishigami", *X, "--out", "sweep"), SWEEP),
+    (("sweep", "nothing"), None),
+    (("robot", "import", "arm.urdf", "--out", "arm"), MESHES),
+    (("robot", "check", "gone"), None),
+    (("demo", "--seeds", "0"), None),
+    (("reproduce", "nothing"), None),
+    (("figure", "nothing"), None),
+    (("bench", "detection", "--docs", "gone"), None),
+    (("bench", "avoidance", "--docs", "gone"), None),
+    (("bench", "localization", "--docs", "gone"), None),
+    (("bench", "both", "--docs", "gone"), None),
+    (("bench", "free-motion", "--seeds", "0"), None),
+    (("bench", "cycle", "--rate", "0"), None),
+    (("bench", "calibration", "--skins", "0"), None),
+    (("recover", "gone.mcap"), None),
+    (("detect", "gone.csv"), None),
+    (("detect", "a.bag"), BAGS),
+    (("detect", "force.csv", "--out", "force.png"), FIGURES),
+    (("identify", "gone.mcap"), None),
+    (("report", "gone.mcap"), FIGURES),
+    (("skin", "monitor", "--keys", "gone.toml"), None),
+    (("skin", "calibrate", "--skin", "gone.toml", "--recording", "gone.mcap"), None),
+    (("skin", "coverage", "gone.toml"), None),
+    (("skin", "simulate", "--keys", "keys.toml", "--skin", "gone.toml"), None),
+    (("skin", "provision", "--id", "a", "--keys", "k.toml", "--ssid", "a", "--host", "::"), None),
+    (("skin", "keys", "--keys", "k.toml"), None),
+    (("warm-up",), None),
+    (("serve-fci", "--stiffness", "-1"), None),
+]
+SCRIPT = """
+import io, json, sys
+from contextlib import redirect_stderr, redirect_stdout
+hidden, asked = json.loads(sys.argv[1])
+sys.modules.update(dict.fromkeys(hidden))
+from pretouch.cli import main
+for words in asked:
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as said:
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = end.code
+    print(json.dumps([code, said.getvalue()]))
+"""
+
+
+def test_every_command_is_asked_for():
+    assert {words[0] for words, _ in ASKED} == set(command_names())
+
+
+@pytest.mark.parametrize("extra", [*EXTRAS, SWEEP], ids=lambda extra: extra.name)
+def test_without_an_extra_a_command_does_without_it_or_says_what_to_run(extra, tmp_path, monkeypatch):
+    (tmp_path / "arm.urdf").write_text(URDF)
+    for name in ("a.dae", "a.bag"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "force.csv").write_text("time_s,force_x_N,force_y_N,force_z_N\n0,0,0,0\n")
+    monkeypatch.chdir(tmp_path)
+    there = [words for words, _ in ASKED if extra != FIGURES or words[0] not in LAB]
+    asked = [(words, needed) for words, needed in ASKED if needed in (None, extra) and words in there]
+    given = json.dumps([extra.modules, [words for words, _ in asked]])
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, given], capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    answers = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(answers) == len(asked)
+    for (words, needed), (code, said) in zip(asked, answers, strict=True):
+        assert "Traceback" not in said, words
+        assert code in (0, 2), (words, said)
+        if needed:
+            assert code == 2, words
+            assert f"of the extra '{extra.name}': run {extra.command}\n" in said, (words, said)
+        else:
+            assert "extra" not in said, (words, said)
+            assert "usage" not in said, (words, said)
+
+
+def test_the_sentence_names_make_in_a_clone_and_pip_elsewhere(monkeypatch, tmp_path):
+    monkeypatch.setattr(extras, "find_spec", lambda name: None)
+    monkeypatch.setattr(extras, "_CLONE", tmp_path)
+    monkeypatch.setattr(sys, "executable", "/a b/python")
+    with pytest.raises(MissingExtraError) as caught:
+        ROS2.need("An arm on ROS 2")
+    assert str(caught.value) == (
+        "An arm on ROS 2 needs cyclonedds, rosbags of the extra 'ros2': run"
+        " '/a b/python' -m pip install 'pretouch[ros2]'"
+    )
+    monkeypatch.setattr(sys, "prefix", str(tmp_path / ".venv"))
+    monkeypatch.chdir(tmp_path)
+    assert ROS2.command == "make ros2"
+    assert VIEWER.command == "make setup"
+    monkeypatch.chdir("/")
+    assert ROS2.command == f"make -C {tmp_path} ros2"
+
+
+@pytest.mark.parametrize("extra", [*EXTRAS, SWEEP], ids=lambda extra: extra.name)
+def test_an_extra_is_one_that_its_distribution_has_and_make_installs(extra):
+    root = Path(__file__).parents[2]
+    project = root / ("lab" if extra.distribution == "pretouch-lab" else "") / "pyproject.toml"
+    assert extra.name in tomllib.loads(project.read_text())["project"]["optional-dependencies"]
+    assert f"\n{extra.target}: " in (root / "Makefile").read_text()

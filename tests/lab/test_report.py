@@ -1,0 +1,147 @@
+import json
+from dataclasses import fields, replace
+from html.parser import HTMLParser
+from shutil import copytree
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pretouch.errors import ExperimentError, RecordingError
+from pretouch.recording.reader import open_recording
+from pretouch.text_table import TextTable
+from pretouch.whole_file import write_json
+from pretouch_lab.campaign import Request, open_folder, recording_file, trial_file
+from pretouch_lab.cell import Cell, Grid
+from pretouch_lab.paper import dynamic, static
+from pretouch_lab.registry import EXPERIMENTS, summarise
+from pretouch_lab.report import write_report
+from pretouch_lab.trace import Trace, read_trace, trace_of
+from pretouch_lab.trial import record_of
+
+LINE = ("line", "-y")
+
+
+class Links(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.images, self.tables, self.anchors, self.ids = [], 0, [], set()
+
+    def handle_starttag(self, tag, attrs):
+        if tag == "img":
+            self.images.append(dict(attrs)["src"])
+        self.tables += tag == "table"
+        self.anchors += [dict(attrs)["href"][1:]] if tag == "a" else []
+        self.ids |= {dict(attrs).get("id")}
+
+
+@pytest.fixture(scope="module")
+def request_and_folder(context, tmp_path_factory):
+    request, out = Request(("static", "dynamic"), seeds=1), tmp_path_factory.mktemp("run")
+    open_folder(request, out)
+    cells = [c for c in static.cells(Grid(("blind", "paper"))) if (c.where["trajectory"], c.where["side"]) == LINE]
+    for cell in [*cells, Cell(dynamic.NAME, "paper", {"restrictions": "slack"})]:
+        recorded = replace(context, recording=recording_file(out, cell, 0))
+        row, _ = (static if cell.experiment == "static" else dynamic).trial(cell, 0, recorded)
+        write_json(row, trial_file(out, cell, 0))
+    return request, out
+
+
+def test_the_page_shows_each_table_and_picture(request_and_folder):
+    request, out = request_and_folder
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("*/*.json")]
+    page = write_report([(request, out)], summarise(rows), out)
+    links = Links()
+    links.feed(page.read_text())
+    assert links.tables == 2
+    assert links.images == ["static.png", "dynamic.png", "framework.png"]
+    assert links.anchors == ["static", "dynamic"]
+    assert set(links.anchors) <= links.ids
+    for name in links.images:
+        with Image.open(out / name) as picture:
+            assert picture.width >= 1000
+            assert np.asarray(picture.convert("L")).std() > 10
+
+
+def test_a_run_without_trials_still_has_a_page(tmp_path):
+    request = Request(("static",), seeds=1)
+    open_folder(request, tmp_path)
+    text = write_report([(request, tmp_path)], {}, tmp_path).read_text()
+    assert "<table" not in text
+    assert "static: 1 seeds, profiles blind, paper" in text
+
+
+def test_a_page_that_cannot_be_written_is_named(tmp_path):
+    request = Request(("avoidance",), seeds=1)
+    with pytest.raises(ExperimentError, match="page cannot be written"):
+        write_report([(request, tmp_path / "none")], {}, tmp_path / "none")
+
+
+def test_a_recording_that_cannot_be_read_leaves_its_picture_out(request_and_folder, tmp_path):
+    request, whole = request_and_folder
+    out = copytree(whole, tmp_path / "out")
+    (file,) = (out / "recordings").glob("dynamic*.mcap")
+    file.write_bytes(file.read_bytes()[:100])
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("*/*.json")]
+    links = Links()
+    links.feed(write_report([(request, out)], summarise(rows), out).read_text())
+    assert links.images == ["static.png", "framework.png"]
+
+
+@pytest.mark.parametrize("content", [b"", b"no recording", b"\x89MCAP0\r\n"])
+def test_what_is_no_recording_is_named(tmp_path, content):
+    path = tmp_path / "x.mcap"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"x\.mcap "):
+        read_trace(path)
+
+
+def test_a_recorded_trial_has_the_course_of_the_trial_itself(context, tmp_path):
+    where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
+    cell, place = Cell(static.NAME, "paper", where), tmp_path / "x.mcap"
+    _, record = static.trial(cell, 101, replace(context, recording=place))
+    trace, again = trace_of(record), read_trace(place)
+    assert again[1] == context.skin.ids
+    for field in fields(Trace):
+        np.testing.assert_array_equal(getattr(again[0], field.name), getattr(trace, field.name))
+    kept = record_of(open_recording(place))
+    assert [(t.time, t.link, t.velocity.tolist()) for t in kept.touches] == [
+        (t.time, t.link, t.velocity.tolist()) for t in record.touches
+    ]
+    np.testing.assert_array_equal(kept.hand_position, record.hand_position)
+
+
+def test_to_record_a_trial_changes_nothing_of_it(context, tmp_path):
+    where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
+    cell = Cell(static.NAME, "paper", where)
+    row, _ = static.trial(cell, 101, context)
+    assert static.trial(cell, 101, replace(context, recording=tmp_path / "x.mcap"))[0] == row
+
+
+def test_a_trace_has_the_mean_true_force_of_each_step(context):
+    where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
+    _, record = static.trial(Cell(static.NAME, "blind", where), 101, context)
+    trace = trace_of(record)
+    i = int(np.abs(trace.true_force[:, 1]).argmax())
+    since = (record.true_time > trace.time[i - 1] + 1e-9) & (record.true_time <= trace.time[i] + 1e-9)
+    assert since.sum() == 10
+    np.testing.assert_allclose(trace.true_force[i], record.true_force[since].mean(axis=0))
+
+
+def test_the_tables_are_written_in_markdown_too(request_and_folder, tmp_path, monkeypatch):
+    request, out = request_and_folder
+    table = TextTable("Title", ("|a|", "b\n[m]"), (("x|y", "1\n2"),), "A note.")
+    static_only = replace(EXPERIMENTS["static"], tables=lambda _: [table])
+    monkeypatch.setattr("pretouch_lab.report.GROUPS", {"Group": (static_only,)})
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("static-*/*.json")]
+    write_report([(request, out)], summarise(rows), tmp_path)
+    assert (tmp_path / "tables.md").read_text().splitlines()[:5] == [
+        "## Title", "", r"| \|a\| | b<br>[m] |", "| --- | --- |", r"| x\|y | 1<br>2 |",
+    ]  # fmt: skip
+
+
+def test_the_page_says_what_was_run(request_and_folder):
+    request, out = request_and_folder
+    page = write_report([(request, out), (Request(("noise",), 1), out)], {}, out).read_text()
+    assert "static, dynamic: 1 seeds, profiles blind, paper, restrictions off, slack." in page
+    assert "noise: 1 seeds, profiles blind:threshold.f_base_n=1000." in page

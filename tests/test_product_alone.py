@@ -1,0 +1,92 @@
+"""The product goes its ways without the lab, and without anything that only figures, bags and sweeps need."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pretouch.extras import BAGS, FIGURES, VIEWER
+from tests.importing.made import six_axis, written
+
+HIDDEN = ("pretouch_lab", "matplotlib", "mpl_toolkits", "rosbags", "SALib", "pyarrow", "distributed", "viser")
+_ALONE = f"""
+import sys
+sys.modules.update(dict.fromkeys({HIDDEN}))  # to import one of them is an ImportError
+from pretouch.cli import main
+if sys.argv[1:2] == ["run"]:  # pushes and checks take seconds
+    from pretouch.cli.run import command
+    from pretouch.session.preflight import PreflightParams
+    command.GuidedPush.confirm = lambda *_: None
+    command.PREFLIGHT = PreflightParams(watch_s=1.0)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder, in a process that finds none of the hidden modules."""
+    return subprocess.run([sys.executable, "-c", _ALONE, *words], cwd=folder, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize(
+    "words", [("live",), ("skin",), ("run",), ("replay",), ("detect",), ("robot", "import"), ("serve-fci",)]
+)
+def test_help(tmp_path: Path, words: tuple[str, ...]):
+    done = alone(tmp_path, *words, "--help")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"usage: pretouch {words[0]}" in done.stdout
+
+
+def test_a_rehearsed_run_is_recorded_recomputed_and_not_reported_without_figures(tmp_path: Path):
+    words = ("--no-skin", "--profile", "blind", "--path", "hold", "--seconds", "0.1", "--yes", "--no-learnt")
+    done = alone(tmp_path, "run", *words, "--record", "a.mcap")
+    assert done.returncode == 0, done.stderr
+    done = alone(tmp_path, "replay", "a.mcap", "--verify")
+    assert done.returncode == 0, done.stderr
+    done = alone(tmp_path, "report", "a.mcap")
+    assert done.returncode == 2
+    assert done.stderr == f"A report needs matplotlib of the extra 'figures': run {FIGURES.command}\n"
+    done = alone(tmp_path, "detect", "a.mcap")
+    assert done.returncode == 2
+    assert done.stderr == f"A bag or MCAP file needs rosbags of the extra 'bags': run {BAGS.command}\n"
+
+
+def test_contacts_of_a_table_are_found_and_only_the_figure_needs_more(tmp_path: Path):
+    rows = (f"{0.01 * i},0,0,{25 if 300 < i < 320 else 0.1 * (i % 2)}" for i in range(400))
+    (tmp_path / "force.csv").write_text("\n".join(["time_s,force_x_N,force_y_N,force_z_N", *rows]))
+    done = alone(tmp_path, "detect", "force.csv", "--json", "found.json")
+    assert done.returncode == 0, done.stderr
+    (profile,) = json.loads((tmp_path / "found.json").read_text())["profiles"]
+    assert len(profile["contacts"]) == 1
+    done = alone(tmp_path, "detect", "force.csv", "--out", "figure.png")
+    assert done.returncode == 2
+    assert done.stderr == f"A figure needs matplotlib of the extra 'figures': run {FIGURES.command}\n"
+
+
+def test_an_arm_is_imported(tmp_path: Path):
+    done = alone(tmp_path, "robot", "import", str(written(tmp_path, six_axis())), "--out", "arm")
+    assert done.returncode == 0, done.stderr
+    assert alone(tmp_path, "robot", "check", "arm").returncode == 0
+
+
+def test_a_simulated_arm_is_served(tmp_path: Path):
+    command = [sys.executable, "-u", "-c", _ALONE, "serve-fci", "--port", "0", "--scene", "static"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as server:
+        assert server.stdout is not None
+        assert server.stdout.readline().startswith("Listening at 127.0.0.1:")
+        server.terminate()
+
+
+@pytest.mark.parametrize("name", ["reproduce", "demo"])
+def test_a_command_of_the_lab_is_a_sentence(tmp_path: Path, name: str):
+    done = alone(tmp_path, name)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "pretouch-lab" in done.stderr
+
+
+def test_live_names_what_it_needs(tmp_path: Path):
+    done = alone(tmp_path, "live")
+    assert done.returncode == 2
+    assert done.stderr == f"The page needs viser of the extra 'viewer': run {VIEWER.command}\n"
