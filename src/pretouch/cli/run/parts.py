@@ -37,7 +37,7 @@ class Parts:
     profile: Profile
     floor: float
     """Height of what is below the arm, base frame [m]."""
-    task: TaskOptions
+    task: "TaskOptions"
 
     @property
     def fixtures(self) -> Fixtures:
