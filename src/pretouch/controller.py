@@ -185,7 +185,7 @@ class Controller:
         push = response.Felt(model, kin, robot, felt, close, state.command, p, fixed.planes, fixed.capsules)
         react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
         events |= events_of(
-            unfit, silent, lost, felt, feeling.window.count, react, close, before, state.near.detour.blocked, p
+            unfit, silent, lost, felt, feeling.window.count, react, close, before, state.near.blocked, p
         )  # fmt: skip
         mode = next_mode(state.mode, events, inputs.resume)
         contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
@@ -196,8 +196,7 @@ class Controller:
         # how fast: eqs. 3-4 on the path, or eq. 12
         slowed = speed_scale(seen.nearest, p.reduction.d_max_m) if p.reduction.enabled else 1.0
         scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.reduction)
-        shifted = x - state.near.detour.offset if p.anticipation.detour else x
-        way = paths.follow(self.path, state.path, shifted, p.task)
+        way = paths.follow(self.path, state.path, x, p.task)
         answer, react = response.answered(react, doing(mode, felt.armed, p), push)
         desired, qd = (way.scaled(scale), None) if answer is None else (answer.velocity, answer.qd)
         mark("path")

@@ -204,18 +204,6 @@ def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: Rob
     assert gaps["pretouch"] > gaps["pretouch:anticipation.null_space=no"] + 0.005
 
 
-def test_with_a_detour_the_hand_goes_aside_and_returns_to_the_path(panda_model: RobotModel, paper_skin: Skin):
-    arm = on_its_way(panda_model, paper_skin, profile("pretouch:anticipation.detour=yes"))
-    run_into_a_wall(arm, 150)
-    steps = arm.run(100, seen={LEFT: 0.01})
-    aside = arm.ee() - steps[-1].path_position
-    assert np.linalg.norm(aside[[0, 2]]) > 0.05
-    assert np.linalg.norm(arm.state.near.detour.offset) <= A.detour_distance_m + 1e-9
-    steps = arm.run(500)
-    np.testing.assert_array_equal(arm.state.near.detour.offset, np.zeros(3))
-    assert np.linalg.norm(steps[-1].ee_position - steps[-1].path_position) < 0.01
-
-
 def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model: RobotModel, paper_skin: Skin):
     arm = Arm(panda_model, paper_skin)
     wanted = np.array([0.02, -0.01, 0.03, 0.0, 0.01, -0.02, 0.01])

@@ -1,4 +1,4 @@
-"""Joint velocities with anticipation: the rows, null space and detour of `AnticipationParams` in place of eqs. 5-7.
+"""Joint velocities with anticipation: the rows and null space of `AnticipationParams` in place of eqs. 5-7.
 
 As in `joint_motion`, everything is done in one compiled call, made of the functions that are tested alone.
 """
@@ -7,8 +7,8 @@ import numpy as np
 
 from pretouch.cholesky import factor
 from pretouch.compiled import compiled
+from pretouch.control.blocked import time_blocked
 from pretouch.control.braking import braking_rows, slots_init
-from pretouch.control.detour import Detour, detour_init, shift
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.control.motion import Motion, joint_motion
 from pretouch.control.null_space import away, cost_with_null_space
@@ -31,7 +31,8 @@ class NearState:
     """(2 K, 9) rows of the units, see `control.braking`."""
     null_velocity: FloatArray
     """(n,) joint velocity asked for in the null space [rad/s]."""
-    detour: Detour
+    blocked: float
+    """How long the arm has been kept from its path [s]."""
 
 
 @value
@@ -44,8 +45,6 @@ class NearSettings:
     """(4,) of `touch_speed`."""
     null: FloatArray
     """(4,) of `away`: distance [m], speed [m/s], joint velocity [rad/s], its change in a period [rad/s]; or none."""
-    detour: FloatArray
-    """(5,) of `shift`: largest shift [m], step [m], speed [m/s], hold [s], period [s]."""
 
 
 _CLOSING_DEADBAND = 5
@@ -57,7 +56,7 @@ _NO_MASS, _NO_JOINT = np.zeros((0, 0)), np.zeros(0)
 
 def near_init(model: RobotModel, units: int) -> NearState:
     """Return the state with nothing near an arm with a skin of so many units."""
-    return NearState(slots_init(units), np.zeros(model.n), detour_init())
+    return NearState(slots_init(units), np.zeros(model.n), 0.0)
 
 
 def widened(state: NearState, units: int) -> NearState:
@@ -67,13 +66,13 @@ def widened(state: NearState, units: int) -> NearState:
         return state
     slots = slots_init(units)
     slots[:half], slots[units : units + half] = state.slots[:half], state.slots[half:]
-    return NearState(slots, state.null_velocity, state.detour)
+    return NearState(slots, state.null_velocity, state.blocked)
 
 
 def anticipates(profile: Profile) -> bool:
     """Whether a profile asks for anything that `joint_motion` alone does not do."""
     p = profile.anticipation
-    return profile.restriction.mode == "braking" or profile.task.mid_joint_projected or p.null_space or p.detour
+    return profile.restriction.mode == "braking" or profile.task.mid_joint_projected or p.null_space
 
 
 def near_settings(profile: Profile) -> NearSettings | None:
@@ -91,10 +90,6 @@ def near_settings(profile: Profile) -> NearSettings | None:
         touch_parameters(p),
         np.array((p.null_distance_m, p.null_speed_m_s, p.null_joint_rad_s, p.null_rate_rad_s2 * t.control_period_s))
         if p.null_space else _NO_JOINT,
-        np.array((
-            p.detour_distance_m if p.detour else 0.0, p.detour_speed_m_s * t.control_period_s, p.detour_speed_m_s,
-            p.detour_hold_s, t.control_period_s,
-        )),
     )  # fmt: skip
 
 
@@ -102,7 +97,7 @@ def _touching_at(settings: NearSettings, speed: float) -> NearSettings:
     """Return the settings with a touch speed [m/s] whatever the mass, and no heed of what moves by itself."""
     rows = settings.rows.copy()
     rows[_CLOSING_DEADBAND] = np.inf
-    return NearSettings(rows, np.array((np.inf, 1.0, 1.0, speed)), settings.null, settings.detour)
+    return NearSettings(rows, np.array((np.inf, 1.0, 1.0, speed)), settings.null)
 
 
 def near_motion(
@@ -132,20 +127,21 @@ def near_motion(
     else:
         rows, which = approach_rows(kin, model.moved_by, obstacles, r)
         G, h, room = rows.G, rows.h, len(rows.h)
-    after = NearState(state.slots.copy(), np.empty(n), Detour(state.detour.vectors.copy(), state.detour.times.copy()))
+    slots, null_velocity = state.slots.copy(), np.empty(n)
     qd, slack, multipliers, velocities = np.empty(n), np.empty(room), np.empty(n + room), np.empty((2, 3))
     H, f = np.empty((n, n)), np.empty(n)
-    seen, ending, violated = _near_motion(
-        after.slots, after.null_velocity, after.detour.vectors, after.detour.times, state.null_velocity,
+    seen, ending, violated, blocked = _near_motion(
+        slots, null_velocity, state.null_velocity, state.blocked, t.control_period_s,
         kin.position, kin.rotation, kin.anchor, kin.axis, model.moved_by, model.ee,
         robot.q, robot.qd, robot.q_commanded, robot.qd_commanded, mass,
         obstacles.unit, obstacles.link, obstacles.body_point, obstacles.direction, obstacles.body_distance,
-        obstacles.closing_speed, settings.rows, settings.touch, settings.null, settings.detour,
+        obstacles.closing_speed, settings.rows, settings.touch, settings.null,
         velocity, rotation_goal, model.q_mid, limits.table, r.slack_weight if soft else 0.0,
         t.orientation == "hold", t.orientation_gain_1_s, t.damping_max, t.manipulability_threshold, t.mid_joint_gain,
         t.mid_joint_time_s, t.mid_joint_projected, profile.failure.solver_iterations, braking, hold, tracks,
         _NO_JOINT if reaction_qd is None else reaction_qd, G, h, which, H, f, qd, slack, multipliers, velocities,
     )  # fmt: skip
+    after = NearState(slots, null_velocity, blocked)
     if violated and not soft and not hold:
         lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, limits.table)
         hard = ApproachRows(G, h, soft=False)
@@ -162,21 +158,21 @@ def near_motion(
 
 @compiled
 def _near_motion(
-    slots: FloatArray, null: FloatArray, shifted: FloatArray, shift_times: FloatArray, null_before: FloatArray,
+    slots: FloatArray, null: FloatArray, null_before: FloatArray, blocked: float, period: float,
     position: FloatArray, rotation: FloatArray, anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, ee: int,
     q: FloatArray, qd: FloatArray, q_commanded: FloatArray, qd_commanded: FloatArray, mass: FloatArray,
     unit: IntArray, link: IntArray, body_point: FloatArray, direction: FloatArray, distance: FloatArray,
-    closing: FloatArray, row_settings: FloatArray, touch: FloatArray, null_settings: FloatArray, detour: FloatArray,
+    closing: FloatArray, row_settings: FloatArray, touch: FloatArray, null_settings: FloatArray,
     velocity: FloatArray, rotation_goal: FloatArray, q_mid: FloatArray, limits: FloatArray, weight: float,
     keep_orientation: bool, orientation_gain: float, damping_max: float, threshold: float, mid_gain: float,
     mid_time: float, projected: bool, budget: int, braking: bool, hold: bool, tracks: bool, reaction_qd: FloatArray,
     G: FloatArray, h: FloatArray, which: IntArray, H: FloatArray, f: FloatArray, answer: FloatArray,
     slack: FloatArray, multipliers: FloatArray, velocities: FloatArray,
-) -> tuple[int, int, bool]:  # fmt: skip
-    """Change the slots and the detour, write `null` and the last two lines of arguments.
+) -> tuple[int, int, bool, float]:  # fmt: skip
+    """Change the slots, write `null` and the last two lines of arguments.
 
-    Rows G, h are given but for `braking`. Returns how many are of what is seen, how the solver ended, and whether any
-    row is violated.
+    Rows G, h are given but for `braking`. Returns how many are of what is seen, how the solver ended, whether any row
+    is violated, and for how long the path has been blocked.
     """
     n, seen, found = len(q), len(h), len(h)
     if braking:
@@ -215,8 +211,5 @@ def _near_motion(
         hand, towards = np.empty(seen, np.bool_), np.empty((seen, 3))
         for k in range(seen):
             hand[k], towards[k] = moved_by[link[which[k]]].all(), direction[which[k]]
-        shift(
-            shifted, shift_times, velocity, velocities[1], towards, h[:seen], hand, detour[0], detour[1], detour[2],
-            detour[3], detour[4],
-        )  # fmt: skip
-    return seen, ending, bool((slack > 0.0).any())
+        blocked = time_blocked(blocked, velocity, velocities[1], towards, h[:seen], hand, period)
+    return seen, ending, bool((slack > 0.0).any()), blocked
