@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka ros2 meshes browser micropython test test-slow lint bench peers format clean
+.PHONY: setup demo live franka ros2 meshes browser micropython test test-slow golden golden-values lint bench peers format clean
 
 setup: $(STAMP)
 
@@ -49,6 +49,15 @@ test: setup
 test-slow: setup
 	$(BIN)/pytest -n 2 -m "slow and not alone"
 	$(BIN)/pytest -n 0 -m alone
+
+# every field of every control step, to the bit, here and in the commit BASE (docs/design.md, golden steps)
+BASE ?= HEAD
+golden: setup
+	$(BIN)/python -m tests.golden $(BASE) $(foreach name,$(WITHOUT),--without "$(name)")
+
+# the values the default tests hold: renewed only where the arm is meant to do something else, in a commit of its own
+golden-values: setup
+	$(BIN)/python -m tests.golden.values
 
 lint: setup
 	$(BIN)/ruff check .
