@@ -128,8 +128,8 @@ def yielded(
     # just after a contact the filters still lag, and the detector has found a push already
     at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
     tank, pushed = _yield(
-        torque, command, band, state, p, _Step(keep, at_once, 1.0 - math.exp(-dt / _STEADY_S), dt),
-        _After(velocity, side, sliding, steady),
+        torque, command, band, state, p, (keep, at_once, 1.0 - math.exp(-dt / _STEADY_S), dt),
+        (velocity, side, sliding, steady),
     )  # fmt: skip
     velocity = _no_faster(velocity, *arm, p.speed_max_m_s)
     quiet, unfelt = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.unfelt + dt

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, entry
+from pretouch.compiled import entry
 from pretouch.contact.reaction import external_force
 from pretouch.contact.thresholds import ThresholdNumbers, crossed, side_distances, threshold_parts
 from pretouch.contact.window import WindowState, add_to, added, place, window_mean, window_std
@@ -52,10 +52,11 @@ def detect(
     """
     armed, p, parts = state.full, params, np.empty((6, 3))
     chunk, at, sums = place(state)
-    found = _detect(
-        _Window(chunk, at, sums, state.count, armed),
-        _Force(force is not None, _NONE if force is None else force, p.compare == "filtered"), ee_position, obstacles,
-        p, parts,
+    found = _detect.flat(
+        chunk, at, sums, state.count, armed,
+        force is not None, _NONE if force is None else force, p.compare == "filtered",
+        ee_position, obstacles.point, obstacles.ee_distance,
+        p.alpha, p.lambda_, p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n, p.d_max_m, p.d_min_m, parts,
     )  # fmt: skip
     after = state if force is None else added(state, chunk, sums)
     limits, contact = Thresholds(parts), None
@@ -99,7 +100,7 @@ class _Near(NamedTuple):
 
 @entry
 def _detect(
-    window: _Window, force: _Force, ee_position: FloatArray, obstacles: ByName[_Near], p: ByName[ThresholdNumbers],
+    window: _Window, force: _Force, ee_position: FloatArray, obstacles: _Near, p: ThresholdNumbers,
     parts: FloatArray,
 ) -> bool:  # fmt: skip
     """Add to the window, write the thresholds (6, 3), and say whether the force crosses one of them."""

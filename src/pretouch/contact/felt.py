@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry
+from pretouch.compiled import compiled, entry
 from pretouch.contact.cues import Cues
 from pretouch.contact.fixed import force_map_into
 from pretouch.contact.hypotheses import NearPrior, write_hypotheses
@@ -139,17 +139,20 @@ def take_sample(
             weights, covariance, spread, seen = weights.copy(), covariance.copy(), spread.copy(), seen.copy()
     lasting, turning = state.lasting.copy(), state.turning.copy()
     may = p.learn and (watched or p.learn_unseen)
-    memory = _Memory(
-        Learnt(weights, covariance, spread, seen, prior), _Blocks(block, m.filled, queue, m.waiting),
-        _Recent(ring, state.at, min(state.count + 1, LONGEST), state.calm, lasting, state.steady, turning, m.speed),
-    )  # fmt: skip
-    now = _Now(
+    o = obstacles
+    evidence, calm, filled, waiting, steady = _take.flat(
+        robot.qd, robot.qd_commanded, robot.tau_ext,
+        o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
+        weights, covariance, spread, seen, prior,
+        block, m.filled, queue, m.waiting,
+        ring, state.at, min(state.count + 1, LONGEST), state.calm, lasting, state.steady, turning, m.speed,
         math.exp(-p.observer_gain_1_s * period), period, settle, alarm_level(p, period), may, reacting,
         (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2, cues.gain,
+        p.inertia, p.widen_at_turns, p.offset_prior_nm, p.use_proximity, p.contact_gain, p.tails, p.near_gain,
+        p.near_m, p.near_horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm, p.still_rad_s,
+        p.memory_s, p.spread_memory_s,
+        residual, speed, force, bands, means, S, doubt, *kin, *model.mechanism_fields,
     )  # fmt: skip
-    evidence, calm, filled, waiting, steady = _take(
-        kin, model.mechanism, robot, obstacles, memory, p, now, _Room(residual, speed, force, bands, means, S, doubt)
-    )
     at, count = (state.at + 1) % LONGEST, min(state.count + 1, LONGEST)
     if steady < 0:  # learnt: what was felt before is no contact
         felt = Felt(residual, means, S, doubt, 0.0, np.zeros(3), bands, False, True, False)
@@ -263,8 +266,8 @@ class _Room(NamedTuple):
 
 @entry
 def _take(
-    kin: Kinematics, mechanism: Mechanism, robot: ByName[_Robot], obstacles: ByName[ObstacleArrays], memory: _Memory,
-    p: ByName[_Params], now: _Now, room: _Room,
+    robot: _Robot, obstacles: ObstacleArrays, memory: _Memory, now: _Now, p: _Params, room: _Room, kin: Kinematics,
+    mechanism: Mechanism,
 ) -> tuple[float, int, int, int, int]:  # fmt: skip
     """Write what a sample says, and what is learnt; return evidence, calm samples, and what waits."""
     learnt, blocks, recent = memory

@@ -116,8 +116,8 @@ def listen(
     likelihood = np.zeros((BINS, len(model.parts)))
     judged = _listen(
         kin, model.mechanism, skin.arrays, robot.qd_commanded, imu,
-        _Memory(
-            number, gap, _Bins(felt, heard, expected, moved, told), _Usual(mean, spread, usual, seen), speed, behind
+        (
+            number, gap, (felt, heard, expected, moved, told), (mean, spread, usual, seen), speed, behind
         ),
         _Params(period, p.imu_follow_1_s, p.imu_motion_doubt, p.rotor_kg_m2, p.imu_contact_gain, p.imu_tails),
         likelihood,

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, entry
+from pretouch.compiled import entry
 from pretouch.control.baselines import MODES, baseline_motion
 from pretouch.control.joint_box import box_and_brake
 from pretouch.control.penalty import SOLVED, Minimum, Problem, excesses, minimise
 from pretouch.control.qp import ENDING, Cost, cost_into, solve, task_cost
 from pretouch.control.restriction import Rows, approach_rows, rows_into
-from pretouch.control.setup import Asked, MotionNumbers, MotionRequest, MotionSetup
+from pretouch.control.setup import NO_JOINTS, Asked, MotionNumbers, MotionRequest, MotionSetup
 from pretouch.control.task import task, twist
 from pretouch.groups import NOTHING_NEAR, Arm, JointArrays, ObstacleArrays
 from pretouch.robot.model import Kinematics, jacobian_into
@@ -55,9 +55,13 @@ def joint_motion(
     n, count = model.n, 0 if restriction.mode == "off" else len(obstacles.unit)
     qd, multipliers, velocities = np.empty(n), np.empty(n + count), np.empty((2, 3))
     restricted, rows = np.empty(count, WHOLE), np.empty((2, count))
-    found, ending, violated = _motion(
-        model.arm, kin, robot, obstacles if count else NOTHING_NEAR, setup.numbers, request,
-        _Answer(qd, multipliers, velocities, restricted, rows),
+    o = obstacles if count else NOTHING_NEAR
+    found, ending, violated = _motion.flat(
+        robot.q, robot.qd, robot.q_commanded, robot.qd_commanded,
+        o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
+        request.velocity, request.rotation_goal, request.hold, request.tracks,
+        request.qd is not None, NO_JOINTS if request.qd is None else request.qd,
+        qd, multipliers, velocities, restricted, rows, *kin, *setup.fields,
     )  # fmt: skip
     if violated and restriction.mode == "hard" and not request.hold:
         return _motion_with_hard_rows(setup, kin, robot, obstacles, request)
@@ -91,8 +95,8 @@ class _Answer(NamedTuple):
 
 @entry
 def _motion(
-    arm: Arm, kin: Kinematics, robot: ByName[JointArrays], obstacles: ByName[ObstacleArrays], numbers: MotionNumbers,
-    asked: ByName[Asked], answer: _Answer,
+    robot: JointArrays, obstacles: ObstacleArrays, asked: Asked, answer: _Answer, kin: Kinematics, arm: Arm,
+    numbers: MotionNumbers,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Write the answer; return how many rows, how the solver ended, and whether any is violated."""
     n, limit, slack, multipliers = len(robot.q), answer.rows[0], answer.rows[1], answer.multipliers

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.cholesky import factor
-from pretouch.compiled import ByName, entry
+from pretouch.compiled import entry, flattened
 from pretouch.control.blocked import time_blocked
 from pretouch.control.braking import Mass, Slots, braking_rows, slots_init
 from pretouch.control.joint_box import box_and_brake
@@ -17,7 +17,15 @@ from pretouch.control.null_space import away, cost_with_null_space
 from pretouch.control.penalty import SOLVED, Minimum, Problem, excesses, minimise
 from pretouch.control.qp import Cost, solve
 from pretouch.control.restriction import ApproachRows, Rows, approach_rows
-from pretouch.control.setup import Asked, MotionNumbers, MotionRequest, MotionSetup, NearSettings, touching_at
+from pretouch.control.setup import (
+    NO_JOINTS,
+    Asked,
+    MotionNumbers,
+    MotionRequest,
+    MotionSetup,
+    NearSettings,
+    touching_at,
+)
 from pretouch.control.task import twist
 from pretouch.groups import Arm, Chain, JointArrays, ObstacleArrays
 from pretouch.robot.model import Kinematics, RobotModel, jacobian_into
@@ -69,8 +77,6 @@ def near_motion(
     settings, model, profile = setup.near, setup.model, setup.profile
     if settings is None:
         return joint_motion(setup, kin, robot, obstacles, request), state
-    if request.touch is not None:
-        settings = touching_at(settings, request.touch)
     r, n = profile.restriction, model.n
     mass, counts = _NO_NUMBERS, False
     if settings.braking:
@@ -86,10 +92,16 @@ def near_motion(
     slots = Slots(link.copy(), limit.copy(), across.copy(), normal.copy(), point.copy())
     null_velocity, cost = state.null_velocity.copy(), Cost(np.empty((n, n)), np.empty(n))
     qd, slack, multipliers, velocities = np.empty(n), np.empty(room), np.empty(n + room), np.empty((2, 3))
-    seen, ending, violated, blocked = _near_motion(
-        model.arm, kin, robot, obstacles, _Numbers(setup.numbers, settings), request,
-        _Memory(slots, _Other(null_velocity, state.blocked, counts, mass)),
-        _Room(G, h, which, cost.H, cost.f, qd, slack, multipliers, velocities),
+    o, fields = obstacles, setup.near_fields
+    if request.touch is not None:
+        fields = flattened(model.arm, setup.numbers, touching_at(settings, request.touch))
+    seen, ending, violated, blocked = _near_motion.flat(
+        robot.q, robot.qd, robot.q_commanded, robot.qd_commanded,
+        o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
+        request.velocity, request.rotation_goal, request.hold, request.tracks,
+        request.qd is not None, NO_JOINTS if request.qd is None else request.qd,
+        *slots, null_velocity, state.blocked, counts, mass,
+        G, h, which, cost.H, cost.f, qd, slack, multipliers, velocities, *kin, *fields,
     )  # fmt: skip
     after = NearState(slots, null_velocity, blocked)
     if violated and r.mode == "hard" and not request.hold:
@@ -150,8 +162,8 @@ class _Room(NamedTuple):
 
 @entry
 def _near_motion(
-    arm: Arm, kin: Kinematics, robot: ByName[JointArrays], obstacles: ByName[ObstacleArrays], numbers: _Numbers,
-    asked: ByName[Asked], memory: _Memory, room: _Room,
+    robot: JointArrays, obstacles: ObstacleArrays, asked: Asked, memory: _Memory, room: _Room, kin: Kinematics,
+    arm: Arm, numbers: _Numbers,
 ) -> tuple[int, int, bool, float]:  # fmt: skip
     """Write the answer, and change what is remembered.
 

@@ -1,9 +1,10 @@
 """What the arm's motion is made with, set up once, and what is asked of it in a step."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from pretouch.compiled import flattened
 from pretouch.control.braking import BrakingLimits
 from pretouch.control.joint_box import JointLimits
 from pretouch.control.null_space import NullSpaceLimits
@@ -58,6 +59,10 @@ class MotionSetup:
     numbers: MotionNumbers
     near: NearSettings | None
     """None for a profile without anticipation."""
+    fields: tuple[Any, ...]
+    """Of arm and numbers, for compiled code."""
+    near_fields: tuple[Any, ...]
+    """Of arm, numbers and what anticipation takes."""
 
 
 @value
@@ -78,29 +83,22 @@ class MotionRequest:
     """Speed at which an arm that a contact moves may touch what it sees, and then nothing drives it away from what
     comes nearer [m/s]; None for what the profile says."""
 
-    @property
-    def by_joint(self) -> bool:
-        """Whether joint velocities are asked for."""
-        return self.qd is not None
 
-    @property
-    def joints(self) -> FloatArray:
-        """These (n,), or no numbers."""
-        return _NO_NUMBERS if self.qd is None else self.qd
-
-
-_NO_NUMBERS = np.zeros(0)
+NO_JOINTS = np.zeros(0)
+"""What stands for joint velocities that are not asked for."""
 
 
 class Asked(NamedTuple):
-    """What compiled code takes of a `MotionRequest`, under the same names."""
+    """What compiled code takes of a `MotionRequest`."""
 
     velocity: FloatArray
     rotation_goal: FloatArray
     hold: bool
     tracks: bool
     by_joint: bool
+    """Whether joint velocities are asked for."""
     joints: FloatArray
+    """(n,) these [rad/s]; without meaning if not."""
 
 
 def motion_setup(model: RobotModel, limits: JointLimits, profile: Profile) -> MotionSetup:
@@ -110,7 +108,8 @@ def motion_setup(model: RobotModel, limits: JointLimits, profile: Profile) -> Mo
         approach_params(r), cost_params(t), t.orientation_gain_1_s, t.orientation == "hold",
         r.slack_weight if r.mode != "hard" else 0.0, profile.failure.solver_iterations, limits.table, model.q_mid,
     )  # fmt: skip
-    return MotionSetup(model, limits, profile, numbers, near_settings(profile))
+    near, arm = near_settings(profile), model.arm
+    return MotionSetup(model, limits, profile, numbers, near, flattened(arm, numbers), flattened(arm, numbers, near))
 
 
 def anticipates(profile: Profile) -> bool:

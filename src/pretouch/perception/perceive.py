@@ -1,10 +1,10 @@
 """Perception in one call: readings in, obstacles with their closest body points out."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry
+from pretouch.compiled import compiled, entry, flattened
 from pretouch.groups import CapsuleArrays, Chain, Sensors, SkinArrays
 from pretouch.params import PerceptionParams
 from pretouch.perception.closest import ClosestArrays, closest, distances, no_obstacles
@@ -94,8 +94,8 @@ class PerceptionSetup:
     skin: Skin
     fixtures: Fixtures
     params: PerceptionParams
-    scene: Scene
-    numbers: SightNumbers
+    fields: tuple[Any, ...]
+    """Of scene, skin and numbers, for compiled code."""
 
 
 def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: PerceptionParams) -> PerceptionSetup:
@@ -109,7 +109,7 @@ def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: 
         p.persistence_s, p.self_margin_m, p.filter_views, p.closing_speed, p.closing_memory_s, p.reckon_below_minimum,
         p.silent_after_s if p.keep_while_silent else 0.0, 0.0 if skin.exact else p.spread_sigmas,
     )  # fmt: skip
-    return PerceptionSetup(model, skin, fixtures, params, scene, numbers)
+    return PerceptionSetup(model, skin, fixtures, params, flattened(scene, skin.arrays, numbers))
 
 
 def perceive(
@@ -129,13 +129,14 @@ def perceive(
         return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0), state
     motion = state.motion.copy() if params.closing_speed else state.motion
     tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy(), motion)
-    moving = params.place_at_stamp and robot is not None
-    instant = Instant(now, True, robot.stamp, robot.qd) if moving and robot else Instant(now, False, 0.0, _NO_JOINT)
+    moving = robot if params.place_at_stamp else None
     distance = np.empty(count)
     indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
-    found, nearest, oldest = _perceive(
-        tracks, kin, setup.scene, setup.skin.arrays, readings, setup.numbers, instant,
-        _Room(distance, indices, vectors, scalars),
+    found, nearest, oldest = _perceive.flat(
+        tracks.point, tracks.direction, tracks.times, tracks.motion,
+        readings.stamp, readings.distance, readings.status,
+        now, moving is not None, 0.0 if moving is None else moving.stamp, _NO_JOINT if moving is None else moving.qd,
+        distance, indices, vectors, scalars, *kin, *setup.fields,
     )  # fmt: skip
     obstacles = Obstacles(
         unit=indices[0, :found], link=indices[1, :found],
@@ -194,8 +195,8 @@ class _Room(NamedTuple):
 
 @entry
 def _perceive(
-    tracks: ByName[_Tracks], kin: Kinematics, scene: Scene, skin: SkinArrays, readings: ByName[_Readings],
-    p: SightNumbers, instant: Instant, room: _Room,
+    tracks: _Tracks, readings: _Readings, instant: Instant, room: _Room, kin: Kinematics, scene: Scene,
+    skin: SkinArrays, p: SightNumbers,
 ) -> tuple[int, float, float]:  # fmt: skip
     """Change the tracks, write obstacles.
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, flattened
 from pretouch.errors import RobotModelError
 from pretouch.groups import Arm, Links, Mechanism
 from pretouch.robot.body import Capsules, capsules_of
@@ -97,6 +97,7 @@ class RobotModel:
         self.arm = Arm(self.moved_by, self.ee)
         self.mechanism = Mechanism(self.arm, Links(self.mass, self.com, self.inertia, self.parts, self.middle))
         """Both for compiled code."""
+        self.mechanism_fields = flattened(self.mechanism)
         self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
         self.q_max: FloatArray = self._model.jnt_range[:, 1].copy()
         self.q_mid: FloatArray = (self.q_min + self.q_max) / 2
