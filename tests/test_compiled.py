@@ -4,7 +4,9 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -115,3 +117,92 @@ def test_an_installation_nobody_can_write_to_works(tmp_path: Path):
     home.unlink()
     said = in_python(STEP, PYTHONPATH=str(tmp_path), PYTHONDONTWRITEBYTECODE="1", **nowhere)
     assert str(home) in said
+
+
+class Pose(NamedTuple):
+    """A group."""
+
+    place: np.ndarray
+    turned: float
+
+
+class Both(NamedTuple):
+    """A group that holds one, and more."""
+
+    pose: Pose
+    size: int
+
+
+@dataclass
+class Described:
+    """What has the fields of `Pose`, and others."""
+
+    name: str
+    turned: float
+    place: np.ndarray
+
+
+def weighed(both: Both, pose: compiled.ByName[Pose], factor: float) -> float:
+    """Make a number of all that is given."""
+    return (both.pose.place[0] + both.pose.turned) * both.size + factor * pose.place[1] * pose.turned
+
+
+GIVEN = Both(Pose(np.array([1.0, 2.0]), 0.5), 3), Described("other", 0.25, np.array([4.0, 8.0])), 10.0
+
+
+def test_an_entry_takes_groups_and_whatever_has_their_fields():
+    entry = compiled.entry(weighed)
+    assert entry(*GIVEN) == weighed(*GIVEN) == 24.5
+    assert entry(GIVEN[0], factor=10.0, pose=GIVEN[0].pose) == 4.5 + 10.0
+    assert entry.__doc__ == weighed.__doc__
+
+
+def test_what_an_entry_lacks_is_named():
+    entry = compiled.entry(weighed)
+    with pytest.raises(TypeError, match=r"weighed\(\) missing 1 required positional argument: 'factor'"):
+        entry(*GIVEN[:2])
+    with pytest.raises(AttributeError, match="no attribute 'place'"):
+        entry(GIVEN[0], np.zeros(2), 1.0)
+    with pytest.raises(TypeError, match="not enough arguments: expected 6, got 5"):
+        entry(Both(Pose(np.zeros(2), 0.5)[:1], 3), GIVEN[1], 1.0)  # type: ignore[arg-type]
+
+    def bare(x):
+        return x
+
+    with pytest.raises(TypeError, match=r"bare\(\) has no type for x"):
+        compiled.entry(bare)
+
+
+MODULE = """
+from typing import NamedTuple
+import numpy as np
+from pretouch.callee import multiplied
+from pretouch.compiled import entry
+
+class Group(NamedTuple):
+    x: np.ndarray
+
+@entry
+def body(group: Group, y: float) -> float:
+    return multiplied(group.x[0]) + y
+"""
+CALLEE = "from pretouch.compiled import compiled\n\n@compiled\ndef multiplied(x: float) -> float:\n    return 2.0 * x\n"
+CALL = """
+import numpy as np
+from pretouch.module import Group, body
+found = body(Group(np.ones(2)), 1.0)
+print(found, sum(body.__globals__["_flat"].stats.cache_hits.values()))
+"""
+
+
+def test_an_entry_is_kept_between_processes_until_what_it_calls_changes(tmp_path: Path):
+    package = tmp_path / "pretouch"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    shutil.copy(PACKAGE / "compiled.py", package)
+    (package / "module.py").write_text(MODULE)
+    (package / "callee.py").write_text(CALLEE)
+    assert in_python(CALL, PYTHONPATH=str(tmp_path)).split() == ["3.0", "0"]
+    assert in_python(CALL, PYTHONPATH=str(tmp_path)).split() == ["3.0", "1"]
+    (package / "callee.py").write_text(CALLEE.replace("2.0", "5.0"))
+    assert in_python(CALL, PYTHONPATH=str(tmp_path)).split() == ["6.0", "0"]

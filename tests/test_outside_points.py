@@ -112,11 +112,12 @@ def test_points_that_cannot_be_used_are_named(panda_model, paper_skin, points, s
 
 def test_room_for_more_units_leaves_the_rows_there_are(panda_model):
     state = near_init(panda_model, 2)
-    slots = np.arange(36.0).reshape(4, 9)
-    wider = widened(NearState(slots, state.null_velocity, state.detour), 5)
-    assert (wider.slots[:2] == slots[:2]).all()
-    assert (wider.slots[5:7] == slots[2:]).all()
-    assert (wider.slots[[2, 3, 4, 7, 8, 9], 0] == -1).all()
+    limit, point = np.arange(4.0), np.arange(12.0).reshape(4, 3)
+    slots = state.slots._replace(link=np.arange(4), limit=limit, point=point)
+    wider = widened(NearState(slots, state.null_velocity, state.blocked), 5)
+    assert wider.slots.link.tolist() == [0, 1, -1, -1, -1, 2, 3, -1, -1, -1]
+    assert (wider.slots.limit[[0, 1, 5, 6]] == limit).all()
+    assert (wider.slots.point[[0, 1, 5, 6]] == point).all()
     assert widened(wider, 3) is wider
 
 

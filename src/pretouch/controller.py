@@ -16,8 +16,9 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.tactile import TouchState, feel_touch, touch_init, touch_settings
 from pretouch.control import path as paths
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.near import NearState, near_init, near_motion, near_settings, widened
+from pretouch.control.near import NearState, near_init, near_motion, widened
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
+from pretouch.control.setup import MotionRequest, motion_setup
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import doing, events_of
 from pretouch.faults import (
@@ -34,7 +35,7 @@ from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.params import Profile
 from pretouch.perception.obstacles import TrackState, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
-from pretouch.perception.perceive import perceive, silent_units
+from pretouch.perception.perceive import perceive, perception_setup, silent_units
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
@@ -85,7 +86,8 @@ class Controller:
             if model.link_index(unit.link) != link:
                 raise SkinError(f"The skin was made for another arm than {model.description.name}: make one for it.")
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
-        self._nearness = near_settings(profile)
+        self._sight = perception_setup(model, skin, fixtures, profile.perception)
+        self._setup = motion_setup(model, self.limits, profile)
         self._touching = touch_settings(model, skin, profile.detection)
         self._mark = mark
 
@@ -161,11 +163,10 @@ class Controller:
 
         # what is near: eq. 1 and the closest points of the body
         known = track_init(len(self.skin)) if Event.TIME_BACKWARDS in events else state.tracks
-        seen, tracks = perceive(known, model, self.skin, self.fixtures, kin, readings, now, p.perception, robot)
+        seen, tracks = perceive(known, self._sight, kin, readings, now, robot)
         seen, outside = see_outside(
-            state.outside, Event.TIME_BACKWARDS in events, seen, points, len(self.skin), model, self.fixtures, kin,
-            robot, now, p.perception,
-        )  # fmt: skip
+            state.outside, Event.TIME_BACKWARDS in events, seen, points, self._sight, kin, robot, now
+        )
         heard, silent = silent_units(self.skin, tracks, readings.status, seen.longest_silence, now, p.perception)
         told, lost = outside_silence(outside, lost, now, p.perception)
         mark("perception")
@@ -185,7 +186,7 @@ class Controller:
         push = response.Felt(model, kin, robot, felt, close, state.command, p, fixed.planes, fixed.capsules)
         react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
         events |= events_of(
-            unfit, silent, lost, felt, feeling.window.count, react, close, before, state.near.detour.blocked, p
+            unfit, silent, lost, felt, feeling.window.count, react, close, before, state.near.blocked, p
         )  # fmt: skip
         mode = next_mode(state.mode, events, inputs.resume)
         contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
@@ -196,8 +197,7 @@ class Controller:
         # how fast: eqs. 3-4 on the path, or eq. 12
         slowed = speed_scale(seen.nearest, p.reduction.d_max_m) if p.reduction.enabled else 1.0
         scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.reduction)
-        shifted = x - state.near.detour.offset if p.anticipation.detour else x
-        way = paths.follow(self.path, state.path, shifted, p.task)
+        way = paths.follow(self.path, state.path, x, p.task)
         answer, react = response.answered(react, doing(mode, felt.armed, p), push)
         desired, qd = (way.scaled(scale), None) if answer is None else (answer.velocity, answer.qd)
         mark("path")
@@ -205,11 +205,10 @@ class Controller:
         # how near: eqs. 5-7, and the joint velocities: eq. 2
         touch = None if answer is None else answer.touch
         room = len(self.skin) + (0 if outside is None else len(outside.sigma))
-        motion, near = near_motion(
-            widened(state.near, room), self._nearness, model, kin, robot, seen.obstacles, desired,
-            state.rotation_goal, self.limits, p,
-            mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch,
-        )  # fmt: skip
+        request = MotionRequest(
+            desired, state.rotation_goal, mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch
+        )
+        motion, near = near_motion(widened(state.near, room), self._setup, kin, robot, seen.obstacles, request)
         qp = motion.qp
         if qp.outcome in _TROUBLE and (qp.outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)

@@ -37,7 +37,7 @@ def only(joint: int, value: float) -> np.ndarray:
 
 def after(state: AdmittanceState, arm, torque, command=None, params=NO_LAG) -> AdmittanceState:
     command = np.copysign(1e9, state.velocity) if command is None else command
-    return yielded(state, *arm, np.asarray(torque, float), command, BAND, DT, params)
+    return yielded(state, arm, np.asarray(torque, float), command, BAND, DT, params)
 
 
 def test_the_dead_band_grows_with_the_torque_limit():
@@ -145,10 +145,7 @@ def test_the_fastest_point_is_that_of_the_jacobians(arm):
         for link, a, b in zip(model.body.link, model.body.a, model.body.b, strict=True)
         for end in (a, b)
     ]
-    found = fastest_point(
-        kin.position, kin.rotation, kin.anchor, kin.axis, model.moved_by, model.body.link, model.body.a, model.body.b,
-        qd,
-    )  # fmt: skip
+    found = fastest_point(kin, model.moved_by, model.body.arrays, qd)
     assert found == pytest.approx(max(speeds))
 
 

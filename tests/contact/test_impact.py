@@ -20,10 +20,7 @@ NOISE = 0.05
 
 def pattern(model: RobotModel, skin: Skin, q: FloatArray) -> FloatArray:
     kin = model.kinematics(q)
-    return responses(
-        kin.anchor, kin.axis, kin.position, kin.rotation, model.moved_by, model.mass, model.com, model.inertia,
-        OURS.detection.rotor_kg_m2, model.parts, model.middle, skin.link, skin.T_link_sensor,
-    )  # fmt: skip
+    return responses(kin, model.mechanism, OURS.detection.rotor_kg_m2, skin.arrays)
 
 
 class Rig:

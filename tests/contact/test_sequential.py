@@ -10,6 +10,7 @@ from scipy.stats import multivariate_normal, multivariate_t
 from pretouch.contact.sequential import (
     LENGTHS,
     LONGEST,
+    Hypotheses,
     alarm_level,
     explained_by_force,
     judge,
@@ -17,9 +18,14 @@ from pretouch.contact.sequential import (
     window_means,
 )
 from pretouch.params import DetectionParams
+from pretouch.types import FloatArray
 
 N = 3
-NO_POINT = (np.zeros((0, 3, N)), np.zeros(0, np.int64))
+
+
+def no_point(weight: FloatArray) -> Hypotheses:
+    """Torques on the joints before each link only, of given weights."""
+    return Hypotheses(np.zeros((0, 3, N)), np.zeros(0, np.int64), weight, np.zeros((0, 3)))
 
 
 def spread() -> np.ndarray:
@@ -96,7 +102,7 @@ def test_the_expectation_of_the_statistic_in_free_motion_is_the_sum_of_the_weigh
     for _ in range(20_000):
         means = np.zeros((len(LENGTHS), N))
         means[0] = np.linalg.cholesky(S) @ rng.standard_normal(N) / math.sqrt(rng.chisquare(tails) / tails)
-        log_r, _, _ = judge(means, 1, S, np.zeros(N), *NO_POINT, weight, np.zeros((0, 3)), 0.5, tails)
+        log_r, _, _ = judge(means, 1, S, np.zeros(N), no_point(weight), 0.5, tails)
         total.append(math.exp(log_r) * len(LENGTHS))
     assert np.mean(total) == pytest.approx(1.0, abs=0.03)
 
@@ -109,7 +115,7 @@ def test_false_alarms_on_noise_stay_within_the_bound():
         ring[i % LONGEST] = L @ rng.standard_normal(N)
         means = np.zeros((len(LENGTHS), N))
         whole = window_means(ring, (i + 1) % LONGEST, min(i + 1, LONGEST), means)
-        log_r, _, _ = judge(means, whole, S, np.zeros(N), *NO_POINT, weight, np.zeros((0, 3)), 15.0, 30.0)
+        log_r, _, _ = judge(means, whole, S, np.zeros(N), no_point(weight), 15.0, 30.0)
         passed += log_r >= level
     assert passed <= samples * 0.01 * 1.0  # one a second is the bound
 
@@ -118,9 +124,7 @@ def test_a_push_is_found_and_its_window_is_that_of_its_length():
     means = np.zeros((len(LENGTHS), N))
     means[:] = 0.1
     means[3] = [6.0, 0.0, 0.0]
-    log_r, window, _ = judge(
-        means, 6, np.eye(N), np.full(N, 1e-3), *NO_POINT, np.full(N, 1.0 / N), np.zeros((0, 3)), 15.0, 30.0
-    )
+    log_r, window, _ = judge(means, 6, np.eye(N), np.full(N, 1e-3), no_point(np.full(N, 1.0 / N)), 15.0, 30.0)
     assert window == 3
     assert log_r > alarm_level(DetectionParams(slack_nats=0.0), 0.01)
 
@@ -128,7 +132,6 @@ def test_a_push_is_found_and_its_window_is_that_of_its_length():
 def test_an_outlier_of_one_sample_is_less_to_a_test_with_heavy_tails():
     means = np.full((len(LENGTHS), N), 7.0)
     heavy, light = (
-        judge(means, 1, np.eye(N), np.zeros(N), *NO_POINT, np.full(N, 1 / N), np.zeros((0, 3)), 15.0, tails)[0]
-        for tails in (5.0, 1e3)
+        judge(means, 1, np.eye(N), np.zeros(N), no_point(np.full(N, 1 / N)), 15.0, tails)[0] for tails in (5.0, 1e3)
     )
     assert heavy < 0.3 * light

@@ -22,7 +22,7 @@ def course(state: AdmittanceState, arm, torque: np.ndarray, seconds: float, rng)
     """Velocities (T, n) under a constant torque and noise, of an arm that follows."""
     band, command, made = dead_band(arm[0].description.tau_max, P), state.velocity, []
     for _ in range(round(seconds / DT)):
-        state = yielded(state, *arm, torque + NOISE * rng.standard_normal(N), command, band, DT, P)
+        state = yielded(state, arm, torque + NOISE * rng.standard_normal(N), command, band, DT, P)
         command = state.velocity
         made.append(command)
     return np.array(made), state
@@ -82,4 +82,4 @@ def test_a_noisy_and_biased_estimate_moves_nobody_who_pushes_back(panda_model):
         state = begun(admittance_init(N, P), model, kin, samples[4], samples[3], band, P)
         for sample in samples[5:]:
             assert force @ J @ state.velocity >= 0.0
-            state = yielded(state, model, kin, sample, state.velocity, band, DT, P)
+            state = yielded(state, (model, kin), sample, state.velocity, band, DT, P)

@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 from tests.contact.places import MODEL, SPREAD, SURFACE, N, P, exposed, of, place, posture, said, torques
 
 from pretouch.contact.cues import Cues, no_cues
-from pretouch.contact.one_place import covariance_of_mean, evidence_of_places
-from pretouch.contact.two_places import held
-from pretouch.contact.where_prior import place_surface, prior_of_places
+from pretouch.contact.one_place import ForcePrior, Whitened, covariance_of_mean, evidence_of_places
+from pretouch.contact.two_places import Held, held
+from pretouch.contact.where_prior import PriorParams, SeenNear, UnitCues, place_surface, prior_of_places
 from pretouch.types import Obstacles
 
 
@@ -43,15 +43,13 @@ def test_evidence_is_that_of_a_normal_distribution_with_the_force_integrated_out
     L = np.linalg.cholesky(C)
     y = np.linalg.solve(L, torque)
     ln, force = np.empty(len(SURFACE)), np.empty((len(SURFACE), 3))
-    left = evidence_of_places(
-        kin.anchor, kin.axis, kin.position, kin.rotation, MODEL.moved_by, SURFACE.link, SURFACE.point, SURFACE.normal,
-        SURFACE.first, L, y, y @ y, 0.25, 1000.0, 1e9, ln, force,
-    )  # fmt: skip
+    known = ForcePrior(0.25, 1000.0, 1e9)
+    left = evidence_of_places(kin, MODEL.moved_by, SURFACE.arrays, Whitened(L, y, y @ y), known, ln, force)
     assert_allclose(force[c], -30.0 * normal, atol=0.5)
     assert left < 0.1
     size = -force[c] @ normal
     whole = np.empty((N, N))
-    held(C, kin.anchor, kin.axis, MODEL.moved_by[SURFACE.link[c]], point, normal, size, 0.25, 1000.0, whole)
+    held(C, kin, Held(MODEL.moved_by[SURFACE.link[c]], point, normal, size), known, whole)
     J = MODEL.jacobian(kin, int(SURFACE.link[c]), point)[:3]
     V = 1000.0**2 * np.outer(normal, normal) + (0.25 * size) ** 2 * (np.eye(3) - np.outer(normal, normal))
     assert_allclose(whole, C + J.T @ V @ J, rtol=1e-9)
@@ -153,8 +151,9 @@ def test_the_prior_is_one_in_all_and_hides_what_cannot_be_touched():
     hidden, ln = ~exposed(kin), np.empty(len(SURFACE))
     assert 0 < hidden.sum() < len(SURFACE) / 2
     prior_of_places(
-        at, SURFACE.link, SURFACE.area, hidden, np.ones(len(MODEL.links)), at[:2] + 0.03, np.array([0.03, 0.2]),
-        0.7, 0.06, 0.25, np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), 0.95, 0.015, ln,
+        at, SURFACE.arrays, hidden, SeenNear(at[:2] + 0.03, np.array([0.03, 0.2])),
+        UnitCues(np.ones(len(MODEL.links)), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)),
+        PriorParams(0.7, 0.06, 0.25, 0.95, 0.015), ln,
     )  # fmt: skip
     assert np.exp(ln).sum() == pytest.approx(1.0, abs=1e-6)
     assert np.exp(ln[hidden]).max() < 1e-11

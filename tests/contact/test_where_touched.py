@@ -8,7 +8,7 @@ from tests.contact.places import DOUBT, MODEL, SPREAD, SURFACE, N, exposed, of, 
 
 from pretouch.contact.cues import Cues
 from pretouch.contact.tactile import gain_of, surface_area
-from pretouch.contact.where_prior import place_surface, prior_of_places
+from pretouch.contact.where_prior import PriorParams, SeenNear, UnitCues, place_surface, prior_of_places
 from pretouch.params import DetectionParams
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.unit import TouchPatch
@@ -83,8 +83,8 @@ def prior(kin: Kinematics, cues: Cues, hidden: FloatArray) -> FloatArray:
     place_surface(kin.position, kin.rotation, SURFACE.link, SURFACE.point, SURFACE.normal, at, outwards)
     ln = np.empty(len(SURFACE))
     prior_of_places(
-        at, SURFACE.link, SURFACE.area, hidden, cues.gain, np.zeros((0, 3)), np.zeros(0), 0.7, 0.06, 0.25, cues.link,
-        cues.point, cues.sigma, 0.95, 0.015, ln,
+        at, SURFACE.arrays, hidden, SeenNear(np.zeros((0, 3)), np.zeros(0)),
+        UnitCues(cues.gain, cues.link, cues.point, cues.sigma), PriorParams(0.7, 0.06, 0.25, 0.95, 0.015), ln,
     )  # fmt: skip
     return np.exp(ln)
 

@@ -14,6 +14,7 @@ from pretouch.control.baselines import (
     slowed_joints,
 )
 from pretouch.control.joint_box import joint_limits
+from pretouch.control.setup import MotionRequest, motion_setup
 from pretouch.errors import ParameterError
 from pretouch.params import BaselineParams, profile
 from pretouch.perception.closest import closest_points, no_obstacles
@@ -136,8 +137,8 @@ class Arm:
         robot = self.robot
         for _ in range(60):
             qp, which, limit, _, after = baseline_motion(
-                self.model, self.kin, robot, self.obstacles, np.array(velocity), self.kin.rotation[self.model.ee],
-                self.limits, self.profile, hold,
+                motion_setup(self.model, self.limits, self.profile), self.kin, robot, self.obstacles,
+                MotionRequest(np.array(velocity), self.kin.rotation[self.model.ee], hold),
             )  # fmt: skip
             robot = replace(robot, qd=qp.qd, qd_commanded=qp.qd)
         return qp, which, limit, after
@@ -179,8 +180,8 @@ def test_a_held_arm_brakes_whatever_is_near(panda_model, mode):
 def test_an_arm_at_rest_begins_its_retreat_as_fast_as_its_joints_allow(panda_model):
     arm = Arm(panda_model, "ding", [0.0, 0.15, 0.0])
     qp, *_ = baseline_motion(
-        panda_model, arm.kin, arm.robot, arm.obstacles, np.array([0.0, 0.3, 0.0]), arm.kin.rotation[panda_model.ee],
-        arm.limits, arm.profile, False,
+        motion_setup(panda_model, arm.limits, arm.profile), arm.kin, arm.robot, arm.obstacles,
+        MotionRequest(np.array([0.0, 0.3, 0.0]), arm.kin.rotation[panda_model.ee]),
     )  # fmt: skip
     J = panda_model.jacobian(arm.kin, int(arm.obstacles.link[0]), arm.obstacles.body_point[0])[:3]
     assert arm.obstacles.direction[0] @ J @ qp.qd < -0.02

@@ -5,7 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.control.braking import ACROSS, LIMIT, LINK, braking_cap, braking_rows, slots_init, tangents_of
+from pretouch.control.braking import BrakingLimits, Mass, braking_cap, braking_rows, slots_init, tangents_of
+from pretouch.control.restriction import Rows
+from pretouch.control.touch_speed import TouchLimits
+from pretouch.groups import Chain, ObstacleArrays
 from pretouch.types import FloatArray
 
 DT, A, TOUCH, TASK, NOTICE = 0.01, 0.3, 0.03, 0.3, 0.6
@@ -22,9 +25,9 @@ class Sled:
 
     def __init__(self, across: bool = False, units: int = 1) -> None:
         self.slots, self.units = slots_init(units), units
-        self.settings = np.array((
-            NOTICE, A, 0.0, 0.0, RETREAT, 0.0, NEAR if across else -np.inf, SLOWEST, TASK, TIGHTEN, LOOSEN, DT, 0.0,
-        ))  # fmt: skip
+        self.limits = BrakingLimits(
+            NOTICE, A, 0.0, 0.0, RETREAT, 0.0, NEAR if across else -np.inf, SLOWEST, TASK, TIGHTEN, LOOSEN, DT
+        )
 
     def rows(
         self, speed: float, seen: dict[int, tuple[int, float]], closing: float = 0.0, normal: FloatArray = UP
@@ -32,11 +35,14 @@ class Sled:
         """Rows of units that see {unit: (link, distance)}: how many are of what is seen, G in m/s, h."""
         k = len(seen)
         G, h = np.empty((10 * self.units, 1)), np.empty(10 * self.units)
+        obstacles = ObstacleArrays(
+            np.array(list(seen), np.int64), np.array([link for link, _ in seen.values()], np.int64), np.zeros((k, 3)),
+            np.tile(normal, (k, 1)), np.array([d for _, d in seen.values()]), np.full(k, closing),
+        )  # fmt: skip
+        chain = Chain(self.anchor, self.axis, self.moved_by, np.array([speed / 1000.0]))
         found, rows = braking_rows(
-            self.slots, np.array(list(seen), np.int64), np.array([link for link, _ in seen.values()], np.int64),
-            np.zeros((k, 3)), np.tile(normal, (k, 1)), np.array([d for _, d in seen.values()]), np.full(k, closing),
-            self.anchor, self.axis, self.moved_by, np.array([speed / 1000.0]), np.eye(1),
-            np.array([100.0, 1e5, 1.0, TOUCH]), self.settings, G, h, np.empty(k, np.int64),
+            self.slots, obstacles, chain, Mass(False, np.eye(1)), TouchLimits(100.0, 1e5, 1.0, TOUCH), self.limits,
+            Rows(G, h, np.empty(k, np.int64)),
         )  # fmt: skip
         return found, G[:rows, 0] / 1000.0, h[:rows]
 
@@ -132,7 +138,7 @@ def test_what_is_no_longer_seen_lets_go_at_one_rate():
         last = h[0]
     sled.rows(0.03, {})
     assert len(sled.rows(0.03, {})[1]) == 0
-    assert np.all(sled.slots[:, LINK] == -1)
+    assert np.all(sled.slots.link == -1)
 
 
 def test_a_point_seen_again_goes_on_from_where_its_row_had_come():
@@ -190,9 +196,9 @@ def test_the_cap_across_the_normal_appears_and_goes_at_the_rates():
     level, sled = np.array([1.0, 0.0, 0.0]), Sled(across=True)
     _, G, h = sled.rows(0.3, {0: (1, 0.0)}, normal=level)
     assert h[1:][G[1:] > 0.5] == pytest.approx(0.3 - TIGHTEN * DT)
-    before = float(sled.slots[0, ACROSS])
+    before = float(sled.slots.across[0])
     sled.rows(0.1, {0: (1, 0.3)}, normal=level)
-    assert sled.slots[0, ACROSS] == pytest.approx(before + LOOSEN * DT)
+    assert sled.slots.across[0] == pytest.approx(before + LOOSEN * DT)
 
 
 @given(unit_vectors)
@@ -215,5 +221,5 @@ def test_units_keep_their_rows_apart():
     assert found == 2
     assert h[0] == pytest.approx(TOUCH)
     assert h[1] == pytest.approx(np.sqrt(TOUCH**2 + 2 * A * 0.2))
-    assert sled.slots[:, LINK].tolist() == [1, -1, 2, -1, -1, -1]
-    assert sled.slots[0, LIMIT] == pytest.approx(TOUCH)
+    assert sled.slots.link.tolist() == [1, -1, 2, -1, -1, -1]
+    assert sled.slots.limit[0] == pytest.approx(TOUCH)

@@ -10,7 +10,8 @@ from tests.following_arm import DT, Arm
 from pretouch.control.braking import braking_cap
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.motion import joint_motion
-from pretouch.control.near import anticipates, near_init, near_motion, near_settings
+from pretouch.control.near import near_init, near_motion
+from pretouch.control.setup import MotionRequest, anticipates, motion_setup
 from pretouch.params import PROFILES, Profile, profile
 from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.robot.model import RobotModel
@@ -65,13 +66,12 @@ def test_the_papers_profile_anticipates_nothing(panda_model: RobotModel, paper_s
     assert not anticipates(PROFILES["paper"])
     assert not anticipates(PROFILES["blind"])
     arm = on_its_way(panda_model, paper_skin, PROFILES["paper"])
-    given = (
-        panda_model, panda_model.kinematics(arm.q), arm.robot(), no_obstacles(), np.array([0.0, 0.3, 0.0]), np.eye(3),
-        arm.controller.limits, PROFILES["paper"], False,
-    )  # fmt: skip
+    request = MotionRequest(np.array([0.0, 0.3, 0.0]), np.eye(3), tracks=True)
+    setup = motion_setup(panda_model, arm.controller.limits, PROFILES["paper"])
+    given = (setup, panda_model.kinematics(arm.q), arm.robot(), no_obstacles(), request)
     state = near_init(panda_model, 7)
-    assert near_settings(PROFILES["paper"]) is None
-    motion, after = near_motion(state, None, *given, True)
+    assert setup.near is None
+    motion, after = near_motion(state, *given)
     assert after is state
     np.testing.assert_array_equal(motion.qp.qd, joint_motion(*given).qp.qd)
 
@@ -193,10 +193,8 @@ def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: Rob
                 kin, panda_model.body, kin.position[panda_model.ee], np.zeros(1, np.int64), thing[None], np.eye(3)[:1]
             )
             robot = RobotState(0.0, q, qd, q, qd, np.zeros(7), None)
-            motion, state = near_motion(
-                state, near_settings(params), panda_model, kin, robot, near, np.zeros(3),
-                start.rotation[panda_model.ee], limits, params, False, True,
-            )  # fmt: skip
+            request = MotionRequest(np.zeros(3), start.rotation[panda_model.ee], tracks=True)
+            motion, state = near_motion(state, motion_setup(panda_model, limits, params), kin, robot, near, request)
             qd = motion.qp.qd
             q = q + qd * DT
         gaps[name] = float(near.body_distance[0])
@@ -204,26 +202,14 @@ def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: Rob
     assert gaps["pretouch"] > gaps["pretouch:anticipation.null_space=no"] + 0.005
 
 
-def test_with_a_detour_the_hand_goes_aside_and_returns_to_the_path(panda_model: RobotModel, paper_skin: Skin):
-    arm = on_its_way(panda_model, paper_skin, profile("pretouch:anticipation.detour=yes"))
-    run_into_a_wall(arm, 150)
-    steps = arm.run(100, seen={LEFT: 0.01})
-    aside = arm.ee() - steps[-1].path_position
-    assert np.linalg.norm(aside[[0, 2]]) > 0.05
-    assert np.linalg.norm(arm.state.near.detour.offset) <= A.detour_distance_m + 1e-9
-    steps = arm.run(500)
-    np.testing.assert_array_equal(arm.state.near.detour.offset, np.zeros(3))
-    assert np.linalg.norm(steps[-1].ee_position - steps[-1].path_position) < 0.01
-
-
 def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model: RobotModel, paper_skin: Skin):
     arm = Arm(panda_model, paper_skin)
     wanted = np.array([0.02, -0.01, 0.03, 0.0, 0.01, -0.02, 0.01])
     for params in (PROFILES["paper"], PRETOUCH):
         motion, _ = near_motion(
-            near_init(panda_model, 7), near_settings(params), panda_model, panda_model.kinematics(arm.q), arm.robot(),
-            no_obstacles(),
-            np.array([0.0, 0.3, 0.0]), np.eye(3), arm.controller.limits, params, False, True, wanted,
+            near_init(panda_model, 7), motion_setup(panda_model, arm.controller.limits, params),
+            panda_model.kinematics(arm.q), arm.robot(), no_obstacles(),
+            MotionRequest(np.array([0.0, 0.3, 0.0]), np.eye(3), tracks=True, qd=wanted),
         )  # fmt: skip
         np.testing.assert_allclose(motion.qp.qd, wanted, atol=1e-12)
 

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.control.null_space import away, cost_with_null_space, projector
-from pretouch.control.qp import task_cost
+from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space, projector
+from pretouch.control.qp import cost_params, task_cost
+from pretouch.groups import ObstacleArrays
 from pretouch.params import TaskParams
 from pretouch.robot.model import RobotModel
 
@@ -19,11 +20,7 @@ def postures(model: RobotModel, count: int) -> np.ndarray:
 
 
 def cost(J, x_d, q, q_mid, null=NO_MOTION, projected=True):
-    p = TASK
-    return cost_with_null_space(
-        J, x_d, q, q_mid, p.damping_max, p.manipulability_threshold, p.mid_joint_gain, p.mid_joint_time_s, projected,
-        null,
-    )  # fmt: skip
+    return cost_with_null_space(J, x_d, q, q_mid, cost_params(TASK), projected, null)
 
 
 @pytest.mark.parametrize("m", [3, 6])
@@ -91,11 +88,17 @@ def test_without_the_switch_the_mid_joint_term_is_the_papers(panda_model: RobotM
     np.testing.assert_allclose(f, paper.f, atol=1e-12)
 
 
+def at(distance: float) -> ObstacleArrays:
+    """One obstacle near link 1."""
+    none = np.zeros((1, 3))
+    return ObstacleArrays(np.zeros(1, np.int64), np.ones(1, np.int64), none, none, np.array([distance]), np.zeros(1))
+
+
 def asked(distance: float, row: np.ndarray, hand: bool = False, last: np.ndarray | None = None) -> np.ndarray:
     moved_by = np.array([[False, False], [True, hand]])
     return away(
-        np.zeros(2) if last is None else last, row[None], np.zeros(1, np.int64), np.ones(1, np.int64),
-        np.array([distance]), moved_by, 0.25, 0.1, 0.5, 10.0,
+        np.zeros(2) if last is None else last, row[None], np.zeros(1, np.int64), at(distance), moved_by,
+        NullSpaceLimits(0.25, 0.1, 0.5, 10.0),
     )  # fmt: skip
 
 
@@ -118,7 +121,7 @@ def test_what_is_asked_is_finite_and_bounded_whatever_the_row(distance, a, b):
 def test_it_changes_at_no_more_than_its_rate():
     moved_by = np.array([[False], [False]])
     z = away(
-        np.array([0.2]), np.ones((1, 1)), np.zeros(1, np.int64), np.ones(1, np.int64), np.zeros(1), moved_by,
-        0.25, 0.1, 0.5, 0.01,
+        np.array([0.2]), np.ones((1, 1)), np.zeros(1, np.int64), at(0.0), moved_by,
+        NullSpaceLimits(0.25, 0.1, 0.5, 0.01),
     )  # fmt: skip
     np.testing.assert_allclose(z, [0.19])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.coverage.surface import surface_of
-from pretouch.perception.closest import closest
+from pretouch.perception.closest import ClosestArrays, closest
 from tests.coverage.made import RADIUS, arm
 
 
@@ -30,10 +30,8 @@ def test_all_points_are_on_the_outside_of_their_link(panda_model):
         count = len(here)
         distance = np.empty(count)
         direction = np.zeros((count, 3))
-        closest(
-            own.link, own.a, own.b, own.radius, here.point, np.empty((count, 3)), np.empty(count, np.int64), direction,
-            distance,
-        )  # fmt: skip
+        found = ClosestArrays(np.empty((count, 3)), np.empty(count, np.int64), direction, distance)
+        closest(own.arrays, here.point, found)
         assert np.abs(distance).max() < 1e-9
         np.testing.assert_allclose(direction, here.normal, atol=1e-6)
 

@@ -73,8 +73,7 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "effective_mass": (True, False), "body_region": ("chest", "face"), "region_force_n": (0.0, 1.0, 1e3),
         "closing_speed": (True, False), "tangential": (True, False), "tighten_m_s2": (3.0, 0.1, 100.0),
         "loosen_m_s2": (1.0, 0.1, 100.0), "null_space": (True, False), "null_speed_m_s": (0.1, 2.0),
-        "null_joint_rad_s": (0.5, 5.0), "null_rate_rad_s2": (1.0, 100.0), "detour": (False, True),
-        "detour_distance_m": (0.2, 0.01, 1.0), "detour_speed_m_s": (0.1, 2.0), "blocked_after_s": (2.0, 0.05),
+        "null_joint_rad_s": (0.5, 5.0), "null_rate_rad_s2": (1.0, 100.0), "blocked_after_s": (2.0, 0.05),
     },
     DetectionParams: {
         "method": ("sequential", "sequential", "fixed", "thresholds"), "freeze_while_reacting": (True, False),

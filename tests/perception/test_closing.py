@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.perception.closing import closing_speeds, follow_points, motion_init, reckon
+from pretouch.groups import Sensors
+from pretouch.perception.closing import LastSeen, closing_speeds, follow_points, motion_init, reckon
 
 MEMORY, PERIOD = 0.09, 0.02
 TOWARDS_ME = np.array([0.0, 0.0, 1.0])
@@ -84,8 +85,8 @@ def reckoned(distance: float, last: float | None, sensor: float = 0.0, velocity:
     before = np.full((1, 3), np.nan) if last is None else last * TOWARDS_ME[None]
     stamp = np.array([-np.inf if last is None else 1.0 - age])
     reckon(
-        points, np.array([distance]), before, stamp, np.ones(1), motion, sensor * TOWARDS_ME[None], np.eye(3)[None],
-        0.04, 0.18,
+        points, np.array([distance]), np.ones(1), LastSeen(before, stamp, motion),
+        Sensors(sensor * TOWARDS_ME[None], np.eye(3)[None], np.zeros(1, np.int64)), 0.04, 0.18,
     )  # fmt: skip
     return float(points[0, 2] - sensor)
 

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from pretouch.params import PerceptionParams
 from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.perception.outside import moving_links, outside_silence, see_outside
-from pretouch.perception.perceive import Perception
+from pretouch.perception.perceive import Perception, perception_setup
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.robot.description import panda
 from pretouch.robot.vectors import placed
+from pretouch.sensing.skin import paper_skin
 from pretouch.types import RobotState, SeenPoints
 
 TCP = np.array([0.30689, 0.0, 0.48688])
@@ -26,6 +27,10 @@ NOTHING = Perception(no_obstacles(), np.full(UNITS, np.nan), np.inf, 0.0)
 def points_at(stamp: float, *point, sigma: float = 0.0) -> SeenPoints:
     at = np.array(point, dtype=np.float64).reshape(-1, 3)
     return SeenPoints(stamp, np.full(len(at), stamp), at, np.full(len(at), sigma))
+
+
+def setup_of(model, params, fixtures):
+    return perception_setup(model, paper_skin(model), fixtures, params)
 
 
 class Watcher:
@@ -42,7 +47,7 @@ class Watcher:
     def see(self, now: float, points: SeenPoints | None, anew: bool = False):
         robot = RobotState(now, self.q, self.qd, self.q, self.qd, np.zeros(7), None)
         seen, self.state = see_outside(
-            self.state, anew, NOTHING, points, UNITS, self.model, self.fixtures, self.kin, robot, now, self.params
+            self.state, anew, NOTHING, points, setup_of(self.model, self.params, self.fixtures), self.kin, robot, now
         )
         self.nearest = seen.nearest
         return seen.obstacles
@@ -61,8 +66,8 @@ def test_without_a_source_or_a_place_for_it_nothing_is_touched(panda_model):
     for params, points in (
         (PARAMS, None), (PerceptionParams(), points_at(0.0, BESIDE)), (replace(PARAMS, enabled=False), points_at(0.0)),
     ):  # fmt: skip
-        given = (None, False, NOTHING, points, UNITS, panda_model, no_fixtures(), None, robot, 0.0, params)
-        seen, state = see_outside(*given)
+        setup = setup_of(panda_model, params, no_fixtures())
+        seen, state = see_outside(None, False, NOTHING, points, setup, panda_model.kinematics(np.zeros(7)), robot, 0.0)
         assert seen is NOTHING
         assert state is None
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import track_init
-from pretouch.perception.perceive import perceive, silent_units
+from pretouch.perception.perceive import perceive, perception_setup, silent_units
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
@@ -44,9 +44,8 @@ class _Watcher:
         )
 
     def take(self, readings: RangeReadings, now: float):
-        self.seen, self.state = perceive(
-            self.state, self.model, self.skin, self.fixtures, self.kin, readings, now, self.params
-        )
+        setup = perception_setup(self.model, self.skin, self.fixtures, self.params)
+        self.seen, self.state = perceive(self.state, setup, self.kin, readings, now)
         return self.seen.obstacles
 
     def see(self, now: float, status=RangeStatus.OK, **distance: float):

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.perception.sighting import GRID_M, common_area, in_view, ways_free, ways_seen
+from pretouch.groups import CapsuleArrays, Sensors
+from pretouch.perception.sighting import GRID_M, BallWays, Stretch, common_area, in_view, ways_free, ways_seen
 
 HALF = np.deg2rad(13.5)
 LIGHT = 2.0 / 3.0 * 0.5 / 0.17 * 1.3**2
@@ -52,8 +53,8 @@ def test_at_the_edge_behind_and_beyond_the_limit():
 def seen(start, way, first=10, last=50, run=2, limit=1.3, free=True):
     out = np.zeros((1, 1), np.bool_)
     ways_seen(
-        np.array([start]), np.array([way]), np.array([free]), 0.05, first, last, run, np.zeros((1, 3)),
-        np.eye(3)[None], np.array([limit]), 1e9, out,
+        BallWays(np.array([start]), np.array([way]), 0.05), np.array([free]), Stretch(first, last, run),
+        Sensors(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1, np.int64)), np.array([limit]), 1e9, out,
     )  # fmt: skip
     return bool(out[0, 0])
 
@@ -73,8 +74,8 @@ def free(start, way, radius=0.05, length=0.8, own=0):
     a, b = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.5]]), np.array([[0.0, 0.0, 0.1], [0.0, 1.0, 0.5]])
     out = np.zeros(1, np.bool_)
     ways_free(
-        np.array([start]), np.array([way]), length, radius, np.array([own]), a, b, np.array([0.1, 0.02]),
-        np.array([[0.0, 0.0, 1.0, -0.2]]), out,
+        BallWays(np.array([start]), np.array([way]), radius), length, np.array([own]),
+        CapsuleArrays(np.zeros(2, np.int64), a, b, np.array([0.1, 0.02])), np.array([[0.0, 0.0, 1.0, -0.2]]), out,
     )  # fmt: skip
     return bool(out[0])
 

@@ -10,7 +10,7 @@ from tests.fuzz.invariants import same
 
 from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import track_init
-from pretouch.perception.perceive import perceive
+from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.perception.spread import spread
 from pretouch.robot.description import panda
@@ -33,7 +33,7 @@ def seen(model, skin: Skin, distances, params=PARAMS, q=READY, state=None, now=1
     distance = np.broadcast_to(np.asarray(distances, dtype=np.float64), count).copy()
     readings = RangeReadings(np.full(count, stamp), distance, np.full(count, int(RangeStatus.OK)))
     state = track_init(count) if state is None else state
-    return perceive(state, model, skin, FLOOR, model.kinematics(q), readings, now, params)
+    return perceive(state, perception_setup(model, skin, FLOOR, params), model.kinematics(q), readings, now)
 
 
 def test_the_spread_grows_with_the_distance_and_both_uncertainties():

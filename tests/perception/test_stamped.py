@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.groups import Chain, Sensors
 from pretouch.params import PROFILES, PerceptionParams
 from pretouch.perception.obstacles import poses, track_init
-from pretouch.perception.perceive import perceive
+from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.perception.stamped import move_back
 from pretouch.types import RangeReadings, RangeStatus, RobotState
@@ -35,16 +36,15 @@ def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[fl
         )  # fmt: skip
         q = q0 + QD * now
         robot = RobotState(now, q, QD, q, QD, np.zeros(7), None)
-        seen, state = perceive(
-            state, model, skin, no_fixtures(), model.kinematics(q), readings, now, params, robot
-        )  # fmt: skip
+        setup = perception_setup(model, skin, no_fixtures(), params)
+        seen, state = perceive(state, setup, model.kinematics(q), readings, now, robot)
         found.append(float((seen.obstacles.point[0] - on) @ normal))
     return found
 
 
 def placed(model, skin, q):
     kin = model.kinematics(q)
-    return poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
+    return Sensors(*poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor), skin.link)
 
 
 def test_a_plane_stays_where_it_is_while_the_arm_turns(panda_model, paper_skin):
@@ -62,13 +62,12 @@ def test_with_noise_its_place_is_within_noise(panda_model, paper_skin):
 
 def test_poses_go_back_as_the_arm_came(panda_model, paper_skin):
     q = panda_model.description.q_ready
-    position, rotation = placed(panda_model, paper_skin, q)
+    sensors = placed(panda_model, paper_skin, q)
     kin, age = panda_model.kinematics(q), 0.001
     stamp = np.full(len(paper_skin), 7.0 - age)
-    move_back(
-        position, rotation, paper_skin.link, kin.anchor, kin.axis, panda_model.moved_by, QD, stamp, 7.0, 0.06
-    )  # fmt: skip
-    at, turned = placed(panda_model, paper_skin, q - QD * age)
+    move_back(sensors, stamp, Chain(kin.anchor, kin.axis, panda_model.moved_by, QD), 7.0, 0.06)
+    position, rotation, _ = sensors
+    at, turned, _ = placed(panda_model, paper_skin, q - QD * age)
     np.testing.assert_allclose(position, at, atol=1e-6)
     np.testing.assert_allclose(rotation, turned, atol=1e-6)
     np.testing.assert_allclose(rotation @ rotation.transpose(0, 2, 1), np.tile(np.eye(3), (len(at), 1, 1)), atol=1e-12)
@@ -76,16 +75,15 @@ def test_poses_go_back_as_the_arm_came(panda_model, paper_skin):
 
 def test_no_reading_is_moved_back_by_more_than_it_lasts_nor_into_the_future(panda_model, paper_skin):
     q = panda_model.description.q_ready
-    kin, arm = panda_model.kinematics(q), (paper_skin.link, QD)
+    kin = panda_model.kinematics(q)
+    chain = Chain(kin.anchor, kin.axis, panda_model.moved_by, QD)
     here = placed(panda_model, paper_skin, q)
     stays = placed(panda_model, paper_skin, q)
-    move_back(
-        *stays, arm[0], kin.anchor, kin.axis, panda_model.moved_by, arm[1], np.full(len(paper_skin), 7.5), 7.0, 0.06
-    )  # fmt: skip
-    np.testing.assert_array_equal(stays[0], here[0])
+    move_back(stays, np.full(len(paper_skin), 7.5), chain, 7.0, 0.06)
+    np.testing.assert_array_equal(stays.position, here.position)
     for stamp, same in ((-np.inf, 6.94), (6.0, 6.94)):
         first, second = placed(panda_model, paper_skin, q), placed(panda_model, paper_skin, q)
         for at, pose in ((stamp, first), (same, second)):
             stamps = np.full(len(paper_skin), at)
-            move_back(*pose, arm[0], kin.anchor, kin.axis, panda_model.moved_by, arm[1], stamps, 7.0, 0.06)
+            move_back(pose, stamps, chain, 7.0, 0.06)
         np.testing.assert_allclose(first[0], second[0], atol=1e-12)

@@ -16,7 +16,5 @@ MODEL = RobotModel(panda())
 @given(st.lists(st.floats(-2.8, 2.8), min_size=7, max_size=7))
 def test_it_is_mujocos_in_any_posture(q):
     kin, M = MODEL.kinematics(np.array(q)), np.empty((7, 7))
-    mass_matrix_into(
-        kin.anchor, kin.axis, kin.position, kin.rotation, MODEL.moved_by, MODEL.mass, MODEL.com, MODEL.inertia, M
-    )
+    mass_matrix_into(kin, MODEL.mechanism, M)
     assert_allclose(M, MODEL.mass_matrix(np.array(q)), atol=1e-12)

@@ -6,13 +6,15 @@ Ferraguti et al. 2015; both bound it with what they call passivity observer and 
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import ByName, compiled, entry
+from pretouch.groups import CapsuleArrays
 from pretouch.params import ReactionParams
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
 
@@ -105,15 +107,14 @@ def begun(
 
 
 def yielded(
-    state: AdmittanceState, model: RobotModel, kin: Kinematics, residual: FloatArray, command: FloatArray,
+    state: AdmittanceState, arm: tuple[RobotModel, Kinematics], residual: FloatArray, command: FloatArray,
     band: FloatArray, dt: float, params: ReactionParams, contact: bool = True,
 ) -> AdmittanceState:  # fmt: skip
     """Move the virtual mass by one period under the torque that is felt.
 
     Args:
         state: memory.
-        model: the arm.
-        kin: its posture.
+        arm: model and posture.
         residual: (n,) external torque [Nm].
         command: (n,) joint velocities commanded last [rad/s].
         band: (n,) dead band [Nm].
@@ -127,11 +128,10 @@ def yielded(
     # just after a contact the filters still lag, and the detector has found a push already
     at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
     tank, pushed = _yield(
-        torque, state.torque, state.velocity, command, state.side, state.sliding, band, keep, p.inertia_kg_m2,
-        p.damping_nm_s, p.reverse_band, p.static_friction_nm, _KEEPS, at_once, _REST_RAD_S,
-        1.0 - math.exp(-dt / _STEADY_S), dt, state.tank, p.tank_max_j, velocity, side, sliding, steady,
+        torque, command, band, state, p, (keep, at_once, 1.0 - math.exp(-dt / _STEADY_S), dt),
+        (velocity, side, sliding, steady),
     )  # fmt: skip
-    velocity = _no_faster(velocity, model, kin, p.speed_max_m_s)
+    velocity = _no_faster(velocity, *arm, p.speed_max_m_s)
     quiet, unfelt = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.unfelt + dt
     return AdmittanceState(
         state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, unfelt, state.since + dt
@@ -141,9 +141,7 @@ def yielded(
 def _no_faster(velocity: FloatArray, model: RobotModel, kin: Kinematics, most: float) -> FloatArray:
     """Scale joint velocities (n,) [rad/s] so that no point of the body's axes is faster than `most` [m/s]."""
     body = model.body
-    fastest = fastest_point(
-        kin.position, kin.rotation, kin.anchor, kin.axis, model.moved_by, body.link, body.a, body.b, velocity
-    )
+    fastest = fastest_point(kin, model.moved_by, body.arrays, velocity)
     return velocity * (most / fastest) if fastest > most else velocity
 
 
@@ -160,19 +158,63 @@ _REST_RAD_S = 1e-3
 """Speed at which a joint that nothing drives sticks [rad/s]: none that can be seen."""
 
 
-@compiled
+class _Before(NamedTuple):
+    """As of `AdmittanceState`."""
+
+    torque: FloatArray
+    velocity: FloatArray
+    side: FloatArray
+    sliding: FloatArray
+    tank: float
+
+
+class _Params(NamedTuple):
+    """What is taken of `ReactionParams`."""
+
+    inertia_kg_m2: float
+    damping_nm_s: float
+    reverse_band: float
+    static_friction_nm: float
+    tank_max_j: float
+
+
+class _Step(NamedTuple):
+    """What a period comes to."""
+
+    keep: float
+    """Part of the torque before that the estimate still shows."""
+    at_once: float
+    """Times the static friction from which two samples tear a joint loose."""
+    weight: float
+    """Of a sample in the filters."""
+    dt: float
+    """[s]"""
+
+
+class _After(NamedTuple):
+    """Room for what follows, as of `AdmittanceState`; `steady` is that of before."""
+
+    velocity: FloatArray
+    side: FloatArray
+    sliding: FloatArray
+    steady: FloatArray
+
+
+@entry
 def _yield(
-    torque: FloatArray, before: FloatArray, v: FloatArray, command: FloatArray, side: FloatArray, loose: FloatArray,
-    band: FloatArray, keep: float, inertia: float, damping: float, reverse: float, friction: float, keeps: float,
-    at_once: float, rest: float, weight: float, dt: float, tank: float, tank_max: float,
-    velocity: FloatArray, sides: FloatArray, sliding: FloatArray, steady: FloatArray,
+    torque: FloatArray, command: FloatArray, band: FloatArray, state: ByName[_Before], p: ByName[_Params], step: _Step,
+    after: _After,
 ) -> tuple[float, bool]:  # fmt: skip
-    """Write the last line of arguments; return the energy in the tank [J], and whether a push goes on."""
+    """Write what follows; return the energy in the tank [J], and whether a push goes on."""
+    before, v, side, loose, tank = state
+    inertia, damping, reverse, friction, tank_max = p
+    keep, at_once, weight, dt = step
+    velocity, sides, sliding, steady = after
     n, power, pushed = len(v), 0.0, False
     for i in range(n):
         steady[0, i] += weight * (torque[i] - steady[0, i])
         steady[1, i] += weight * (steady[0, i] - steady[1, i])
-        lasts = abs(steady[0, i]) > max(band[i], keeps * friction)
+        lasts = abs(steady[0, i]) > max(band[i], _KEEPS * friction)
         starts = _both(steady[0, i], steady[1, i], friction) or _both(torque[i], before[i], at_once * friction)
         sliding[i] = 1.0 if friction == 0.0 or starts or (loose[i] > 0.0 and lasts) else 0.0
         pushed = pushed or (lasts and sliding[i] > 0.0)
@@ -193,7 +235,7 @@ def _yield(
         sides[i] = side[i]
         if drive != 0.0:
             sides[i] = np.sign(drive)
-        elif velocity[i] * command[i] <= 0.0 or (friction > 0.0 and abs(velocity[i]) < rest):
+        elif velocity[i] * command[i] <= 0.0 or (friction > 0.0 and abs(velocity[i]) < _REST_RAD_S):
             velocity[i] = 0.0
         elif abs(velocity[i]) > abs(command[i]):
             # nothing drives it: it is never asked for more than it does
@@ -224,15 +266,14 @@ def _shrunk(torque: FloatArray, band: FloatArray) -> FloatArray:
     return np.sign(torque) * np.maximum(0.0, np.abs(torque) - band)
 
 
-@compiled
-def fastest_point(
-    position: FloatArray, rotation: FloatArray, anchor: FloatArray, axis: FloatArray, moved_by: BoolArray,
-    link: IntArray, a: FloatArray, b: FloatArray, qd: FloatArray,
-) -> float:  # fmt: skip
+@entry
+def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, qd: FloatArray) -> float:
     """Speed [m/s] of the fastest end of any capsule's axis at joint velocities `qd` (n,) [rad/s].
 
     The speed along an axis is convex, so no point of it is faster than both its ends.
     """
+    position, rotation, anchor, axis = kin
+    link, a, b = capsules.link, capsules.a, capsules.b
     fastest = 0.0
     for c in range(len(link)):
         k = link[c]

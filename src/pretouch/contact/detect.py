@@ -1,12 +1,13 @@
 """Contact detection in one call: force in, thresholds and perhaps a contact out."""
 
 from dataclasses import field
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import entry
 from pretouch.contact.reaction import external_force
-from pretouch.contact.thresholds import crossed, side_distances, threshold_parts
+from pretouch.contact.thresholds import ThresholdNumbers, crossed, side_distances, threshold_parts
 from pretouch.contact.window import WindowState, add_to, added, place, window_mean, window_std
 from pretouch.params import ThresholdParams
 from pretouch.types import Contact, FloatArray, Obstacles, Thresholds, Touched, untouched
@@ -51,10 +52,11 @@ def detect(
     """
     armed, p, parts = state.full, params, np.empty((6, 3))
     chunk, at, sums = place(state)
-    found = _detect(
-        chunk, at, sums, state.count, armed, force is not None, _NONE if force is None else force, ee_position,
-        obstacles.point, obstacles.ee_distance, p.alpha, p.lambda_, p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n,
-        p.d_max_m, p.d_min_m, p.compare == "filtered", parts,
+    found = _detect.flat(
+        chunk, at, sums, state.count, armed,
+        force is not None, _NONE if force is None else force, p.compare == "filtered",
+        ee_position, obstacles.point, obstacles.ee_distance,
+        p.alpha, p.lambda_, p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n, p.d_max_m, p.d_min_m, parts,
     )  # fmt: skip
     after = state if force is None else added(state, chunk, sums)
     limits, contact = Thresholds(parts), None
@@ -67,26 +69,52 @@ def detect(
 _NONE = np.full(3, np.nan)
 
 
-@compiled
+class _Window(NamedTuple):
+    """What one more value changes of a window, see `place`."""
+
+    chunk: FloatArray
+    at: int
+    sums: FloatArray
+    held: int
+    """How many values the window holds."""
+    full: bool
+
+
+class _Force(NamedTuple):
+    """What is held against the thresholds."""
+
+    present: bool
+    """Whether there is an estimate."""
+    value: FloatArray
+    """(3,) [N], without meaning if not."""
+    filtered: bool
+    """Whether it is compared as it enters the window (eq. 8), or as it is."""
+
+
+class _Near(NamedTuple):
+    """As of `Obstacles`."""
+
+    point: FloatArray
+    ee_distance: FloatArray
+
+
+@entry
 def _detect(
-    chunk: FloatArray, at: int, sums: FloatArray, count: int, full: bool, present: bool, force: FloatArray,
-    ee_position: FloatArray,
-    point: FloatArray, ee_distance: FloatArray, alpha: float, lambda_: float, f_base: float, f_std: float,
-    sigma_max: float, f_d: float, d_max: float, d_min: float, filtered: bool, parts: FloatArray,
+    window: _Window, force: _Force, ee_position: FloatArray, obstacles: _Near, p: ThresholdNumbers,
+    parts: FloatArray,
 ) -> bool:  # fmt: skip
     """Add to the window, write the thresholds (6, 3), and say whether the force crosses one of them."""
-    if present:
-        add_to(chunk, at, sums, count, full, force, alpha, lambda_)
-        count = count if full else count + 1
-    mean = window_mean(sums, count)
-    positive, negative = side_distances(ee_position, point, ee_distance)
-    threshold_parts(
-        mean, window_std(sums, count), positive, negative, f_base, f_std, sigma_max, f_d, d_max, d_min, parts
-    )
-    if not present:
+    chunk, at, sums, held, full = window
+    if force.present:
+        add_to(chunk, at, sums, held, full, force.value, p.alpha, p.lambda_)
+        held = held if full else held + 1
+    mean = window_mean(sums, held)
+    positive, negative = side_distances(ee_position, obstacles.point, obstacles.ee_distance)
+    threshold_parts(mean, window_std(sums, held), positive, negative, p, parts)
+    if not force.present:
         return False
     found = False
     for i in range(3):
-        compared = sums[0, i] if filtered else force[i]
+        compared = sums[0, i] if force.filtered else force.value[i]
         found = found or compared > parts[0, i] or compared < parts[1, i]
     return found

@@ -1,18 +1,29 @@
 """The sequential detector: torques less their learnt mean, held against contacts of each link, in one compiled call."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry
 from pretouch.contact.cues import Cues
 from pretouch.contact.fixed import force_map_into
-from pretouch.contact.hypotheses import write_hypotheses
-from pretouch.contact.lasting_load import find_lasting, learn_lasting, stands_out, still_explains, weight_part
+from pretouch.contact.hypotheses import NearPrior, write_hypotheses
+from pretouch.contact.lasting_load import (
+    WeightPart,
+    find_lasting,
+    learn_lasting,
+    stands_out,
+    still_explains,
+    weight_part,
+)
 from pretouch.contact.proximity_prior import MOST
 from pretouch.contact.residual_model import (
     BLOCK,
     QUEUE,
+    CalmSample,
+    Learnt,
+    Pace,
     ResidualModel,
     add_sample,
     features_into,
@@ -22,12 +33,13 @@ from pretouch.contact.residual_model import (
     residual_init,
     spread_of_sample,
 )
-from pretouch.contact.sequential import LENGTHS, LONGEST, alarm_level, judge, window_means
+from pretouch.contact.sequential import LENGTHS, LONGEST, Hypotheses, alarm_level, judge, window_means
 from pretouch.contact.turning import learn_turning, turning_doubt, turning_init
+from pretouch.groups import Mechanism, ObstacleArrays
 from pretouch.params import DetectionParams
 from pretouch.robot.mass_matrix import mass_matrix_into
 from pretouch.robot.model import Kinematics, RobotModel, jacobian_into
-from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RobotState
+from pretouch.types import FloatArray, Obstacles, RobotState
 from pretouch.values import value
 
 _FIRST_S = 2.0
@@ -114,7 +126,7 @@ def take_sample(
         p: parameters.
         cues: what units say of a touch.
     """
-    m, o, n = state.model, obstacles, model.n
+    m, n = state.model, model.n
     residual, speed, force, bands = np.empty(n), np.empty(n), np.empty(3), np.empty((6, 3))
     means, S, doubt = np.zeros((len(LENGTHS), n)), np.empty((n, n)), np.empty(n)
     ring, block, queue, prior = state.ring.copy(), m.block.copy(), m.queue, _NONE
@@ -127,19 +139,19 @@ def take_sample(
             weights, covariance, spread, seen = weights.copy(), covariance.copy(), spread.copy(), seen.copy()
     lasting, turning = state.lasting.copy(), state.turning.copy()
     may = p.learn and (watched or p.learn_unseen)
-    evidence, calm, filled, waiting, steady = _take(
-        kin.anchor, kin.axis, kin.position, kin.rotation,
-        model.moved_by, model.mass, model.com, model.inertia, model.parts, model.middle, model.ee,
-        robot.qd, robot.qd_commanded, robot.tau_ext, m.speed,
-        o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
-        ring, state.at, min(state.count + 1, LONGEST), state.calm, block, m.filled, queue, m.waiting,
-        weights, covariance, spread, seen, prior, lasting, state.steady, settle, turning,
-        math.exp(-p.observer_gain_1_s * period), may, p.inertia, p.widen_at_turns, reacting, p.offset_prior_nm,
-        alarm_level(p, period), period, p.use_proximity, p.contact_gain, p.tails,
-        cues.gain,
-        p.near_gain, p.near_m, p.near_horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm, p.still_rad_s,
-        p.memory_s, p.spread_memory_s, (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2,
-        residual, speed, force, bands, means, S, doubt,
+    o = obstacles
+    evidence, calm, filled, waiting, steady = _take.flat(
+        robot.qd, robot.qd_commanded, robot.tau_ext,
+        o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
+        weights, covariance, spread, seen, prior,
+        block, m.filled, queue, m.waiting,
+        ring, state.at, min(state.count + 1, LONGEST), state.calm, lasting, state.steady, turning, m.speed,
+        math.exp(-p.observer_gain_1_s * period), period, settle, alarm_level(p, period), may, reacting,
+        (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2, cues.gain,
+        p.inertia, p.widen_at_turns, p.offset_prior_nm, p.use_proximity, p.contact_gain, p.tails, p.near_gain,
+        p.near_m, p.near_horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm, p.still_rad_s,
+        p.memory_s, p.spread_memory_s,
+        residual, speed, force, bands, means, S, doubt, *kin, *model.mechanism_fields,
     )  # fmt: skip
     at, count = (state.at + 1) % LONGEST, min(state.count + 1, LONGEST)
     if steady < 0:  # learnt: what was felt before is no contact
@@ -157,79 +169,163 @@ def take_sample(
 _NONE = np.zeros(0)
 
 
-@compiled
+class _Blocks(NamedTuple):
+    """Blocks of samples that wait to be learnt, as of `ResidualModel`."""
+
+    block: FloatArray
+    filled: int
+    queue: FloatArray
+    waiting: int
+
+
+class _Recent(NamedTuple):
+    """The newest samples and what they leave, as of `SequentialState`."""
+
+    ring: FloatArray
+    at: int
+    held: int
+    calm: int
+    lasting: FloatArray
+    steady: int
+    turning: FloatArray
+    speed: FloatArray
+    """(n,) commanded joint velocities as late as the torques, of the sample before [rad/s]."""
+
+
+class _Memory(NamedTuple):
+    """All that is remembered, and changed."""
+
+    learnt: Learnt
+    blocks: _Blocks
+    recent: _Recent
+
+
+class _Now(NamedTuple):
+    """What else there is to say of one sample."""
+
+    late: float
+    """Part of the commanded velocities of the sample before that the torques still show."""
+    period: float
+    """Of control [s]."""
+    settle: int
+    """Samples after which what lasts is learnt, 0 for never."""
+    level: float
+    """ln A of the test."""
+    may: bool
+    """Whether free motion may be learnt."""
+    reacting: bool
+    """Whether the arm moves with a contact."""
+    most_velocity: float
+    """Largest variance A [(rad/s^2)^2]."""
+    most_torque: float
+    """Largest variance D [Nm^2]."""
+    touch_gain: FloatArray
+    """(L,) times a contact on each link is likelier than without what units say."""
+
+
+class _Params(NamedTuple):
+    """What is taken of `DetectionParams`."""
+
+    inertia: bool
+    widen_at_turns: bool
+    offset_prior_nm: float
+    use_proximity: bool
+    contact_gain: float
+    tails: float
+    near_gain: float
+    near_m: float
+    near_horizon_s: float
+    clear_m: float
+    suspect: float
+    noise_floor_nm: float
+    bias_floor_nm: float
+    still_rad_s: float
+    memory_s: float
+    spread_memory_s: float
+
+
+class _Robot(NamedTuple):
+    """What is taken of `RobotState`."""
+
+    qd: FloatArray
+    qd_commanded: FloatArray
+    tau_ext: FloatArray
+
+
+class _Room(NamedTuple):
+    """Room for what a sample says, as of `Felt`, and for the velocities as late as the torques."""
+
+    residual: FloatArray
+    speed: FloatArray
+    force: FloatArray
+    bands: FloatArray
+    means: FloatArray
+    spread: FloatArray
+    doubt: FloatArray
+
+
+@entry
 def _take(
-    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray,
-    moved_by: BoolArray, mass: FloatArray, com: FloatArray, inertia: FloatArray, parts: IntArray, middle: FloatArray,
-    ee: int, qd: FloatArray, qd_commanded: FloatArray, torque: FloatArray, speed_before: FloatArray,
-    link: IntArray, body_point: FloatArray, direction: FloatArray, distance: FloatArray, closing: FloatArray,
-    ring: FloatArray, at: int, count: int, calm: int, block: FloatArray, filled: int, queue: FloatArray, waiting: int,
-    weights: FloatArray, covariance: FloatArray, spread: FloatArray, seen: FloatArray, prior: FloatArray,
-    lasting: FloatArray, steady: int, settle: int, turning: FloatArray,
-    late: float, may: bool, inertial: bool, widened: bool, reacting: bool, offset_prior: float,
-    level: float, period: float, use_proximity: bool, gain: float, tails: float,
-    touch_gain: FloatArray,
-    near_gain: float, near: float, horizon: float, clear: float, suspect: float, floor: float, bias_floor: float,
-    still: float, memory: float, spread_memory: float, most_velocity: float, most_torque: float,
-    residual: FloatArray, speed: FloatArray, force: FloatArray, bands: FloatArray,
-    means: FloatArray, S: FloatArray, doubt: FloatArray,
+    robot: _Robot, obstacles: ObstacleArrays, memory: _Memory, now: _Now, p: _Params, room: _Room, kin: Kinematics,
+    mechanism: Mechanism,
 ) -> tuple[float, int, int, int, int]:  # fmt: skip
-    """Write the last two lines of arguments and what is learnt; return evidence, calm samples, and what waits."""
-    n, growth = len(qd), np.empty(len(qd))
-    moving = _velocities(qd_commanded, speed_before, late, period, still, speed, growth)
-    x, mean = np.empty((n, weights.shape[1])), np.empty(n)
-    M, J_ee = np.empty((n, n)), np.empty((6, n))
-    features_into(
-        anchor, axis, position, rotation, moved_by, mass, com, ee, speed, growth if inertial else np.zeros(n), x
-    )
-    mean_and_doubt(weights, covariance, x, mean, doubt)
-    mass_matrix_into(anchor, axis, position, rotation, moved_by, mass, com, inertia, M)
-    spread_of_sample(M, spread[moving], floor, S)
+    """Write what a sample says, and what is learnt; return evidence, calm samples, and what waits."""
+    learnt, blocks, recent = memory
+    arm, S, doubt = mechanism.arm, room.spread, room.doubt
+    speed, means, at, n = room.speed, room.means, recent.at, len(robot.qd)
+    growth = np.empty(n)
+    moving = _velocities(robot.qd_commanded, recent.speed, now.late, now.period, p.still_rad_s, speed, growth)
+
+    # the mean of free motion, and how well it is known
+    x, mean, M = np.empty((n, learnt.weights.shape[1])), np.empty(n), np.empty((n, n))
+    features_into(kin, mechanism, speed, growth if p.inertia else np.zeros(n), x)
+    mean_and_doubt(learnt.weights, learnt.covariance, x, mean, doubt)
+    mass_matrix_into(kin, mechanism, M)
+    spread_of_sample(M, learnt.spread[moving], p.noise_floor_nm, S)
     for j in range(n):
-        doubt[j] += bias_floor**2
-        residual[j] = torque[j] - mean[j]
-        ring[at, j] = residual[j]
-    if widened:
-        turning_doubt(M, growth, turning, doubt)
+        doubt[j] += p.bias_floor_nm**2
+        room.residual[j] = robot.tau_ext[j] - mean[j]
+        recent.ring[at, j] = room.residual[j]
+    if p.widen_at_turns:
+        turning_doubt(M, growth, recent.turning, doubt)
 
-    whole = window_means(ring, (at + 1) % LONGEST, count, means)
-    most = len(parts) + (min(MOST, len(distance)) if use_proximity else 0)
-    J, joints, weight = np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most)
-    away = np.zeros((most, 3))
-    write_hypotheses(
-        anchor, axis, position, rotation, moved_by, parts, middle, qd, link, body_point, direction, distance, closing,
-        touch_gain, near_gain, near, horizon, J, joints, weight, away,
-    )  # fmt: skip
-    log_r, window, which = judge(means, whole, S, doubt, J, joints, weight, away, gain, tails)
-    evidence = max(0.0, log_r / level)
+    # the test against contacts
+    whole = window_means(recent.ring, (at + 1) % LONGEST, recent.held, means)
+    distance = obstacles.body_distance
+    most = len(mechanism.links.parts) + (min(MOST, len(distance)) if p.use_proximity else 0)
+    contacts = Hypotheses(np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most), np.zeros((most, 3)))
+    near = NearPrior(p.near_gain, p.near_m, p.near_horizon_s)
+    write_hypotheses(kin, mechanism, robot.qd, obstacles, now.touch_gain, near, contacts)
+    log_r, window, which = judge(means, whole, S, doubt, contacts, p.contact_gain, p.tails)
+    evidence = max(0.0, log_r / now.level)
 
-    alone = may and distance.min() >= clear if len(distance) else may
-    jacobian_into(anchor, axis, moved_by[ee], position[ee], J_ee)
-    calm = 0 if evidence >= suspect or reacting or not alone else min(calm + 1, _CALM)
-    if widened and alone and not reacting and whole == len(LENGTHS):
-        learn_turning(at, means, S, doubt, period / memory, turning)
-    if calm < _CALM:
-        filled, waiting = 0, 0
-    else:
-        add_sample(block, filled == 0, torque, x, residual, M, spread[moving], doubt, moving, tails, floor)
-        filled, waiting = _learn_calm(
-            block, filled + 1, queue, waiting, weights, covariance, spread, seen, prior, period, memory, spread_memory,
-            most_velocity, most_torque,
+    # what is learnt
+    alone = now.may and distance.min() >= p.clear_m if len(distance) else now.may
+    J_ee = np.empty((6, n))
+    jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
+    suspected = evidence >= p.suspect
+    calm = 0 if suspected or now.reacting or not alone else min(recent.calm + 1, _CALM)
+    if p.widen_at_turns and alone and not now.reacting and whole == len(LENGTHS):
+        learn_turning(at, means, S, doubt, now.period / p.memory_s, recent.turning)
+    filled, waiting = 0, 0
+    if calm >= _CALM:
+        sample = CalmSample(robot.tau_ext, x, room.residual, M, doubt, moving)
+        add_sample(blocks.block, blocks.filled == 0, sample, learnt.spread[moving], p.tails, p.noise_floor_nm)
+        pace = Pace(
+            BLOCK * now.period / p.memory_s, BLOCK * now.period / p.spread_memory_s, _FIRST_S / now.period,
+            now.most_velocity, now.most_torque,
         )  # fmt: skip
-    suspected = evidence >= suspect
-    if settle and alone and whole == len(LENGTHS) and calm < _CALM and (steady or suspected or reacting):
-        steady = _still_there(
-            lasting, steady, settle, suspected, reacting, means[-1], x, J_ee, S, weights, covariance, prior,
-            offset_prior, moving,
-        )  # fmt: skip
-    else:
-        steady = 0
+        filled, waiting = _learn_calm(blocks, blocks.filled + 1, learnt, pace)
+    steady = 0
+    something = recent.steady > 0 or suspected or now.reacting
+    if now.settle > 0 and alone and whole == len(LENGTHS) and calm < _CALM and something:
+        found = _Standing(means[-1], x, J_ee, S, moving)
+        steady = _still_there(recent, now.settle, suspected, now.reacting, found, learnt, p.offset_prior_nm)
+
     for j in range(n):
         S[j, j] += doubt[j]
-    _write_force(
-        J_ee, means[window], mean, S, away[max(which - n, 0)] if which >= n else np.zeros(3), math.sqrt(2.0 * level),
-        force, bands,
-    )  # fmt: skip
+    away = contacts.away[max(which - n, 0)] if which >= n else np.zeros(3)
+    _write_force(J_ee, means[window], mean, S, away, math.sqrt(2.0 * now.level), room.force, room.bands)
     return evidence, calm, filled, waiting, steady
 
 
@@ -249,50 +345,59 @@ def _velocities(
 
 
 @compiled
-def _learn_calm(
-    block: FloatArray, filled: int, queue: FloatArray, waiting: int, weights: FloatArray, covariance: FloatArray,
-    spread: FloatArray, seen: FloatArray, prior: FloatArray, period: float, memory: float, spread_memory: float,
-    most_velocity: float, most_torque: float,
-) -> tuple[int, int]:  # fmt: skip
+def _learn_calm(blocks: _Blocks, filled: int, learnt: Learnt, pace: Pace) -> tuple[int, int]:
     """Let a block that is full wait, and learn the one that has waited longest; return what waits now."""
+    queue, waiting = blocks.queue, blocks.waiting
     if filled < BLOCK:
         return filled, waiting
     if waiting < QUEUE:
-        queue[waiting] = block
+        queue[waiting] = blocks.block
         return 0, waiting + 1
-    learn_block(
-        queue[0], weights, covariance, spread, seen, prior, BLOCK * period / memory, BLOCK * period / spread_memory,
-        _FIRST_S / period, most_velocity, most_torque,
-    )  # fmt: skip
+    learn_block(queue[0], learnt, pace)
     queue[:-1] = queue[1:].copy()
-    queue[-1] = block
+    queue[-1] = blocks.block
     return 0, waiting
+
+
+class _Standing(NamedTuple):
+    """What is left of the torques over the longest window, and in which posture."""
+
+    residual: FloatArray
+    """(n,) mean [Nm]."""
+    x: FloatArray
+    """(n, f) features."""
+    J: FloatArray
+    """(6, n) Jacobian of the end-effector."""
+    S: FloatArray
+    """(n, n) spread of a sample [Nm^2]."""
+    moving: int
+    """1 if the arm moves, or 0."""
 
 
 @compiled
 def _still_there(
-    lasting: FloatArray, steady: int, settle: int, suspected: bool, reacting: bool, residual: FloatArray, x: FloatArray,
-    J: FloatArray, S: FloatArray, weights: FloatArray, covariance: FloatArray, prior: FloatArray, offset_prior: float,
-    moving: int,
-) -> int:  # fmt: skip
+    recent: _Recent, settle: int, suspected: bool, reacting: bool, found: _Standing, known: Learnt, offset_prior: float
+) -> int:
     """Return for how many samples that count the same load or step has explained the residual; -1: it was learnt.
 
     Samples count in which a contact is suspected or the arm reacts, but only what stands out is something to find out.
     """
+    lasting, steady = recent.lasting, recent.steady
+    residual, x, J, S, moving = found
     n = len(residual)
-    learnt, offset, unit = np.empty(n), np.empty(n), np.empty(n)
-    weight_part(weights, x, learnt, offset, unit)
+    weight = WeightPart(np.empty(n), np.empty(n), np.empty(n))
+    weight_part(known.weights, x, weight)
     counts = suspected or reacting
-    if steady and still_explains(lasting, residual, unit, J, S, LONGEST, moving):
+    if steady and still_explains(lasting, residual, weight.unit, J, S, LONGEST, moving):
         steady += int(counts)
     else:
         steady, counts = 0, suspected or (reacting and stands_out(residual, S, LONGEST))
     if counts and (steady == 0 or steady > settle):
         now = np.empty(3 + n)
-        if not find_lasting(residual, learnt, offset, unit, J, S, LONGEST, offset_prior, now):
+        if not find_lasting(residual, weight, J, S, LONGEST, offset_prior, now):
             return steady if steady <= 2 * settle else 0
         if steady > settle:
-            learn_lasting(now, residual, x, S, LONGEST, offset_prior**2, weights, covariance, prior)
+            learn_lasting(now, residual, x, S, LONGEST, offset_prior**2, known)
             return -1
         lasting[:] = now
         steady = 1

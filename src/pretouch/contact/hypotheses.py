@@ -1,26 +1,39 @@
 """The contacts that the sequential test looks for in one posture: given to `sequential.judge`."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.contact.proximity_prior import nearest_of, nearness
-from pretouch.robot.model import jacobian_into
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.contact.sequential import Hypotheses
+from pretouch.groups import Mechanism, ObstacleArrays
+from pretouch.robot.model import Kinematics, jacobian_into
+from pretouch.types import FloatArray
+
+
+class NearPrior(NamedTuple):
+    """How much likelier a contact is where something is near."""
+
+    near_gain: float
+    near_m: float
+    near_horizon_s: float
 
 
 @compiled
 def write_hypotheses(
-    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
-    parts: IntArray, middle: FloatArray, qd: FloatArray,
-    link: IntArray, body_point: FloatArray, direction: FloatArray, distance: FloatArray, closing: FloatArray,
-    touch_gain: FloatArray, gain: float, near: float, horizon: float,
-    J: FloatArray, joints: IntArray, weight: FloatArray, away: FloatArray,
+    kin: Kinematics, mechanism: Mechanism, qd: FloatArray, obstacles: ObstacleArrays, touch_gain: FloatArray,
+    p: NearPrior, contacts: Hypotheses,
 ) -> None:  # fmt: skip
-    """Write Jacobians (H, 3, n), joints (H,), prior weights (n + H,) and directions (H, 3) of the contacts looked for.
+    """Write the contacts that are looked for: of each joint, then of each link, then of the nearest objects.
 
-    Each joint's weight, then each link's, then those of the nearest objects; see `sequential.judge`. All are times
-    `touch_gain` (L,) of the link; of several links behind one joint the largest counts.
+    Joints move at `qd` (n,) [rad/s]. All weights are times `touch_gain` (L,) of the link; of several links behind one
+    joint the largest counts.
     """
+    position, rotation, anchor, axis = kin
+    moved_by, parts, middle = mechanism.arm.moved_by, mechanism.links.parts, mechanism.links.middle
+    distance, direction = obstacles.body_distance, obstacles.direction
+    J, joints, weight, away = contacts
     n, count, full, point = len(anchor), len(parts), np.empty((6, len(anchor))), np.empty(3)
     order, k = nearest_of(distance, len(J) - count), 0
     weight[:n] = 0.0
@@ -38,13 +51,13 @@ def write_hypotheses(
                     point[a] += rotation[touched, a, b] * middle[h, b]
         else:
             k = order[h - count]
-            touched, point[:] = link[k], body_point[k]
+            touched, point[:] = obstacles.link[k], obstacles.body_point[k]
         jacobian_into(anchor, axis, moved_by[touched], point, full)
         J[h], joints[h] = full[:3], moved_by[touched].sum()
         if h >= count:
-            speed = closing[k]
+            speed = obstacles.closing_speed[k]
             for a in range(3):
                 away[h, a] = -direction[k, a]
                 for j in range(n):
                     speed += direction[k, a] * J[h, a, j] * qd[j]
-            weight[n + h] = gain * nearness(distance[k], speed, near, horizon) * touch_gain[touched]
+            weight[n + h] = p.near_gain * nearness(distance[k], speed, p.near_m, p.near_horizon_s) * touch_gain[touched]

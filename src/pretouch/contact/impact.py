@@ -7,12 +7,14 @@ that follow gains on the links of the sequential test, for a short while; where 
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import ByName, compiled, entry
 from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.impact_pattern import likelihoods, responses
+from pretouch.groups import Mechanism, SkinArrays
 from pretouch.params import DetectionParams, Profile
 from pretouch.robot.link_motion import chain_motion, lever_acceleration
 from pretouch.robot.model import Kinematics, RobotModel
@@ -113,10 +115,12 @@ def listen(
     speed, behind, excess = s.speed.copy(), s.behind.copy(), s.excess * math.exp(-period / p.imu_memory_s)
     likelihood = np.zeros((BINS, len(model.parts)))
     judged = _listen(
-        number, gap, period, kin.anchor, kin.axis, kin.position, kin.rotation, model.moved_by, model.mass, model.com,
-        model.inertia, model.parts, model.middle, skin.link, skin.T_link_sensor, robot.qd_commanded,
-        imu.unit, imu.stamp, imu.acceleration, felt, heard, expected, moved, told, mean, spread, usual, seen,
-        speed, behind, p.imu_follow_1_s, p.imu_motion_doubt, p.rotor_kg_m2, p.imu_contact_gain, p.imu_tails, likelihood,
+        kin, model.mechanism, skin.arrays, robot.qd_commanded, imu,
+        (
+            number, gap, (felt, heard, expected, moved, told), (mean, spread, usual, seen), speed, behind
+        ),
+        _Params(period, p.imu_follow_1_s, p.imu_motion_doubt, p.rotor_kg_m2, p.imu_contact_gain, p.imu_tails),
+        likelihood,
     )  # fmt: skip
     if judged:
         _raise(excess, likelihood, model.parts, p)
@@ -139,30 +143,77 @@ def _raise(excess: FloatArray, likelihood: FloatArray, parts: IntArray, p: Detec
         excess[parts] *= min(1.0, most / float(excess[parts].mean()))
 
 
-@compiled
+class _Bins(NamedTuple):
+    """Sums of samples, as of `ImpactState`: B bins of K units, or one of them."""
+
+    felt: FloatArray
+    heard: IntArray
+    expected: FloatArray
+    moved: FloatArray
+    told: IntArray
+
+
+class _Usual(NamedTuple):
+    """What is usual of K units, as of `ImpactState`."""
+
+    mean: FloatArray
+    spread: FloatArray
+    usual: FloatArray
+    seen: IntArray
+
+
+class _Memory(NamedTuple):
+    """All that is remembered, and changed."""
+
+    number: int
+    """Number of the newest bin."""
+    gap: int
+    """By how many bins it is newer than the one of the step before."""
+    bins: _Bins
+    usual: _Usual
+    speed: FloatArray
+    behind: FloatArray
+
+
+class _Params(NamedTuple):
+    """The period, and what is taken of `DetectionParams`."""
+
+    period: float
+    follow: float
+    motion_doubt: float
+    rotor: float
+    gain: float
+    tails: float
+
+
+class _Samples(NamedTuple):
+    """As `ImuReadings`."""
+
+    unit: IntArray
+    stamp: FloatArray
+    acceleration: FloatArray
+
+
+@entry
 def _listen(
-    number: int, gap: int, period: float, anchor: FloatArray, axis: FloatArray, position: FloatArray,
-    rotation: FloatArray, moved_by: BoolArray, mass: FloatArray, com: FloatArray, inertia: FloatArray, parts: IntArray,
-    middle: FloatArray, link: IntArray, T: FloatArray, qd_commanded: FloatArray, unit: IntArray, stamp: FloatArray,
-    acceleration: FloatArray, felt: FloatArray, heard: IntArray, expected: FloatArray, moved: FloatArray,
-    told: IntArray, mean: FloatArray, spread: FloatArray, usual: FloatArray, seen: IntArray, speed: FloatArray,
-    behind: FloatArray, follow: float, motion_doubt: float, rotor: float, gain: float, tails: float,
-    likelihood: FloatArray,
+    kin: Kinematics, mechanism: Mechanism, skin: SkinArrays, qd_commanded: FloatArray, imu: ByName[_Samples],
+    memory: _Memory, p: _Params, likelihood: FloatArray,
 ) -> int:  # fmt: skip
     """Move the bins on to `number`, fill them, and write the likelihood ratios (B, P) of those that were added to.
 
     Returns how many there are. Writes what is remembered.
     """
-    for b in range(number - gap + 1, number + 1):
+    number, bins, usual = memory.number, memory.bins, memory.usual
+    felt, heard, expected, moved, told = bins
+    unit, stamp, acceleration = imu
+    for b in range(number - memory.gap + 1, number + 1):
         k = b % BINS
-        _learn(felt[k], heard[k], expected[k], told[k], mean, spread, usual, seen)
+        _learn(felt[k], heard[k], expected[k], told[k], usual)
         felt[k], heard[k], expected[k], moved[k], told[k] = 0.0, 0, 0.0, 0.0, 0
-    growth = _followed(qd_commanded, speed, behind, follow, period)
-    _expect(
-        anchor, axis, position, rotation, moved_by, link, T, speed, growth, expected[number % BINS],
-        moved[number % BINS],
-    )  # fmt: skip
-    told[number % BINS] += 1
+    growth = _followed(qd_commanded, memory.speed, memory.behind, p.follow, p.period)
+    newest = number % BINS
+    _expect(kin, mechanism.arm.moved_by, skin, memory.speed, growth, expected[newest], moved[newest])
+    told[newest] += 1
     fresh = np.zeros(BINS, np.bool_)
     for i in range(len(unit)):
         b = int(np.floor(stamp[i] / BIN_S))
@@ -176,14 +227,10 @@ def _listen(
     for k in range(BINS):
         if fresh[k] and told[k]:
             if not judged:
-                A = responses(
-                    anchor, axis, position, rotation, moved_by, mass, com, inertia, rotor, parts, middle, link, T
-                )
+                A = responses(kin, mechanism, p.rotor, skin)
             judged += 1
-            z, variance, known = _innovation(
-                felt[k], heard[k], expected[k], moved[k], told[k], mean, spread, usual, seen, motion_doubt
-            )
-            likelihoods(z, variance, known, A, gain, tails, likelihood[k])
+            z, variance, known = _innovation(bins, k, usual, p.motion_doubt)
+            likelihoods(z, variance, known, A, p.gain, p.tails, likelihood[k])
     return judged
 
 
@@ -207,10 +254,12 @@ def _followed(
 
 @compiled
 def _expect(
-    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
-    link: IntArray, T: FloatArray, qd: FloatArray, qdd: FloatArray, expected: FloatArray, moved: FloatArray,
+    kin: Kinematics, moved_by: BoolArray, skin: SkinArrays, qd: FloatArray, qdd: FloatArray, expected: FloatArray,
+    moved: FloatArray,
 ) -> None:  # fmt: skip
     """Add to `expected` (K, 3) the specific force of each unit, sensor frame, and to `moved` (K,) the motion's size."""
+    position, rotation, anchor, axis = kin
+    link, T = skin.link, skin.T_link_sensor
     w, alpha, a, point = chain_motion(anchor, axis, qd, qdd)
     for u in range(len(link)):
         body, k = link[u], moved_by[link[u]].sum()
@@ -223,11 +272,10 @@ def _expect(
 
 
 @compiled
-def _innovation(
-    felt: FloatArray, heard: IntArray, expected: FloatArray, moved: FloatArray, told: int, mean: FloatArray,
-    spread: FloatArray, usual: FloatArray, seen: IntArray, motion_doubt: float,
-) -> tuple[FloatArray, FloatArray, BoolArray]:  # fmt: skip
-    """Innovations (K, 3) of one bin with their variances (K, 3), and which units' are known (K,)."""
+def _innovation(bins: _Bins, k: int, known_of: _Usual, motion_doubt: float) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Innovations (K, 3) of bin k with their variances (K, 3), and which units' are known (K,)."""
+    felt, heard, expected, moved, told = bins.felt[k], bins.heard[k], bins.expected[k], bins.moved[k], bins.told[k]
+    mean, spread, usual, seen = known_of
     z, variance, known = np.zeros(mean.shape), np.ones(mean.shape), np.zeros(len(mean), np.bool_)
     for u in range(len(mean)):
         if heard[u] and seen[u] >= SETTLED:
@@ -240,11 +288,9 @@ def _innovation(
 
 
 @compiled
-def _learn(
-    felt: FloatArray, heard: IntArray, expected: FloatArray, told: int, mean: FloatArray, spread: FloatArray,
-    usual: FloatArray, seen: IntArray,
-) -> None:  # fmt: skip
+def _learn(felt: FloatArray, heard: IntArray, expected: FloatArray, told: int, known_of: _Usual) -> None:
     """Learn mean and spread (K, 3) of the units from a bin that gets no more samples; outliers count for less."""
+    mean, spread, usual, seen = known_of
     if not told:
         return
     for u in range(len(mean)):

@@ -10,9 +10,10 @@ import numpy as np
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
 from pretouch.contact.sequential import log_ratio
+from pretouch.groups import Mechanism, SkinArrays
 from pretouch.robot.mass_matrix import mass_matrix_into
-from pretouch.robot.model import jacobian_into
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.robot.model import Kinematics, jacobian_into
+from pretouch.types import BoolArray, FloatArray
 
 _LARGEST = 100.0
 """Logarithm of a likelihood ratio from which on it is all the same."""
@@ -21,21 +22,19 @@ _SINGULAR = 1e-6
 
 
 @compiled
-def responses(
-    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
-    mass: FloatArray, com: FloatArray, inertia: FloatArray, rotor: float, parts: IntArray, middle: FloatArray,
-    link: IntArray, T_link_sensor: FloatArray,
-) -> FloatArray:  # fmt: skip
+def responses(kin: Kinematics, mechanism: Mechanism, rotor: float, skin: SkinArrays) -> FloatArray:
     """Return A (P, K, 3, 3) [1/kg]: sensor frame of each unit, base frame of a force at the middle of each link.
 
-    The first four arguments are those of `Kinematics`, the next four and `parts` and `middle` those of `RobotModel`;
     `rotor` is the drives' inertia [kg m^2], which moves with the joints.
     """
+    position, rotation, anchor, axis = kin
+    moved_by, parts, middle = mechanism.arm.moved_by, mechanism.links.parts, mechanism.links.middle
+    link, T_link_sensor = skin.link, skin.T_link_sensor
     n, units = len(anchor), len(link)
     M, L, J = np.empty((n, n)), np.zeros((n, n)), np.empty((6, n))
     y, X = np.empty(n), np.empty((n, 3))
     A, felt = np.zeros((len(parts), units, 3, 3)), np.empty((units, 3, n))
-    mass_matrix_into(anchor, axis, position, rotation, moved_by, mass, com, inertia, M)
+    mass_matrix_into(kin, mechanism, M)
     for j in range(n):
         M[j, j] += rotor
     if not factor(M, L):

@@ -5,11 +5,13 @@ small torque on one joint alone, is learnt as free motion, whether the arm stand
 neither: near, or not constant, or not straight down, or felt by more than one joint.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.residual_model import PLAIN, least_squares_step
+from pretouch.contact.residual_model import PLAIN, Learnt, least_squares_step
 from pretouch.types import FloatArray
 
 MOST_KG = 3.0
@@ -75,24 +77,34 @@ def _torque_of(lasting: FloatArray, unit: FloatArray, J: FloatArray, j: int) -> 
     return float(lasting[0] * unit[j] + moments + lasting[3 + j])
 
 
+class WeightPart(NamedTuple):
+    """What of the mean may be weight, as `weight_part` writes it."""
+
+    learnt: FloatArray
+    """(n,) what of the mean learnt so far may be weight [Nm]."""
+    offset: FloatArray
+    """(n,) constant part of that mean [Nm]."""
+    unit: FloatArray
+    """(n,) torques of 1 kg at the end-effector [Nm]."""
+
+
 @compiled
 def find_lasting(
-    residual: FloatArray, learnt: FloatArray, offset: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray,
-    samples: int, offset_prior: float, lasting: FloatArray,
+    residual: FloatArray, weight: WeightPart, J: FloatArray, S: FloatArray, samples: int, offset_prior: float,
+    lasting: FloatArray,
 ) -> bool:  # fmt: skip
     """Write a load or a step of one joint that a residual can be, and return whether there is one.
 
     Args:
         residual: (n,) mean of the torques that free motion does not explain [Nm].
-        learnt: (n,) what of the mean learnt so far may be weight [Nm].
-        offset: (n,) constant part of that mean [Nm].
-        unit: (n,) torques of 1 kg at the end-effector [Nm].
-        J: (6, n) Jacobian there.
+        weight: what of the mean may be weight.
+        J: (6, n) Jacobian of the end-effector.
         S: (n, n) spread of a sample [Nm^2].
         samples: how many the mean is of.
         offset_prior: deviation of a joint's offset [Nm].
         lasting: (3 + n,) written: load [kg], its moments about both horizontal axes [kg m], each joint's torque [Nm].
     """
+    learnt, offset, unit = weight
     lasting[:] = 0.0
     load, misfit = np.zeros(3), np.inf
     joint, step, rest = _one_joint(residual, S, samples)
@@ -181,16 +193,15 @@ def _spread_of_mean(S: FloatArray, samples: int, unknown: float, C: FloatArray) 
 
 @compiled
 def learn_lasting(
-    lasting: FloatArray, residual: FloatArray, x: FloatArray, S: FloatArray, samples: int, widen: float,
-    weights: FloatArray, covariance: FloatArray, prior: FloatArray,
-) -> None:  # fmt: skip
+    lasting: FloatArray, residual: FloatArray, x: FloatArray, S: FloatArray, samples: int, widen: float, known: Learnt
+) -> None:
     """Take what has lasted into the mean at once: all joints carry a load, one joint its step.
 
     What is left of the residual (n,) goes into the load and the offset of each joint alone, `widen` being the variance
     that the offset then has more [Nm^2].
     """
     n, load = x.shape[0], x.shape[1] - 1
-    kg = lasting[0]
+    weights, covariance, kg = known.weights, known.covariance, lasting[0]
     for j in range(n):
         torque = residual[j]
         for a in range(load + 1):
@@ -202,7 +213,7 @@ def learn_lasting(
             covariance[j, load, load] += (_LOAD_KG + _LOAD_PART * abs(kg)) ** 2
         elif lasting[3 + j] != 0.0:
             covariance[j, 0, 0] += _UNKNOWN_NM**2
-        least_squares_step(weights[j], covariance[j], x[j], torque, S[j, j] / samples, prior, 0.0)
+        least_squares_step(weights[j], covariance[j], x[j], torque, S[j, j] / samples, known.prior, 0.0)
 
 
 _LOAD_KG, _LOAD_PART = 0.1, 0.05
@@ -210,8 +221,9 @@ _LOAD_KG, _LOAD_PART = 0.1, 0.05
 
 
 @compiled
-def weight_part(weights: FloatArray, x: FloatArray, learnt: FloatArray, offset: FloatArray, unit: FloatArray) -> None:
-    """Write what of the mean may be weight, its constant part, and the torques of 1 kg (n,) each [Nm]."""
+def weight_part(weights: FloatArray, x: FloatArray, part: WeightPart) -> None:
+    """Write what of the mean may be weight, its constant part, and the torques of 1 kg."""
+    learnt, offset, unit = part
     n, load = x.shape[0], x.shape[1] - 1
     for j in range(n):
         offset[j], unit[j], learnt[j] = weights[j, 0] * x[j, 0], x[j, load], weights[j, 0] * x[j, 0]

@@ -5,10 +5,11 @@ This is the chain an arm with joint torque sensors runs itself at 1 kHz (De Luca
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import ByName, entry
 from pretouch.types import FloatArray
 
 
@@ -55,25 +56,29 @@ def observe(
     Returns:
         The new memory, its `residual` positive for torques **by** the environment **on** the robot.
     """
-    residual, integral = _observe(
-        state.residual, state.integral, state.mass_matrix, mass_matrix, bias, qd, tau, gain, dt
-    )
+    residual, integral = _observe(state, mass_matrix, bias, qd, tau, gain, dt)
     return ObserverState(residual, integral, mass_matrix)
 
 
-@compiled
+class _Before(NamedTuple):
+    """As of `ObserverState`."""
+
+    integral: FloatArray
+    mass_matrix: FloatArray
+
+
+@entry
 def _observe(
-    r: FloatArray, integral: FloatArray, M_last: FloatArray, M: FloatArray, bias: FloatArray, qd: FloatArray,
-    tau: FloatArray, gain: float, dt: float,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    before: ByName[_Before], M: FloatArray, bias: FloatArray, qd: FloatArray, tau: FloatArray, gain: float, dt: float
+) -> tuple[FloatArray, FloatArray]:
     n = len(qd)
     momentum, rate = np.zeros(n), np.zeros(n)
     for i in range(n):
         for j in range(n):
             momentum[i] += M[i, j] * qd[j]
-            rate[i] += (M[i, j] - M_last[i, j]) * qd[j]
+            rate[i] += (M[i, j] - before.mass_matrix[i, j]) * qd[j]
     # implicit in r, so that the discrete low-pass is stable for any gain
-    grown = integral + (tau - bias) * dt + rate
+    grown = before.integral + (tau - bias) * dt + rate
     residual = gain * (momentum - grown) / (1.0 + gain * dt)
     return residual, grown + residual * dt
 

@@ -11,11 +11,14 @@ by the best fit: a place where any force explains nearly anything pays for it.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.groups import SurfaceArrays
+from pretouch.robot.model import Kinematics
+from pretouch.types import BoolArray, FloatArray
 
 LEAST_N = 1.0
 """Force along the normal below which the one across it is no longer made smaller [N]."""
@@ -124,17 +127,40 @@ def force_there(
     return explained, pushes + 0.5 * math.log(normal) + math.log(across) - math.log(c00 * c11 * c22)
 
 
+class ForcePrior(NamedTuple):
+    """What a contact's force is like, and the noise."""
+
+    mu: float
+    """Deviation of the force across the normal, as part of that along it."""
+    largest: float
+    """Deviation of the force along the normal [N]."""
+    tails: float
+    """Degrees of freedom of the Student distribution of the torques."""
+
+
+class Whitened(NamedTuple):
+    """Torques (n,) in units of their deviations: y = L^-1 tau."""
+
+    L: FloatArray
+    """(n, n) Cholesky factor of their covariance."""
+    y: FloatArray
+    """(n,)."""
+    square: float
+    """y . y."""
+
+
 @compiled
 def evidence_of_places(
-    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
-    link: IntArray, point: FloatArray, normal: FloatArray, first: IntArray,
-    L: FloatArray, y: FloatArray, square: float, mu: float, largest: float, tails: float,
-    ln: FloatArray, force: FloatArray,
+    kin: Kinematics, moved_by: BoolArray, surface: SurfaceArrays, torques: Whitened, p: ForcePrior, ln: FloatArray,
+    force: FloatArray,
 ) -> float:  # fmt: skip
     """Write ln of the evidence (N,) of a contact at each place, and the most likely force (N, 3) there, base frame.
 
     Returns the least that any of them leaves unexplained of `square` = y . y.
     """
+    position, rotation, anchor, axis = kin
+    link, point, normal, first = surface.link, surface.point, surface.normal, surface.first
+    L, y, square = torques
     n, left = len(anchor), square
     W, G, h, u = np.empty((n, 6)), np.empty((6, 6)), np.empty(6), np.empty((3, 6))
     f, arm, outwards = np.empty(3), np.empty(3), np.empty(3)
@@ -161,10 +187,10 @@ def evidence_of_places(
                     arm[i] += rotation[k, i, j] * point[c, j]
                     outwards[i] += rotation[k, i, j] * normal[c, j]
             directions(outwards, arm, u)
-            explained, cost = force_there(G, h, u, mu, largest, f)
+            explained, cost = force_there(G, h, u, p.mu, p.largest, f)
             rest = max(square - explained, 0.0)
             left = min(left, rest)
-            ln[c] = cost - 0.5 * (tails + n) * math.log1p(rest / tails)
+            ln[c] = cost - 0.5 * (p.tails + n) * math.log1p(rest / p.tails)
             for i in range(3):
                 force[c, i] = f[0] * u[0, i] + f[1] * u[1, i] + f[2] * u[2, i]
     return left

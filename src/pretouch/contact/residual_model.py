@@ -14,12 +14,14 @@ beginning of a contact is never learnt.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry
 from pretouch.errors import ParameterError
+from pretouch.groups import Mechanism
 from pretouch.params import DetectionParams
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import BoolArray, FloatArray
@@ -95,19 +97,21 @@ def features(model: RobotModel, kin: Kinematics, speed: FloatArray, growth: Floa
     the links behind each joint, as point masses [Nm], and that of 1 kg at the end-effector.
     """
     x = np.empty((model.n, features_of(model.n)))
-    features_into(
-        kin.anchor, kin.axis, kin.position, kin.rotation, model.moved_by, model.mass, model.com, model.ee, speed,
-        growth, x,
-    )  # fmt: skip
+    _features(kin, model.mechanism, speed, growth, x)
     return x
 
 
+@entry
+def _features(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, growth: FloatArray, x: FloatArray) -> None:
+    features_into(kin, mechanism, speed, growth, x)
+
+
 @compiled
-def features_into(
-    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
-    mass: FloatArray, com: FloatArray, ee: int, speed: FloatArray, growth: FloatArray, x: FloatArray,
-) -> None:  # fmt: skip
+def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, growth: FloatArray, x: FloatArray) -> None:
     """Write what `features` returns."""
+    position, rotation, anchor, axis = kin
+    moved_by, ee = mechanism.arm
+    mass, com = mechanism.links.mass, mechanism.links.com
     n, point = len(speed), np.empty(3)
     V, torque = np.empty((n, 3)), np.empty(n)
     x[:] = 0.0
@@ -195,17 +199,34 @@ def least_squares_step(
         P[a, a] += forget * prior[a]
 
 
+class CalmSample(NamedTuple):
+    """A sample of free motion."""
+
+    torque: FloatArray
+    """(n,) [Nm]."""
+    x: FloatArray
+    """(n, f) features."""
+    residual: FloatArray
+    """(n,) torques less their mean [Nm]."""
+    M: FloatArray
+    """(n, n) mass matrix [kg m^2]."""
+    doubt: FloatArray
+    """(n,) variance of the error of the mean [Nm^2]."""
+    moving: int
+    """1 if the arm moves, or 0."""
+
+
 @compiled
 def add_sample(
-    block: FloatArray, first: bool, torque: FloatArray, x: FloatArray, residual: FloatArray, M: FloatArray,
-    spread: FloatArray, doubt: FloatArray, moving: int, tails: float, floor: float,
-) -> None:  # fmt: skip
+    block: FloatArray, first: bool, sample: CalmSample, spread: FloatArray, tails: float, floor: float
+) -> None:
     """Add a sample to a block, to an empty one if it is the first: torques, features, both variances of the spread.
 
     With e = M v + d, of spread S = M A M^T + D, the sample's expectation of v_i^2 is (A M^T S^-1 e)_i^2 + A_i -
-    A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. `doubt` (n,) is the variance of the mean's
-    error, which is in the sample but not in D.
+    A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. The variance of the mean's error is in the
+    sample but not in D. `spread` (2, n) is A and D of samples of its kind.
     """
+    torque, x, residual, M, doubt, moving = sample
     n, f = x.shape
     S, L, y, z = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n)
     if first:
@@ -249,16 +270,35 @@ def spread_of_sample(M: FloatArray, spread: FloatArray, floor: float, S: FloatAr
         S[i, i] += spread[1, i] + floor**2
 
 
-@compiled
-def learn_block(
-    block: FloatArray, weights: FloatArray, covariance: FloatArray, spread: FloatArray, seen: FloatArray,
-    prior: FloatArray, forget: float, least_gain: float, first: float, most_velocity: float, most_torque: float,
-) -> None:  # fmt: skip
-    """Learn a block of samples: weights by their mean torques and features, and one step of both variances.
+class Learnt(NamedTuple):
+    """What was learnt, as of `ResidualModel`, and the prior's variances (f,); changed."""
 
-    `least_gain` is the weight of a block once many have been seen, `first` [samples] what the prior of the spread
-    counts; the last two bound the variances A and D.
-    """
+    weights: FloatArray
+    covariance: FloatArray
+    spread: FloatArray
+    seen: FloatArray
+    prior: FloatArray
+
+
+class Pace(NamedTuple):
+    """How fast is learnt."""
+
+    forget: float
+    """Part by which a block's time fades what was learnt of the mean."""
+    least_gain: float
+    """Weight of a block in the spread once many have been seen."""
+    first: float
+    """What the prior of the spread counts [samples]."""
+    most_velocity: float
+    """Largest variance A [(rad/s^2)^2]."""
+    most_torque: float
+    """Largest variance D [Nm^2]."""
+
+
+@compiled
+def learn_block(block: FloatArray, learnt: Learnt, pace: Pace) -> None:
+    """Learn a block of samples: weights by their mean torques and features, and one step of both variances."""
+    weights, covariance, spread, seen, prior = learnt
     n, f = weights.shape
     x, samples, start, k = np.empty(f), block[-2], n + n * f, int(block[-1])
     if samples <= 0.0:
@@ -267,11 +307,11 @@ def learn_block(
         for a in range(f):
             x[a] = block[n + j * f + a] / samples
         noise = block[start + 2 * n + j] / samples**2
-        least_squares_step(weights[j], covariance[j], x, block[j] / samples, noise, prior, forget)
+        least_squares_step(weights[j], covariance[j], x, block[j] / samples, noise, prior, pace.forget)
     seen[k] += samples
-    gain = max(samples / (first + seen[k]), least_gain)
+    gain = max(samples / (pace.first + seen[k]), pace.least_gain)
     for part in range(2):
-        ceiling = most_torque if part else most_velocity
+        ceiling = pace.most_torque if part else pace.most_velocity
         for j in range(n):
             new = block[start + part * n + j] / samples
             spread[k, part, j] = min(spread[k, part, j] + gain * (new - spread[k, part, j]), ceiling)

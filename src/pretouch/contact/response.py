@@ -109,7 +109,7 @@ def noticed(state: ResponseState, doing: Doing, felt: Felt, phase: float, resume
     elif doing in ("react", "soft"):
         band = dead_band(felt.model.description.tau_max, p)
         contact = felt.found.evidence >= 1.0
-        yielding = yielded(yielding, felt.model, felt.kin, residual, felt.command, band, dt, p, contact)
+        yielding = yielded(yielding, (felt.model, felt.kin), residual, felt.command, band, dt, p, contact)
     if doing == "soft" and clamp.torque:
         # out of the clamp it may be moved, not back into it
         yielding = replace(yielding, velocity=np.where(yielding.velocity * clamp.course > 0, 0.0, yielding.velocity))
@@ -202,10 +202,7 @@ def answered(state: ResponseState, doing: Doing, felt: Felt) -> tuple[Answer | N
     opens = doing == "react" and state.clamp.torque > 0 and not state.clamp.open
     if opens:
         way, clamp = opened(state.clamp, state.yielding.torque, felt.robot.q_commanded, dt, p)
-        body = model.body
-        fastest = fastest_point(
-            kin.position, kin.rotation, kin.anchor, kin.axis, model.moved_by, body.link, body.a, body.b, way
-        )
+        fastest = fastest_point(kin, model.moved_by, model.body.arrays, way)
         qd = way * min(1.0, p.open_m_s / fastest) if fastest > 0 else way
         state = replace(state, clamp=clamp, yielding=replace(state.yielding, velocity=np.zeros(len(qd))))
     if doing == "soft" and not qd.any():

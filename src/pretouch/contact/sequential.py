@@ -9,6 +9,7 @@ joints feel what the others do not.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,27 +56,38 @@ def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> in
     return whole
 
 
+class Hypotheses(NamedTuple):
+    """The contacts that are looked for.
+
+    The first n are torques on the joints before each link, of any wrench; the H others are forces at a point.
+    """
+
+    J: FloatArray
+    """(H, 3, n) Jacobians of the points."""
+    joints: IntArray
+    """(H,) how many joints move each point."""
+    weight: FloatArray
+    """(n + H,) prior weights of all hypotheses, for all windows together."""
+    away: FloatArray
+    """(H, 3) direction of the force where one is expected, zero where it may be any."""
+
+
 @compiled
 def judge(
-    means: FloatArray, whole: int, S: FloatArray, doubt: FloatArray, J: FloatArray, joints: IntArray,
-    weight: FloatArray, away: FloatArray, gain: float, tails: float,
-) -> tuple[float, int, int]:  # fmt: skip
+    means: FloatArray, whole: int, S: FloatArray, doubt: FloatArray, contacts: Hypotheses, gain: float, tails: float
+) -> tuple[float, int, int]:
     """Return ln R, and the window and the hypothesis that have the largest part in it.
-
-    The first n hypotheses are torques on the joints before each link, of any wrench. The others are forces at a point.
 
     Args:
         means: (6, n) means of the windows' samples [Nm].
         whole: how many of them there are.
         S: (n, n) spread of a sample [Nm^2].
         doubt: (n,) variance of the error of their mean [Nm^2]: it does not average out.
-        J: (H, 3, n) Jacobians of the points.
-        joints: (H,) how many joints move each point.
-        weight: (n + H,) prior weights of all hypotheses, for all windows together.
-        away: (H, 3) direction of the force where one is expected, zero where it may be any.
+        contacts: hypotheses.
         gain: g, how much larger a contact's spread is than that of free motion.
         tails: degrees of freedom of the Student distribution.
     """
+    J, joints, weight, away = contacts
     n, total, best, window, which = S.shape[0], 0.0, -1.0, 0, 0
     S0, L, z, y, pivot = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n)
     scratch, widened = np.empty((n, 3)), np.log1p(gain)

@@ -1,8 +1,10 @@
 """Dynamic contact thresholds: eqs. 9-11, and the test against them."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import ByName, compiled, entry
 from pretouch.params import ThresholdParams
 from pretouch.types import BoolArray, FloatArray, Number, Thresholds
 
@@ -56,25 +58,44 @@ def thresholds(
         negative: (3,) the same for the negative side [m].
         params: F_b, F_std, sigma_max, F_d, d_max, d_min.
     """
-    p, parts = params, np.empty((6, 3))
-    threshold_parts(
-        mean, sigma, positive, negative, p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n, p.d_max_m, p.d_min_m, parts
-    )
+    parts = np.empty((6, 3))
+    _parts(mean, sigma, positive, negative, params, parts)
     return Thresholds(parts)
+
+
+class ThresholdNumbers(NamedTuple):
+    """What is taken of `ThresholdParams`."""
+
+    alpha: float
+    lambda_: float
+    f_base_n: float
+    f_std_n: float
+    sigma_max_n: float
+    f_d_n: float
+    d_max_m: float
+    d_min_m: float
+
+
+@entry
+def _parts(
+    mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ByName[ThresholdNumbers],
+    parts: FloatArray,
+) -> None:  # fmt: skip
+    threshold_parts(mean, sigma, positive, negative, p, parts)
 
 
 @compiled
 def threshold_parts(
-    mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, f_base: float, f_std: float,
-    sigma_max: float, f_d: float, d_max: float, d_min: float, parts: FloatArray,
+    mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ThresholdNumbers,
+    parts: FloatArray,
 ) -> None:  # fmt: skip
     """Write what `thresholds` returns to `parts` (6, 3), in the order of `Thresholds`."""
     for i in range(3):
-        f_sigma = noise_force(sigma[i], f_std, sigma_max)
-        f_positive = obstacle_force(positive[i], f_d, d_max, d_min)
-        f_negative = obstacle_force(negative[i], f_d, d_max, d_min)
-        parts[0, i] = mean[i] + f_base + f_sigma - f_negative
-        parts[1, i] = mean[i] - f_base - f_sigma + f_positive
+        f_sigma = noise_force(sigma[i], p.f_std_n, p.sigma_max_n)
+        f_positive = obstacle_force(positive[i], p.f_d_n, p.d_max_m, p.d_min_m)
+        f_negative = obstacle_force(negative[i], p.f_d_n, p.d_max_m, p.d_min_m)
+        parts[0, i] = mean[i] + p.f_base_n + f_sigma - f_negative
+        parts[1, i] = mean[i] - p.f_base_n - f_sigma + f_positive
         parts[2, i], parts[3, i], parts[4, i], parts[5, i] = mean[i], sigma[i], f_positive, f_negative
 
 

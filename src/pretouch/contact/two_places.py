@@ -9,12 +9,15 @@ outer contact alone has to explain.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.one_place import LEAST_N, evidence_of_places
+from pretouch.contact.one_place import LEAST_N, ForcePrior, Whitened, evidence_of_places
+from pretouch.groups import SurfaceArrays
+from pretouch.robot.model import Kinematics
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _LEFT_OUT = 1e4
@@ -33,13 +36,25 @@ def total_of(ln: FloatArray) -> float:
     return most + math.log(total)
 
 
+class Held(NamedTuple):
+    """A contact held at a place."""
+
+    moved: BoolArray
+    """(n,) joints that move it."""
+    at: FloatArray
+    """(3,) [m]."""
+    outwards: FloatArray
+    """(3,) normal there."""
+    size: float
+    """Force into the surface [N]."""
+
+
 @compiled
-def held(
-    C: FloatArray, anchor: FloatArray, axis: FloatArray, moved: BoolArray, at: FloatArray, outwards: FloatArray,
-    size: float, mu: float, largest: float, out: FloatArray,
-) -> None:  # fmt: skip
-    """Write C + J^T V J (n, n) for a contact held at a place, with a force of so many newtons into the surface."""
-    n = len(C)
+def held(C: FloatArray, kin: Kinematics, contact: Held, p: ForcePrior, out: FloatArray) -> None:
+    """Write C + J^T V J (n, n) for a contact held at a place."""
+    anchor, axis = kin.anchor, kin.axis
+    moved, at, outwards, size = contact
+    n, largest = len(C), p.largest
     J = np.zeros((n, 3))
     for j in range(n):
         if moved[j]:
@@ -47,7 +62,7 @@ def held(
             J[j, 0] = axis[j, 1] * z - axis[j, 2] * y
             J[j, 1] = axis[j, 2] * x - axis[j, 0] * z
             J[j, 2] = axis[j, 0] * y - axis[j, 1] * x
-    across = (mu * max(size, LEAST_N)) ** 2
+    across = (p.mu * max(size, LEAST_N)) ** 2
     for i in range(n):
         along_i = J[i, 0] * outwards[0] + J[i, 1] * outwards[1] + J[i, 2] * outwards[2]
         for j in range(n):
@@ -56,12 +71,27 @@ def held(
             out[i, j] = C[i, j] + across * dot + (largest * largest - across) * along_i * along_j
 
 
+class Places(NamedTuple):
+    """The places that a contact may be at, and the torques it is to explain."""
+
+    mean: FloatArray
+    """(n,) torques [Nm]."""
+    kin: Kinematics
+    moved_by: BoolArray
+    """(L, n) whether a joint moves a link."""
+    surface: SurfaceArrays
+    """N places."""
+    at: FloatArray
+    """(N, 3) where they are [m]."""
+    outwards: FloatArray
+    """(N, 3) normals there."""
+    prior: FloatArray
+    """(N,) ln of the prior of a contact."""
+    force: ForcePrior
+
+
 @compiled
-def evidence_under(
-    C: FloatArray, mean: FloatArray, anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray,
-    moved_by: BoolArray, link: IntArray, point: FloatArray, normal: FloatArray, first: IntArray, prior: FloatArray,
-    mu: float, largest: float, tails: float, ln: FloatArray, force: FloatArray,
-) -> float:  # fmt: skip
+def evidence_under(C: FloatArray, places: Places, ln: FloatArray, force: FloatArray) -> float:
     """Write ln of prior and evidence (N,) of each place under a covariance C (n, n), comparable between covariances.
 
     Returns what `evidence_of_places` does; -1 where the covariance is none.
@@ -70,56 +100,67 @@ def evidence_under(
     L, y = np.zeros((n, n)), np.empty(n)
     if not factor(C, L):
         return -1.0
-    square, volume = forward(L, mean, y), 0.0
+    square, volume = forward(L, places.mean, y), 0.0
     for j in range(n):
         volume += math.log(L[j, j])
-    left = evidence_of_places(
-        anchor, axis, position, rotation, moved_by, link, point, normal, first, L, y, square, mu, largest, tails, ln,
-        force,
-    )  # fmt: skip
+    torques = Whitened(L, y, square)
+    left = evidence_of_places(places.kin, places.moved_by, places.surface, torques, places.force, ln, force)
     for c in range(len(ln)):
-        ln[c] += prior[c] - volume
+        ln[c] += places.prior[c] - volume
     return left
 
 
+class Beginning(NamedTuple):
+    """Where the search for two contacts begins."""
+
+    place: int
+    """At this one, if it is not negative."""
+    size: float
+    """Force into the surface there [N]."""
+    behind: int
+    """Else behind this joint."""
+    turns: int
+    """How often one of both is moved."""
+
+
+class Pair(NamedTuple):
+    """Room for two contacts."""
+
+    place: IntArray
+    """(2,)."""
+    ln: FloatArray
+    """(2, N) ln of the evidence of each one's place, the other being held."""
+    force: FloatArray
+    """(2, N, 3) forces there [N]."""
+
+
 @compiled
-def best_pair(
-    C: FloatArray, mean: FloatArray, anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray,
-    moved_by: BoolArray, link: IntArray, point: FloatArray, normal: FloatArray, first: IntArray, body: IntArray,
-    prior: FloatArray, at: FloatArray, outwards: FloatArray, mu: float, largest: float, tails: float,
-    begin: int, begin_size: float, behind: int, turns: int,
-    pair: IntArray, ln: FloatArray, force: FloatArray,
-) -> float:  # fmt: skip
+def best_pair(C: FloatArray, places: Places, begin: Beginning, pair: Pair) -> float:
     """Move two contacts to where they explain most; return ln of the evidence of all pairs about the best one.
 
-    The search begins with a contact at the place `begin`, if it is not negative, or behind the joint `behind`. `pair`
-    (2,) becomes the two places; `ln` (2, N) is that of each one's place, the other being held, and `force` (2, N, 3)
-    the forces there. -inf where there is none.
+    -inf where there is none.
     """
+    link, first, body = places.surface.link, places.surface.first, places.surface.body
+    at, outwards, ln, force = places.at, places.outwards, pair.ln, pair.force
     count = len(link)
     D, total, top = C.copy(), -np.inf, 0.0
-    place, size = begin, begin_size
+    place, size = begin.place, begin.size
     if place < 0:
-        for j in range(behind):
+        for j in range(begin.behind):
             D[j, j] += _LEFT_OUT
-        if evidence_under(
-            D, mean, anchor, axis, position, rotation, moved_by, link, point, normal, first, prior, mu, largest, tails,
-            ln[0], force[0],
-        ) < 0.0:  # fmt: skip
+        if evidence_under(D, places, ln[0], force[0]) < 0.0:
             return -np.inf
         for c in range(count):
-            if c < first[min(behind, len(first) - 1)]:
+            if c < first[min(begin.behind, len(first) - 1)]:
                 ln[0, c] = -np.inf
         place = int(np.argmax(ln[0]))
         size = -_along(force[0, place], outwards[place])
     known = -np.inf
-    for turn in range(turns):
+    for turn in range(begin.turns):
         k = 1 - turn % 2
-        held(C, anchor, axis, moved_by[link[place]], at[place], outwards[place], size, mu, largest, D)
-        if evidence_under(
-            D, mean, anchor, axis, position, rotation, moved_by, link, point, normal, first, prior, mu, largest, tails,
-            ln[k], force[k],
-        ) < 0.0:  # fmt: skip
+        contact = Held(places.moved_by[link[place]], at[place], outwards[place], size)
+        held(C, places.kin, contact, places.force, D)
+        if evidence_under(D, places, ln[k], force[k]) < 0.0:
             return -np.inf
         for c in range(count):
             if body[c] == body[place]:
@@ -127,9 +168,9 @@ def best_pair(
         other = int(np.argmax(ln[k]))
         # about the best pair the two places are taken to be independent
         total = known - top + total_of(ln[k]) if turn else -np.inf
-        if turn == turns - 1:
-            total += prior[place]
-        pair[k], pair[1 - k] = other, place
+        if turn == begin.turns - 1:
+            total += places.prior[place]
+        pair.place[k], pair.place[1 - k] = other, place
         known, top = total_of(ln[k]), ln[k, other]
         place, size = other, -_along(force[k, other], outwards[other])
     return total

@@ -7,20 +7,29 @@ that was looked for last, so that a search goes on from step to step at a bounde
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.cholesky import factor, forward
-from pretouch.compiled import compiled
+from pretouch.compiled import ByName, compiled, entry
 from pretouch.contact.cues import Cues
-from pretouch.contact.one_place import covariance_of_mean
+from pretouch.contact.one_place import ForcePrior, covariance_of_mean
 from pretouch.contact.sequential import LENGTHS
-from pretouch.contact.two_places import best_pair, evidence_under, total_of
-from pretouch.contact.where_prior import hidden_places, place_surface, prior_of_places
-from pretouch.contact.where_summary import exchange, leave_out, summarise
+from pretouch.contact.two_places import Beginning, Pair, Places, best_pair, evidence_under, total_of
+from pretouch.contact.where_prior import (
+    PriorParams,
+    SeenNear,
+    UnitCues,
+    hidden_places,
+    place_surface,
+    prior_of_places,
+)
+from pretouch.contact.where_summary import ContactArrays, exchange, leave_out, summarise
+from pretouch.groups import CapsuleArrays, SurfaceArrays
 from pretouch.params import LocalisationParams
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.robot.vectors import placed_ends
+from pretouch.robot.vectors import placed_capsules
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Obstacles, Touched
 from pretouch.values import value
 
@@ -92,20 +101,19 @@ def locate(
         return state.touched, WhereState(
             state.ln, state.weight, state.pair, state.size, state.two, state.steps, since, state.touched
         )  # fmt: skip
-    s, body, o = model.surface, model.capsules, obstacles
+    s = model.surface
     ln = np.zeros(len(s)) if state.steps == 0 else state.ln.copy()
     pair, link = state.pair.copy(), np.empty(2, np.int64)
     point, force, sigma, probability = np.empty((2, 3)), np.empty((2, 3)), np.empty(2), np.empty(2)
     weight, size, found = _infer(
-        kin.anchor, kin.axis, kin.position, kin.rotation, model.moved_by,
-        s.link, s.point, s.normal, s.area, s.body, s.first,
-        body.link, body.a, body.b, body.radius, model.rigid,
-        means, _steady(samples, qd, period, p), spread, doubt, min(1.0, period / p.independent_s),
-        o.point, o.body_distance, cues.gain, cues.link, cues.point, cues.sigma,
-        p.friction, p.force_n, p.relative, p.tails, p.seen_share, p.seen_m, p.near_m, p.unit_share, p.unit_m,
-        -math.log(p.two_odds), math.exp(-max(since, period) / p.memory_s) if p.memory_s > 0.0 else 0.0,
-        state.steps, state.weight, state.size, state.two,
-        ln, pair, link, point, force, sigma, probability,
+        kin, _Body(model.moved_by, model.rigid, s.arrays, model.capsules.arrays),
+        _Residuals(means, _steady(samples, qd, period, p), spread, doubt, min(1.0, period / p.independent_s)),
+        obstacles, cues, p,
+        _SoFar(
+            ln, pair, state.steps, state.weight, state.size, state.two, -math.log(p.two_odds),
+            math.exp(-max(since, period) / p.memory_s) if p.memory_s > 0.0 else 0.0,
+        ),
+        ContactArrays(link, point, force, sigma, probability),
     )  # fmt: skip
     if not found:
         return NOT_TOUCHED, _NOTHING
@@ -134,74 +142,125 @@ def _steady(samples: int, qd: FloatArray, period: float, p: LocalisationParams) 
     return samples if fastest * samples * period <= 2.0 * p.relative else int(2.0 * p.relative / (fastest * period)) + 1
 
 
-@compiled
-def _infer(
-    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
-    link: IntArray, place: FloatArray, normal: FloatArray, area: FloatArray, body: IntArray, first: IntArray,
-    capsule: IntArray, a: FloatArray, b: FloatArray, radius: FloatArray, rigid: IntArray,
-    means: FloatArray, samples: int, spread: FloatArray, doubt: FloatArray, independent: float,
-    seen: FloatArray, distance: FloatArray, gain: FloatArray,
-    told_link: IntArray, told: FloatArray, told_sigma: FloatArray,
-    mu: float, largest: float, relative: float, tails: float, seen_share: float, seen_m: float, near: float,
-    unit_share: float, unit_m: float, margin: float, keep: float, steps: int, weight: float, size: float, two: bool,
-    average: FloatArray, pair: IntArray, on: IntArray, point: FloatArray, force: FloatArray, sigma: FloatArray,
-    probability: FloatArray,
-) -> tuple[float, float, int]:  # fmt: skip
-    """Write the last two lines of arguments; return the weight of the average, a force of the pair, and how many."""
-    n, count = len(anchor), len(link)
-    at, outwards, hidden = np.empty((count, 3)), np.empty((count, 3)), np.empty(count, np.bool_)
-    place_surface(position, rotation, link, place, normal, at, outwards)
-    ends = placed_ends(capsule, a, b, position, rotation)
-    hidden_places(at, body, rigid[capsule], ends[0], ends[1], radius, hidden)
-    prior = np.empty(count)
-    prior_of_places(
-        at, link, area, hidden, gain, seen, distance, seen_share, seen_m, near, told_link, told, told_sigma, unit_share,
-        unit_m, prior,
-    )  # fmt: skip
+class _Body(NamedTuple):
+    """The arm, as a contact finds it."""
 
+    moved_by: BoolArray
+    """(L, n) whether a joint moves a link."""
+    rigid: IntArray
+    """(L,) rigid body of each link."""
+    surface: SurfaceArrays
+    capsules: CapsuleArrays
+
+
+class _Residuals(NamedTuple):
+    """Torques that free motion does not explain, as `locate` is given them."""
+
+    means: FloatArray
+    samples: int
+    spread: FloatArray
+    doubt: FloatArray
+    independent: float
+    """Part of a sample that says something new."""
+
+
+class _Params(NamedTuple):
+    """What is taken of `LocalisationParams`."""
+
+    friction: float
+    force_n: float
+    relative: float
+    tails: float
+    seen_share: float
+    seen_m: float
+    near_m: float
+    unit_share: float
+    unit_m: float
+
+
+class _SoFar(NamedTuple):
+    """The contact so far, as of `WhereState`, and how much more two contacts have to explain."""
+
+    average: FloatArray
+    pair: IntArray
+    steps: int
+    weight: float
+    size: float
+    two: bool
+    margin: float
+    """Evidence by which two contacts have to be likelier than one [nats]."""
+    keep: float
+    """Part of the average that is kept."""
+
+
+@entry
+def _infer(
+    kin: Kinematics, body: _Body, felt: _Residuals, seen: ByName[SeenNear], cues: ByName[UnitCues],
+    p: ByName[_Params], so_far: _SoFar, contacts: ContactArrays,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Write average, pair and contacts; return the weight of the average, a force of the pair, and how many."""
+    surface, capsules, rigid, average, pair, two = (
+        body.surface, body.capsules, body.rigid, so_far.average, so_far.pair, so_far.two,
+    )  # fmt: skip
+    n, count = len(kin.anchor), len(surface.link)
+    at, outwards, hidden = np.empty((count, 3)), np.empty((count, 3)), np.empty(count, np.bool_)
+    place_surface(kin.position, kin.rotation, surface.link, surface.point, surface.normal, at, outwards)
+    placed = placed_capsules(capsules, kin)
+    hidden_places(at, surface.body, rigid[capsules.link], placed.a, placed.b, placed.radius, hidden)
+    prior = np.empty(count)
+    shares = PriorParams(p.seen_share, p.seen_m, p.near_m, p.unit_share, p.unit_m)
+    prior_of_places(at, surface, hidden, seen, cues, shares, prior)
+
+    # one contact
     C = np.empty((n, n))
-    window, square = _clearest(means, samples, spread, doubt, independent, relative, C)
+    window, square = _clearest(felt.means, felt.samples, felt.spread, felt.doubt, felt.independent, p.relative, C)
     if window < 0:
         return 0.0, 0.0, 0
     ln, there = np.empty(count), np.empty((count, 3))
-    left = evidence_under(
-        C, means[window], anchor, axis, position, rotation, moved_by, link, place, normal, first, prior, mu, largest,
-        tails, ln, there,
-    )  # fmt: skip
+    force = ForcePrior(p.friction, p.force_n, p.tails)
+    places = Places(felt.means[window], kin, body.moved_by, surface, at, outwards, prior, force)
+    left = evidence_under(C, places, ln, there)
     one = total_of(ln)
-    total = keep * weight + square
+    kept = so_far.keep * so_far.weight
+    total = kept + square
     for c in range(count):
-        average[c] = (keep * weight * average[c] + square * (ln[c] - prior[c])) / total
+        average[c] = (kept * average[c] + square * (ln[c] - prior[c])) / total
 
+    # two contacts
+    size = so_far.size
     if left > _LEFT or two:
-        lns, forces, other = np.empty((2, count)), np.empty((2, count, 3)), np.empty(2, np.int64)
+        found = Pair(np.empty(2, np.int64), np.empty((2, count)), np.empty((2, count, 3)))
         # a pair that is believed is followed; else it is improved, and another one tried, in turns
-        again = pair[0] >= 0 and (two or steps % 2 == 1)
-        behind = 2 + steps // 2 % max(1, n - 3)
-        best = best_pair(
-            C, means[window], anchor, axis, position, rotation, moved_by, link, place, normal, first, body, prior, at,
-            outwards, mu, largest, tails, pair[0] if again else -1, size, behind, _TURNS, other, lns, forces,
-        )  # fmt: skip
+        again = pair[0] >= 0 and (two or so_far.steps % 2 == 1)
+        behind = 2 + so_far.steps // 2 % max(1, n - 3)
+        best = best_pair(C, places, Beginning(pair[0] if again else -1, size, behind, _TURNS), found)
         if best > -np.inf and (again or pair[0] < 0 or best > one):
-            pair[:] = other
+            pair[:] = found.place
             size = 0.0
             for i in range(3):
-                size -= forces[0, pair[0], i] * outwards[pair[0], i]
-        if best - one > (0.0 if two else margin):
-            for k in range(2):
-                summarise(lns[k], at, outwards, link, first, forces[k], on, point, force, sigma, probability, k)
-            if rigid[on[0]] == rigid[on[1]]:
-                # each place left out the other's own body only: the less sure contact is on the likeliest other one
-                k = 0 if probability[0] < probability[1] else 1
-                leave_out(lns[k], body, rigid[on[k]])
-                summarise(lns[k], at, outwards, link, first, forces[k], on, point, force, sigma, probability, k)
-            if probability[1] > probability[0]:
-                exchange(on, point, force, sigma, probability)
+                size -= found.force[0, pair[0], i] * outwards[pair[0], i]
+        if best - one > (0.0 if two else so_far.margin):
+            _summarise_two(found, places, rigid, contacts)
             return total, size, 2
     for c in range(count):
         ln[c] = average[c] + prior[c]
-    summarise(ln, at, outwards, link, first, there, on, point, force, sigma, probability, 0)
+    summarise(ln, at, outwards, surface, there, contacts, 0)
     return total, size, 1
+
+
+@compiled
+def _summarise_two(found: Pair, places: Places, rigid: IntArray, contacts: ContactArrays) -> None:
+    """Write both contacts, on two rigid bodies, the surer one first."""
+    at, outwards, surface, probability = places.at, places.outwards, places.surface, contacts.probability
+    for k in range(2):
+        summarise(found.ln[k], at, outwards, surface, found.force[k], contacts, k)
+    if rigid[contacts.link[0]] == rigid[contacts.link[1]]:
+        # each place left out the other's own body only: the less sure contact is on the likeliest other one
+        k = 0 if probability[0] < probability[1] else 1
+        leave_out(found.ln[k], surface.body, rigid[contacts.link[k]])
+        summarise(found.ln[k], at, outwards, surface, found.force[k], contacts, k)
+    if probability[1] > probability[0]:
+        exchange(contacts)
 
 
 @compiled

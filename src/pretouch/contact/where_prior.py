@@ -1,10 +1,12 @@
 """Where a contact is likely before its torques are looked at: outside, where something is near, where units say so."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.groups import SurfaceArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _NEVER = 1e-12
@@ -50,11 +52,41 @@ def hidden_places(
                 break
 
 
+class SeenNear(NamedTuple):
+    """What is seen, as of `Obstacles`."""
+
+    point: FloatArray
+    """(K, 3) [m]."""
+    body_distance: FloatArray
+    """(K,) from the body [m]."""
+
+
+class UnitCues(NamedTuple):
+    """What units say of a touch, as of `Cues`."""
+
+    gain: FloatArray
+    """(L,) times a contact on each link is likelier."""
+    link: IntArray
+    """(T,) link of each place that is touched."""
+    point: FloatArray
+    """(T, 3) these places [m]."""
+    sigma: FloatArray
+    """(T,) standard deviation of each [m]."""
+
+
+class PriorParams(NamedTuple):
+    """What is taken of `LocalisationParams`."""
+
+    seen_share: float
+    seen_m: float
+    near_m: float
+    unit_share: float
+    unit_m: float
+
+
 @compiled
 def prior_of_places(
-    at: FloatArray, link: IntArray, area: FloatArray, hidden: BoolArray, gain: FloatArray,
-    seen: FloatArray, distance: FloatArray, seen_share: float, seen_m: float, near: float,
-    told_link: IntArray, told: FloatArray, told_sigma: FloatArray, told_share: float, told_least: float,
+    at: FloatArray, surface: SurfaceArrays, hidden: BoolArray, seen: SeenNear, cues: UnitCues, p: PriorParams,
     ln: FloatArray,
 ) -> None:  # fmt: skip
     """Write ln of the prior (N,) of a contact at each place, all places together 1.
@@ -65,29 +97,30 @@ def prior_of_places(
     place is known counts by that place, and not once more by the gain of its link: else what is left for the case that
     it is false would lie on that link too.
     """
+    link, area, distance = surface.link, surface.area, seen.body_distance
     count, base, most = len(at), 0.0, 0.0
     weight, extra, told_kernels = np.zeros(count), np.empty(count), np.zeros(count)
-    by_place = np.zeros(len(gain), np.bool_)
-    for k in range(len(told_link)):
-        if _kernel(at, link, area, hidden, told_link[k], told[k], max(told_sigma[k], told_least), extra):
-            by_place[told_link[k]] = True
+    by_place = np.zeros(len(cues.gain), np.bool_)
+    for k in range(len(cues.link)):
+        if _kernel(at, link, area, hidden, cues.link[k], cues.point[k], max(cues.sigma[k], p.unit_m), extra):
+            by_place[cues.link[k]] = True
             for c in range(count):
                 told_kernels[c] += extra[c]
     for c in range(count):
         if not hidden[c]:
-            weight[c] = area[c] if by_place[link[c]] else area[c] * gain[link[c]]
+            weight[c] = area[c] if by_place[link[c]] else area[c] * cues.gain[link[c]]
             base += weight[c]
     for c in range(count):
         weight[c] /= max(base, 1e-300)
     kernels = np.zeros(count)
     for k in range(len(distance)):
-        nearness = min(1.0, max(0.0, 1.0 - distance[k] / near))
-        if nearness > 0.0 and _kernel(at, link, area, hidden, -1, seen[k], seen_m, extra):
+        nearness = min(1.0, max(0.0, 1.0 - distance[k] / p.near_m))
+        if nearness > 0.0 and _kernel(at, link, area, hidden, -1, seen.point[k], p.seen_m, extra):
             most = max(most, nearness)
             for c in range(count):
                 kernels[c] += nearness * extra[c]
-    _mix(weight, kernels, seen_share * most)
-    _mix(weight, told_kernels, told_share)
+    _mix(weight, kernels, p.seen_share * most)
+    _mix(weight, told_kernels, p.unit_share)
     for c in range(count):
         ln[c] = math.log(max(weight[c], _NEVER))
 

@@ -1,10 +1,12 @@
 """What a distribution over places comes to: the likeliest body, the place on it, how sure both are."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.groups import SurfaceArrays
 from pretouch.robot.surface import SPACING_M
 from pretouch.types import FloatArray, IntArray
 
@@ -12,12 +14,24 @@ _NEGLIGIBLE = 12.0
 """Nats below the most likely place from which on a place is left out."""
 
 
+class ContactArrays(NamedTuple):
+    """Room for two contacts, as of `Touched`."""
+
+    link: IntArray
+    point: FloatArray
+    force: FloatArray
+    sigma: FloatArray
+    probability: FloatArray
+
+
 @compiled
 def summarise(
-    ln: FloatArray, at: FloatArray, outwards: FloatArray, link: IntArray, first: IntArray, there: FloatArray,
-    on: IntArray, point: FloatArray, force: FloatArray, sigma: FloatArray, probability: FloatArray, k: int,
+    ln: FloatArray, at: FloatArray, outwards: FloatArray, surface: SurfaceArrays, there: FloatArray,
+    contacts: ContactArrays, k: int,
 ) -> None:  # fmt: skip
     """Write contact k: the likeliest rigid body, the mean place on it brought to the surface, force, spread."""
+    link, first = surface.link, surface.first
+    on, point, force, sigma, probability = contacts
     most, total, best, body = ln.max(), 0.0, -1.0, 0
     for d in range(len(first) - 1):
         here = 0.0
@@ -76,8 +90,9 @@ def leave_out(ln: FloatArray, body: IntArray, out: int) -> None:
 
 
 @compiled
-def exchange(on: IntArray, point: FloatArray, force: FloatArray, sigma: FloatArray, probability: FloatArray) -> None:
+def exchange(contacts: ContactArrays) -> None:
     """Exchange both contacts."""
+    on, point, force, sigma, probability = contacts
     on[0], on[1] = on[1], on[0]
     sigma[0], sigma[1] = sigma[1], sigma[0]
     probability[0], probability[1] = probability[1], probability[0]

@@ -9,12 +9,13 @@ is reproduced, and what not, stands in docs/explanation/baselines.md.
 
 import numpy as np
 
-from pretouch.control.joint_box import JointLimits, box_and_brake
+from pretouch.control.joint_box import box_and_brake
 from pretouch.control.qp import skipped, solve, task_cost
 from pretouch.control.restriction import ApproachRows
+from pretouch.control.setup import MotionRequest, MotionSetup
 from pretouch.control.task import task
-from pretouch.params import BaselineParams, Profile
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.params import BaselineParams
+from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, IntArray, Obstacles, QpSolution, RobotState
 
 MODES = ("flacco", "ding")
@@ -99,14 +100,14 @@ def ding_rows(rows: FloatArray, distance: FloatArray, params: BaselineParams) ->
 
 
 def baseline_motion(
-    model: RobotModel, kin: Kinematics, robot: RobotState, obstacles: Obstacles, velocity: FloatArray,
-    rotation_goal: FloatArray, limits: JointLimits, profile: Profile, hold: bool,
-) -> tuple[QpSolution, IntArray, FloatArray, FloatArray, FloatArray]:  # fmt: skip
+    setup: MotionSetup, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
+) -> tuple[QpSolution, IntArray, FloatArray, FloatArray, FloatArray]:
     """Answer of `joint_motion` in the modes flacco and ding, in the order of the fields of `Motion`.
 
     The rows of Ding and Thomas are soft: as hard ones, which they are in a box without acceleration limits, they ask
     an arm at rest for a retreat that no arm can have reached after one period.
     """
+    model, limits, profile, velocity = setup.model, setup.limits, setup.profile, request.velocity
     p, t, distance = profile.baselines, profile.task, obstacles.body_distance
     moved = [model.jacobian(kin, int(k), at)[:3] for k, at in zip(obstacles.link, obstacles.body_point, strict=True)]
     lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, limits.table)
@@ -121,10 +122,10 @@ def baseline_motion(
         approach = np.array([d @ J_c for J_c, d in zip(moved, obstacles.direction, strict=True)])
         rows, which = ding_rows(approach, distance, p)
     J = model.ee_jacobian(kin)
-    goal = task(J, velocity, kin.rotation[model.ee], rotation_goal, t)
+    goal = task(J, velocity, kin.rotation[model.ee], request.rotation_goal, t)
     cost = task_cost(*goal, robot.q, model.q_mid, t)
     weight, budget = profile.restriction.slack_weight, profile.failure.solver_iterations
-    qp = skipped(stop, rows) if hold else solve(cost, lower, upper, rows, weight, stop, budget)
+    qp = skipped(stop, rows) if request.hold else solve(cost, lower, upper, rows, weight, stop, budget)
     found = len(which)
     of_points = QpSolution(qp.qd, qp.slack[:found], qp.multipliers[: model.n + found], qp.outcome, qp.status)
     return of_points, which, rows.h[:found], J[:3] @ robot.qd, J[:3] @ qp.qd

@@ -7,27 +7,71 @@ one rate and gives way at another, also when its object is no longer seen; so no
 for what is so near that the arm could not slow at that rate before it: there it brakes as hard as its joints may.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.control.touch_speed import mass_along, touch_speed
+from pretouch.control.restriction import Rows
+from pretouch.control.touch_speed import TouchLimits, mass_along, touch_speed
+from pretouch.groups import Chain, ObstacleArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
 
-LINK, LIMIT, ACROSS, DIRECTION, POINT, WIDTH = 0, 1, 2, 3, 6, 9
-"""Columns of a slot: link of the row or -1, its limit and that across the normal [m/s], normal, body point; how many.
-"""
 _TANGENTS = 4
-(
-    NOTICE, DECELERATION, LATENCY, MARGIN, RETREAT, DEADBAND, NEAR, SLOWEST, FASTEST, TIGHTEN, LOOSEN, PERIOD, MASSES,
-) = range(13)  # fmt: skip
-"""Places of the numbers in `settings` of `braking_rows`."""
 
 
-def slots_init(units: int) -> FloatArray:
-    """Return the slots (2 K, 9) of K units without a row: first one a unit, then one for the row it had before."""
-    slots = np.zeros((2 * units, WIDTH))
-    slots[:, LINK] = -1.0
-    return slots
+class Slots(NamedTuple):
+    """What is remembered of the rows of K units: first one slot a unit, then one for the row it had before."""
+
+    link: IntArray
+    """(2 K,) link of the row, -1 for none."""
+    limit: FloatArray
+    """(2 K,) largest closing speed along the normal [m/s]."""
+    across: FloatArray
+    """(2 K,) largest speed across it [m/s]."""
+    normal: FloatArray
+    """(2 K, 3) from the body to the obstacle."""
+    point: FloatArray
+    """(2 K, 3) on the body [m]."""
+
+
+def slots_init(units: int) -> Slots:
+    """Return the slots of K units without a row."""
+    count = 2 * units
+    return Slots(
+        np.full(count, -1, np.int64), np.zeros(count), np.zeros(count), np.zeros((count, 3)), np.zeros((count, 3))
+    )
+
+
+class BrakingLimits(NamedTuple):
+    """Numbers of the braking curve, of the profile."""
+
+    notice_m: float
+    """Body distance from which on nothing is restricted [m]."""
+    deceleration_m_s2: float
+    latency_s: float
+    margin_m: float
+    retreat_m_s: float
+    """Fastest retreat that is asked for [m/s]."""
+    deadband_m_s: float
+    """Closing speed of an object below which it counts as still [m/s]."""
+    across_m: float
+    """Body distance below which motion across the normal is restricted too [m], -inf for none."""
+    across_slowest_m_s: float
+    """Speed across the normal at the surface [m/s]."""
+    fastest_m_s: float
+    """Speed from which on nothing is restricted [m/s]."""
+    tighten_m_s2: float
+    loosen_m_s2: float
+    period_s: float
+
+
+class Mass(NamedTuple):
+    """The arm's inertia, where the touch speed follows from it."""
+
+    counts: bool
+    factor: FloatArray
+    """(n, n) Cholesky factor of the mass matrix; without meaning where it does not count."""
 
 
 @compiled
@@ -44,131 +88,121 @@ def braking_cap(distance: float, touch: float, deceleration: float, latency: flo
 
 @compiled
 def braking_rows(
-    slots: FloatArray, unit: IntArray, link: IntArray, body_point: FloatArray, direction: FloatArray,
-    distance: FloatArray, closing: FloatArray, anchor: FloatArray, axis: FloatArray, moved_by: BoolArray,
-    qd: FloatArray, L: FloatArray, limits: FloatArray, settings: FloatArray,
-    G: FloatArray, h: FloatArray, which: IntArray,
+    slots: Slots, obstacles: ObstacleArrays, chain: Chain, mass: Mass, touching: TouchLimits, limits: BrakingLimits,
+    rows: Rows,
 ) -> tuple[int, int]:  # fmt: skip
-    """Change `slots` by one period and write rows G (R, n), h (R,); return how many are of what is seen, and of all.
+    """Change `slots` by one period and write rows; return how many are of what is seen, and how many there are.
 
-    The first are those of the obstacles `which`; then those that fade, then those across the normals.
+    The first are those of the obstacles; then those that fade, then those across the normals.
 
     Args:
-        slots: (2 K, 9) rows so far.
-        unit: (M,) of each obstacle.
-        link: (M,) closest to each.
-        body_point: (M, 3) closest on the body [m].
-        direction: (M, 3) from there to the obstacle.
-        distance: (M,) between them [m].
-        closing: (M,) each obstacle's own closing speed [m/s].
-        anchor: (n, 3) of the joints [m].
-        axis: (n, 3) of the joints.
-        moved_by: (L, n) which joint moves which link.
-        qd: (n,) joint velocities as last commanded [rad/s].
-        L: (n, n) factor of the mass matrix.
-        limits: (4,) of `touch_speed`.
-        settings: (13,) numbers at the places named above.
-        G: room for all rows.
-        h: likewise.
-        which: room for M indices.
+        slots: rows so far.
+        obstacles: M that are near.
+        chain: what moves the points.
+        mass: of the arm.
+        touching: what a touch may be.
+        limits: of the braking curve.
+        rows: room for all rows, and for M indices.
     """
-    half, s = len(slots) // 2, settings
+    half, s, distance = len(slots.link) // 2, limits, obstacles.body_distance
     seen, found = np.zeros(half, np.bool_), 0
-    for m in range(len(unit)):
-        k = unit[m]
-        if not distance[m] < s[NOTICE]:
+    for m in range(len(obstacles.unit)):
+        k = obstacles.unit[m]
+        if not distance[m] < s.notice_m:
             continue
         seen[k] = True
-        _take_slot(slots, k, half, link[m])
+        _take_slot(slots, k, half, obstacles.link[m])
         for i in range(3):
-            slots[k, DIRECTION + i], slots[k, POINT + i] = direction[m, i], body_point[m, i]
-        approach = _row(slots[k], anchor, axis, moved_by, qd, direction[m], G[found])
-        touch = touch_speed(mass_along(L, G[found]), limits) if s[MASSES] > 0 else limits[3]
-        own = max(0.0, closing[m] - s[DEADBAND])
-        target = max(braking_cap(distance[m], touch, s[DECELERATION], s[LATENCY], s[MARGIN]) - own, -s[RETREAT])
-        last = braking_cap(distance[m], touch, s[TIGHTEN], s[LATENCY], s[MARGIN]) - own
+            slots.normal[k, i], slots.point[k, i] = obstacles.direction[m, i], obstacles.body_point[m, i]
+        row = rows.G[found]
+        approach = _row(slots.link[k], slots.point[k], obstacles.direction[m], chain, row)
+        touch = touch_speed(mass_along(mass.factor, row), touching) if mass.counts else touching.speed_max_m_s
+        own = max(0.0, obstacles.closing_speed[m] - s.deadband_m_s)
+        cap = braking_cap(distance[m], touch, s.deceleration_m_s2, s.latency_s, s.margin_m)
+        target = max(cap - own, -s.retreat_m_s)
+        last = braking_cap(distance[m], touch, s.tighten_m_s2, s.latency_s, s.margin_m) - own
         # beyond the speed from which tightening at its rate would still do, smoothness comes second
-        slots[k, LIMIT] = min(_eased(target, slots[k, LIMIT], approach, s), max(target, last, 0.0))
-        h[found], which[found] = slots[k, LIMIT], m
+        slots.limit[k] = min(_eased(target, slots.limit[k], approach, s), max(target, last, 0.0))
+        rows.h[found], rows.which[found] = slots.limit[k], m
         across = np.inf
-        if distance[m] < s[NEAR]:
-            share = max(0.0, distance[m]) / s[NEAR]
-            across = s[SLOWEST] + share * max(0.0, s[FASTEST] - s[SLOWEST])
-        slots[k, ACROSS] = min(across, slots[k, ACROSS] + s[LOOSEN] * s[PERIOD])
+        if distance[m] < s.across_m:
+            share = max(0.0, distance[m]) / s.across_m
+            across = s.across_slowest_m_s + share * max(0.0, s.fastest_m_s - s.across_slowest_m_s)
+        slots.across[k] = min(across, slots.across[k] + s.loosen_m_s2 * s.period_s)
         found += 1
-    rows = _fading_rows(slots, seen, anchor, axis, moved_by, qd, s, G, h, found)
-    return found, _rows_across(slots, anchor, axis, moved_by, qd, s, G, h, rows)
+    with_fading = _fading_rows(slots, seen, chain, s, rows, found)
+    return found, _rows_across(slots, chain, s, rows, with_fading)
 
 
 @compiled
-def _take_slot(slots: FloatArray, k: int, half: int, link: int) -> None:
+def _take_slot(slots: Slots, k: int, half: int, link: int) -> None:
     """Make slot k that of a unit's row on a link: as it is, as it was before another link was nearer, or empty."""
-    if slots[k, LINK] == link:
+    if slots.link[k] == link:
         return
     last = half + k
-    if slots[last, LINK] == link:
-        for i in range(slots.shape[1]):
-            slots[k, i], slots[last, i] = slots[last, i], slots[k, i]
+    if slots.link[last] == link:
+        slots.link[k], slots.link[last] = slots.link[last], slots.link[k]
+        slots.limit[k], slots.limit[last] = slots.limit[last], slots.limit[k]
+        slots.across[k], slots.across[last] = slots.across[last], slots.across[k]
+        for i in range(3):
+            slots.normal[k, i], slots.normal[last, i] = slots.normal[last, i], slots.normal[k, i]
+            slots.point[k, i], slots.point[last, i] = slots.point[last, i], slots.point[k, i]
         return
     _leave(slots, k, last)
-    slots[k, LINK], slots[k, LIMIT], slots[k, ACROSS] = link, np.inf, np.inf
+    slots.link[k], slots.limit[k], slots.across[k] = link, np.inf, np.inf
 
 
 @compiled
-def _leave(slots: FloatArray, k: int, last: int) -> None:
+def _leave(slots: Slots, k: int, last: int) -> None:
     """Let the row in slot k fade in slot `last`, unless a row that fades there is the tighter one."""
-    if slots[k, LINK] >= 0 and (slots[last, LINK] < 0 or slots[k, LIMIT] <= slots[last, LIMIT]):
-        for i in range(slots.shape[1]):
-            slots[last, i] = slots[k, i]
-    slots[k, LINK] = -1.0
+    if slots.link[k] >= 0 and (slots.link[last] < 0 or slots.limit[k] <= slots.limit[last]):
+        slots.link[last], slots.limit[last], slots.across[last] = slots.link[k], slots.limit[k], slots.across[k]
+        for i in range(3):
+            slots.normal[last, i], slots.point[last, i] = slots.normal[k, i], slots.point[k, i]
+    slots.link[k] = -1
 
 
 @compiled
 def _fading_rows(
-    slots: FloatArray, seen: BoolArray, anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, qd: FloatArray,
-    s: FloatArray, G: FloatArray, h: FloatArray, rows: int,
+    slots: Slots, seen: BoolArray, chain: Chain, s: BrakingLimits, rows: Rows, found: int
 ) -> int:  # fmt: skip
-    """Add the rows of what is no longer seen to those there are; return how many there are then."""
-    half = len(slots) // 2
+    """Add the rows of what is no longer seen to those that were found; return how many there are then."""
+    half = len(slots.link) // 2
     for k in range(half):
         if not seen[k]:
             _leave(slots, k, half + k)
-        slot = slots[half + k]
-        if slot[LINK] < 0:
+        last = half + k
+        if slots.link[last] < 0:
             continue
-        slot[LIMIT] += s[LOOSEN] * s[PERIOD]
-        slot[ACROSS] += s[LOOSEN] * s[PERIOD]
-        free = max(s[FASTEST], np.sqrt(2.0 * s[DECELERATION] * s[NOTICE]))
-        if slot[LIMIT] >= free and slot[ACROSS] >= s[FASTEST]:
-            slot[LINK] = -1.0
+        slots.limit[last] += s.loosen_m_s2 * s.period_s
+        slots.across[last] += s.loosen_m_s2 * s.period_s
+        free = max(s.fastest_m_s, np.sqrt(2.0 * s.deceleration_m_s2 * s.notice_m))
+        if slots.limit[last] >= free and slots.across[last] >= s.fastest_m_s:
+            slots.link[last] = -1
             continue
-        approach = _row(slot, anchor, axis, moved_by, qd, slot[DIRECTION : DIRECTION + 3], G[rows])
-        h[rows] = max(slot[LIMIT], approach - s[TIGHTEN] * s[PERIOD])
-        rows += 1
-    return rows
+        approach = _row(slots.link[last], slots.point[last], slots.normal[last], chain, rows.G[found])
+        rows.h[found] = max(slots.limit[last], approach - s.tighten_m_s2 * s.period_s)
+        found += 1
+    return found
 
 
 @compiled
-def _rows_across(
-    slots: FloatArray, anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, qd: FloatArray, s: FloatArray,
-    G: FloatArray, h: FloatArray, rows: int,
-) -> int:  # fmt: skip
+def _rows_across(slots: Slots, chain: Chain, s: BrakingLimits, rows: Rows, found: int) -> int:
     """Add (t + n) . v <= cap for four tangents t of each near point, n its normal: what retreats may slide as fast."""
     tangents, along = np.empty((2, 3)), np.empty(3)
-    for k in range(len(slots)):
-        slot = slots[k]
-        if slot[LINK] < 0 or not slot[ACROSS] < s[FASTEST]:
+    for k in range(len(slots.link)):
+        if slots.link[k] < 0 or not slots.across[k] < s.fastest_m_s:
             continue
-        normal = slot[DIRECTION : DIRECTION + 3]
+        normal = slots.normal[k]
         tangents_of(normal, tangents)
         for t in range(_TANGENTS):
             sign = 1.0 if t % 2 == 0 else -1.0
             for i in range(3):
                 along[i] = normal[i] + sign * tangents[t // 2, i]
-            speed = _row(slot, anchor, axis, moved_by, qd, along, G[rows])
-            h[rows] = max(slot[ACROSS], speed - s[TIGHTEN] * s[PERIOD])
-            rows += 1
-    return rows
+            speed = _row(slots.link[k], slots.point[k], along, chain, rows.G[found])
+            rows.h[found] = max(slots.across[k], speed - s.tighten_m_s2 * s.period_s)
+            found += 1
+    return found
 
 
 @compiled
@@ -189,23 +223,20 @@ def tangents_of(normal: FloatArray, tangents: FloatArray) -> None:
 
 
 @compiled
-def _eased(target: float, last: float, approach: float, s: FloatArray) -> float:
+def _eased(target: float, last: float, approach: float, s: BrakingLimits) -> float:
     """Limit between what is wanted, how far it may loosen from the last, and how hard it may slow the arm."""
-    eased = min(target, last + s[LOOSEN] * s[PERIOD])
-    return max(eased, approach - s[TIGHTEN] * s[PERIOD])
+    eased = min(target, last + s.loosen_m_s2 * s.period_s)
+    return max(eased, approach - s.tighten_m_s2 * s.period_s)
 
 
 @compiled
-def _row(
-    slot: FloatArray, anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, qd: FloatArray, along: FloatArray,
-    row: FloatArray,
-) -> float:  # fmt: skip
-    """Write the row along^T J (n,) of a slot's point, and return the speed along it [m/s]."""
-    link, speed = int(slot[LINK]), 0.0
+def _row(link: int, point: FloatArray, along: FloatArray, chain: Chain, row: FloatArray) -> float:
+    """Write the row along^T J (n,) of a point (3,) of a link, and return the speed along it [m/s]."""
+    anchor, axis, moved_by, qd, speed = chain.anchor, chain.axis, chain.moved_by, chain.qd, 0.0
     for j in range(len(anchor)):
         row[j] = 0.0
         if moved_by[link, j]:
-            x, y, z = slot[POINT] - anchor[j, 0], slot[POINT + 1] - anchor[j, 1], slot[POINT + 2] - anchor[j, 2]
+            x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
             row[j] = (
                 along[0] * (axis[j, 1] * z - axis[j, 2] * y)
                 + along[1] * (axis[j, 2] * x - axis[j, 0] * z)

@@ -1,9 +1,12 @@
 """What the arm does with the joint motion that leaves its task as it is."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.control.qp import damping, manipulability, mid_joint_velocity
+from pretouch.control.qp import CostParams, damping, manipulability, mid_joint_velocity
+from pretouch.groups import ObstacleArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _DAMPING = 1e-6
@@ -42,19 +45,19 @@ def projector(J: FloatArray) -> FloatArray:
 
 @compiled
 def cost_with_null_space(
-    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, damping_max: float, threshold: float, k: float,
-    time: float, projected: bool, null_velocity: FloatArray,
+    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, p: CostParams, projected: bool,
+    null_velocity: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """H (n, n) and f (n,) of eq. 2 with its mid-joint term, and a motion asked for, in the task's null space.
 
     1/2 |x_d - J qd|^2 + mu/2 |qd|^2 + k/2 |N (z - qd)|^2, z the motion (n,) [rad/s] asked for. With `projected` the
     velocity to the middle of the joints is part of z, without it it stays a term of its own, k/2 |qd_mid - qd|^2.
     """
-    n, N = len(q), projector(J)
-    mu = damping(manipulability(J), damping_max, threshold)
+    n, N, k = len(q), projector(J), p.mid_joint_gain
+    mu = damping(manipulability(J), p.damping_max, p.manipulability_threshold)
     H, f, z = np.empty((n, n)), np.empty(n), null_velocity.copy()
     for i in range(n):
-        middle = mid_joint_velocity(q[i], q_mid[i], time)
+        middle = mid_joint_velocity(q[i], q_mid[i], p.mid_joint_time_s)
         f[i] = 0.0 if projected else -k * middle
         z[i] += middle if projected else 0.0
     for i in range(n):
@@ -70,18 +73,31 @@ def cost_with_null_space(
     return H, f
 
 
+class NullSpaceLimits(NamedTuple):
+    """How links before the hand move away."""
+
+    distance_m: float
+    """Body distance below which they do [m]."""
+    speed_m_s: float
+    """Speed of the closest point at no distance [m/s]."""
+    joint_rad_s: float
+    """Largest length of the joint velocity [rad/s]."""
+    change_rad_s: float
+    """Largest length of its change in a period [rad/s]."""
+
+
 @compiled
 def away(
-    last: FloatArray, G: FloatArray, which: IntArray, link: IntArray, distance: FloatArray, moved_by: BoolArray,
-    within: float, speed: float, most: float, change: float,
+    last: FloatArray, G: FloatArray, which: IntArray, obstacles: ObstacleArrays, moved_by: BoolArray,
+    limits: NullSpaceLimits,
 ) -> FloatArray:  # fmt: skip
     """Joint velocities (n,) [rad/s] that take body points before the hand away from what is near.
 
-    Each row g = n^T J of G (R, n), that of obstacle `which` (R,), adds -g v / |g|^2 with v = speed (1 - d / within)^2:
-    alone it would move its point away at v. The sum is at most `most` long, and differs from `last` (n,) by no more
-    than `change`.
+    Each row g = n^T J of G (R, n), that of obstacle `which` (R,), adds -g v / |g|^2 with v = v_0 (1 - d / d_0)^2: alone
+    it would move its point away at v. Sum and change from `last` (n,) are no longer than `limits` allow.
     """
-    n = G.shape[1]
+    n, within = G.shape[1], limits.distance_m
+    link, distance = obstacles.link, obstacles.body_distance
     z = np.zeros(n)
     for r in range(len(which)):
         m = which[r]
@@ -90,13 +106,13 @@ def away(
         size2 = 0.0
         for j in range(n):
             size2 += G[r, j] * G[r, j]
-        wanted = speed * (1.0 - max(0.0, distance[m]) / within) ** 2
+        wanted = limits.speed_m_s * (1.0 - max(0.0, distance[m]) / within) ** 2
         # a point that hardly moves asks for no more than one 0.1 m off an axis
         for j in range(n):
             z[j] -= G[r, j] * wanted / max(size2, 0.01)
-    _shorten(z, most)
+    _shorten(z, limits.joint_rad_s)
     step = z - last
-    _shorten(step, change)
+    _shorten(step, limits.change_rad_s)
     return last + step
 
 

@@ -8,6 +8,8 @@ The cost is piecewise quadratic and convex, so Newton steps, each to the least o
 by an exact line search where it would overshoot, end at the minimum after finitely many.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.compiled import compiled
@@ -23,44 +25,66 @@ _REST = 1e-11
 """Length of a step from which no other is needed [rad/s]."""
 
 
-@compiled
-def minimise(
-    H: FloatArray, f: FloatArray, lower: FloatArray, upper: FloatArray, G: FloatArray, h: FloatArray, weight: float,
-    budget: int, x: FloatArray, slack: FloatArray, multipliers: FloatArray,
-) -> int:  # fmt: skip
-    """Write the minimum to x, and say how it ended.
+class Problem(NamedTuple):
+    """What is minimised."""
 
-    Args:
-        H: (n, n), positive definite.
-        f: (n,).
-        lower: (n,) box.
-        upper: (n,) box.
-        G: (K, n) rows.
-        h: (K,) their bounds.
-        weight: price w of a squared violation.
-        budget: factorisations after which to give up.
-        x: (n,) for the answer.
-        slack: (K,) for by how much each row is violated.
-        multipliers: (n + K,) for those of box and rows, positive at an upper and negative at a lower bound.
-    """
-    if not _finite(H, f, lower, upper, G, h):
+    H: FloatArray
+    """(n, n), positive definite."""
+    f: FloatArray
+    """(n,)."""
+    lower: FloatArray
+    """(n,) box."""
+    upper: FloatArray
+    """(n,) box."""
+    G: FloatArray
+    """(K, n) rows."""
+    h: FloatArray
+    """(K,) their bounds."""
+    weight: float
+    """Price w of a squared violation."""
+
+
+class Minimum(NamedTuple):
+    """Room for the answer."""
+
+    x: FloatArray
+    """(n,) where it is."""
+    slack: FloatArray
+    """(K,) by how much each row is violated."""
+    multipliers: FloatArray
+    """(n + K,) those of box and rows, positive at an upper and negative at a lower bound."""
+
+
+class _Piece(NamedTuple):
+    """The piece of the cost that some x is on: 1/2 x^T hessian x + linear^T x, and the rows (K,) violated there."""
+
+    hessian: FloatArray
+    linear: FloatArray
+    violated: BoolArray
+
+
+@compiled
+def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
+    """Write the minimum, and say how that ended; `budget` counts the factorisations after which to give up."""
+    H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
+    x = answer.x
+    if not _finite(problem):
         return NOT_FINITE
     n = len(x)
     for i in range(n):
         # the middle of the box is the last command, as a rule, and the next one near it
         x[i] = 0.5 * (lower[i] + upper[i])
     which = possible_rows(G, h, lower, upper)
-    violated, at_bound = np.zeros(len(h), np.bool_), np.zeros(n, np.int64)
-    hessian, linear = H.copy(), f.copy()
-    _take_violated(H, f, G, h, which, weight, x, violated, hessian, linear)
+    at_bound, piece = np.zeros(n, np.int64), _Piece(H.copy(), f.copy(), np.zeros(len(h), np.bool_))
+    _take_violated(problem, which, x, piece)
     y, left = x.copy(), budget
     while True:
-        status, left = _box_minimum(hessian, linear, lower, upper, y, at_bound, left)
+        status, left = _box_minimum(piece.hessian, piece.linear, lower, upper, y, at_bound, left)
         if status != SOLVED:
             return status
-        if not _differs(G, h, which, y, violated):
+        if not _differs(G, h, which, y, piece.violated):
             break
-        _shorten(H, f, G, h, which, weight, x, y)
+        _shorten(problem, which, x, y)
         moved = 0.0
         for i in range(n):
             moved = max(moved, abs(y[i] - x[i]) / (1.0 + abs(x[i])))
@@ -70,13 +94,13 @@ def minimise(
             x[i] = y[i]
             if at_bound[i] != 0 and lower[i] < x[i] < upper[i]:
                 at_bound[i] = 0
-        _take_violated(H, f, G, h, which, weight, x, violated, hessian, linear)
+        _take_violated(problem, which, x, piece)
     sound = True
     for i in range(n):
         # the box to the last digit, which rounding may miss
         x[i] = min(max(y[i], lower[i]), upper[i])
         sound = sound and np.isfinite(x[i])
-    _certify(hessian, linear, G, h, weight, at_bound, x, slack, multipliers)
+    _certify(problem, piece, at_bound, answer)
     return SOLVED if sound else NOT_FINITE
 
 
@@ -95,7 +119,8 @@ def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatA
 
 
 @compiled
-def _finite(H: FloatArray, f: FloatArray, lower: FloatArray, upper: FloatArray, G: FloatArray, h: FloatArray) -> bool:
+def _finite(problem: Problem) -> bool:
+    H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
     # a number that is not finite spoils any sum of products with zero
     spoilt = 0.0
     for i in range(len(f)):
@@ -126,11 +151,10 @@ def excesses(G: FloatArray, h: FloatArray, x: FloatArray, slack: FloatArray) -> 
 
 
 @compiled
-def _take_violated(
-    H: FloatArray, f: FloatArray, G: FloatArray, h: FloatArray, which: IntArray, weight: float, x: FloatArray,
-    violated: BoolArray, hessian: FloatArray, linear: FloatArray,
-) -> None:  # fmt: skip
-    """Make hessian and linear those of the piece of the cost that x is on, and note its violated rows."""
+def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Piece) -> None:
+    """Make the piece of the cost the one that x is on; only the rows `which` are looked at."""
+    H, f, G, h, weight = problem.H, problem.f, problem.G, problem.h, problem.weight
+    hessian, linear, violated = piece.hessian, piece.linear, piece.violated
     n, dropped = len(x), False
     for k in which:
         dropped = dropped or (violated[k] and not _excess(G, h, k, x) > 0)
@@ -164,11 +188,9 @@ def _differs(G: FloatArray, h: FloatArray, which: IntArray, x: FloatArray, viola
 
 
 @compiled
-def _shorten(
-    H: FloatArray, f: FloatArray, G: FloatArray, h: FloatArray, which: IntArray, weight: float, x: FloatArray,
-    y: FloatArray,
-) -> None:  # fmt: skip
+def _shorten(problem: Problem, which: IntArray, x: FloatArray, y: FloatArray) -> None:
     """Draw y back towards x to the least of the cost on the way from x to it."""
+    H, f, G, h, weight = problem.H, problem.f, problem.G, problem.h, problem.weight
     n, d = len(x), np.empty(len(x))
     for i in range(n):
         d[i] = y[i] - x[i]
@@ -303,15 +325,13 @@ def _newton_step(H: FloatArray, gradient: FloatArray, free: IntArray, L: FloatAr
 
 
 @compiled
-def _certify(
-    hessian: FloatArray, linear: FloatArray, G: FloatArray, h: FloatArray, weight: float, at_bound: IntArray,
-    x: FloatArray, slack: FloatArray, multipliers: FloatArray,
-) -> None:  # fmt: skip
+def _certify(problem: Problem, piece: _Piece, at_bound: IntArray, answer: Minimum) -> None:
     """Write slack (K,) and multipliers (n + K,) of the minimum x."""
+    hessian, linear, x, slack, multipliers = piece.hessian, piece.linear, answer.x, answer.slack, answer.multipliers
     n = len(x)
-    excesses(G, h, x, slack)
-    for k in range(len(h)):
-        multipliers[n + k] = weight * slack[k]
+    excesses(problem.G, problem.h, x, slack)
+    for k in range(len(problem.h)):
+        multipliers[n + k] = problem.weight * slack[k]
     for i in range(n):
         pull = linear[i]
         for j in range(n):

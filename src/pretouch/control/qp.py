@@ -1,10 +1,21 @@
 """The quadratic program for joint velocities: eq. 2 within joint box and approach rows. Never without an answer."""
 
+from typing import NamedTuple
+
 import daqp
 import numpy as np
 
-from pretouch.compiled import compiled
-from pretouch.control.penalty import BUDGET, NOT_CONVEX, NOT_FINITE, SOLVED, minimise, possible_rows
+from pretouch.compiled import compiled, entry
+from pretouch.control.penalty import (
+    BUDGET,
+    NOT_CONVEX,
+    NOT_FINITE,
+    SOLVED,
+    Minimum,
+    Problem,
+    minimise,
+    possible_rows,
+)
 from pretouch.control.restriction import ApproachRows
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray, Number, QpOutcome, QpSolution
@@ -34,6 +45,21 @@ class Cost:
     """(n, n), positive definite."""
     f: FloatArray
     """(n,)."""
+
+
+class CostParams(NamedTuple):
+    """What eq. 2 takes of `TaskParams`."""
+
+    damping_max: float
+    manipulability_threshold: float
+    mid_joint_gain: float
+    mid_joint_time_s: float
+
+
+def cost_params(params: TaskParams) -> CostParams:
+    """Return what eq. 2 takes of the parameters."""
+    p = params
+    return CostParams(p.damping_max, p.manipulability_threshold, p.mid_joint_gain, p.mid_joint_time_s)
 
 
 @compiled
@@ -80,24 +106,27 @@ def task_cost(jacobian: FloatArray, velocity: FloatArray, q: FloatArray, q_mid: 
         q_mid: (n,) middle of the joint ranges [rad].
         params: damping and mid-joint term.
     """
-    n, p = len(q), params
+    n = len(q)
     H, f = np.empty((n, n)), np.empty(n)
-    cost_into(
-        jacobian, velocity, q, q_mid, p.damping_max, p.manipulability_threshold, p.mid_joint_gain, p.mid_joint_time_s,
-        H, f,
-    )  # fmt: skip
+    _cost(jacobian, velocity, q, q_mid, cost_params(params), H, f)
     return Cost(H, f)
+
+
+@entry
+def _cost(
+    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, p: CostParams, H: FloatArray, f: FloatArray
+) -> None:
+    cost_into(J, x_d, q, q_mid, p, H, f)
 
 
 @compiled
 def cost_into(
-    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, damping_max: float, threshold: float, k: float,
-    time: float, H: FloatArray, f: FloatArray,
-) -> None:  # fmt: skip
+    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, p: CostParams, H: FloatArray, f: FloatArray
+) -> None:
     """Write H (n, n) and f (n,) of `task_cost`."""
-    mu = damping(manipulability(J), damping_max, threshold)
+    mu, k = damping(manipulability(J), p.damping_max, p.manipulability_threshold), p.mid_joint_gain
     for i in range(len(q)):
-        f[i] = -k * mid_joint_velocity(q[i], q_mid[i], time)
+        f[i] = -k * mid_joint_velocity(q[i], q_mid[i], p.mid_joint_time_s)
         for m in range(len(x_d)):
             f[i] -= J[m, i] * x_d[m]
         for j in range(i + 1):
@@ -130,18 +159,27 @@ def solve(
         stop: (n,) braking command inside the box [rad/s].
         budget: iterations after which to brake. A limit in time would give another answer each time.
     """
-    n, count = len(lower), len(rows.h)
-    x, slack, multipliers = np.empty(n), np.empty(count), np.empty(n + count)
+    x, slack, multipliers = answer = _room(len(lower), len(rows.h))
     # hard rows have no price: what is best without them is best with them if it keeps them
     weight = slack_weight if rows.soft else 0.0
-    ending = minimise(cost.H, cost.f, lower, upper, rows.G, rows.h, weight, budget, x, slack, multipliers)
+    ending = _minimise(Problem(cost.H, cost.f, lower, upper, rows.G, rows.h, weight), budget, answer)
     if ending != SOLVED:
         return _braking(stop, rows, QpOutcome.FAILED, ENDING[ending])
-    if count and not rows.soft and slack.max() > 0:
+    if len(slack) and not rows.soft and slack.max() > 0:
         return _solve_hard(cost, lower, upper, rows, stop, budget)
-    violated = bool(count) and slack.max() > 0
+    violated = len(slack) > 0 and slack.max() > 0
     status = "solved, an approach row is violated" if violated else "solved"
     return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, status)
+
+
+def _room(n: int, count: int) -> Minimum:
+    """Return room for the minimum of a problem with n joints and so many rows."""
+    return Minimum(np.empty(n), np.empty(count), np.empty(n + count))
+
+
+@entry
+def _minimise(problem: Problem, budget: int, answer: Minimum) -> int:
+    return minimise(problem, budget, answer)
 
 
 def _solve_hard(
@@ -170,10 +208,10 @@ def _solve_hard(
 
 def _contradict(lower: FloatArray, upper: FloatArray, rows: ApproachRows, budget: int) -> bool:
     """Whether no joint velocities in the box meet all rows: those that violate them least still do."""
-    n, count = len(lower), len(rows.h)
-    x, slack, multipliers = np.empty(n), np.empty(count), np.empty(n + count)
-    least = minimise(1e-6 * np.eye(n), np.zeros(n), lower, upper, rows.G, rows.h, 1e3, budget, x, slack, multipliers)
-    return least == SOLVED and bool(slack.max() > 1e-6)
+    n = len(lower)
+    answer = _room(n, len(rows.h))
+    least = _minimise(Problem(1e-6 * np.eye(n), np.zeros(n), lower, upper, rows.G, rows.h, 1e3), budget, answer)
+    return least == SOLVED and bool(answer.slack.max() > 1e-6)
 
 
 def skipped(stop: FloatArray, rows: ApproachRows) -> QpSolution:

@@ -1,8 +1,11 @@
 """Restricting the body's approach to obstacles: eqs. 5-7, as rows G qd <= h of the QP."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import ByName, compiled, entry
+from pretouch.groups import ObstacleArrays
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
 from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles
@@ -45,34 +48,43 @@ def approach_limit(d: FloatArray, params: RestrictionParams) -> FloatArray:
     V_a - V_max below d_repulse, V_b from there to d_notice. `d` (K,) [m] is from the body's surface and may be
     negative. In mode floor the limit never lies below `floor_m_s`.
     """
+    return _limits(d, approach_params(params))
+
+
+class ApproachParams(NamedTuple):
+    """What eqs. 5-7 take of `RestrictionParams`."""
+
+    v_max_m_s: float
+    beta: float
+    d_crit_m: float
+    d_repulse_m: float
+    d_notice_m: float
+    least_m_s: float
+    """Limit no row falls below, -inf for none [m/s]."""
+
+
+def approach_params(params: RestrictionParams) -> ApproachParams:
+    """Return what eqs. 5-7 take of the parameters."""
     p = params
-    return _limits(d, p.v_max_m_s, p.beta, p.d_crit_m, p.d_repulse_m, p.d_notice_m, least_limit(p))
+    least = p.floor_m_s if p.mode == "floor" else -np.inf
+    return ApproachParams(p.v_max_m_s, p.beta, p.d_crit_m, p.d_repulse_m, p.d_notice_m, least)
 
 
-def least_limit(params: RestrictionParams) -> float:
-    """Return the approach limit no row falls below [m/s], -inf where there is none."""
-    return params.floor_m_s if params.mode == "floor" else -np.inf
-
-
-@compiled
-def _limits(
-    d: FloatArray, v_max: float, beta: float, d_crit: float, d_repulse: float, d_notice: float, floor: float
-) -> FloatArray:
+@entry
+def _limits(d: FloatArray, p: ApproachParams) -> FloatArray:
     limits = np.empty(len(d))
     for k in range(len(d)):
-        limits[k] = _limit(d[k], v_max, beta, d_crit, d_repulse, d_notice, floor)
+        limits[k] = _limit(d[k], p)
     return limits
 
 
 @compiled
-def _limit(
-    d: float, v_max: float, beta: float, d_crit: float, d_repulse: float, d_notice: float, floor: float
-) -> float:
-    if not d < d_notice:
+def _limit(d: float, p: ApproachParams) -> float:
+    if not d < p.d_notice_m:
         return np.inf
-    if d < d_repulse:
-        return max(velocity_a(d, v_max, beta, d_crit) - v_max, floor)
-    return max(velocity_b(d, v_max, beta, d_crit, d_notice), floor)
+    if d < p.d_repulse_m:
+        return max(velocity_a(d, p.v_max_m_s, p.beta, p.d_crit_m) - p.v_max_m_s, p.least_m_s)
+    return max(velocity_b(d, p.v_max_m_s, p.beta, p.d_crit_m, p.d_notice_m), p.least_m_s)
 
 
 def approach_rows(
@@ -87,24 +99,37 @@ def approach_rows(
     if p.mode == "off" or count == 0:
         return ApproachRows(np.zeros((0, n)), np.zeros(0), soft=False), np.zeros(0, np.int64)
     G, h, which = np.empty((count, n)), np.empty(count), np.empty(count, np.int64)
-    found = rows_into(
-        kin.anchor, kin.axis, moved_by, obstacles.link, obstacles.body_point, obstacles.direction,
-        obstacles.body_distance, p.v_max_m_s, p.beta, p.d_crit_m, p.d_repulse_m, p.d_notice_m, least_limit(p),
-        G, h, which,
-    )  # fmt: skip
+    found = _rows(kin, moved_by, obstacles, approach_params(p), Rows(G, h, which))
     return ApproachRows(G[:found], h[:found], p.mode in ("slack", "floor")), which[:found]
 
 
+class Rows(NamedTuple):
+    """Room for rows of the QP, as many as there may be."""
+
+    G: FloatArray
+    """(R, n) as in `ApproachRows`."""
+    h: FloatArray
+    """(R,) likewise."""
+    which: IntArray
+    """(K,) the obstacle that each of the first belongs to."""
+
+
+@entry
+def _rows(
+    kin: Kinematics, moved_by: BoolArray, obstacles: ByName[ObstacleArrays], p: ApproachParams, rows: Rows
+) -> int:
+    return rows_into(kin, moved_by, obstacles, p, rows)
+
+
 @compiled
-def rows_into(
-    anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, link: IntArray, point: FloatArray,
-    direction: FloatArray, distance: FloatArray, v_max: float, beta: float, d_crit: float, d_repulse: float,
-    d_notice: float, floor: float, G: FloatArray, h: FloatArray, which: IntArray,
-) -> int:  # fmt: skip
-    """Write the rows G, h of `approach_rows` and the indices of their obstacles; return how many."""
+def rows_into(kin: Kinematics, moved_by: BoolArray, obstacles: ObstacleArrays, p: ApproachParams, rows: Rows) -> int:
+    """Write the rows of `approach_rows` and the indices of their obstacles; return how many."""
+    anchor, axis = kin.anchor, kin.axis
+    link, point, direction = obstacles.link, obstacles.body_point, obstacles.direction
+    G, h, which = rows.G, rows.h, rows.which
     found = 0
     for k in range(len(link)):
-        limit = _limit(distance[k], v_max, beta, d_crit, d_repulse, d_notice, floor)
+        limit = _limit(obstacles.body_distance[k], p)
         if limit == np.inf:
             continue
         h[found], which[found] = limit, k

@@ -1,5 +1,7 @@
 """The speed at which a touch is allowed: from the arm's mass along the normal and what a body region bears."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.cholesky import forward
@@ -8,24 +10,34 @@ from pretouch.params.anticipation import REGIONS, AnticipationParams
 from pretouch.types import FloatArray
 
 
-def touch_parameters(params: AnticipationParams) -> FloatArray:
-    """Force [N], stiffness [N/m], mass [kg] and cap [m/s] (4,) of `touch_speed`."""
+class TouchLimits(NamedTuple):
+    """What a touch may be."""
+
+    force_n: float
+    """Force it may reach in the spring model [N]."""
+    stiffness_n_m: float
+    """Stiffness of the body region [N/m]."""
+    mass_kg: float
+    """Mass of the body region [kg]."""
+    speed_max_m_s: float
+    """Largest speed, whatever the mass [m/s]."""
+
+
+def touch_limits(params: AnticipationParams) -> TouchLimits:
+    """Return what `touch_speed` takes of the parameters."""
     region = REGIONS[params.body_region]
-    return np.array((
-        params.allowed_force_n, region.stiffness_n_m, region.mass_kg, params.touch_speed_max_m_s,
-    ))  # fmt: skip
+    return TouchLimits(params.allowed_force_n, region.stiffness_n_m, region.mass_kg, params.touch_speed_max_m_s)
 
 
 @compiled
-def touch_speed(mass: float, limits: FloatArray) -> float:
+def touch_speed(mass: float, limits: TouchLimits) -> float:
     """Speed v_c = F / sqrt(mu k) [m/s], 1/mu = 1/m_H + 1/m_R, at which two masses meet over a spring with force F.
 
     The spring model of ISO/TS 15066, annex A, for orientation. `mass` m_R [kg] is that of the arm along the normal,
-    infinite where it cannot move; `limits` (4,) are those of `touch_parameters`, the last of them the most it may be.
+    infinite where it cannot move.
     """
-    force, stiffness, body_mass, most = limits[0], limits[1], limits[2], limits[3]
-    inverse = 1.0 / body_mass + 1.0 / mass
-    return min(most, force * np.sqrt(inverse / stiffness))
+    inverse = 1.0 / limits.mass_kg + 1.0 / mass
+    return min(limits.speed_max_m_s, limits.force_n * np.sqrt(inverse / limits.stiffness_n_m))
 
 
 @compiled

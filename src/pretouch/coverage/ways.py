@@ -8,9 +8,10 @@ import numpy as np
 from pretouch.control.braking import tangents_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.surface import Surface
+from pretouch.groups import CapsuleArrays, Sensors
 from pretouch.perception.obstacles import poses
 from pretouch.perception.scene_filter import Fixtures, expected_range
-from pretouch.perception.sighting import ways_free, ways_seen
+from pretouch.perception.sighting import BallWays, Stretch, ways_free, ways_seen
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -51,15 +52,19 @@ def ways_to(
     start, way = np.empty((2, len(q), len(point), 3))
     free = np.empty((len(q), len(point)), np.bool_)
     arm = model.capsules
-    ball = here.point + params.object_radius_m * normal
+    centre = here.point + params.object_radius_m * normal
     for s, kin in enumerate(postures):
         R = kin.rotation[here.link]
-        start[s] = kin.position[here.link] + np.einsum("wij,wj->wi", R, ball)
+        start[s] = kin.position[here.link] + np.einsum("wij,wj->wi", R, centre)
         way[s] = np.einsum("wij,wj->wi", R, cosine_weighted(normal, rng))
         a, b = placed(arm, kin)
         about = room.capsules
-        ends = np.vstack([a, about.a]), np.vstack([b, about.b]), np.concatenate([arm.radius, about.radius])
-        ways_free(start[s], way[s], params.way_m, params.object_radius_m, here.capsule, *ends, room.planes, free[s])
+        capsules = CapsuleArrays(
+            np.concatenate([arm.link, about.link]), np.vstack([a, about.a]), np.vstack([b, about.b]),
+            np.concatenate([arm.radius, about.radius]),
+        )  # fmt: skip
+        ball = BallWays(start[s], way[s], params.object_radius_m)
+        ways_free(ball, params.way_m, here.capsule, capsules, room.planes, free[s])
     return Ways(model, room, params, surface, postures, point, start, way, free)
 
 
@@ -90,8 +95,8 @@ def seen_by(ways: Ways, link: IntArray, T_link_sensor: FloatArray, postures: Seq
         limit = np.minimum(p.range_m, own_view - p.self_margin_m)
         found = np.zeros((len(link), len(ways.point)), np.bool_)
         ways_seen(
-            ways.start[s], ways.way[s], ways.free[s], p.object_radius_m, p.first, p.last, p.run, position, rotation,
-            limit, p.light_m2, found,
+            BallWays(ways.start[s], ways.way[s], p.object_radius_m), ways.free[s], Stretch(p.first, p.last, p.run),
+            Sensors(position, rotation, link), limit, p.light_m2, found,
         )  # fmt: skip
         seen[:, i] = found
     return seen

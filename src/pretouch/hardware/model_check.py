@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.checks import Checked, Fraction, Positive, PositiveCount
+from pretouch.groups import CapsuleArrays, Sensors
 from pretouch.hardware.findings import Finding
 from pretouch.perception.closest import bounds
 from pretouch.perception.obstacles import is_evidence, measured_distance, sensor_poses
-from pretouch.perception.scene_filter import RAYS, Fixtures, capsule_return, expected_range, plane_return
+from pretouch.perception.scene_filter import RAYS, Fixtures, expected_range, nearest_capsule, plane_return
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
@@ -136,15 +137,15 @@ def _certain_return(
     shapes = []
     for part in (body, fixtures.capsules):
         a, b = placed(part, kin)
-        shapes.append((part.link, a, b, part.radius, bounds(a, b, part.radius)))
-    far = np.full(len(own), np.inf)
+        shapes.append((CapsuleArrays(part.link, a, b, part.radius), bounds(a, b, part.radius)))
+    sensors, far = Sensors(position, rotation, own), np.full(len(own), np.inf)
     for k in np.flatnonzero(wanted).tolist():
         far[k] = 0.0
         for i in range(len(_INNER)):
             ray = _INNER[i : i + 1]
             end = plane_return(position, rotation, k, fixtures.planes, ray, np.inf)
             for shape in shapes:
-                end = min(end, capsule_return(position, rotation, k, own[k], *shape, ray, np.inf, -np.inf))
+                end = min(end, nearest_capsule(sensors, k, *shape, ray))
             far[k] = max(far[k], end)
             if far[k] == np.inf:
                 break

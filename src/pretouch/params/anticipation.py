@@ -1,9 +1,9 @@
 """Parameters of anticipation: what nearness does to motion beyond the paper. Each switch is off in `paper`."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Literal
 
-from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
+from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.errors import ParameterError
 
 BodyRegion = Literal["hand", "forearm", "upper-arm", "chest", "abdomen", "back", "face", "skull"]
@@ -93,14 +93,6 @@ class AnticipationParams(Checked):
     """Largest such joint velocity (norm) [rad/s]."""
     null_rate_rad_s2: Positive = 1.0
     """Rate at which it changes [rad/s^2]."""
-    detour: bool = False
-    """Whether the path is shifted aside where something blocks it."""
-    detour_distance_m: Annotated[float, Check(low=0.0, open_low=True, high=1.0)] = 0.2
-    """Largest shift of the path [m]."""
-    detour_speed_m_s: Positive = 0.1
-    """Speed at which the path shifts aside, and back [m/s]."""
-    detour_hold_s: NonNegative = 0.5
-    """How long the way has to be clear before the path shifts back [s]."""
     blocked_after_s: Positive = 2.0
     """How long the arm has to be kept from its path before the mode's reason says so [s]."""
 

@@ -104,6 +104,13 @@ paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.m
 `flacco` and `ding`: published ways to avoid obstacles, to compare with (docs/explanation/baselines.md)."""
 
 
+_NO_DETOUR = "the arm no longer goes round what blocks its path, which kept it from none of 8 boards. Leave it out."
+REMOVED = {
+    f"anticipation.{name}": _NO_DETOUR for name in ("detour", "detour_distance_m", "detour_speed_m_s", "detour_hold_s")
+}
+"""Parameters that earlier versions had, and what to do without each."""
+
+
 def profile(name: str) -> Profile:
     """Look a profile up: by its name, or as `NAME:GROUP.FIELD=VALUE:...`, that profile with some parameters changed.
 
@@ -134,6 +141,8 @@ def _change(profile: Profile, change: str) -> tuple[str, str, object]:
         raise ParameterError(f"The group {group!r} of {change!r} is unknown: choose from {', '.join(groups)}.")
     params = getattr(profile, group)
     known = [f.name for f in fields(params)]
+    if where in REMOVED:
+        raise ParameterError(f"The parameter {where!r} is gone: {REMOVED[where]}")
     if name not in known:
         raise ParameterError(f"The parameter {where!r} is unknown: choose from {', '.join(known)}.")
     return group, name, _read(where, text, getattr(params, name))

@@ -1,13 +1,16 @@
 """Which points of an outside source are kept: those of no arm and no fixture that are nearest to each link."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from pretouch.compiled import compiled
-from pretouch.perception.closest import closest, to_axis
+from pretouch.compiled import ByName, compiled, entry
+from pretouch.groups import CapsuleArrays, Chain
+from pretouch.perception.closest import ClosestArrays, closest, to_axis
 from pretouch.perception.closing import follow_points
 from pretouch.perception.obstacles import HEARD, SEEN, USED
 from pretouch.robot.vectors import dot
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import FloatArray, IntArray
 
 _FARTHEST = 100.0
 """A coordinate [m] from here on is none: another unit, or a broken message."""
@@ -40,31 +43,95 @@ def _is_point(stamp: float, point: FloatArray, m: int, sigma: float) -> bool:
     return bool(0.0 <= sigma <= _LARGEST_SIGMA and np.isfinite(stamp))
 
 
-@compiled
-def take_points(
-    last: FloatArray, times: FloatArray, motion: FloatArray, kept_sigma: FloatArray, heard: float, stamp: FloatArray,
-    point: FloatArray, sigma: FloatArray, now: float, body_link: IntArray, body_from: FloatArray, body_to: FloatArray,
-    body_radius: FloatArray, place: IntArray, arm_link: IntArray, arm_ends: FloatArray, arm_radius: FloatArray,
-    other_ends: FloatArray, other_radius: FloatArray, planes: FloatArray, anchor: FloatArray, axis: FloatArray,
-    moved_by: BoolArray, qd: FloatArray, posed: float, persistence: float, hidden: float, margin: float, sigmas: float,
-    kept: int, memory: float,
-) -> None:  # fmt: skip
-    """Choose the points of each link's places, and change the tracks (first line of arguments) by them.
+class KeptPoints(NamedTuple):
+    """The points that P places show, changed by newer ones."""
 
-    Points that were kept before stand for election with the new ones where the arm hides them. Of the tracks' times
-    `used` is when a point was measured, and `seen` when it was last known to be there or hidden.
+    point: FloatArray
+    """(P, 3) [m]."""
+    times: FloatArray
+    """(3, P) as of `TrackState`: `used` is when a point was measured, `seen` when it was last there or hidden."""
+    motion: FloatArray
+    """(2, P, 3) smoothed place [m] and velocity [m/s]."""
+    sigma: FloatArray
+    """(P,) standard deviation of each [m]."""
+
+
+class PointSet(NamedTuple):
+    """As `SeenPoints`."""
+
+    heard: float
+    stamp: FloatArray
+    point: FloatArray
+    sigma: FloatArray
+
+
+class Placed(NamedTuple):
+    """What is there already when points are measured, placed in the base frame in one posture."""
+
+    body: CapsuleArrays
+    """The part of the arm that joints move."""
+    arm_link: IntArray
+    """(C,) link of each capsule of the whole arm."""
+    arm_ends: FloatArray
+    """(2, C, 3) both ends of the axis of each [m]."""
+    arm_radius: FloatArray
+    """(C,) [m]."""
+    other_ends: FloatArray
+    """(2, F, 3) the same of fixtures."""
+    other_radius: FloatArray
+    """(F,) [m]."""
+    planes: FloatArray
+    """(Q, 4) of fixtures."""
+
+
+class PointNumbers(NamedTuple):
+    """What is taken of `PerceptionParams`."""
+
+    outside_persistence_s: float
+    outside_hidden_s: float
+    outside_margin_m: float
+    spread_sigmas: float
+    outside_points: int
+    closing_speed: bool
+    closing_memory_s: float
+
+
+@entry
+def take_points(
+    old: KeptPoints, new: ByName[PointSet], now: float, place: IntArray, there: Placed, chain: Chain, posed: float,
+    p: ByName[PointNumbers],
+) -> None:  # fmt: skip
+    """Choose the points of each link's places, and change those that are kept.
+
+    Points that were kept before stand for election with the new ones where the arm hides them.
+
+    Args:
+        old: those kept.
+        new: those of the sources.
+        now: instant of the step [s].
+        place: (L,) of each link, -1 for none.
+        there: what is no obstacle, in the posture of the arm.
+        chain: of the arm.
+        posed: instant of that posture [s].
+        p: parameters.
     """
+    last, times, motion, kept_sigma = old
+    heard, stamp, point, sigma = new
+    arm_link, arm_ends, arm_radius = there.arm_link, there.arm_ends, there.arm_radius
+    other_ends, other_radius, planes = there.other_ends, there.other_radius, there.planes
+    persistence, hidden, margin = p.outside_persistence_s, p.outside_hidden_s, p.outside_margin_m
+    sigmas, kept = p.spread_sigmas, p.outside_points
     ends = np.empty_like(arm_ends)
-    move_ends(arm_ends, arm_link, anchor, axis, moved_by, qd, posed - heard, ends)
+    move_ends(arm_ends, arm_link, chain, posed - heard, ends)
     placed_for, room = heard, len(stamp) + len(last)
     near, spread, when = np.empty((room, 3)), np.empty(room), np.empty(room)
     known, count = np.full(room, _UNKNOWN), 0
-    for p in range(len(last)):
-        u = sigmas * kept_sigma[p]
-        if now - times[USED, p] <= hidden and now - times[SEEN, p] <= persistence:
-            gap_of_arm = _gap(last, p, ends, arm_radius)
+    for k in range(len(last)):
+        u = sigmas * kept_sigma[k]
+        if now - times[USED, k] <= hidden and now - times[SEEN, k] <= persistence:
+            gap_of_arm = _gap(last, k, ends, arm_radius)
             if -u <= gap_of_arm <= margin + u:
-                near[count], spread[count], when[count], known[count] = last[p], kept_sigma[p], times[USED, p], _HIDDEN
+                near[count], spread[count], when[count], known[count] = last[k], kept_sigma[k], times[USED, k], _HIDDEN
                 count += 1
     for m in range(len(stamp)):
         if _is_point(stamp[m], point, m, sigma[m]) and 0.0 <= now - stamp[m] <= persistence:
@@ -74,7 +141,7 @@ def take_points(
     body_point, link, gap = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
     direction = np.zeros((count, 3))
     direction[:, 2] = 1.0
-    closest(body_link, body_from, body_to, body_radius, near, body_point, link, direction, gap)
+    closest(there.body, near, ClosestArrays(body_point, link, direction, gap))
     for m in range(count):
         gap[m] -= sigmas * spread[m]
 
@@ -90,7 +157,7 @@ def take_points(
             if known[m] == _UNKNOWN:
                 if not abs(when[m] - placed_for) < _ONE_INSTANT:
                     placed_for = when[m]
-                    move_ends(arm_ends, arm_link, anchor, axis, moved_by, qd, posed - placed_for, ends)
+                    move_ends(arm_ends, arm_link, chain, posed - placed_for, ends)
                 within = margin + sigmas * spread[m]
                 known[m] = _OBSTACLE
                 if (
@@ -103,18 +170,18 @@ def take_points(
             chosen[first + rank] = m
 
     points, stamps, taken = np.zeros((len(chosen), 3)), np.full(len(chosen), heard), np.zeros(len(chosen), np.bool_)
-    for p in range(len(chosen)):
-        if chosen[p] >= 0:
-            points[p], stamps[p], taken[p] = near[chosen[p]], when[chosen[p]], known[chosen[p]] == _OBSTACLE
-    if memory > 0:
-        follow_points(motion, last, times[SEEN], points, stamps, taken, memory)
-    for p in range(len(chosen)):
-        times[HEARD, p] = heard
-        if chosen[p] >= 0:
-            last[p], kept_sigma[p], times[USED, p] = points[p], spread[chosen[p]], stamps[p]
-            times[SEEN, p] = stamps[p] if taken[p] else heard
-            if memory > 0 and not taken[p]:
-                motion[0, p], motion[1, p] = points[p], 0.0
+    for k in range(len(chosen)):
+        if chosen[k] >= 0:
+            points[k], stamps[k], taken[k] = near[chosen[k]], when[chosen[k]], known[chosen[k]] == _OBSTACLE
+    if p.closing_speed:
+        follow_points(motion, last, times[SEEN], points, stamps, taken, p.closing_memory_s)
+    for k in range(len(chosen)):
+        times[HEARD, k] = heard
+        if chosen[k] >= 0:
+            last[k], kept_sigma[k], times[USED, k] = points[k], spread[chosen[k]], stamps[k]
+            times[SEEN, k] = stamps[k] if taken[k] else heard
+            if p.closing_speed and not taken[k]:
+                motion[0, k], motion[1, k] = points[k], 0.0
 
 
 @compiled
@@ -136,15 +203,9 @@ def _gap(points: FloatArray, m: int, ends: FloatArray, radius: FloatArray) -> fl
 
 
 @compiled
-def move_ends(
-    ends: FloatArray, link: IntArray, anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, qd: FloatArray,
-    age: float, out: FloatArray,
-) -> None:  # fmt: skip
-    """Write to `out` where the ends (2, C, 3) [m] of capsules on links (C,) were `age` [s] before, to first order.
-
-    `anchor` (n, 3) [m] and `axis` (n, 3) are those of the joints, `qd` (n,) [rad/s] their velocities, `moved_by` (L, n)
-    says which joint moves which link.
-    """
+def move_ends(ends: FloatArray, link: IntArray, chain: Chain, age: float, out: FloatArray) -> None:
+    """Write to `out` where the ends (2, C, 3) [m] of capsules on links (C,) were `age` [s] before, to first order."""
+    anchor, axis, moved_by, qd = chain
     for end in range(2):
         for c in range(len(link)):
             x, y, z = 0.0, 0.0, 0.0

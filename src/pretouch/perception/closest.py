@@ -1,8 +1,11 @@
 """The closest point of the body to each obstacle: signed distance and direction, on capsules."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.groups import CapsuleArrays
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
 from pretouch.robot.vectors import placed
@@ -37,7 +40,7 @@ def closest_points(
     count = len(point)
     body_point, link, distance = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
     direction, ee_distance = last_direction.astype(np.float64), np.empty(count)
-    closest(body.link, a, b, body.radius, point, body_point, link, direction, distance)
+    closest(CapsuleArrays(body.link, a, b, body.radius), point, ClosestArrays(body_point, link, direction, distance))
     distances(point, ee_position, ee_distance)
     return Obstacles(unit, point, ee_distance, body_point, link, direction, distance, np.zeros(count))
 
@@ -56,15 +59,24 @@ def distances(point: FloatArray, origin: FloatArray, out: FloatArray) -> None:
         out[k] = np.sqrt(x * x + y * y + z * z)
 
 
-@compiled
-def closest(
-    link: IntArray, a: FloatArray, b: FloatArray, radius: FloatArray, point: FloatArray, body_point: FloatArray,
-    on_link: IntArray, direction: FloatArray, distance: FloatArray,
-) -> None:  # fmt: skip
-    """Write body points, links, directions and distances of `closest_points`, for C placed capsules.
+class ClosestArrays(NamedTuple):
+    """Room for the closest points of the body to K points, of `Obstacles`."""
 
-    `direction` (K, 3) holds the one to fall back on before.
-    """
+    body_point: FloatArray
+    """(K, 3) [m]."""
+    link: IntArray
+    """(K,) that carries it."""
+    direction: FloatArray
+    """(K, 3) from there; before, what to fall back on."""
+    distance: FloatArray
+    """(K,) [m]."""
+
+
+@compiled
+def closest(capsules: CapsuleArrays, point: FloatArray, found: ClosestArrays) -> None:
+    """Write what is closest to each point (K, 3) of C placed capsules, as `closest_points` says."""
+    link, a, b, radius = capsules
+    body_point, on_link, direction, distance = found
     spheres, gap2 = bounds(a, b, radius), np.empty(len(radius))
     for k in range(len(point)):
         # begun with the capsule whose middle is nearest, most of the others need no closer look

@@ -1,8 +1,11 @@
 """How fast an object itself comes nearer: what a unit's points do in the base frame, where the arm's motion is not."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.groups import Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 FASTEST = 2.0
@@ -49,17 +52,30 @@ def follow_points(
             motion[1, k, i] += (1.0 - theta) ** 2 / dt * missed
 
 
+class LastSeen(NamedTuple):
+    """What each of K units showed last."""
+
+    point: FloatArray
+    """(K, 3) [m]."""
+    stamp: FloatArray
+    """(K,) [s]."""
+    motion: FloatArray
+    """(2, K, 3) smoothed place [m] and velocity [m/s]."""
+
+
 @compiled
 def reckon(
-    points: FloatArray, distance: FloatArray, last: FloatArray, last_stamp: FloatArray, stamp: FloatArray,
-    motion: FloatArray, position: FloatArray, rotation: FloatArray, least: float, within: float,
+    points: FloatArray, distance: FloatArray, stamp: FloatArray, before: LastSeen, sensors: Sensors, least: float,
+    within: float,
 ) -> None:  # fmt: skip
     """Put points (K, 3) that are nearer than the sensor measures where they were last seen, as far as that may be.
 
     A reading of `least` [m] says only that something is between 0 and that. Where the unit saw a point up to `within`
     [s] before, it is on the beam at the height of that, moved on if it came nearer by itself faster than 0.1 m/s;
-    where it saw none, it is at the sensor. `position` (K, 3) and `rotation` (K, 3, 3) are the sensors' poses.
+    where it saw none, it is at the sensor. `stamp` (K,) [s] is that of the reading.
     """
+    last, last_stamp, motion = before
+    position, rotation = sensors.position, sensors.rotation
     for k in range(len(distance)):
         if not distance[k] <= least:
             continue

@@ -1,5 +1,7 @@
 """Where the sensed obstacles are: eq. 1, which readings count, and how long a point is kept."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pretouch.compiled import compiled
@@ -167,16 +169,30 @@ def track(
         persistence: age at which a point is given up [s].
     """
     point, times = state.point.copy(), state.times.copy()
-    take_in(point, times, readings.stamp, points, is_fresh(state, readings, now), shows, tells, now, persistence)
+    new = NewReadings(readings.stamp, points, is_fresh(state, readings, now), shows, tells)
+    take_in(point, times, new, now, persistence)
     return TrackState(point, state.direction, times, state.motion)
 
 
+class NewReadings(NamedTuple):
+    """Readings of K units, as `track` takes them."""
+
+    stamp: FloatArray
+    """(K,) [s]."""
+    points: FloatArray
+    """(K, 3) where they are [m]."""
+    fresh: BoolArray
+    """(K,) whether each is new."""
+    shows: BoolArray
+    """(K,) whether it shows an obstacle."""
+    tells: BoolArray
+    """(K,) whether it tells anything."""
+
+
 @compiled
-def take_in(
-    point: FloatArray, times: FloatArray, stamp: FloatArray, points: FloatArray, fresh: BoolArray, shows: BoolArray,
-    tells: BoolArray, now: float, persistence: float,
-) -> None:  # fmt: skip
+def take_in(point: FloatArray, times: FloatArray, new: NewReadings, now: float, persistence: float) -> None:
     """Change the points (K, 3) and times (3, K) of a `TrackState` as `track` says."""
+    stamp, points, fresh, shows, tells = new
     for k in range(len(stamp)):
         if fresh[k]:
             times[USED, k] = stamp[k]

@@ -7,17 +7,18 @@ is left out, the arm being where it was when the points were measured.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import ByName, entry
+from pretouch.groups import CapsuleArrays, Chain
 from pretouch.params import PerceptionParams
-from pretouch.perception.chosen_points import take_points
-from pretouch.perception.closest import closest, distances
+from pretouch.perception.chosen_points import KeptPoints, Placed, take_points
+from pretouch.perception.closest import ClosestArrays, closest, distances
 from pretouch.perception.closing import closing_speeds
 from pretouch.perception.obstacles import HEARD, SEEN, TrackState, track_init
-from pretouch.perception.perceive import Perception
-from pretouch.perception.scene_filter import Fixtures
+from pretouch.perception.perceive import Perception, PerceptionSetup
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed_ends
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState, SeenPoints
@@ -48,8 +49,8 @@ def outside_init(model: RobotModel, kept: int) -> OutsideState:
 
 
 def see_outside(
-    state: OutsideState | None, anew: bool, seen: Perception, points: SeenPoints | None, units: int, model: RobotModel,
-    fixtures: Fixtures, kin: Kinematics, robot: RobotState, now: float, params: PerceptionParams,
+    state: OutsideState | None, anew: bool, seen: Perception, points: SeenPoints | None, setup: PerceptionSetup,
+    kin: Kinematics, robot: RobotState, now: float,
 ) -> tuple[Perception, OutsideState | None]:  # fmt: skip
     """Add what outside sources see to what the skin does, and return what to remember.
 
@@ -61,29 +62,27 @@ def see_outside(
         anew: whether what was seen is to be forgotten, for time went backwards.
         seen: by the skin.
         points: newest set; None for none.
-        units: number of units of the skin; the places follow their indices.
-        model: the arm.
-        fixtures: what is known to stand around it.
-        kin: its posture.
+        setup: arm, skin, surroundings and parameters; the places follow the indices of the skin's units.
+        kin: posture of the arm.
         robot: the state that `kin` is of.
         now: instant of this step [s].
-        params: of perception.
     """
+    params, model = setup.params, setup.model
     if not params.enabled or params.outside_points == 0 or (state is None and points is None):
         return seen, state
     if state is None or anew:
         state = outside_init(model, params.outside_points)
-    body = model.body
-    body_from, body_to = placed_ends(body.link, body.a, body.b, kin.position, kin.rotation)
+    ends = placed_ends(model.body.link, model.body.a, model.body.b, kin.position, kin.rotation)
+    body = CapsuleArrays(model.body.link, ends[0], ends[1], model.body.radius)
     if points is not None and state.heard < points.heard <= now:
-        state = _taken(state, points, body_from, body_to, model, fixtures, kin, robot, now, params)
+        state = _taken(state, points, body, setup, kin, robot, now)
     before = state.tracks
     count, direction = len(state.sigma), before.direction.copy()
     indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
+    silence = params.outside_silent_after_s if params.keep_while_silent else 0.0
     found, nearest = _shown(
-        before.point, direction, before.times, before.motion, state.sigma, now, params.outside_persistence_s,
-        params.outside_silent_after_s if params.keep_while_silent else 0.0, params.spread_sigmas, params.closing_speed,
-        body.link, body_from, body_to, body.radius, kin.position[model.ee], units, indices, vectors, scalars,
+        _Places(before.point, direction, before.times, before.motion, state.sigma), now, silence, params, body,
+        kin.position[model.ee], len(setup.skin), _Room(indices, vectors, scalars),
     )  # fmt: skip
     after = OutsideState(TrackState(before.point, direction, before.times, before.motion), state.sigma, state.heard)
     if found == 0:
@@ -122,11 +121,12 @@ def outside_silence(state: OutsideState | None, unfit: str, now: float, params: 
 
 
 def _taken(
-    state: OutsideState, points: SeenPoints, body_from: FloatArray, body_to: FloatArray, model: RobotModel,
-    fixtures: Fixtures, kin: Kinematics, robot: RobotState, now: float, params: PerceptionParams,
+    state: OutsideState, points: SeenPoints, body: CapsuleArrays, setup: PerceptionSetup, kin: Kinematics,
+    robot: RobotState, now: float,
 ) -> OutsideState:  # fmt: skip
-    """Return the state with a newer set of points taken in."""
-    old, arm, body, others = state.tracks, model.capsules, model.body, fixtures.capsules
+    """Return the state with a newer set of points taken in; `body` is the arm's, placed."""
+    model, params, old = setup.model, setup.params, state.tracks
+    arm, others = model.capsules, setup.fixtures.capsules
     motion = old.motion.copy() if params.closing_speed else old.motion
     tracks, sigma = TrackState(old.point.copy(), old.direction, old.times.copy(), motion), state.sigma.copy()
     place = np.full(len(model.links), -1, dtype=np.int64)
@@ -134,26 +134,58 @@ def _taken(
     arm_ends = placed_ends(arm.link, arm.a, arm.b, kin.position, kin.rotation)
     other_ends = placed_ends(others.link, others.a, others.b, kin.position, kin.rotation)
     take_points(
-        tracks.point, tracks.times, motion, sigma, points.heard, points.stamp, points.point, points.sigma, now,
-        body.link, body_from, body_to, body.radius, place, arm.link, arm_ends, arm.radius, other_ends, others.radius,
-        fixtures.planes, kin.anchor, kin.axis, model.moved_by, robot.qd, robot.stamp, params.outside_persistence_s,
-        params.outside_hidden_s,        params.outside_margin_m, params.spread_sigmas, params.outside_points,
-        params.closing_memory_s if params.closing_speed else 0.0,
+        KeptPoints(tracks.point, tracks.times, motion, sigma), points, now, place,
+        Placed(body, arm.link, arm_ends, arm.radius, other_ends, others.radius, setup.fixtures.planes),
+        Chain(kin.anchor, kin.axis, model.moved_by, robot.qd), robot.stamp, params,
     )  # fmt: skip
     return OutsideState(tracks, sigma, points.heard)
 
 
-@compiled
-def _shown(
-    point: FloatArray, last_direction: FloatArray, times: FloatArray, motion: FloatArray, sigma: FloatArray, now: float,
-    persistence: float, silence: float, sigmas: float, closing: bool, body_link: IntArray, body_from: FloatArray,
-    body_to: FloatArray, body_radius: FloatArray, ee: FloatArray, units: int, indices: IntArray, vectors: FloatArray,
-    scalars: FloatArray,
-) -> tuple[int, float]:  # fmt: skip
-    """Write the obstacles of the places whose points last (last line), as `perceive` does of units.
+class _Places(NamedTuple):
+    """What P places show."""
 
-    Returns how many there are, and the distance of the nearest from the end-effector's origin [m].
+    point: FloatArray
+    """(P, 3) [m]."""
+    direction: FloatArray
+    """(P, 3) last direction from the body, changed."""
+    times: FloatArray
+    """(3, P) as of `TrackState` [s]."""
+    motion: FloatArray
+    """(2, P, 3) likewise."""
+    sigma: FloatArray
+    """(P,) standard deviation of each point [m]."""
+
+
+class _Numbers(NamedTuple):
+    """What is taken of `PerceptionParams`."""
+
+    outside_persistence_s: float
+    spread_sigmas: float
+    closing_speed: bool
+
+
+class _Room(NamedTuple):
+    """Room for P obstacles, as that of `perceive`."""
+
+    indices: IntArray
+    vectors: FloatArray
+    scalars: FloatArray
+
+
+@entry
+def _shown(
+    places: _Places, now: float, silence: float, params: ByName[_Numbers], body: CapsuleArrays, ee: FloatArray,
+    units: int, room: _Room,
+) -> tuple[int, float]:  # fmt: skip
+    """Write the obstacles of the places whose points last, as `perceive` does of units.
+
+    `silence` [s] is how long a place that is not heard is kept. Returns how many obstacles there are, and the distance
+    of the nearest from the end-effector's origin [m].
     """
+    point, last_direction, times, motion, sigma = places
+    persistence, sigmas, indices, vectors, scalars = (
+        params.outside_persistence_s, params.spread_sigmas, room.indices, room.vectors, room.scalars,
+    )  # fmt: skip
     place, link, near, body_point, direction = indices[0], indices[1], vectors[0], vectors[1], vectors[2]
     ee_distance, body_distance = scalars[0], scalars[1]
     found = 0
@@ -166,9 +198,9 @@ def _shown(
                 direction[found, 0], direction[found, 1], direction[found, 2] = 0.0, 0.0, 1.0
             found += 1
     near, direction = near[:found], direction[:found]
-    closest(body_link, body_from, body_to, body_radius, near, body_point, link, direction, body_distance)
+    closest(body, near, ClosestArrays(body_point, link, direction, body_distance))
     distances(near, ee, ee_distance)
-    if closing:
+    if params.closing_speed:
         closing_speeds(motion, place[:found], direction, scalars[2])
     nearest = np.inf
     for m in range(found):

@@ -1,15 +1,19 @@
 """Perception in one call: readings in, obstacles with their closest body points out."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry, flattened
+from pretouch.groups import CapsuleArrays, Chain, Sensors, SkinArrays
 from pretouch.params import PerceptionParams
-from pretouch.perception.closest import closest, distances, no_obstacles
-from pretouch.perception.closing import closing_speeds, follow_points, reckon
+from pretouch.perception.closest import ClosestArrays, closest, distances, no_obstacles
+from pretouch.perception.closing import LastSeen, closing_speeds, follow_points, reckon
 from pretouch.perception.obstacles import (
     HEARD,
     SEEN,
     USED,
+    NewReadings,
     TrackState,
     locate,
     measured,
@@ -23,7 +27,7 @@ from pretouch.perception.scene_filter import RAYS, Fixtures, leave_out, leave_ou
 from pretouch.perception.spread import bring_nearer, widen
 from pretouch.perception.stamped import move_back
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.robot.vectors import placed_ends, rotate
+from pretouch.robot.vectors import placed_capsules, rotate
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus, RobotState
@@ -43,17 +47,75 @@ class Perception:
     """Time since the unit that has been silent for longest told anything [s]."""
 
 
+class Scene(NamedTuple):
+    """What is known to be there: the arm, and what stands around it."""
+
+    arm: CapsuleArrays
+    """The whole arm."""
+    body: CapsuleArrays
+    """The part of it that joints move."""
+    others: CapsuleArrays
+    """Of fixtures."""
+    planes: FloatArray
+    """(P, 4) of fixtures."""
+    rays: FloatArray
+    """(R, 3) that stand for what a sensor sees."""
+    moved_by: BoolArray
+    """(L, n) whether a joint moves a link."""
+    ee: int
+    """Index of the end-effector's link."""
+
+
+class SightNumbers(NamedTuple):
+    """What perception takes of its parameters."""
+
+    persistence_s: float
+    margin_m: float
+    """Distance before what is known to be there from which on a reading is explained by it."""
+    filters: bool
+    """Whether readings are explained at all."""
+    estimates: bool
+    """Whether closing speeds are estimated."""
+    memory_s: float
+    """Memory of these estimates."""
+    reckons: bool
+    """Whether points nearer than a sensor measures are placed where they were last seen."""
+    silence_s: float
+    """How long the point of a silent unit is kept, 0 for no longer than others."""
+    sigmas: float
+    """How many standard deviations of a unit's place are taken off, 0 where all places are exact."""
+
+
+@value
+class PerceptionSetup:
+    """What perception is made with, once: an arm, its skin, its surroundings and parameters."""
+
+    model: RobotModel
+    skin: Skin
+    fixtures: Fixtures
+    params: PerceptionParams
+    fields: tuple[Any, ...]
+    """Of scene, skin and numbers, for compiled code."""
+
+
+def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: PerceptionParams) -> PerceptionSetup:
+    """Return what `perceive` is made with."""
+    p = params
+    scene = Scene(
+        model.capsules.arrays, model.body.arrays, fixtures.capsules.arrays, fixtures.planes, RAYS, model.moved_by,
+        model.ee,
+    )  # fmt: skip
+    numbers = SightNumbers(
+        p.persistence_s, p.self_margin_m, p.filter_views, p.closing_speed, p.closing_memory_s, p.reckon_below_minimum,
+        p.silent_after_s if p.keep_while_silent else 0.0, 0.0 if skin.exact else p.spread_sigmas,
+    )  # fmt: skip
+    return PerceptionSetup(model, skin, fixtures, params, flattened(scene, skin.arrays, numbers))
+
+
 def perceive(
-    state: TrackState,
-    model: RobotModel,
-    skin: Skin,
-    fixtures: Fixtures,
-    kin: Kinematics,
-    readings: RangeReadings,
-    now: float,
-    params: PerceptionParams,
+    state: TrackState, setup: PerceptionSetup, kin: Kinematics, readings: RangeReadings, now: float,
     robot: RobotState | None = None,
-) -> tuple[Perception, TrackState]:
+) -> tuple[Perception, TrackState]:  # fmt: skip
     """Locate what the units see (eq. 1), leave out the arm and fixtures, and find the closest body points.
 
     `robot` is the state that `kin` is of: with it and the switch for it, a reading is placed from where its unit was at
@@ -62,27 +124,19 @@ def perceive(
     Where the skin says how uncertain the places of its units are, distances are less by the points' spread, and the
     arm and fixtures are expected earlier by it.
     """
-    if not params.enabled or len(skin) == 0:
+    params, count = setup.params, len(setup.skin)
+    if not params.enabled or count == 0:
         return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0), state
-    arm, body, others, count = model.capsules, model.body, fixtures.capsules, len(skin)
     motion = state.motion.copy() if params.closing_speed else state.motion
     tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy(), motion)
     moving = robot if params.place_at_stamp else None
     distance = np.empty(count)
     indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
-    found, nearest, oldest = _perceive(
+    found, nearest, oldest = _perceive.flat(
         tracks.point, tracks.direction, tracks.times, tracks.motion,
-        kin.position, kin.rotation, model.ee, skin.link, skin.T_link_sensor,
-        kin.anchor, kin.axis, model.moved_by, _NO_JOINT if moving is None else moving.qd,
-        0.0 if moving is None else moving.stamp,
-        readings.stamp, readings.distance, readings.status, now,
-        arm.link, arm.a, arm.b, arm.radius, body.link, body.a, body.b, body.radius,
-        others.link, others.a, others.b, others.radius, fixtures.planes, RAYS,
-        params.persistence_s, params.self_margin_m, params.filter_views,
-        params.closing_memory_s if params.closing_speed else 0.0, params.reckon_below_minimum,
-        params.silent_after_s if params.keep_while_silent else 0.0,
-        0.0 if skin.exact else params.spread_sigmas, skin.position_sigma, skin.orientation_sigma,
-        distance, indices, vectors, scalars,
+        readings.stamp, readings.distance, readings.status,
+        now, moving is not None, 0.0 if moving is None else moving.stamp, _NO_JOINT if moving is None else moving.qd,
+        distance, indices, vectors, scalars, *kin, *setup.fields,
     )  # fmt: skip
     obstacles = Obstacles(
         unit=indices[0, :found], link=indices[1, :found],
@@ -96,95 +150,146 @@ def perceive(
 _NO_JOINT = np.zeros(0)
 
 
-@compiled
+class Instant(NamedTuple):
+    """When a step is, and how the arm moves."""
+
+    now: float
+    """[s]"""
+    moves: bool
+    """Whether readings are placed from where their units were at the stamp."""
+    posed: float
+    """Instant of the arm's posture [s]; without meaning, as the next, if not."""
+    qd: FloatArray
+    """(n,) joint velocities [rad/s]."""
+
+
+class _Tracks(NamedTuple):
+    """As `TrackState`."""
+
+    point: FloatArray
+    direction: FloatArray
+    times: FloatArray
+    motion: FloatArray
+
+
+class _Readings(NamedTuple):
+    """As `RangeReadings`."""
+
+    stamp: FloatArray
+    distance: FloatArray
+    status: IntArray
+
+
+class _Room(NamedTuple):
+    """Room for K obstacles."""
+
+    distance: FloatArray
+    """(K,) what each reading stands for [m]."""
+    indices: IntArray
+    """(2, K) unit and link."""
+    vectors: FloatArray
+    """(3, K, 3) point, body point and direction."""
+    scalars: FloatArray
+    """(3, K) distance from end-effector and body, closing speed."""
+
+
+@entry
 def _perceive(
-    point: FloatArray, last_direction: FloatArray, times: FloatArray, motion: FloatArray,
-    link_position: FloatArray, link_rotation: FloatArray, ee: int, unit_link: IntArray, T_link_sensor: FloatArray,
-    anchor: FloatArray, axis: FloatArray, moved_by: BoolArray, qd: FloatArray, posed: float,
-    stamp: FloatArray, reading: FloatArray, status: IntArray, now: float,
-    arm_link: IntArray, arm_a: FloatArray, arm_b: FloatArray, arm_radius: FloatArray,
-    body_link: IntArray, body_a: FloatArray, body_b: FloatArray, body_radius: FloatArray,
-    other_link: IntArray, other_a: FloatArray, other_b: FloatArray, other_radius: FloatArray, planes: FloatArray,
-    rays: FloatArray, persistence: float, margin: float, filter_views: bool, memory: float, reckoned: bool,
-    silence: float, sigmas: float, position_sigma: FloatArray, orientation_sigma: FloatArray,
-    distance: FloatArray, indices: IntArray, vectors: FloatArray, scalars: FloatArray,
+    tracks: _Tracks, readings: _Readings, instant: Instant, room: _Room, kin: Kinematics, scene: Scene,
+    skin: SkinArrays, p: SightNumbers,
 ) -> tuple[int, float, float]:  # fmt: skip
-    """Change the tracks (first line of arguments), write obstacles (last line).
+    """Change the tracks, write obstacles.
 
     Returns how many there are, the distance of the nearest from the end-effector, and when the unit that is silent for
     longest last told anything.
     """
-    measured(reading, status, distance)
+    now, times, distance = instant.now, tracks.times, room.distance
+    measured(readings.distance, readings.status, distance)
 
     # which readings are new, show what is not known to be there, and where
-    fresh, any_fresh = newer(times[USED], stamp, now), False
+    fresh, any_fresh = newer(times[USED], readings.stamp, now), False
     for k in range(len(fresh)):
         any_fresh = any_fresh or fresh[k]
     if any_fresh:
-        position, rotation = poses(link_position, link_rotation, unit_link, T_link_sensor)
-        tells, shows = tells_anything(reading, status, distance), np.empty(len(distance), np.bool_)
-        ends = distance + margin
-        for k in range(len(shows)):
-            shows[k] = not np.isnan(distance[k])
-        if filter_views:
-            arm_from, arm_to = placed_ends(arm_link, arm_a, arm_b, link_position, link_rotation)
-            if sigmas > 0:
-                widen(ends, sigmas, position_sigma, orientation_sigma, distance, margin)
-            leave_out(shows, fresh, ends, position, rotation, unit_link, arm_link, arm_from, arm_to, arm_radius, rays)
-        if len(qd):
-            # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
-            move_back(position, rotation, unit_link, anchor, axis, moved_by, qd, stamp, posed, persistence)
-        if filter_views:
-            other_from, other_to = placed_ends(other_link, other_a, other_b, link_position, link_rotation)
-            leave_out(
-                shows, fresh, ends, position, rotation, unit_link, other_link, other_from, other_to, other_radius, rays
-            )
-            leave_out_planes(shows, fresh, ends, position, rotation, planes, rays)
-        points = locate(position, rotation, distance)
-        if reckoned:
-            reckon(
-                points, distance, point, times[SEEN], stamp, motion, position, rotation, MIN_DISTANCE, 3 * persistence
-            )
-        if memory > 0:
-            taken = fresh & shows & (now - stamp <= persistence)
-            follow_points(motion, point, times[SEEN], points, stamp, taken, memory)
-        take_in(point, times, stamp, points, fresh, shows, tells, now, persistence)
+        _take_readings(tracks, kin, scene, skin, readings, p, instant, NewShown(distance, fresh))
 
     # the points, as long as they last
-    unit, link, near, body_point, direction = indices[0], indices[1], vectors[0], vectors[1], vectors[2]
-    ee_distance, body_distance = scalars[0], scalars[1]
+    unit, link, near, body_point, direction = (
+        room.indices[0], room.indices[1], room.vectors[0], room.vectors[1], room.vectors[2],
+    )  # fmt: skip
+    ee_distance, body_distance = room.scalars[0], room.scalars[1]
     found = 0
     for k in range(len(unit)):
         unanswered = times[HEARD, k] <= times[SEEN, k]
-        if now - times[SEEN, k] <= (max(persistence, silence) if unanswered else persistence):
+        if now - times[SEEN, k] <= (max(p.persistence_s, p.silence_s) if unanswered else p.persistence_s):
             unit[found] = k
             for i in range(3):
-                near[found, i], direction[found, i] = point[k, i], last_direction[k, i]
+                near[found, i], direction[found, i] = tracks.point[k, i], tracks.direction[k, i]
             if np.isnan(direction[found, 0]):
                 # in place of a direction from the body that never was, the one the unit looks in
-                rotate(link_rotation[unit_link[k]], T_link_sensor[k, :3, 2], direction[found])
+                rotate(kin.rotation[skin.link[k]], skin.T_link_sensor[k, :3, 2], direction[found])
             found += 1
 
     # the body's closest points to them
     near, direction = near[:found], direction[:found]
-    body_from, body_to = placed_ends(body_link, body_a, body_b, link_position, link_rotation)
-    closest(body_link, body_from, body_to, body_radius, near, body_point, link, direction, body_distance)
-    distances(near, link_position[ee], ee_distance)
-    if sigmas > 0:
-        bring_nearer(
-            body_distance, ee_distance, near, unit, sigmas, position_sigma, orientation_sigma, unit_link, T_link_sensor,
-            link_position, link_rotation,
-        )  # fmt: skip
-    if memory > 0:
-        closing_speeds(motion, unit[:found], direction, scalars[2])
+    closest(placed_capsules(scene.body, kin), near, ClosestArrays(body_point, link, direction, body_distance))
+    distances(near, kin.position[scene.ee], ee_distance)
+    if p.sigmas > 0:
+        bring_nearer(body_distance, ee_distance, near, unit, p.sigmas, skin, kin)
+    if p.estimates:
+        closing_speeds(tracks.motion, unit[:found], direction, room.scalars[2])
     nearest, oldest = np.inf, np.inf
     for m in range(found):
         nearest = min(nearest, ee_distance[m])
         for i in range(3):
-            last_direction[unit[m], i] = direction[m, i]
+            tracks.direction[unit[m], i] = direction[m, i]
     for k in range(len(unit)):
         oldest = min(oldest, times[HEARD, k])
     return found, nearest, oldest
+
+
+class NewShown(NamedTuple):
+    """What readings stand for."""
+
+    distance: FloatArray
+    """(K,) [m], NaN for nothing."""
+    fresh: BoolArray
+    """(K,) whether each is new."""
+
+
+@compiled
+def _take_readings(
+    tracks: _Tracks, kin: Kinematics, scene: Scene, skin: SkinArrays, readings: _Readings, p: SightNumbers,
+    instant: Instant, shown: NewShown,
+) -> None:  # fmt: skip
+    """Take the readings that are new and show what is not known to be there into the tracks."""
+    times, distance, fresh, now = tracks.times, shown.distance, shown.fresh, instant.now
+    position, rotation = poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
+    sensors = Sensors(position, rotation, skin.link)
+    tells, shows = tells_anything(readings.distance, readings.status, distance), np.empty(len(distance), np.bool_)
+    ends = distance + p.margin_m
+    for k in range(len(shows)):
+        shows[k] = not np.isnan(distance[k])
+    if p.filters:
+        if p.sigmas > 0:
+            widen(ends, p.sigmas, skin.position_sigma, skin.orientation_sigma, distance, p.margin_m)
+        leave_out(shows, fresh, ends, sensors, placed_capsules(scene.arm, kin), scene.rays)
+    if instant.moves:
+        # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
+        chain = Chain(kin.anchor, kin.axis, scene.moved_by, instant.qd)
+        move_back(sensors, readings.stamp, chain, instant.posed, p.persistence_s)
+    if p.filters:
+        leave_out(shows, fresh, ends, sensors, placed_capsules(scene.others, kin), scene.rays)
+        leave_out_planes(shows, fresh, ends, position, rotation, scene.planes, scene.rays)
+    points = locate(position, rotation, distance)  # eq. 1
+    if p.reckons:
+        before = LastSeen(tracks.point, times[SEEN], tracks.motion)
+        reckon(points, distance, readings.stamp, before, sensors, MIN_DISTANCE, 3 * p.persistence_s)
+    if p.estimates:
+        taken = fresh & shows & (now - readings.stamp <= p.persistence_s)
+        follow_points(tracks.motion, tracks.point, times[SEEN], points, readings.stamp, taken, p.memory_s)
+    new = NewReadings(readings.stamp, points, fresh, shows, tells)
+    take_in(tracks.point, times, new, now, p.persistence_s)
 
 
 _FAILURES = {

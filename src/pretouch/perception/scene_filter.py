@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry
 from pretouch.errors import FixtureError
+from pretouch.groups import CapsuleArrays, Sensors
 from pretouch.perception.closest import bounds, to_axis, to_spheres
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
@@ -88,24 +89,22 @@ def expected_range(
     near = np.array([plane_return(position, rotation, k, fixtures.planes, RAYS, np.inf) for k in range(len(own_link))])
     for part in (body, fixtures.capsules):
         a, b = placed(part, kin)
-        shape = (part.link, a, b, part.radius, bounds(a, b, part.radius))
+        sensors, capsules = Sensors(position, rotation, own_link), CapsuleArrays(part.link, a, b, part.radius)
+        spheres = bounds(a, b, part.radius)
         for k in range(len(near)):
-            found = capsule_return(position, rotation, k, own_link[k], *shape, RAYS, np.inf, -np.inf)
-            near[k] = min(near[k], found)
+            near[k] = min(near[k], nearest_capsule(sensors, k, capsules, spheres, RAYS))
     return near
 
 
 @compiled
 def leave_out(
-    shows: BoolArray, fresh: BoolArray, ends: FloatArray, position: FloatArray, rotation: FloatArray, own: IntArray,
-    link: IntArray, a: FloatArray, b: FloatArray, radius: FloatArray, rays: FloatArray,
-) -> None:  # fmt: skip
+    shows: BoolArray, fresh: BoolArray, ends: FloatArray, sensors: Sensors, capsules: CapsuleArrays, rays: FloatArray
+) -> None:
     """Take from `shows` (K,) each fresh reading that a placed capsule explains: one seen up to its `ends` (K,) [m]."""
-    spheres = bounds(a, b, radius)
+    spheres = bounds(capsules.a, capsules.b, capsules.radius)
     for k in range(len(shows)):
         if fresh[k] and shows[k]:
-            seen = capsule_return(position, rotation, k, own[k], link, a, b, radius, spheres, rays, ends[k], ends[k])
-            shows[k] = seen > ends[k]
+            shows[k] = capsule_return(sensors, k, capsules, spheres, rays, ends[k], ends[k]) > ends[k]
 
 
 @compiled
@@ -119,16 +118,23 @@ def leave_out_planes(
             shows[k] = plane_return(position, rotation, k, planes, rays, ends[k]) > ends[k]
 
 
+@entry
+def nearest_capsule(sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, rays: FloatArray) -> float:
+    """Least distance [m] at which sensor k sees a placed capsule; `spheres` are those of `bounds`."""
+    return capsule_return(sensors, k, capsules, spheres, rays, np.inf, -np.inf)
+
+
 @compiled
 def capsule_return(
-    position: FloatArray, rotation: FloatArray, k: int, own: int, link: IntArray, a: FloatArray, b: FloatArray,
-    radius: FloatArray, spheres: FloatArray, rays: FloatArray, within: float, enough: float,
+    sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, rays: FloatArray, within: float,
+    enough: float,
 ) -> float:  # fmt: skip
     """Least distance [m] at which sensor k sees a capsule, infinite for none nearer than `within`.
 
     The search ends with the first distance of `enough` or less, which then need not be the least. `spheres` are those
     of `bounds`.
     """
+    position, rotation, link, own = sensors.position, sensors.rotation, capsules.link, sensors.link[k]
     far2 = np.empty(len(link))
     to_spheres(position, k, spheres, far2)
     bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
@@ -143,8 +149,8 @@ def capsule_return(
         inside = reach + _SIN * along
         if along < -reach or (far2[c] - along * along) * (_COS * _COS) > inside * inside:
             continue
-        if _cone_meets(position, rotation, k, a, b, c, radius[c], within):
-            least = min(least, _cast(position, rotation, k, a, b, c, radius[c], rays, enough))
+        if _cone_meets(sensors, k, capsules, c, within):
+            least = min(least, _cast(sensors, k, capsules, c, rays, enough))
             if least <= enough:
                 return least
     return least if least <= within else np.inf
@@ -169,17 +175,15 @@ def plane_return(
 
 
 @compiled
-def _cone_meets(
-    position: FloatArray, rotation: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int, radius: float,
-    within: float,
-) -> bool:  # fmt: skip
-    """Whether the cone of sensor k can meet a capsule at a distance of at most `within` [m]; never wrongly no.
+def _cone_meets(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, within: float) -> bool:
+    """Whether the cone of sensor k can meet capsule c at a distance of at most `within` [m]; never wrongly no.
 
     With z along the beam and l across it, z sin - l cos is by how much a point lies inside the tangent plane of the
     cone: no point of the capsule's axis may be farther out than the radius. On the axis that is a convex function,
     whose least value is where its slope vanishes or at an end.
     """
-    reach = radius + _ROUNDING
+    position, rotation, a, b = sensors.position, sensors.rotation, capsules.a, capsules.b
+    reach = capsules.radius[c] + _ROUNDING
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = a[c, 0] - position[k, 0], a[c, 1] - position[k, 1], a[c, 2] - position[k, 2]
     bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
@@ -208,11 +212,9 @@ def _cone_meets(
 
 
 @compiled
-def _cast(
-    position: FloatArray, rotation: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int, radius: float,
-    rays: FloatArray, enough: float,
-) -> float:  # fmt: skip
+def _cast(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, rays: FloatArray, enough: float) -> float:
     """Least distance [m] to capsule c along the rays of sensor k, or the first one of `enough` or less."""
+    position, rotation, a, b, radius = sensors.position, sensors.rotation, capsules.a, capsules.b, capsules.radius[c]
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = position[k, 0] - a[c, 0], position[k, 1] - a[c, 1], position[k, 2] - a[c, 2]
     R = rotation[k]

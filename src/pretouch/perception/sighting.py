@@ -5,9 +5,12 @@ A way is a straight line of the ball's centre: s metres before the contact it is
 not.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry
+from pretouch.groups import CapsuleArrays, Sensors
 from pretouch.perception.scene_filter import ray_capsule
 from pretouch.sensing.unit import CONE_ANGLE
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -20,25 +23,44 @@ _TOUCHING_M = 1e-6
 """Depth to which rounding may put a ball into what it touches [m]."""
 
 
-@compiled
+class BallWays(NamedTuple):
+    """W ways of one ball."""
+
+    start: FloatArray
+    """(W, 3) centre of the ball at the contact [m]."""
+    way: FloatArray
+    """(W, 3) unit vectors u from there to where it comes from."""
+    radius: float
+    """Of the ball [m]."""
+
+
+class Stretch(NamedTuple):
+    """Which places of the grid count."""
+
+    first: int
+    """Number of the nearest one, s = first GRID_M."""
+    last: int
+    """Number of the farthest."""
+    run: int
+    """So many steps of the grid the ball has to be in view."""
+
+
+@entry
 def ways_free(
-    start: FloatArray, way: FloatArray, length: float, radius: float, own: IntArray, a: FloatArray, b: FloatArray,
-    thickness: FloatArray, planes: FloatArray, free: BoolArray,
-) -> None:  # fmt: skip
+    ways: BallWays, length: float, own: IntArray, capsules: CapsuleArrays, planes: FloatArray, free: BoolArray
+) -> None:
     """Write whether (W,) a ball can come along each way without meeting anything before the contact.
 
     Args:
-        start: (W, 3) centre of the ball at the contact [m].
-        way: (W, 3) unit vectors u from there to where it comes from.
+        ways: of the ball.
         length: of the ways [m].
-        radius: of the ball [m].
         own: (W,) index of the capsule that each touches.
-        a: (C, 3) one end of each capsule's axis [m], base frame, as all else.
-        b: (C, 3) other end [m].
-        thickness: (C,) their radii [m].
+        capsules: C of arm and room, base frame, as all else.
         planes: (P, 4) rows (normal, offset), the normal pointing into free space.
         free: (W,) the answer.
     """
+    start, way, radius = ways
+    a, b, thickness = capsules.a, capsules.b, capsules.radius
     for w in range(len(start)):
         free[w] = True
         for m in range(len(planes)):
@@ -53,27 +75,25 @@ def ways_free(
                 free[w] = ray_capsule(start[w], way[w], a[c], b[c], reach) > length
 
 
-@compiled
+@entry
 def ways_seen(
-    start: FloatArray, way: FloatArray, free: BoolArray, radius: float, first: int, last: int, run: int,
-    position: FloatArray, rotation: FloatArray, limit: FloatArray, light: float, seen: BoolArray,
+    ways: BallWays, free: BoolArray, stretch: Stretch, sensors: Sensors, limit: FloatArray, light: float,
+    seen: BoolArray,
 ) -> None:  # fmt: skip
     """Write whether (K, W) each unit has the ball in view at `run` + 1 places of the grid in a row.
 
     Args:
-        start: (W, 3) as for `ways_free`.
-        way: (W, 3) likewise.
+        ways: of the ball.
         free: (W,) ways to look at; the others count as not seen.
-        radius: of the ball [m].
-        first: number of the nearest place that counts, s = first GRID_M.
-        last: number of the farthest.
-        run: so many steps of the grid the ball has to be in view.
-        position: (K, 3) of the units [m].
-        rotation: (K, 3, 3) of the units, z along the beam.
+        stretch: places that count.
+        sensors: K units.
         limit: (K,) farthest reading that shows the ball, and not the arm or the room [m].
         light: of `in_view` [m^2].
         seen: (K, W) the answer.
     """
+    start, way, radius = ways
+    first, last, run = stretch
+    position, rotation = sensors.position, sensors.rotation
     near, far = first * GRID_M, last * GRID_M
     for k in range(len(position)):
         ox, oy, oz = position[k, 0], position[k, 1], position[k, 2]

@@ -3,6 +3,8 @@
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.groups import SkinArrays
+from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, IntArray, Number
 
 
@@ -33,8 +35,7 @@ def widen(
 @compiled
 def bring_nearer(
     body_distance: FloatArray, ee_distance: FloatArray, point: FloatArray, unit: IntArray, sigmas: float,
-    position_sigma: FloatArray, orientation_sigma: FloatArray, link: IntArray, T_link_sensor: FloatArray,
-    link_position: FloatArray, link_rotation: FloatArray,
+    skin: SkinArrays, kin: Kinematics,
 ) -> None:  # fmt: skip
     """Take its spread off the distances (M,) [m] of each point (M, 3), as far as the unit (M,) now is from it.
 
@@ -43,12 +44,12 @@ def bring_nearer(
     """
     for m in range(len(point)):
         k = unit[m]
-        origin, R, away2 = link_position[link[k]], link_rotation[link[k]], 0.0
+        origin, R, away2 = kin.position[skin.link[k]], kin.rotation[skin.link[k]], 0.0
         for i in range(3):
             at = origin[i]
             for j in range(3):
-                at += R[i, j] * T_link_sensor[k, j, 3]
+                at += R[i, j] * skin.T_link_sensor[k, j, 3]
             away2 += (point[m, i] - at) ** 2
-        u = spread(sigmas, position_sigma[k], orientation_sigma[k], np.sqrt(away2))
+        u = spread(sigmas, skin.position_sigma[k], skin.orientation_sigma[k], np.sqrt(away2))
         body_distance[m] -= u
         ee_distance[m] = max(0.0, ee_distance[m] - u)

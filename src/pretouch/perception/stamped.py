@@ -5,31 +5,26 @@ import math
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.groups import Chain, Sensors
+from pretouch.types import FloatArray
 
 
 @compiled
-def move_back(
-    position: FloatArray, rotation: FloatArray, unit_link: IntArray, anchor: FloatArray, axis: FloatArray,
-    moved_by: BoolArray, qd: FloatArray, stamp: FloatArray, posed: float, longest: float,
-) -> None:  # fmt: skip
+def move_back(sensors: Sensors, stamp: FloatArray, chain: Chain, posed: float, longest: float) -> None:
     """Move sensor poses, (K, 3) [m] and (K, 3, 3), from the instant of the arm's posture back to their stamps (K,) [s].
 
     That is the motion of their links at the joint velocities (n,) [rad/s], to first order in the place; the rotation is
     exact for a constant angular velocity. No reading is taken for older than `longest` [s].
 
     Args:
-        position: changed.
-        rotation: changed.
-        unit_link: (K,) link of each unit.
-        anchor: (n, 3) a point on each joint's axis [m].
-        axis: (n, 3) its direction.
-        moved_by: (L, n) whether a link is moved by a joint.
-        qd: joint velocities.
+        sensors: changed.
         stamp: of the readings.
+        chain: of the arm.
         posed: instant of the arm's posture [s].
         longest: see above.
     """
+    position, rotation, unit_link = sensors
+    anchor, axis, moved_by, qd = chain
     v, w, turned = np.empty(3), np.empty(3), np.empty(3)
     for k in range(len(unit_link)):
         age = min(posed - stamp[k], longest)

@@ -26,12 +26,19 @@ _UNREAD = "watch.robot.tau_ext"
 @cache
 def _hints(kind: type) -> tuple[tuple[str, Any], ...]:
     hints = get_type_hints(kind)
-    return tuple((f.name, hints[f.name]) for f in fields(kind))
+    return tuple((name, hints[name]) for name in (getattr(kind, "_fields", None) or [f.name for f in fields(kind)]))
+
+
+def _is_made_of_fields(hint: Any) -> bool:
+    """Whether a type is a dataclass or a named tuple."""
+    return is_dataclass(hint) or hasattr(hint, "_fields")
 
 
 @cache
 def _with_default(kind: type) -> frozenset[str]:
     """Names of the fields that need not be given."""
+    if not is_dataclass(kind):
+        return frozenset()
     return frozenset(f.name for f in fields(kind) if f.default is not MISSING)
 
 
@@ -99,7 +106,7 @@ def _kind(hint: Any, value: Any) -> tuple[Any, str]:
         if value is None:
             return hint, "none"
         hint = _without_none(hint)
-    if is_dataclass(hint):
+    if _is_made_of_fields(hint):
         return hint, "parts"
     if get_origin(hint) is tuple:
         return hint, "tuple"
@@ -185,7 +192,7 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
         if parts.none(name):
             return None
         hint = _without_none(hint)
-    if is_dataclass(hint):
+    if _is_made_of_fields(hint):
         kind = hint if isinstance(hint, type) else type(hint)
         given, may_lack = {}, _with_default(kind)
         for field, inner in _hints(kind):

@@ -1,11 +1,13 @@
 """The body of an arm as capsules fixed to its links."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
 
 from pretouch.errors import RobotModelError
+from pretouch.groups import CapsuleArrays
 from pretouch.types import FloatArray, IntArray
 
 
@@ -24,6 +26,11 @@ class Capsules:
 
     def __len__(self) -> int:
         return len(self.radius)
+
+    @cached_property
+    def arrays(self) -> CapsuleArrays:
+        """The same for compiled code."""
+        return CapsuleArrays(self.link, self.a, self.b, self.radius)
 
     def of_links(self, links: IntArray) -> "Capsules":
         """Return the capsules on the given links, in order."""

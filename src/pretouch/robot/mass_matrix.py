@@ -3,19 +3,20 @@
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.types import BoolArray, FloatArray
+from pretouch.groups import Mechanism
+from pretouch.robot.model import Kinematics
+from pretouch.types import FloatArray
 
 
 @compiled
-def mass_matrix_into(
-    anchor: FloatArray, axis: FloatArray, position: FloatArray, rotation: FloatArray, moved_by: BoolArray,
-    mass: FloatArray, com: FloatArray, inertia: FloatArray, M: FloatArray,
-) -> None:  # fmt: skip
+def mass_matrix_into(kin: Kinematics, mechanism: Mechanism, M: FloatArray) -> None:
     """Write M = sum of m Jv^T Jv + Jw^T I Jw over the links (n, n) [kg m^2].
 
-    Jv (3, n) is the Jacobian of a link's centre of mass and Jw that of its angular velocity. The first four arguments
-    are those of `Kinematics`, the others of `RobotModel`.
+    Jv (3, n) is the Jacobian of a link's centre of mass and Jw that of its angular velocity.
     """
+    position, rotation, anchor, axis = kin
+    moved_by = mechanism.arm.moved_by
+    mass, com, inertia = mechanism.links.mass, mechanism.links.com, mechanism.links.inertia
     n = len(anchor)
     V, W, H, turned = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 3))
     c, RI = np.empty(3), np.empty((3, 3))

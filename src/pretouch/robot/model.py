@@ -1,21 +1,21 @@
 """Kinematics and dynamics of an arm, over MuJoCo."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, flattened
 from pretouch.errors import RobotModelError
+from pretouch.groups import Arm, Links, Mechanism
 from pretouch.robot.body import Capsules, capsules_of
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.surface import Surface, bodies_of, surface_of
 from pretouch.types import BoolArray, FloatArray, IntArray
-from pretouch.values import value
 
 
-@value
-class Kinematics:
+class Kinematics(NamedTuple):
     """Where everything is in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
 
     position: FloatArray
@@ -94,6 +94,10 @@ class RobotModel:
         """Places where the arm may be touched."""
         self.rigid: IntArray = bodies_of(self.moved_by)
         """(L,) the rigid body each link belongs to, from 0; -1 of links that no joint moves."""
+        self.arm = Arm(self.moved_by, self.ee)
+        self.mechanism = Mechanism(self.arm, Links(self.mass, self.com, self.inertia, self.parts, self.middle))
+        """Both for compiled code."""
+        self.mechanism_fields = flattened(self.mechanism)
         self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
         self.q_max: FloatArray = self._model.jnt_range[:, 1].copy()
         self.q_mid: FloatArray = (self.q_min + self.q_max) / 2

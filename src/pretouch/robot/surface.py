@@ -1,9 +1,11 @@
 """Places spread over the surface of an arm's body, where it may be touched."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from pretouch.groups import SurfaceArrays
 from pretouch.robot.body import Capsules
 from pretouch.types import BoolArray, FloatArray, IntArray
 
@@ -30,6 +32,11 @@ class Surface:
 
     def __len__(self) -> int:
         return len(self.link)
+
+    @cached_property
+    def arrays(self) -> SurfaceArrays:
+        """The same for compiled code."""
+        return SurfaceArrays(self.link, self.point, self.normal, self.area, self.body, self.first)
 
 
 def bodies_of(moved_by: BoolArray) -> IntArray:

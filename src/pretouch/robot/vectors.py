@@ -3,6 +3,7 @@
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.groups import CapsuleArrays
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, IntArray
@@ -25,6 +26,13 @@ def placed(capsules: Capsules, kin: Kinematics) -> tuple[FloatArray, FloatArray]
     """Both ends (C, 3) of each capsule's axis in the base frame [m]."""
     ends = placed_ends(capsules.link, capsules.a, capsules.b, kin.position, kin.rotation)
     return ends[0], ends[1]
+
+
+@compiled
+def placed_capsules(capsules: CapsuleArrays, kin: Kinematics) -> CapsuleArrays:
+    """Return capsules of an arm in a posture, placed in the base frame."""
+    ends = placed_ends(capsules.link, capsules.a, capsules.b, kin.position, kin.rotation)
+    return CapsuleArrays(capsules.link, ends[0], ends[1], capsules.radius)
 
 
 @compiled

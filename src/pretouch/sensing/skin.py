@@ -11,6 +11,7 @@ import tomli_w
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import SkinError
+from pretouch.groups import SkinArrays
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.seat import seat
 from pretouch.sensing.unit import (
@@ -56,6 +57,8 @@ class Skin:
         """(K,) standard deviation of each unit's position [m]."""
         self.orientation_sigma: FloatArray = np.array([u.orientation_sigma for u in self.units], dtype=np.float64)
         """(K,) standard deviation of each unit's orientation [rad]."""
+        self.arrays = SkinArrays(self.link, self.T_link_sensor, self.position_sigma, self.orientation_sigma)
+        """The same for compiled code."""
         self.exact = not (self.position_sigma.any() or self.orientation_sigma.any())
         """Whether the place of every unit is taken as exact."""
         self.touching: IntArray = np.array([k for k, u in enumerate(self.units) if u.touch is not None], dtype=np.int64)

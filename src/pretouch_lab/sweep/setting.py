@@ -14,6 +14,7 @@ from typing import Any
 from pretouch.checks import Checked
 from pretouch.errors import ExperimentError
 from pretouch.params import Profile, profile
+from pretouch.params.profile import REMOVED
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import WorldSet, drawn, world_set
@@ -90,6 +91,8 @@ def current(name: str, base: Profile, scene: Checked) -> Value:
     known = [f.name for f in fields(groups[group])]
     if field not in known:
         also = ["kind", "world"] if group == "plant" else []
+        if name in REMOVED:
+            raise ExperimentError(f"The parameter {name!r} is gone: {REMOVED[name]}")
         raise ExperimentError(f"The parameter {name!r} is unknown: {group} has {', '.join([*known, *also])}.")
     value = getattr(groups[group], field)
     if not isinstance(value, Real | str):

@@ -65,6 +65,7 @@ def test_a_cell_knows_the_file_its_world_is_of(tmp_path):
         ("dance", {"a.b": "1:2"}, ExperimentError, "'dance' cannot be swept: choose from static, avoidance"),
         ("static", {}, ExperimentError, "Nothing is varied: give --vary"),
         ("static", {"f_base_n": "1:2"}, ExperimentError, "'f_base_n' is unknown: write GROUP.FIELD with a group of"),
+        ("static", {"anticipation.detour_hold_s": "1:2"}, ExperimentError, "'anticipation.detour_hold_s' is gone: the"),
         ("static", {"threshold.f": "1:2"}, ExperimentError, "'threshold.f' is unknown: threshold has window_samples"),
         ("static", {"scene.place": "1:2"}, ExperimentError, "scene has trajectory, side, stiffness_n_m"),
         ("static", {"plant.ripple_nm": "1:2"}, ExperimentError, "one value a joint"),

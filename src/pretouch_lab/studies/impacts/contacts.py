@@ -7,10 +7,11 @@ import numpy as np
 
 from pretouch.contact.cues import no_cues
 from pretouch.contact.feel import FeelState, feel, feel_init
-from pretouch.contact.hypotheses import write_hypotheses
+from pretouch.contact.hypotheses import NearPrior, write_hypotheses
 from pretouch.contact.impact import impact_init, listen
 from pretouch.contact.residual_model import spread_of_sample
-from pretouch.contact.sequential import LENGTHS, judge, window_means
+from pretouch.contact.sequential import LENGTHS, Hypotheses, judge, window_means
+from pretouch.groups import NOTHING_NEAR
 from pretouch.params import Profile
 from pretouch.robot.model import Kinematics
 from pretouch.sim.imu import ImuParams
@@ -128,21 +129,17 @@ def link_evidence(state: FeelState, kin: Kinematics, robot: RobotState, profile:
     """Return ln R (P,) of the windows that end with a step, of a force at the middle of each link alone."""
     arm, p = model(), profile.detection
     (known,) = state.sequential
-    n, parts, nothing = arm.n, len(arm.parts), np.zeros((0, 3))
+    n, parts = arm.n, len(arm.parts)
     means, S = np.zeros((len(LENGTHS), n)), np.empty((n, n))
     whole = window_means(known.ring, known.at, known.count, means)
     moving = int(np.any(np.abs(robot.qd_commanded) > p.still_rad_s))
     spread_of_sample(arm.mass_matrix(robot.q), known.model.spread[moving], p.noise_floor_nm, S)
-    J, joints, away = np.empty((parts, 3, n)), np.empty(parts, np.int64), np.zeros((parts, 3))
-    weight = np.empty(n + parts)
-    write_hypotheses(
-        kin.anchor, kin.axis, kin.position, kin.rotation, arm.moved_by, arm.parts, arm.middle, robot.qd,
-        np.zeros(0, np.int64), nothing, nothing, np.zeros(0), np.zeros(0), np.ones(len(arm.links)),
-        p.near_gain, p.near_m, p.near_horizon_s, J, joints, weight, away,
-    )  # fmt: skip
+    contacts = Hypotheses(np.empty((parts, 3, n)), np.empty(parts, np.int64), np.empty(n + parts), np.zeros((parts, 3)))
+    near = NearPrior(p.near_gain, p.near_m, p.near_horizon_s)
+    write_hypotheses(kin, arm.mechanism, robot.qd, NOTHING_NEAR, np.ones(len(arm.links)), near, contacts)
     doubt, found = np.full(n, p.bias_floor_nm**2), np.empty(parts)
     for h in range(parts):
         one = np.zeros(n + parts)
         one[n + h] = 1.0
-        found[h] = judge(means, whole, S, doubt, J, joints, one, away, p.contact_gain, p.tails)[0]
+        found[h] = judge(means, whole, S, doubt, contacts._replace(weight=one), p.contact_gain, p.tails)[0]
     return found

@@ -1,0 +1,143 @@
+"""Groups of arguments that many compiled functions take; see `compiled.entry`.
+
+Each holds fields of a class of the same purpose, under the same names, so that an object of that class can be given.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pretouch.types import BoolArray, FloatArray, IntArray
+
+
+class Arm(NamedTuple):
+    """What moves what, of `RobotModel`. L links, n joints."""
+
+    moved_by: BoolArray
+    """(L, n) whether a joint moves a link."""
+    ee: int
+    """Index of the end-effector's link."""
+
+
+class Chain(NamedTuple):
+    """The moving joints (n,) in one posture: what a point's Jacobian and its speed are made of."""
+
+    anchor: FloatArray
+    """(n, 3) a point on each axis [m]."""
+    axis: FloatArray
+    """(n, 3) its direction."""
+    moved_by: BoolArray
+    """(L, n) whether a joint moves a link."""
+    qd: FloatArray
+    """(n,) joint velocities [rad/s]."""
+
+
+class Links(NamedTuple):
+    """Masses and places of the links, of `RobotModel`."""
+
+    mass: FloatArray
+    """(L,) [kg]."""
+    com: FloatArray
+    """(L, 3) centre of mass, link frame [m]."""
+    inertia: FloatArray
+    """(L, 3, 3) about it, axes of the link frame [kg m^2]."""
+    parts: IntArray
+    """(P,) links of the body that joints move."""
+    middle: FloatArray
+    """(P, 3) the middle of each one's capsules, link frame [m]."""
+
+
+class Mechanism(NamedTuple):
+    """An arm with its masses."""
+
+    arm: Arm
+    links: Links
+
+
+class JointArrays(NamedTuple):
+    """The joints (n,), of `RobotState`."""
+
+    q: FloatArray
+    """Measured positions [rad]."""
+    qd: FloatArray
+    """Measured velocities [rad/s]."""
+    q_commanded: FloatArray
+    """Positions the motion generator is at [rad]."""
+    qd_commanded: FloatArray
+    """Velocities the motion generator is at [rad/s]."""
+
+
+class SurfaceArrays(NamedTuple):
+    """N places on the arm, of `Surface`."""
+
+    link: IntArray
+    """(N,) link of each."""
+    point: FloatArray
+    """(N, 3) link frame [m]."""
+    normal: FloatArray
+    """(N, 3) outwards, link frame."""
+    area: FloatArray
+    """(N,) it stands for [m^2]."""
+    body: IntArray
+    """(N,) rigid body of each."""
+    first: IntArray
+    """(B + 1,) where the places of each rigid body begin, and N."""
+
+
+class CapsuleArrays(NamedTuple):
+    """C capsules on links, of `Capsules`; or placed in the base frame."""
+
+    link: IntArray
+    """(C,) link of each."""
+    a: FloatArray
+    """(C, 3) one end of the axis [m]."""
+    b: FloatArray
+    """(C, 3) other end of the axis [m]."""
+    radius: FloatArray
+    """(C,) [m]."""
+
+
+class Sensors(NamedTuple):
+    """K sensors, placed in the base frame."""
+
+    position: FloatArray
+    """(K, 3) [m]."""
+    rotation: FloatArray
+    """(K, 3, 3), z along the beam."""
+    link: IntArray
+    """(K,) link each sits on."""
+
+
+class SkinArrays(NamedTuple):
+    """The K units of a `Skin`."""
+
+    link: IntArray
+    """(K,) link each sits on."""
+    T_link_sensor: FloatArray
+    """(K, 4, 4)."""
+    position_sigma: FloatArray
+    """(K,) standard deviation of its position [m]."""
+    orientation_sigma: FloatArray
+    """(K,) standard deviation of its orientation [rad]."""
+
+
+class ObstacleArrays(NamedTuple):
+    """What the body has near, of `Obstacles`."""
+
+    unit: IntArray
+    """(K,) index of the unit that shows each."""
+    link: IntArray
+    """(K,) link that is closest."""
+    body_point: FloatArray
+    """(K, 3) closest point on it [m]."""
+    direction: FloatArray
+    """(K, 3) unit vectors from there to the obstacle."""
+    body_distance: FloatArray
+    """(K,) between them [m]."""
+    closing_speed: FloatArray
+    """(K,) speed of the object itself towards the body [m/s]."""
+
+
+NOTHING_NEAR = ObstacleArrays(
+    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+)
