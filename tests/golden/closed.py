@@ -10,9 +10,10 @@ from types import ModuleType
 from pretouch.controller import Controller
 from pretouch.params import profile
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch_lab import clamp, dynamic, pinch, static, vision
 from pretouch_lab.benchmarks.workload import Workload
 from pretouch_lab.cell import Cell, Context
+from pretouch_lab.paper import dynamic, static
+from pretouch_lab.studies import clamp, pinch, vision
 from tests.golden.fields import Values, values_of
 from tests.golden.streams import model, skin
 
