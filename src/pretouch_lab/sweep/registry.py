@@ -5,7 +5,9 @@ from pretouch_lab.sweep.measures import CLOSED_LOOP, Measure
 from pretouch_lab.sweep.streams import ON_STREAMS
 
 MEASURES: dict[str, Measure] = {m.name: m for m in (*CLOSED_LOOP, *ON_STREAMS)}
-REMOVED = {"ishigami": "It only tested the sweep and is now part of its tests: try a sweep with static --samples 2."}
+REMOVED = {
+    "ishigami": "It only tested the sweep and is now part of its tests: try static --vary threshold.f_base_n=7:20 instead."
+}
 """Where former experiments went, by name."""
 
 
