@@ -89,11 +89,6 @@ class Outlets:
         """Return the samples that came since the last call."""
         return [_unpack(record) for record in self._samples.take()]
 
-    @property
-    def lost(self) -> int:
-        """Samples that were taken too late."""
-        return self._samples.lost
-
     def traffic(self) -> Traffic | None:
         """Return the newest counts; None before the first."""
         number, value = self._traffic.read()

@@ -18,8 +18,6 @@ class Ring:
         self._stride = -(-(SLOT.size + most) // 8) * 8
         self._memory = SharedMemory(_FIRST + slots * self._stride)
         self._written = self._taken = 0
-        self.lost = 0
-        """Values that this reader came too late for."""
 
     def write(self, value: bytes) -> None:
         """Add a value of at most that size; the oldest makes room."""
@@ -37,10 +35,8 @@ class Ring:
             read_slot(self._memory.bytes, self._place(number), number, self._most)
             for number in range(first, written + 1)
         ]
-        values = [value for value in found if value is not None]
-        self.lost += written - self._taken - len(values)
         self._taken = written
-        return values
+        return [value for value in found if value is not None]
 
     def _place(self, number: int) -> int:
         return _FIRST + number % self._slots * self._stride
