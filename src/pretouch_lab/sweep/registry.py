@@ -6,7 +6,7 @@ from pretouch_lab.sweep.streams import ON_STREAMS
 
 MEASURES: dict[str, Measure] = {m.name: m for m in (*CLOSED_LOOP, *ON_STREAMS)}
 REMOVED = {
-    "ishigami": "It only tested the sweep and is now part of its tests: try static --vary threshold.f_base_n=7:20 instead."
+    "ishigami": "It only tested the sweep and is part of its tests now: try static --vary threshold.f_base_n=7:20."
 }
 """Where former experiments went, by name."""
 
