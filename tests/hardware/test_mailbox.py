@@ -7,8 +7,7 @@ import time
 
 import pytest
 
-from pretouch.hardware.mailbox import Mailbox
-from pretouch.hardware.ring import Ring
+from pretouch.hardware.mailbox import Mailbox, Ring
 
 SPAWN = multiprocessing.get_context("spawn")
 

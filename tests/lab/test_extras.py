@@ -12,7 +12,7 @@ from pretouch import extras
 from pretouch.cli.registry import command_names
 from pretouch.errors import MissingExtraError
 from pretouch.extras import BAGS, FIGURES, FRANKA, MESHES, ROS2, VIEWER
-from pretouch_lab.extras import SWEEP
+from pretouch_lab.sweep.run import SWEEP
 
 EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, SWEEP, VIEWER)
 

@@ -15,9 +15,9 @@ from tests.viewer.sessions import set_speed
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.types import Mode
+from pretouch.viewer.controls import toggle_recording
 from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage, serve_live
-from pretouch.viewer.recordings import toggle_recording
 from pretouch.viewer.scene import GIZMO_M
 from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.settings import Faults, LiveSettings

@@ -14,9 +14,8 @@ from multiprocessing.connection import Connection
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
-from pretouch.hardware.mailbox import Mailbox
+from pretouch.hardware.mailbox import Mailbox, Ring
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.hardware.ring import Ring
 from pretouch.hardware.traffic import Received, UnitTraffic
 from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, sample_of
 
