@@ -14,7 +14,7 @@ from pretouch.errors import MissingExtraError
 from pretouch.extras import BAGS, FIGURES, FRANKA, MESHES, ROS2, VIEWER
 from pretouch_lab.sweep.run import SWEEP
 
-EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, SWEEP, VIEWER)
+EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, VIEWER)
 
 URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename="a.dae"/></geometry></collision></link>
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
@@ -84,7 +84,7 @@ def test_every_command_is_asked_for():
     assert {words[0] for words, _ in ASKED} == set(command_names())
 
 
-@pytest.mark.parametrize("extra", EXTRAS, ids=lambda extra: extra.name)
+@pytest.mark.parametrize("extra", [*EXTRAS, SWEEP], ids=lambda extra: extra.name)
 def test_without_an_extra_a_command_does_without_it_or_says_what_to_run(extra, tmp_path, monkeypatch):
     (tmp_path / "arm.urdf").write_text(URDF)
     for name in ("a.dae", "a.bag"):
@@ -129,7 +129,7 @@ def test_the_sentence_names_make_in_a_clone_and_pip_elsewhere(monkeypatch, tmp_p
     assert ROS2.command == f"make -C {tmp_path} ros2"
 
 
-@pytest.mark.parametrize("extra", EXTRAS, ids=lambda extra: extra.name)
+@pytest.mark.parametrize("extra", [*EXTRAS, SWEEP], ids=lambda extra: extra.name)
 def test_an_extra_is_one_that_its_distribution_has_and_make_installs(extra):
     root = Path(__file__).parents[2]
     project = root / ("lab" if extra.distribution == "pretouch-lab" else "") / "pyproject.toml"
