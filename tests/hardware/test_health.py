@@ -22,8 +22,6 @@ def test_a_unit_that_is_well_has_the_numbers_it_was_given():
     assert unit.loss == 0.0
     assert unit.latency_s == pytest.approx(0.015)
     assert unit.latency_late_s == pytest.approx(0.015)
-    assert unit.latency_worst_s == pytest.approx(0.015)
-    assert unit.age_s == pytest.approx(0.015)
     assert unit.silent_s == 0.0
     assert unit.sigma_m == pytest.approx(0.004)
     assert unit.battery_v == pytest.approx(3.9)

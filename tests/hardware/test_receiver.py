@@ -181,11 +181,10 @@ def test_imu_settings_there_are_not_leave_only_the_imu_out(bench, changes):
     assert bench.receiver.take_imu() == []
 
 
-def test_samples_for_recordings_are_bounded_and_the_rest_is_counted():
+def test_samples_for_recordings_are_bounded_and_the_rest_is_dropped():
     with Bench(params=LinkParams(samples_most=10)) as bench:
         bench.join()
         bench.run(0.2)
-        assert bench.receiver.untaken == 12
         taken = bench.receiver.take_samples()
         assert [(one.unit, one.sample.sequence) for one in taken[-2:]] == [(0, 11), (1, 11)]
         assert len(taken) == 10
@@ -277,6 +276,6 @@ def test_counters_are_plain_numbers(bench):
     unit = bench.receiver.units[0]
     for name in ("accepted", "lost", "replayed", "hellos", "sessions", "reboots", "clock_jumps"):
         assert type(getattr(unit, name)) is int, name
-    for name in ("last_arrival", "last_reading_stamp", "offset", "bound", "latency", "latency_worst"):
+    for name in ("last_arrival", "last_reading_stamp", "offset", "bound", "latency"):
         assert type(getattr(unit, name)) is float, name
         assert math.isfinite(getattr(unit, name))

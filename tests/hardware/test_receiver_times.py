@@ -184,7 +184,7 @@ def test_what_was_offered_before_the_hosts_clock_stood_still_tells_no_time_after
     assert bench.receiver.readings().stamp[0] <= bench.now - 0.01
 
 
-def test_latency_is_told_with_its_mean_and_its_worst(bench):
+def test_latency_is_told_as_a_mean_that_forgets(bench):
     bench.join()
     for k in range(100):
         bench.now += 0.02
@@ -192,8 +192,7 @@ def test_latency_is_told_with_its_mean_and_its_worst(bench):
         bench.now += 0.3 if k == 20 else 0.005
         bench.send(sample)
         bench.deliver()
-        if k == 25:
-            assert 0.3 <= bench.receiver.units[0].latency_worst < 0.31
+        if k == 20:
+            assert bench.receiver.units[0].latency > 0.02
     unit = bench.receiver.units[0]
     assert 0.005 <= unit.latency <= 0.005 + 2 * unit.bound + 1e-4
-    assert unit.latency_worst < 0.02

@@ -11,15 +11,17 @@ import pytest
 from pretouch import extras
 from pretouch.cli.registry import command_names
 from pretouch.errors import MissingExtraError
-from pretouch.extras import BAGS, EXTRAS, FIGURES, FRANKA, MESHES, ROS2, VIEWER
-from pretouch_lab.extras import SWEEP
+from pretouch.extras import BAGS, FIGURES, FRANKA, MESHES, ROS2, VIEWER
+from pretouch_lab.sweep.run import SWEEP
+
+EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, VIEWER)
 
 URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename="a.dae"/></geometry></collision></link>
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
 ARM = ("run", "--robot", "franka", "--ip", "127.0.0.1")
 LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")  # requires figures
-X = ("--vary", "scene.x1=0:1", "--vary", "scene.x2=0:1", "--samples", "2", "--processes", "1")
+X = ("--vary", "threshold.f_base_n=7:20", "--samples", "2", "--processes", "1")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
 ASKED = [
     (("live", "--path", "spiral"), VIEWER),
@@ -33,7 +35,7 @@ ASKED = [
         "ros2",
     ),
     (("run", "--skin", "gone.toml"), None),
-    (("sweep", "ishigami", *X, "--out", "sweep"), SWEEP),
+    (("sweep", "static", *X, "--out", "sweep"), SWEEP),
     (("sweep", "nothing"), None),
     (("robot", "import", "arm.urdf", "--out", "arm"), MESHES),
     (("robot", "check", "gone"), None),

@@ -67,7 +67,7 @@ CHANGED = {
     "pretouch_lab/registry.py": set(),
     "pretouch_lab/weaknesses/creeping.py": {"reproduce creeping"},
     "pretouch_lab/benchmarks/avoidance/livelock.py": {"bench avoidance"},
-    "pretouch_lab/sweep/trying.py": {"sweep ishigami"},
+    "pretouch_lab/sweep/streams.py": {"sweep free-motion", "sweep contacts"},
 }
 """Kinds of results whose keys depend on a file."""
 

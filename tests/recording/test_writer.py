@@ -258,7 +258,6 @@ def test_closing_twice_says_the_same_and_later_cycles_are_left_out(controller, t
     recording.imu("hand_left", np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))
     assert recording.close() is closed
     assert (closed.steps, closed.duration_s) == (2, 0.01)
-    assert closed.size_bytes == (tmp_path / "a.mcap").stat().st_size
     assert "2 control steps" in closed.sentence
     assert len(open_recording(tmp_path / "a.mcap")) == 2
 

@@ -1,5 +1,6 @@
 """What the tests of a live session do with it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,3 +40,9 @@ def modes(steps: list[ControlStep]) -> list[Mode]:
 def holds(steps: list[ControlStep]) -> set[str]:
     """Reasons of the HOLDs among some steps, up to the first bracket."""
     return {s.reason.split(" (")[0] for s in steps if s.mode is Mode.HOLD}
+
+
+def set_speed(session: LiveSimulation, speed: float) -> None:
+    """Follow the path at another speed [m/s]."""
+    profile = session.settings.profile
+    session.set_profile(replace(profile, task=replace(profile.task, speed_m_s=speed)))

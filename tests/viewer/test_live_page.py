@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from tests.ports import free_port
 from tests.viewer.browser import seen_at
+from tests.viewer.sessions import set_speed
 
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.types import Mode
+from pretouch.viewer.controls import toggle_recording
 from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage, serve_live
-from pretouch.viewer.recordings import toggle_recording
 from pretouch.viewer.scene import GIZMO_M
 from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.settings import Faults, LiveSettings
@@ -96,7 +97,7 @@ def test_what_people_ask_for_waits_for_the_loop(clock: Clock, simulation: LiveSi
 
 def test_what_is_refused_is_said_and_changes_nothing(clock: Clock, simulation: LiveSimulation) -> None:
     before = simulation.world.profile
-    clock.page.ask(lambda: simulation.set_speed(-1.0))
+    clock.page.ask(lambda: set_speed(simulation, -1.0))
     clock.turn(0.1)
     assert clock.page.notice.startswith("Not done: TaskParams.speed_m_s is -1")
     assert simulation.world.profile == before
@@ -234,7 +235,7 @@ def test_a_clock_speed_out_of_range_is_the_nearest_in_it(clock: Clock, speed: fl
 
 
 def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Clock, simulation: LiveSimulation) -> None:
-    clock.page.ask(lambda: simulation.set_speed(-1.0))
+    clock.page.ask(lambda: set_speed(simulation, -1.0))
     clock.turn(0.1)
     give(clock.page, "x [m]", 0.9)
     give(clock.page, "Cones", False)

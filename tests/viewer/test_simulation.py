@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.viewer.sessions import ARMED_S, AWAY, modes, poke
+from tests.viewer.sessions import ARMED_S, AWAY, modes, poke, set_speed
 
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
@@ -194,7 +194,7 @@ def test_a_reset_begins_again_with_all_as_it_is_set(live):
     session = live(seed=2)
     fresh = session.advance(0.5)
     session.set_path("line")
-    session.set_speed(0.1)
+    set_speed(session, 0.1)
     session.move_hand(np.array([0.8, 0.2, 0.4]))
     session.advance(1.0)
     world = session.world

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.viewer.sessions import ARMED_S, poke
+from tests.viewer.sessions import ARMED_S, poke, set_speed
 
 from pretouch.errors import RecordingError
 from pretouch.params import PROFILES, profile
@@ -29,7 +29,7 @@ def switched(session: LiveSimulation) -> list:
     session.set_path("line")
     steps += session.advance(0.8)
     steps += poke(session)
-    session.set_speed(0.2)
+    set_speed(session, 0.2)
     steps += session.advance(0.3)
     session.set_faults(frozenset({session.skin.ids[1]}))
     return steps + session.advance(0.7)

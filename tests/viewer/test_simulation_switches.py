@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.viewer.sessions import ARMED_S, AWAY, holds, kept_within_limits, modes, poke
+from tests.viewer.sessions import ARMED_S, AWAY, holds, kept_within_limits, modes, poke, set_speed
 
 from pretouch.errors import ParameterError
 from pretouch.params import PROFILES, profile
@@ -85,7 +85,7 @@ def test_each_restriction_is_a_parameter_like_others(running, mode):
 def test_another_speed_is_reached_gently(running):
     running.advance(1.0)
     assert np.linalg.norm(running.frame.step.ee_velocity) == pytest.approx(0.3, abs=0.03)
-    running.set_speed(0.1)
+    set_speed(running, 0.1)
     after = running.advance(1.5)
     assert np.linalg.norm(after[-1].ee_velocity) == pytest.approx(0.1, abs=0.02)
     assert modes(after) == [Mode.TRACK]
@@ -97,7 +97,7 @@ def test_what_cannot_be_is_refused_and_nothing_changes(running):
     with pytest.raises(ParameterError, match=r"The control period is 0.002 s: it stays 0.01 s until a reset"):
         running.set_profile(profile("paper:task.control_period_s=0.002"))
     with pytest.raises(ParameterError, match=r"speed_m_s is -1"):
-        running.set_speed(-1)
+        set_speed(running, -1)
     with pytest.raises(ParameterError, match=r"LiveSettings.path is 'square': choose one of circle, line"):
         running.set_path("square")
     with pytest.raises(ParameterError, match=r"LiveSettings.stiffness is 10: it must be at least 3000"):
@@ -156,7 +156,7 @@ def test_a_dropped_unit_is_named_and_may_come_back(running):
 
 
 def test_noise_and_latency_are_those_asked_for(running):
-    running.set_speed(0.001)
+    set_speed(running, 0.001)
     beside(running, 0.2)
     running.advance(2.0)
 
@@ -247,7 +247,7 @@ def test_no_command_leaves_the_limits_whatever_a_person_does(live, seed):
         lambda: session.set_profile(profile(f"paper:threshold.window_samples={rng.integers(20, 120)}")),
         lambda: session.set_profile(profile(f"paper:restriction.mode={rng.choice(['off', 'hard', 'slack', 'floor'])}")),
         lambda: session.set_profile(profile("paper:reaction.decay_cycles=50:task.position_margin_rad=0.05")),
-        lambda: session.set_speed(rng.uniform(0.05, 1.0)),
+        lambda: set_speed(session, rng.uniform(0.05, 1.0)),
         lambda: session.set_path(str(rng.choice(["circle", "line"]))),
         lambda: session.set_faults(frozenset({ids[rng.integers(len(ids))]}), rng.uniform(0, 10), rng.uniform(0, 0.1)),
         lambda: session.set_faults(),

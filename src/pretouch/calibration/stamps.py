@@ -34,6 +34,8 @@ _FEW, _APART = 5, 50
 _AGE_ERROR = 0.04
 """An age is off by up to this part of itself: a unit counts the samples it left waiting at the nominal rate."""
 _ROUNDS = 12
+_SPARSE = 100
+"""Stamps that span more than this many times the time their samples take are not all of one clock."""
 _WRAP, _LONGEST_US = 2**32, 2**32 - 1
 """Where an index begins anew by itself, and an age that tells nothing [us]."""
 
@@ -132,6 +134,16 @@ def retimed(imu: ImuTrace, instant: FloatArray) -> ImuTrace:
     """Return samples at instants (M,) [s] found for them, by time; without those whose instants are not known."""
     order = np.argsort(instant, kind="stable")[: np.count_nonzero(np.isfinite(instant))]
     return ImuTrace(instant[order], imu.acceleration[order], imu.angular_velocity[order])
+
+
+def median_period(stamp: FloatArray) -> float:
+    """Return the median time between stamps (M,), two at least [s]."""
+    return float(np.median(np.diff(stamp)))
+
+
+def of_several_clocks(stamp: FloatArray) -> bool:
+    """Tell whether stamps (M,), two at least, are spread over far more time than so many samples take [s]."""
+    return float(np.ptp(stamp)) > _SPARSE * median_period(stamp) * len(stamp)
 
 
 def _each(first: IntArray, count: IntArray) -> IntArray:

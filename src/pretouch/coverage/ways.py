@@ -1,6 +1,5 @@
 """Ways on which a ball comes at the arm, and which units see it on them in time."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,16 +78,14 @@ def cosine_weighted(normal: FloatArray, rng: np.random.Generator) -> FloatArray:
     return drawn
 
 
-def seen_by(ways: Ways, link: IntArray, T_link_sensor: FloatArray, postures: Sequence[int] | None = None) -> BoolArray:
+def seen_by(ways: Ways, link: IntArray, T_link_sensor: FloatArray) -> BoolArray:
     """Whether (K, S, W) each of K units, on links (K,) with poses (K, 4, 4), sees the ball of each way in time.
 
-    A unit sees nothing behind the arm or the room in its own view, its own link included. `postures` names those to
-    look at; by default all.
+    A unit sees nothing behind the arm or the room in its own view, its own link included.
     """
-    p, chosen = ways.params, range(len(ways.postures)) if postures is None else postures
-    seen = np.zeros((len(link), len(chosen), len(ways.point)), np.bool_)
-    for i, s in enumerate(chosen):
-        kin = ways.postures[s]
+    p = ways.params
+    seen = np.zeros((len(link), len(ways.postures), len(ways.point)), np.bool_)
+    for s, kin in enumerate(ways.postures):
         position, rotation = poses(kin.position, kin.rotation, link, T_link_sensor)
         everything = np.full(len(link), -1, np.int64)
         own_view = expected_range(kin, position, rotation, everything, ways.model.capsules, ways.room)
@@ -98,5 +95,5 @@ def seen_by(ways: Ways, link: IntArray, T_link_sensor: FloatArray, postures: Seq
             BallWays(ways.start[s], ways.way[s], p.object_radius_m), ways.free[s], Stretch(p.first, p.last, p.run),
             Sensors(position, rotation, link), limit, p.light_m2, found,
         )  # fmt: skip
-        seen[:, i] = found
+        seen[:, s] = found
     return seen

@@ -84,10 +84,6 @@ class UnitHealth:
     """Median time from the measurement to its arrival, at most [s]."""
     latency_late_s: float
     """The time that one in twenty of these is over [s]."""
-    latency_worst_s: float
-    """Largest of these [s]."""
-    age_s: float
-    """Age of the newest reading, at most [s]."""
     distance_m: float
     """Newest reading [m], whatever its status."""
     status: int
@@ -182,8 +178,6 @@ def unit_health(
         loss=counted.lost / sent if sent else math.nan,
         latency_s=float(np.median(ages)) if len(ages) else math.nan,
         latency_late_s=float(np.percentile(ages, 95)) if len(ages) else math.nan,
-        latency_worst_s=float(ages.max()) if len(ages) else math.nan,
-        age_s=now - newest.stamp if newest and math.isfinite(newest.stamp) else math.nan,
         distance_m=newest.sample.range_mm / 1000 if newest else math.nan,
         status=newest.sample.range_status if newest else RangeStatus.NONE,
         sigma_m=float(np.median(sigmas)) if sigmas else math.nan,

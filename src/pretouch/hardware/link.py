@@ -198,11 +198,6 @@ class Link:
         self.beacon_due = math.inf
         """When the live session's next beacon is to be sent [s]; never while there is none."""
 
-    @property
-    def pending(self) -> int:
-        """Sessions that are offered."""
-        return len(self._pending)
-
     def hello(self, datagram: memoryview, now: float) -> bytes | str:
         """Return the answer to a datagram that looks like a hello, to be sent at once; or why there is none."""
         challenge = bytes(datagram[_CHALLENGE])

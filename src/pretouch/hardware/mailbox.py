@@ -1,4 +1,4 @@
-"""The newest value, from one process to any number of others, in shared memory; nobody ever waits for anybody.
+"""The newest value, or the last so many, from one process to others, in shared memory; nobody ever waits for anybody.
 
 The writer fills one of a few slots in turn and then tells its number. A slot holds the number, the size and a checksum
 over both and the value, so that a reader takes a value whole or not at all, however writer and reader are interrupted,
@@ -11,7 +11,7 @@ from zlib import crc32
 
 from pretouch.hardware.shared import SharedMemory
 
-SLOT = struct.Struct("@QII")
+_SLOT = struct.Struct("@QII")
 """Number of the value, from 1; its size; checksum."""
 _FIRST = 64
 """Where the slots begin: after the number of the newest value."""
@@ -25,7 +25,7 @@ class Mailbox:
     def __init__(self, most: int) -> None:
         """Make an empty one for values of at most so many bytes."""
         self._most = most
-        self._stride = _aligned(SLOT.size + most)
+        self._stride = _aligned(_SLOT.size + most)
         self._memory = SharedMemory(_FIRST + _SLOTS * self._stride)
         self._last: tuple[int, bytes] = (0, b"")
 
@@ -35,7 +35,7 @@ class Mailbox:
             raise ValueError(f"a value of {len(value)} bytes does not fit into the {self._most} of this mailbox")
         memory = self._memory.bytes
         number = self._memory.count[0] + 1
-        fill_slot(memory, self._place(number), number, value)
+        _fill(memory, self._place(number), number, value)
         self._memory.count[0] = number
         return number
 
@@ -49,7 +49,7 @@ class Mailbox:
             number = self._memory.count[0]
             if number == self._last[0]:
                 break
-            value = read_slot(memory, self._place(number), number, self._most)
+            value = _read(memory, self._place(number), number, self._most)
             if value is not None:
                 self._last = number, value
                 break
@@ -59,19 +59,54 @@ class Mailbox:
         return _FIRST + number % _SLOTS * self._stride
 
 
-def fill_slot(memory: mmap.mmap, place: int, number: int, value: bytes) -> None:
+class Ring:
+    """The last so many values: a reader gets every one that was written since it last looked, as far as there is room.
+
+    One writer; each reader has a `Ring` of its own, pickled for the process that is being spawned.
+    """
+
+    def __init__(self, slots: int, most: int) -> None:
+        """Make an empty one for so many values of at most so many bytes each."""
+        self._slots, self._most = slots, most
+        self._stride = -(-(_SLOT.size + most) // 8) * 8
+        self._memory = SharedMemory(_FIRST + slots * self._stride)
+        self._written = self._taken = 0
+
+    def write(self, value: bytes) -> None:
+        """Add a value of at most that size; the oldest makes room."""
+        if len(value) > self._most:
+            raise ValueError(f"a value of {len(value)} bytes does not fit into the {self._most} of this ring")
+        self._written += 1
+        _fill(self._memory.bytes, self._place(self._written), self._written, value)
+        self._memory.count[0] = self._written
+
+    def take(self) -> list[bytes]:
+        """Return what was written since the last call, oldest first."""
+        written = self._memory.count[0]
+        first = max(self._taken, written - self._slots) + 1
+        found = [
+            _read(self._memory.bytes, self._place(number), number, self._most) for number in range(first, written + 1)
+        ]
+        self._taken = written
+        return [value for value in found if value is not None]
+
+    def _place(self, number: int) -> int:
+        return _FIRST + number % self._slots * self._stride
+
+
+def _fill(memory: mmap.mmap, place: int, number: int, value: bytes) -> None:
     """Write a value and what guards it."""
-    SLOT.pack_into(memory, place, number, len(value), crc32(value, number & 0xFFFFFFFF))
-    start = place + SLOT.size
+    _SLOT.pack_into(memory, place, number, len(value), crc32(value, number & 0xFFFFFFFF))
+    start = place + _SLOT.size
     memory[start : start + len(value)] = value
 
 
-def read_slot(memory: mmap.mmap, place: int, number: int, most: int) -> bytes | None:
+def _read(memory: mmap.mmap, place: int, number: int, most: int) -> bytes | None:
     """Return the value of this number, None if the slot holds another one or is being written."""
-    found, size, checksum = SLOT.unpack_from(memory, place)
+    found, size, checksum = _SLOT.unpack_from(memory, place)
     if found != number or size > most:
         return None
-    start = place + SLOT.size
+    start = place + _SLOT.size
     value = bytes(memory[start : start + size])
     return value if crc32(value, number & 0xFFFFFFFF) == checksum else None
 

@@ -63,7 +63,6 @@ class NetworkSkin:
         self._untold = Traffic(tuple(UnitTraffic(unit.id, unit.number) for unit in units), {}, 0)
         self._imu: list[Received] = []
         self._samples: list[Received] = []
-        self._untaken = 0
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
         arguments = (self._owner, units, (host, port), self._params, priority, self._outlets, theirs)
@@ -135,17 +134,11 @@ class NetworkSkin:
         """Return what the receiver has counted, not older than 0.6 s while it lives."""
         return self._outlets.traffic() or self._untold
 
-    @property
-    def untaken(self) -> int:
-        """Samples dropped because nobody took them in time."""
-        return self._untaken + self._outlets.lost
-
     def _take(self) -> None:
         """Share what came between the two who take it; what one of them never takes is bounded."""
         came, most = self._outlets.take_samples(), self._params.samples_most
         self._samples += came
         self._imu += [received for received in came if received.sample.imu_count]
-        self._untaken += max(len(self._samples) - most, 0)
         del self._samples[:-most], self._imu[:-most]
 
 

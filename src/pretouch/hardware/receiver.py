@@ -116,8 +116,6 @@ class SkinReceiver:
         """How many datagrams were thrown away, by reason (`traffic.REASONS`)."""
         self.unsent = 0
         """Beacons the system did not take."""
-        self.untaken = 0
-        """Samples dropped because nobody took them (`take_samples`, `take_imu`) while others did not fit any more."""
         self.taken = 0
         """Datagrams that the last call of `receive` took in, genuine or not."""
         self._samples: deque[Received] = deque(maxlen=self._params.samples_most)
@@ -257,7 +255,6 @@ class SkinReceiver:
         if self._deliver is not None:
             self._deliver(received, datagram)
             return None
-        self.untaken += len(self._samples) == self._samples.maxlen
         self._samples.append(received)
         if received.sample.imu_count:
             self._imu.append(received)

@@ -14,9 +14,8 @@ from multiprocessing.connection import Connection
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
-from pretouch.hardware.mailbox import Mailbox
+from pretouch.hardware.mailbox import Mailbox, Ring
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.hardware.ring import Ring
 from pretouch.hardware.traffic import Received, UnitTraffic
 from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, sample_of
 
@@ -88,11 +87,6 @@ class Outlets:
     def take_samples(self) -> list[Received]:
         """Return the samples that came since the last call."""
         return [_unpack(record) for record in self._samples.take()]
-
-    @property
-    def lost(self) -> int:
-        """Samples that were taken too late."""
-        return self._samples.lost
 
     def traffic(self) -> Traffic | None:
         """Return the newest counts; None before the first."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pretouch.hardware.keys import UnitKey
 from pretouch.hardware.link import Link, LinkParams, Session
 from pretouch.hardware.stuck import StuckDetector
-from pretouch.hardware.traffic import Latency, Received, UnitTraffic
+from pretouch.hardware.traffic import Received, UnitTraffic
 from pretouch.hardware.unit_clock import UnitClock
 from pretouch.hardware.wire import NO_FORCE, Flag, Sample, touch_part
 from pretouch.types import FloatArray, RangeStatus, TouchStatus
@@ -42,7 +42,6 @@ class Station:
         self._link = Link(unit.key, params, draw)
         self._clock = UnitClock(1e-6 * params.drift_ppm, params.clock_window_s)
         self._stuck = StuckDetector(params.stuck_after_s)
-        self._latency = Latency()
         self._session: Session | None = None
         self._last_hello = -math.inf
         self._echoed = 0
@@ -136,8 +135,9 @@ class Station:
         traffic.clock_jumps = clock.jumps
         traffic.offset, traffic.bound = clock.offset, clock.bound
         if clock.known:
-            self._latency.heard(now - clock.earliest(made), now)
-            traffic.latency, traffic.latency_worst = self._latency.mean, self._latency.worst
+            latency = now - clock.earliest(made)
+            known = traffic.latency
+            traffic.latency = latency if math.isnan(known) else known + 0.0625 * (latency - known)
 
     def _take_reading(self, sample: Sample, now: float) -> float:
         """Keep a reading if it is the newest; return its stamp, NaN if it cannot be told."""

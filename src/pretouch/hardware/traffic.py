@@ -68,8 +68,6 @@ class UnitTraffic:
     """How often the unit's clock contradicted itself."""
     latency: float = math.nan
     """From the making of a sample to its arrival [s], the most it can have been; mean of about the last 16."""
-    latency_worst: float = math.nan
-    """Largest of it in the last one to two seconds [s]."""
     stuck: bool = False
     """Whether its readings repeat to the last digit."""
     sample: Sample | None = None
@@ -133,22 +131,3 @@ def imu_readings(batches: Sequence[ImuBatch]) -> ImuReadings:
         np.concatenate(none + [b.acceleration for b in batches]),
         np.concatenate(none + [b.angular_velocity for b in batches]),
     )
-
-
-class Latency:
-    """Mean and worst of one unit's latency."""
-
-    def __init__(self) -> None:
-        self.mean = math.nan
-        self.worst = math.nan
-        """Largest of the last one to two seconds [s]."""
-        self._now, self._before, self._since = -math.inf, -math.inf, -math.inf
-
-    def heard(self, latency: float, now: float) -> None:
-        """Take in one latency [s] at an instant [s]."""
-        self.mean = latency if math.isnan(self.mean) else self.mean + 0.0625 * (latency - self.mean)
-        if now - self._since >= 1.0:
-            self._before, self._now, self._since = self._now, latency, now
-        elif latency > self._now:
-            self._now = latency
-        self.worst = max(self._now, self._before)

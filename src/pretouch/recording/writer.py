@@ -56,7 +56,6 @@ class Closed:
     steps: int
     duration_s: float
     """From the first step to the last [s]."""
-    size_bytes: int
     sentence: str
     """How it ended, for a person to read."""
 
@@ -183,7 +182,7 @@ class Recording:
         sentence = self.trouble or (
             f"{self.place} holds {self._steps} control steps, {duration:.1f} s, in {size / 1e6:.1f} MB."
         )
-        return Closed(self.place, self._steps, duration, size, sentence)
+        return Closed(self.place, self._steps, duration, sentence)
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():

@@ -3,17 +3,18 @@
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
+from pretouch.errors import RecordingError
 from pretouch.params import PROFILES, Profile, RestrictionMode
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
 from pretouch.viewer.commands import Commands
 from pretouch.viewer.gui import SETTLE_S, TYPED_S, add_button, add_view_boxes, put, when_changed
 from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs, written
-from pretouch.viewer.recordings import toggle_recording
 from pretouch.viewer.settings import ObjectName, PathName
 from pretouch.viewer.simulation import LiveSimulation
 from pretouch.viewer.unit_panel import UnitPanel
@@ -21,6 +22,8 @@ from pretouch.viewer.unit_panel import UnitPanel
 if TYPE_CHECKING:
     from viser import GuiApi
 
+RECORDINGS = Path("runs")
+"""Folder in which recordings are kept."""
 _CLOCK = 0.1, 1.0
 """Range of the clock's speed, simulated over real time."""
 
@@ -231,3 +234,29 @@ class Controls:
         """Have the sliders show where the hand is to be (3,) [m]."""
         for slider, value in zip(self._hand, target.tolist(), strict=True):
             put(slider, round(value, 2))
+
+
+def _fresh_place(folder: Path) -> Path:
+    """A file in the folder that is not there yet."""
+    number = 1
+    while (place := folder / f"live-{number}.mcap").exists():
+        number += 1
+    return place
+
+
+def toggle_recording(simulation: LiveSimulation) -> None:
+    """Begin a recording in a file of its own, or end the one under way; the simulation's notice says where it is.
+
+    A RecordingError says why none can be begun.
+    """
+    if simulation.recording is not None:
+        closed = simulation.stop_recording()
+        simulation.notice = closed.sentence if closed else ""
+        return
+    try:
+        RECORDINGS.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"The folder {RECORDINGS} cannot be made: {error.strerror}.") from error
+    place = _fresh_place(RECORDINGS)
+    simulation.start_recording(place)
+    simulation.notice = f"Recording to {place}."

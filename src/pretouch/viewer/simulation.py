@@ -133,11 +133,6 @@ class LiveSimulation:
             )
         self._go_on(replace(self.settings, profile=profile))
 
-    def set_speed(self, speed: float) -> None:
-        """Follow the path at another speed [m/s]."""
-        profile = self.settings.profile
-        self.set_profile(replace(profile, task=replace(profile.task, speed_m_s=speed)))
-
     def set_path(self, name: str) -> None:
         """Go on along another path, 'circle' or 'line', from where it is nearest."""
         if name != self.settings.path:

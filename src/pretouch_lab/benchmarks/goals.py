@@ -120,9 +120,9 @@ def _towards(streams: list[Row], played: list[Row]) -> Goal:
     )  # fmt: skip
 
 
-def pair(paired: list[Row], family: str, reference: str, measure: str, contender: str = BASE) -> Row | None:
-    """Return how a contender compares with a reference, None if it was not measured."""
-    where = {"family": family, "contender": contender, "reference": reference, "measure": measure}
+def pair(paired: list[Row], family: str, reference: str, measure: str) -> Row | None:
+    """Return how `BASE` compares with a reference, None if it was not measured."""
+    where = {"family": family, "contender": BASE, "reference": reference, "measure": measure}
     return next((row for row in paired if all(row[key] == value for key, value in where.items())), None)
 
 

@@ -51,7 +51,7 @@ def identify_arm(command: Identify) -> None:
     from pretouch_lab.identification.arm_file import arm_toml
     from pretouch_lab.identification.free_motion import read_free_motion
     from pretouch_lab.identification.identify import identify
-    from pretouch_lab.identification.usual import usual_of
+    from pretouch_lab.identification.params import usual_of
 
     out, figure, json_file = (Path(text) if text else None for text in (command.out, command.figure, command.json))
     if figure and figure.suffix not in (".png", ".pdf", ".svg"):

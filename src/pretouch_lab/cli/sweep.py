@@ -103,13 +103,13 @@ def defined(command: Sweep) -> "list[Defined]":
     """Return the sweeps a command asks for. Raises an error of this package."""
     from pretouch.cli.words import words
     from pretouch_lab.sweep.definition import SENSITIVITY, load_sweeps, sensitivity, smaller, sweep_of
-    from pretouch_lab.sweep.registry import MEASURES
+    from pretouch_lab.sweep.registry import MEASURES, REMOVED
 
     if command.processes < 0:
         raise ExperimentError(f"The number of processes is {command.processes}: give 1 or more.")
     if command.samples < 0 or command.arms < 0:
         raise ExperimentError("The numbers of samples and arms have to be positive: leave them out for the defaults.")
-    if command.what in MEASURES:
+    if command.what in MEASURES or command.what in REMOVED:
         given = {key: value for key in ("design", "samples", "arms") if (value := getattr(command, key))}
         return [
             sweep_of(

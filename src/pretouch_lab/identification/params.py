@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from pretouch.checks import Checked, NonNegative, Positive
+from pretouch.sim.plant_params import PlantParams
 
 Joints = tuple[float, ...]
 
@@ -21,6 +22,14 @@ class Usual:
     observer_gain_1_s: float
     period_s: float
     """Of the observer [s]."""
+
+
+def usual_of(plant: PlantParams) -> Usual:
+    """Return what of a plant identification takes for granted."""
+    return Usual(
+        plant.friction_f1_nm, plant.friction_f2_s_rad, plant.friction_f3_rad_s, plant.friction_compensated,
+        plant.ripple_cycles, plant.torque_noise_hz, plant.observer_gain_1_s, plant.period_s,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ TOLERANCE = 0.15
 FORCES = ("filtered_at_detection_n", "raw_at_detection_n", "peak_estimate_n", "true_peak_20ms_n")
 
 _STIFFNESS_N_PER_M = 25_000.0
-_PLACE = ("trajectory", "side")
 _BEGIN_S = 1.5
 """Ages count from here on [s]: the arm is under way, each unit has been heard."""
 

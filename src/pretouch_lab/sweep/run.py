@@ -5,14 +5,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from pretouch.extras import Extra
 from pretouch.whole_file import write_json
-from pretouch_lab.extras import SWEEP
 from pretouch_lab.sweep.cluster import run_on_cluster
 from pretouch_lab.sweep.definition import Sweep
 from pretouch_lab.sweep.design import Point, points
 from pretouch_lab.sweep.local import run_local
 from pretouch_lab.sweep.store import Damaged, Result, Store, unwritable
 from pretouch_lab.sweep.work import Cell, Job, cell_of, jobs_of
+
+SWEEP = Extra("sweep", ("SALib", "distributed", "pyarrow"), "setup", "pretouch-lab")
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,6 @@ def test_what_comes_again_or_late_is_not_new() -> None:
     assert stamps.instant(at(10.0), 1.1, 7) is None
     assert stamps.instant(at(9.5), 1.2, 7) is None
     assert stamps.instant(at(10.01), 1.3, 7) == 1.3
-    assert stamps.repeated == 2
 
 
 def test_another_publisher_begins_anew_and_so_does_a_clock_set_back_once_it_goes_on() -> None:

@@ -3,8 +3,15 @@ import json
 import pytest
 
 from pretouch import cli
+from tests.lab.sweep.made import register
 
 X = ("--vary", "scene.x1=-3:3", "--vary", "scene.x2=-3:3")
+BASE = ("--vary", "threshold.f_base_n=7:20")
+
+
+@pytest.fixture
+def ishigami(monkeypatch):
+    register(monkeypatch)
 
 
 def run(capsys, *args):
@@ -12,7 +19,7 @@ def run(capsys, *args):
     return code, capsys.readouterr()
 
 
-def test_a_sweep_shows_and_writes_what_it_says_and_is_not_played_twice(capsys, tmp_path):
+def test_a_sweep_shows_and_writes_what_it_says_and_is_not_played_twice(capsys, tmp_path, ishigami):
     docs, out = tmp_path / "docs", tmp_path / "out"
     (docs / "results").mkdir(parents=True)
     document = docs / "results" / "sensitivity.md"
@@ -40,11 +47,12 @@ def test_a_sweep_shows_and_writes_what_it_says_and_is_not_played_twice(capsys, t
     [
         (("static",), "Nothing is varied: give --vary"),
         (("static", "--vary", "threshold.f_base_n"), "has no value: write NAME=LOW:HIGH"),
-        (("ishigami", *X, "--vary", "scene.x1=0:1"), "names scene.x1 twice"),
+        (("static", *BASE, *BASE), "names threshold.f_base_n twice"),
         (("sensitivity", "--vary", "scene.x1=0:1"), "--vary goes with an experiment, not with sensitivity"),
+        (("ishigami", *X), "contacts. It only tested the sweep"),
         (("missing.toml",), "missing.toml is neither an experiment nor a file"),
-        (("ishigami", *X, "--processes", "-1"), "number of processes is -1"),
-        (("ishigami", *X, "--docs", "nowhere"), "nowhere/results/sensitivity.md cannot be read"),
+        (("static", *BASE, "--processes", "-1"), "number of processes is -1"),
+        (("static", *BASE, "--docs", "nowhere"), "nowhere/results/sensitivity.md cannot be read"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_sentence(capsys, args, words):
@@ -66,7 +74,7 @@ def test_what_cannot_be_done_is_said_in_a_sentence(capsys, args, words):
         ('[[sweep]]\nexperiment = "ishigami"\n[sweep.vary]\n"scene.x1" = "1:2"\n' * 2, "have the same name"),
     ],
 )
-def test_a_sweep_file_that_is_wrong_is_said(capsys, tmp_path, text, words):
+def test_a_sweep_file_that_is_wrong_is_said(capsys, tmp_path, text, words, ishigami):
     path = tmp_path / "s.toml"
     path.write_text(text)
     code, said = run(capsys, str(path), "--out", str(tmp_path))

@@ -8,8 +8,8 @@ from pretouch.contact.observer import observe, observer_init
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import PlantParams
+from pretouch_lab.identification.params import usual_of
 from pretouch_lab.identification.samples import ArmSamples
-from pretouch_lab.identification.usual import usual_of
 
 MODEL = RobotModel(panda())
 PLANT = PlantParams()

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -12,12 +13,14 @@ from pretouch_lab.sweep import cluster
 from pretouch_lab.sweep.run import Where, play
 from tests.lab.sweep.made import files, ignore, opened_ishigami
 
+ROOT = Path(__file__).parents[3]  # workers import the experiment from the tests
+
 
 @contextmanager
 def process(module, *arguments):
     """A process of the cluster, and the line in which it says that it is there."""
     command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments, "--no-dashboard"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as started:
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as started:
         try:
             yield started
         finally:

@@ -8,9 +8,9 @@ from pretouch_lab.sweep.design import points
 from pretouch_lab.sweep.indices import indices, sobol_indices
 from pretouch_lab.sweep.run import Run
 from pretouch_lab.sweep.store import Result
-from pretouch_lab.sweep.trying import A, B, ishigami
 from pretouch_lab.sweep.work import Cell
 from tests.lab.sweep import made
+from tests.lab.sweep.made import A, B
 
 PI4 = np.pi**4
 V1 = 0.5 * (1 + B * PI4 / 5) ** 2
@@ -23,7 +23,7 @@ FIRST, TOTAL = (V1 / V, V2 / V, 0.0), ((V1 + V13) / V, V2 / V, V13 / V)
 
 @cache
 def evaluated(samples):
-    return tuple(ishigami(*point.values.values()) for point in points(made.ishigami(samples)))
+    return tuple(made.value(*point.values.values()) for point in points(made.ishigami(samples)))
 
 
 def values_of(sweep):
@@ -36,7 +36,7 @@ def played(sweep, tmp_path):
     cells = [Cell(str(i), point.values, point.seed, 0.0) for i, point in enumerate(chosen)]
     run = Run(sweep, tmp_path, chosen, cells)
     for cell in cells:
-        run.results[cell.key] = Result({"value": ishigami(*cell.values.values())}, "", 0.01)
+        run.results[cell.key] = Result({"value": made.value(*cell.values.values())}, "", 0.01)
     return run
 
 

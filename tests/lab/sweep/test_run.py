@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 from multiprocessing import active_children
+from pathlib import Path
 
 import pytest
 from pyarrow import parquet
@@ -15,14 +16,14 @@ from pretouch_lab.sweep.document import picture, tables, written
 from pretouch_lab.sweep.results import values_of
 from pretouch_lab.sweep.run import Where, opened, play
 from pretouch_lab.sweep.store import Store
-from pretouch_lab.sweep.trying import ISHIGAMI, ishigami
-from tests.lab.sweep.made import files, ignore, opened_ishigami
+from tests.lab.sweep.made import ISHIGAMI, files, ignore, opened_ishigami, value
 
 HERE = Where(processes=1)
+ROOT = Path(__file__).parents[3]
 
 
 def known(cell):
-    return ishigami(*(cell.values[f"scene.x{i}"] for i in (1, 2, 3)))
+    return value(*(cell.values[f"scene.x{i}"] for i in (1, 2, 3)))
 
 
 def test_a_sweep_leaves_a_file_for_each_cell_a_table_indices_and_a_figure(tmp_path):
@@ -163,19 +164,20 @@ def test_a_cell_whose_worker_is_killed_each_time_is_given_up_alone(tmp_path, mon
 PARENT = """
 import sys
 from pathlib import Path
+import pytest
 from pretouch_lab.sweep.definition import sweep_of
 from pretouch_lab.sweep.run import Where, opened, play
-if __name__ == "__main__":
-    sweep = sweep_of("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1)
-    play(opened(sweep, Path(sys.argv[1])), Where(1), lambda _: print("done", flush=True))
+from tests.lab.sweep.made import register
+register(pytest.MonkeyPatch())
+sweep = sweep_of("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1)
+play(opened(sweep, Path(sys.argv[1])), Where(1), lambda _: print("done", flush=True))
 """
 
 
 @pytest.mark.slow
 def test_a_sweep_whose_process_is_killed_goes_on_where_it_was(tmp_path):
-    script = tmp_path / "parent.py"
-    script.write_text(PARENT)
-    with subprocess.Popen([sys.executable, str(script), str(tmp_path)], stdout=subprocess.PIPE, text=True) as process:
+    command = [sys.executable, "-c", PARENT, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         for _ in range(5):
             assert process.stdout.readline() == "done\n"
         process.kill()

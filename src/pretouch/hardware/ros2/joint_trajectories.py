@@ -8,7 +8,6 @@ import numpy as np
 
 from pretouch.errors import RobotError
 from pretouch.hardware.ros2.joints import Measured
-from pretouch.hardware.ros2.lag import Lag
 from pretouch.hardware.ros2.messages import TRAJECTORY
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, parts
@@ -24,6 +23,12 @@ _LINGERS_S = 0.3
 """Time after a trajectory's end in which the arm comes to rest too [s]."""
 _AGAIN_S = 10.0
 """Time in which an arm that was found elsewhere must not be so again [s]."""
+_MEMORY = 0.995
+"""Weight in the lag of what was seen a turn earlier."""
+_UNKNOWN_RAD2_S2 = 0.5
+"""Sum of squared velocities from which a lag begins to be known [rad^2/s^2]."""
+_LARGEST_LAG_S = 0.1
+"""Largest lag that is reckoned with [s]."""
 
 
 class Trajectories:
@@ -141,3 +146,36 @@ def parts_of_day(instant: float) -> tuple[int, int]:
         looks.append((after - before, day - (before + after) // 2))
     # the closest look: this thread may have had to wait between two clocks
     return divmod(min(looks)[1] + round(instant * 1e9), 10**9)
+
+
+class Lag:
+    """The time an arm is behind its commands, and its offset at rest, as learnt from its states.
+
+    It tells whether the arm is where it was sent.
+    """
+
+    def __init__(self, qdd_max: FloatArray) -> None:
+        """Take the acceleration limits (n,) [rad/s^2]."""
+        self._qdd_max, self._offset = qdd_max, np.zeros_like(qdd_max)
+        self._moved = self._behind = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """The lag [s]."""
+        return min(max(self._behind / (self._moved + _UNKNOWN_RAD2_S2), 0.0), _LARGEST_LAG_S)
+
+    def rest(self, reference: Reference, instant: float, q: FloatArray) -> None:
+        """Take the offset (n,) [rad] of an arm at rest as its usual one."""
+        self._offset = reference.motion_at(instant)[0] - q
+
+    def stray(self, reference: Reference, instant: float, q: FloatArray) -> FloatArray:
+        """Return how far (n,) [rad] the arm is from where it usually would be, less what is unknown of its lag."""
+        lag = self.seconds
+        usual, _ = reference.motion_at(instant - lag)
+        wanted, qd = reference.motion_at(instant)
+        unknown = _LARGEST_LAG_S * np.abs(qd) * _UNKNOWN_RAD2_S2 / (self._moved + _UNKNOWN_RAD2_S2)
+        # a lag may be a delay, or that of a filter: they differ by this where the velocity changes
+        found = np.abs(usual - self._offset - q) - unknown - self._qdd_max * lag**2 / 2
+        self._behind = _MEMORY * self._behind + float((wanted - self._offset - q) @ qd)
+        self._moved = _MEMORY * self._moved + float(qd @ qd)
+        return np.maximum(found, 0.0)

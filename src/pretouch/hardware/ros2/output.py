@@ -26,7 +26,7 @@ class Ros2Output:
 
     def __init__(self, params: OutputParams, controller: Controller, node: Ros2Node) -> None:
         self._shown = Shown(controller, node.messages, params.base_frame)
-        self._messages, self._link_frames = node.messages, params.links
+        self._messages = node.messages
         self._period, self._diagnostics_period = 1 / params.rate_hz, 1 / params.diagnostics_hz
         self._next = self._next_diagnostics = 0.0
         self._mode: Mode | None = None

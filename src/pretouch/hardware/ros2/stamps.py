@@ -42,8 +42,6 @@ class Stamps:
         """Take whether the stamps are of this machine's time of day; and that [s]."""
         self._shared, self._now = shared_clock, now
         self._writers: dict[int, _Writer] = {}
-        self.repeated = 0
-        """Messages left out because their stamp was not new."""
         self.behind: float | None = None
         """How far stamps are behind this machine's time of day when they come, at best [s]; None: there are none."""
 
@@ -61,7 +59,6 @@ class Stamps:
         if stamp == 0:
             return received
         if not _is_new(known, stamp):
-            self.repeated += 1
             return None
         behind = self._now() - stamp
         self.behind = behind if self.behind is None else min(behind, self.behind, key=abs)

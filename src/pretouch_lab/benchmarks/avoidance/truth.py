@@ -9,8 +9,6 @@ from pretouch_lab.benchmarks.avoidance.obstacle import Nearest, nearest
 from pretouch_lab.benchmarks.avoidance.setting import Setting
 from pretouch_lab.trial import Record
 
-Seen = tuple[float, float]
-
 
 @dataclass(frozen=True)
 class Truth:

@@ -20,7 +20,6 @@ DATA_SHEET = ImuParams(misalignment_deg=0.0)
 CLOCK_ERROR_S = 0.02
 """Each unit's clock is off by up to this [s]."""
 
-_GRAVITY = 9.80665
 _LARGEST_COUNT = 32767
 
 
