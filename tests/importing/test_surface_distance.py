@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+import trimesh
 
 from pretouch.importing.capsule_fit import points_around
 from pretouch.importing.sampling import directions, spread
 from pretouch.importing.solids import Block, Cylinder, Ellipsoid, Rounded, Shape, surface_of
-from pretouch.importing.surface_distance import SurfaceDistance, triangle_distance
+from pretouch.importing.surface_distance import SurfaceDistance
 
 RNG = np.random.default_rng(4)
 
@@ -39,21 +40,23 @@ def test_distances_to_a_capsule_are_off_by_its_corners_only(solid, a):
 def test_a_solid_is_closed_and_faces_outwards(solid):
     triangles = surface_of((Shape(solid, np.eye(4)),))
     edges = np.sort(np.concatenate([triangles.faces[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
-    corners = triangles.corners
+    corners = triangles.triangles
     volume = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
     wanted = {Cylinder: np.pi * 0.05**2 * 0.2, Ellipsoid: 4 / 3 * np.pi * 0.03 * 0.05 * 0.1, Block: 0.048}[type(solid)]
     assert len(edges) == 3 * len(triangles.faces)
     assert volume == pytest.approx(wanted, rel=0.01)
 
 
+def soup_of(corners):
+    return trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners), process=False)
+
+
 def test_nothing_is_missed_by_leaving_far_triangles_out():
     soup = RNG.normal(size=(60, 3, 3)) * 0.3
     points = RNG.normal(size=(150, 3))
-    from pretouch.importing.meshes import Surface
-
-    found = SurfaceDistance(Surface(soup.reshape(-1, 3), np.arange(180).reshape(-1, 3)))
-    each = [triangle_distance(np.repeat(p[None], 60, axis=0), soup).min() for p in points]
-    assert found(points) == pytest.approx(np.array(each), abs=1e-12)
+    found = SurfaceDistance(soup_of(soup))
+    each = np.min([SurfaceDistance(soup_of(one[None]))(points) for one in soup], axis=0)
+    assert found(points) == pytest.approx(each, abs=1e-12)
 
 
 def test_the_distance_to_a_triangle_is_that_of_its_nearest_sample():
@@ -61,7 +64,7 @@ def test_the_distance_to_a_triangle_is_that_of_its_nearest_sample():
     u = RNG.dirichlet([0.5, 0.5, 0.5], 200_000)
     for point in RNG.normal(size=(20, 3)) * 2:
         sampled = np.linalg.norm(u @ triangle - point, axis=1).min()
-        found = triangle_distance(point[None], triangle[None])[0]
+        found = SurfaceDistance(soup_of(triangle[None]))(point[None])[0]
         assert found <= sampled + 1e-12
         assert found == pytest.approx(sampled, abs=0.02)
 

@@ -2,7 +2,6 @@
 
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -31,11 +30,9 @@ def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
 
     import trimesh
 
-    divided: Any = trimesh.remesh.subdivide_to_size
-
     def read(name: str) -> tuple[FloatArray, IntArray]:
         mesh = trimesh.load_scene(folder / f"{name}.dae").to_mesh()
-        vertices, faces = divided(mesh.vertices, mesh.faces, max_edge=_EDGE_M)
+        vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=_EDGE_M)
         return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
 
     found = {i: coarse(*read(link.removeprefix("panda_"))) for i, link in enumerate(model.links) if _has_one(link)}
