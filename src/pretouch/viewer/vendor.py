@@ -4,11 +4,12 @@ from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 from pretouch.extras import MESHES
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
-from pretouch.viewer.surface import Mesh, normals_of
+from pretouch.viewer.surface import Mesh
 
 CELL_M = 0.006
 """Size of the cells whose vertices are merged into one [m]."""
@@ -27,8 +28,6 @@ def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
     folder = _folder()
     if folder is None or MESHES.missing():
         return {}, f"The arm is drawn by its capsules: for the vendor's surfaces, run {MESHES.command}"
-
-    import trimesh
 
     def read(name: str) -> tuple[FloatArray, IntArray]:
         mesh = trimesh.load_scene(folder / f"{name}.dae").to_mesh()
@@ -55,7 +54,8 @@ def coarse(vertices: FloatArray, faces: IntArray, cell: float = CELL_M) -> Mesh:
     kept = kept[np.sort(first)]
     used, renumbered = np.unique(kept, return_inverse=True)
     corners = renumbered.reshape(-1, 3).astype(np.int64)
-    return Mesh(merged[used], corners, normals_of(merged[used], corners))
+    found = trimesh.Trimesh(merged[used], corners, process=False)
+    return Mesh(merged[used], corners, np.array(found.vertex_normals))
 
 
 def _has_one(link: str) -> bool:
