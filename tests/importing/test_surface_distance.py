@@ -5,7 +5,7 @@ import trimesh
 from pretouch.importing.capsule_fit import points_around
 from pretouch.importing.sampling import directions, spread
 from pretouch.importing.solids import Block, Cylinder, Ellipsoid, Rounded, Shape, surface_of
-from pretouch.importing.surface_distance import SurfaceDistance
+from pretouch.importing.surface_distance import SurfaceDistance, triangle_distance
 
 RNG = np.random.default_rng(4)
 
@@ -47,16 +47,19 @@ def test_a_solid_is_closed_and_faces_outwards(solid):
     assert volume == pytest.approx(wanted, rel=0.01)
 
 
-def soup_of(corners):
-    return trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners), process=False)
-
-
 def test_nothing_is_missed_by_leaving_far_triangles_out():
     soup = RNG.normal(size=(60, 3, 3)) * 0.3
     points = RNG.normal(size=(150, 3))
-    found = SurfaceDistance(soup_of(soup))
-    each = np.min([SurfaceDistance(soup_of(one[None]))(points) for one in soup], axis=0)
-    assert found(points) == pytest.approx(each, abs=1e-12)
+    found = SurfaceDistance(trimesh.Trimesh(**trimesh.triangles.to_kwargs(soup), process=False))
+    each = [triangle_distance(np.repeat(p[None], 60, axis=0), soup).min() for p in points]
+    assert found(points) == pytest.approx(np.array(each), abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-4])
+def test_the_distance_to_a_triangle_is_as_exact_where_it_is_small(size):
+    triangles, points = RNG.normal(size=(200, 3, 3)), RNG.normal(size=(200, 3))
+    large, small = triangle_distance(points, triangles), triangle_distance(size * points, size * triangles)
+    assert small / size == pytest.approx(large, abs=1e-9)
 
 
 def test_the_distance_to_a_triangle_is_that_of_its_nearest_sample():
@@ -64,7 +67,7 @@ def test_the_distance_to_a_triangle_is_that_of_its_nearest_sample():
     u = RNG.dirichlet([0.5, 0.5, 0.5], 200_000)
     for point in RNG.normal(size=(20, 3)) * 2:
         sampled = np.linalg.norm(u @ triangle - point, axis=1).min()
-        found = SurfaceDistance(soup_of(triangle[None]))(point[None])[0]
+        found = triangle_distance(point[None], triangle[None])[0]
         assert found <= sampled + 1e-12
         assert found == pytest.approx(sampled, abs=0.02)
 
