@@ -24,6 +24,12 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.fixture(autouse=True)
+def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What installs an extra is said as seen from the folder that one stands in."""
+    monkeypatch.chdir(tmp_path)
+
+
 def alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Run a command in a folder, in a process that finds none of the hidden modules."""
     return subprocess.run([sys.executable, "-c", _ALONE, *words], cwd=folder, capture_output=True, text=True)

@@ -46,6 +46,6 @@ class Extra:
 BAGS = Extra("bags", ("rosbags",), "setup")
 FIGURES = Extra("figures", ("matplotlib",), "setup")
 FRANKA = Extra("franka", ("panda_py", "pylibfranka", "ruckig"), "franka")
-MESHES = Extra("meshes", ("collada", "trimesh"), "meshes")
+MESHES = Extra("meshes", ("collada",), "meshes")
 ROS2 = Extra("ros2", ("cyclonedds", "rosbags"), "ros2")
-VIEWER = Extra("viewer", ("trimesh", "viser"), "setup")
+VIEWER = Extra("viewer", ("viser",), "setup")

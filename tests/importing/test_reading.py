@@ -209,17 +209,20 @@ def test_a_package_is_found_in_the_path_given(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
-        ("a.stl", b"", "is damaged"),
-        ("a.stl", b"\0" * 100, "is damaged: its length"),
-        ("a.stl", b"\0" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "is damaged: its length"),
-        ("a.stl", b"solid x\nvertex 0 0 zero\n", "is damaged: line 2 holds no three numbers"),
-        ("a.stl", b"solid x\nvertex 0 0\n", "is damaged: line 2 holds no three numbers"),
-        ("a.stl", b"solid x\nvertex 0 0 1\n", "is damaged: 1 corners make no triangles"),
+        ("a.stl", b"", "holds no triangle, or is cut off"),
+        ("a.stl", b"\0" * 100, "holds no triangle, or is cut off"),
+        ("a.stl", b"\0" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "holds no triangle, or is cut off"),
+        ("a.stl", b"version https://git-lfs.github.com/spec/v1\n", "holds no triangle, or is cut off"),
+        ("a.stl", ASCII_STL[:-12].encode(), "holds no triangle, or is cut off"),
+        ("a.stl", ASCII_STL.replace("0 50 0", "0 50 zero").encode(), "is damaged: .* could not be read to its end"),
+        ("a.stl", ASCII_STL.replace("0 50 0", "0 50").encode(), "is damaged: incorrect number of vertices"),
+        ("a.stl", ASCII_STL.replace("vertex 0 50 0", "").encode(), "is damaged: .* array of size 2"),
         ("a.stl", ASCII_STL.replace("0 50 0", "50 0 0").encode(), "has no area"),
         ("a.obj", b"v 0 0 0\nf a b c\n", "is damaged: line 2 names no corners by number"),
         ("a.stl", ASCII_STL.replace("100", "nan").encode(), "a coordinate is no finite number"),
         ("a.obj", b"v 0 0 0\nf 1 2 3\n", "a corner that is not there"),
         ("a.obj", b"v 0 0\nf 1 1 1\n", "is damaged: line 1 holds no three numbers"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "a corner that is not there"),
         ("a.obj", b"", "holds no triangle"),
         ("a.dae", b"<COLLADA", "is damaged|extra 'meshes'"),
         ("a.passwd", b"root:x", "none that can be read: use .stl, .obj, .dae"),
@@ -231,6 +234,11 @@ def test_a_broken_mesh_is_refused_in_one_sentence(tmp_path, name, content, sente
         read_mesh(tmp_path / name)
     assert re.search(re.escape(name), str(caught.value))
     assert "root:x" not in str(caught.value)
+
+
+def test_corners_of_an_obj_may_be_counted_backwards_from_where_they_are_named(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 9 9 9\n")
+    assert read_mesh(tmp_path / "a.obj").triangles.max() == 1
 
 
 def test_a_binary_stl_is_read(tmp_path):

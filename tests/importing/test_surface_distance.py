@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import trimesh
 
 from pretouch.importing.capsule_fit import points_around
 from pretouch.importing.sampling import directions, spread
@@ -39,7 +40,7 @@ def test_distances_to_a_capsule_are_off_by_its_corners_only(solid, a):
 def test_a_solid_is_closed_and_faces_outwards(solid):
     triangles = surface_of((Shape(solid, np.eye(4)),))
     edges = np.sort(np.concatenate([triangles.faces[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
-    corners = triangles.corners
+    corners = triangles.triangles
     volume = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
     wanted = {Cylinder: np.pi * 0.05**2 * 0.2, Ellipsoid: 4 / 3 * np.pi * 0.03 * 0.05 * 0.1, Block: 0.048}[type(solid)]
     assert len(edges) == 3 * len(triangles.faces)
@@ -49,11 +50,16 @@ def test_a_solid_is_closed_and_faces_outwards(solid):
 def test_nothing_is_missed_by_leaving_far_triangles_out():
     soup = RNG.normal(size=(60, 3, 3)) * 0.3
     points = RNG.normal(size=(150, 3))
-    from pretouch.importing.meshes import Surface
-
-    found = SurfaceDistance(Surface(soup.reshape(-1, 3), np.arange(180).reshape(-1, 3)))
+    found = SurfaceDistance(trimesh.Trimesh(**trimesh.triangles.to_kwargs(soup), process=False))
     each = [triangle_distance(np.repeat(p[None], 60, axis=0), soup).min() for p in points]
     assert found(points) == pytest.approx(np.array(each), abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-4])
+def test_the_distance_to_a_triangle_is_as_exact_where_it_is_small(size):
+    triangles, points = RNG.normal(size=(200, 3, 3)), RNG.normal(size=(200, 3))
+    large, small = triangle_distance(points, triangles), triangle_distance(size * points, size * triangles)
+    assert small / size == pytest.approx(large, abs=1e-9)
 
 
 def test_the_distance_to_a_triangle_is_that_of_its_nearest_sample():

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from trimesh import Trimesh
 
 from pretouch.errors import RobotModelError
 from pretouch.importing.capsule_fit import MOST, Rods, covering, farthest_out, fitted, points_around
 from pretouch.importing.chain import Arm
-from pretouch.importing.meshes import Surface
 from pretouch.importing.solids import Rounded, Shape, surface_of
 from pretouch.importing.surface_distance import SurfaceDistance
 from pretouch.types import FloatArray
@@ -93,10 +93,10 @@ def _moving(arm: Arm) -> list[int]:
     return [i for i in range(len(arm.source.links)) if any(arm.source.links[k].joints for k in arm.source.ancestors(i))]
 
 
-def _surface(link: str, shapes: tuple[Shape, ...]) -> Surface:
+def _surface(link: str, shapes: tuple[Shape, ...]) -> Trimesh:
     """Return the triangles of a link; one of no possible size is a RobotModelError."""
     surface = surface_of(shapes)
-    size = float(np.ptp(surface.corners.reshape(-1, 3), axis=0).max())
+    size = float(surface.extents.max())
     if size > _LARGEST:
         raise RobotModelError(
             f"The link {link} is {size:.4g} m long: if its meshes are in millimetres, give them the scale"

@@ -23,8 +23,6 @@ class Arm:
     """Index of the end-effector's link."""
     joints: tuple[SourceJoint, ...]
     """The n joints from base to end-effector."""
-    mount: int
-    """Index of the link that the last joint moves: the end-effector is fixed to it."""
     remarks: tuple[str, ...]
     """What was chosen or fixed, a sentence each."""
 
@@ -57,8 +55,7 @@ def arm_of(source: Source, ee: str = "") -> Arm:
             f"{_counted(fixed)} off the arm {'is' if len(fixed) == 1 else 'are'} fixed at 0, or at the nearest limit:"
             f" {', '.join(fixed)}. Give fingers that are to be closed otherwise their place in the file."
         )
-    mount = max(i for i in way if source.links[i].joints)
-    return Arm(Source(source.name, links), end, joints, mount, tuple(remarks))
+    return Arm(Source(source.name, links), end, joints, tuple(remarks))
 
 
 def _counted(names: list[str]) -> str:

@@ -1,38 +1,24 @@
-"""Mesh files: where those are that a URDF names, and their triangles. STL and OBJ by ourselves, COLLADA by trimesh."""
+"""Mesh files: where those are that a URDF names, and their triangles, STL and COLLADA read by trimesh.
+
+OBJ is read here: trimesh 5.2 takes the corner 0, and corners counted backwards before the last vertex, for other ones.
+"""
 
 import warnings
-from dataclasses import dataclass
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 from pretouch.errors import RobotModelError
 from pretouch.extras import MESHES
-from pretouch.types import FloatArray, IntArray
 
 _SCHEMES = ("package://", "model://")
 SUFFIXES = (".stl", ".obj", ".dae")
 _LARGEST_FILE = 200_000_000
 """[bytes]"""
 _MOST_TRIANGLES = 1_000_000
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_HEADER = 84
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Triangles."""
-
-    vertices: FloatArray
-    """(V, 3) [m]."""
-    faces: IntArray
-    """(F, 3) indices of each triangle's corners, anticlockwise seen from outside."""
-
-    @property
-    def corners(self) -> FloatArray:
-        """Corners (F, 3, 3) of the triangles [m]."""
-        return self.vertices[self.faces]
 
 
 class MeshFinder:
@@ -81,52 +67,53 @@ class MeshFinder:
         return None
 
 
-def read_mesh(path: Path) -> Surface:
-    """Read a mesh file, as its suffix says. What is wrong with it is a RobotModelError that names it."""
+def read_mesh(path: Path) -> trimesh.Trimesh:
+    """Read a mesh file, as its suffix says. What is wrong with it is a RobotModelError that names it.
+
+    Vertices at one place are one. Nothing but the file itself is read: no materials or textures beside it.
+    """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise RobotModelError(f"The mesh {path} is none that can be read: use {', '.join(SUFFIXES)}.")
+    if suffix == ".dae":
+        MESHES.need(f"The mesh {path}, a COLLADA file,")
     try:
-        size = path.stat().st_size
-        if not path.is_file() or size > _LARGEST_FILE:
+        if not path.is_file() or path.stat().st_size > _LARGEST_FILE:
             raise RobotModelError(
                 f"The mesh {path} is no file of at most {_LARGEST_FILE // 10**6} MB: make it coarser."
             )
-        read = _collada(path) if suffix == ".dae" else (_stl if suffix == ".stl" else _obj)(path.read_bytes())
+        data = path.read_bytes()
     except OSError as error:
         raise RobotModelError(f"The mesh {path} cannot be read: {error.strerror}.") from error
-    except (ValueError, IndexError, OverflowError) as error:
-        raise RobotModelError(f"The mesh {path} is damaged: {error}.") from error
-    _check(read, path)
-    return read
+    try:
+        mesh = _obj(data) if suffix == ".obj" else _by_trimesh(data, suffix[1:])
+    except Exception as error:  # whatever a library makes of a broken file
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise RobotModelError(f"The mesh {path} is damaged: {reason}.") from error
+    _check(mesh, path)
+    mesh.merge_vertices()
+    return mesh
 
 
-def _check(read: Surface, path: Path) -> None:
+def _by_trimesh(data: bytes, kind: str) -> trimesh.Trimesh:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.filterwarnings("error", "string or file could not be read")  # NumPy would leave the rest out
+        scene = trimesh.load_scene(BytesIO(data), kind, process=False)
+        return (scene.convert_units("meters") if scene.units else scene).to_mesh()
+
+
+def _check(read: trimesh.Trimesh, path: Path) -> None:
     if not len(read.faces):
-        raise RobotModelError(f"The mesh {path} holds no triangle: give one that does.")
+        raise RobotModelError(f"The mesh {path} holds no triangle, or is cut off: give one that is whole.")
     if len(read.faces) > _MOST_TRIANGLES:
         raise RobotModelError(
             f"The mesh {path} has {len(read.faces)} triangles: make it coarser, {_MOST_TRIANGLES} at most."
         )
-    if not np.all(np.isfinite(used := read.corners)):
+    if not np.all(np.isfinite(read.triangles)):
         raise RobotModelError(f"The mesh {path} is damaged: a coordinate is no finite number.")
-    if not np.any(np.cross(used[:, 1] - used[:, 0], used[:, 2] - used[:, 0])):
+    if not np.any(read.triangles_cross):
         raise RobotModelError(f"The mesh {path} has no area, its triangles are lines or points: give one that has.")
-
-
-def _stl(data: bytes) -> Surface:
-    if len(data) >= _HEADER:
-        count = int(np.frombuffer(data, "<u4", 1, 80)[0])
-        if len(data) == _HEADER + count * _RECORD.itemsize:
-            corners = np.frombuffer(data, _RECORD, count, _HEADER)["corners"].astype(np.float64)
-            return _joined(corners)
-    if not data.lstrip()[:5].lower() == b"solid":
-        raise ValueError("its length is not what its number of triangles asks for")
-    lines = data.decode("ascii", "replace").splitlines()
-    places = [_three(line.split()[1:], k) for k, line in enumerate(lines, 1) if "vertex" in line]
-    if len(places) % 3:
-        raise ValueError(f"{len(places)} corners make no triangles")
-    return _joined(np.array(places, dtype=np.float64).reshape(-1, 3, 3))
 
 
 def _three(words: list[str], line: int) -> list[float]:
@@ -138,13 +125,7 @@ def _three(words: list[str], line: int) -> list[float]:
     return [x, y, z]
 
 
-def _joined(corners: FloatArray) -> Surface:
-    """Give corners (F, 3, 3) at the same place one vertex."""
-    vertices, index = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    return Surface(vertices, index.reshape(-1, 3).astype(np.int64))
-
-
-def _obj(data: bytes) -> Surface:
+def _obj(data: bytes) -> trimesh.Trimesh:
     vertices: list[list[float]] = []
     faces: list[tuple[int, int, int]] = []
     for k, line in enumerate(data.decode("utf-8", "replace").splitlines(), 1):
@@ -161,19 +142,4 @@ def _obj(data: bytes) -> Surface:
     index = np.array(faces, dtype=np.int64).reshape(-1, 3)
     if len(index) and (index.min() < 0 or index.max() >= len(vertices)):
         raise ValueError("a triangle has a corner that is not there")
-    return Surface(np.array(vertices, dtype=np.float64).reshape(-1, 3), index)
-
-
-def _collada(path: Path) -> Surface:
-    MESHES.need(f"The mesh {path}, a COLLADA file,")
-    import trimesh
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            scene = trimesh.load_scene(path)
-            mesh = (scene.convert_units("meters") if scene.units else scene).to_mesh()
-            return Surface(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64))
-    except Exception as error:  # whatever a library makes of a broken file
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise RobotModelError(f"The mesh {path} is damaged: {reason}.") from error
+    return trimesh.Trimesh(np.array(vertices).reshape(-1, 3), index, process=False)

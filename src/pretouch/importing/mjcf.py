@@ -4,9 +4,9 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from trimesh import Trimesh
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.meshes import Surface
 from pretouch.importing.solids import Block, Cylinder, Ellipsoid, Rounded, Shape
 from pretouch.importing.source import WORLD, Inertial, Source, SourceJoint, SourceLink
 from pretouch.types import FloatArray
@@ -112,13 +112,10 @@ def _shape(model: mujoco.MjModel, g: int) -> Shape | None:
     return None
 
 
-def _mesh(model: mujoco.MjModel, mesh: int) -> Surface:
+def _mesh(model: mujoco.MjModel, mesh: int) -> Trimesh:
     first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
     face, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    return Surface(
-        model.mesh_vert[first : first + count].astype(np.float64),
-        model.mesh_face[face : face + faces].astype(np.int64),
-    )
+    return Trimesh(model.mesh_vert[first : first + count], model.mesh_face[face : face + faces], process=False)
 
 
 def _pose(position: FloatArray, quaternion: FloatArray) -> FloatArray:

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from trimesh import Trimesh, creation
+from trimesh.util import append_faces
 
-from pretouch.importing.meshes import Surface, read_mesh
+from pretouch.importing.meshes import read_mesh
 from pretouch.types import FloatArray
 
 _TURN = 48
@@ -59,55 +61,29 @@ class MeshFile:
 class Shape:
     """A solid at a place on its link."""
 
-    solid: Block | Cylinder | Rounded | Ellipsoid | MeshFile | Surface
+    solid: Block | Cylinder | Rounded | Ellipsoid | MeshFile | Trimesh
     T_link_solid: FloatArray
     """(4, 4)"""
 
 
-def surface_of(shapes: tuple[Shape, ...]) -> Surface:
+def surface_of(shapes: tuple[Shape, ...]) -> Trimesh:
     """Return the triangles of all shapes of a link, link frame."""
-    vertices, faces, count = [], [], 0
-    for shape in shapes:
-        one = _triangles(shape.solid)
-        vertices.append(one.vertices @ shape.T_link_solid[:3, :3].T + shape.T_link_solid[:3, 3])
-        faces.append(one.faces + count)
-        count += len(one.vertices)
-    return Surface(np.concatenate(vertices), np.concatenate(faces))
+    placed = [_triangles(shape.solid).copy().apply_transform(shape.T_link_solid) for shape in shapes]
+    return Trimesh(*append_faces([one.vertices for one in placed], [one.faces for one in placed]), process=False)
 
 
-def _triangles(solid: Block | Cylinder | Rounded | Ellipsoid | MeshFile | Surface) -> Surface:
+def _triangles(solid: Block | Cylinder | Rounded | Ellipsoid | MeshFile | Trimesh) -> Trimesh:
+    # round solids are made of radius 1 [m], since trimesh leaves out triangles below a fixed area
     match solid:
-        case Surface():
+        case Trimesh():
             return solid
         case MeshFile(find, scale):
-            read = read_mesh(find())
-            # a mirrored mesh is turned inside out, or its triangles would face inwards
-            faces = read.faces if np.prod(scale) > 0 else read.faces[:, ::-1]
-            return Surface(read.vertices * np.array(scale), faces)
+            return read_mesh(find()).apply_scale(scale)
         case Block(half):
-            profile = np.array([[0.0, -1.0], [np.sqrt(2), -1.0], [np.sqrt(2), 1.0], [0.0, 1.0]])
-            return _revolved(profile, 4, np.pi / 4, np.array(half))
+            return creation.box(2 * np.array(half))
         case Cylinder(radius, half):
-            profile = np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]])
-            return _revolved(profile, _TURN)
+            return creation.cylinder(1.0, 2 * half / radius, _TURN).apply_scale(radius)
         case Rounded(radius, half):
-            angle = np.linspace(-np.pi / 2, np.pi / 2, _TURN // 2 + 2)
-            height = radius * np.sin(angle) + np.where(angle > 0, half, -half)
-            return _revolved(np.column_stack([radius * np.cos(angle), height]), _TURN)
+            return creation.capsule(2 * half / radius, 1.0, (_TURN // 2, _TURN)).apply_scale(radius)
         case Ellipsoid(half):
-            angle = np.linspace(-np.pi / 2, np.pi / 2, _TURN // 2 + 1)
-            return _revolved(np.column_stack([np.cos(angle), np.sin(angle)]), _TURN, 0.0, np.array(half))
-
-
-def _revolved(profile: FloatArray, turns: int, first: float = 0.0, scale: FloatArray | float = 1.0) -> Surface:
-    """Turn a profile (P, 2) of radius and height, from the lower end of the axis to the upper, about z."""
-    angle = first + 2 * np.pi * np.arange(turns) / turns
-    radius, height = profile[:, 0, None], np.repeat(profile[:, 1, None], turns, axis=1)
-    vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1).reshape(-1, 3)
-    row, column = np.meshgrid(np.arange(len(profile) - 1), np.arange(turns), indexing="ij")
-    a, b = row * turns + column, row * turns + (column + 1) % turns
-    c, d = b + turns, a + turns
-    faces = np.concatenate([np.stack([a, b, c], axis=-1).reshape(-1, 3), np.stack([a, c, d], axis=-1).reshape(-1, 3)])
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return Surface(vertices * scale, faces[area > 0].astype(np.int64))
+            return creation.uv_sphere(1.0, (_TURN // 2, _TURN // 2)).apply_scale(half)

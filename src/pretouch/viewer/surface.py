@@ -29,17 +29,6 @@ class Mesh:
     """(V, 3) unit vectors, outwards."""
 
 
-def normals_of(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return unit normals (V, 3), the mean of the faces that meet in each vertex by their area."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    across = np.cross(b - a, c - a)
-    total = np.zeros_like(vertices)
-    for i in range(3):
-        np.add.at(total, faces[:, i], across)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return total / np.maximum(length, 1e-12)
-
-
 def signed_distance(points: FloatArray, capsules: Capsules) -> FloatArray:
     """Distance (P,) [m] of points (P, 3) from the union of capsules, blended where they meet; negative inside."""
     total: FloatArray | None = None

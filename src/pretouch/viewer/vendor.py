@@ -2,14 +2,14 @@
 
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import trimesh
 
 from pretouch.extras import MESHES
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
-from pretouch.viewer.surface import Mesh, normals_of
+from pretouch.viewer.surface import Mesh
 
 CELL_M = 0.006
 """Size of the cells whose vertices are merged into one [m]."""
@@ -29,13 +29,9 @@ def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
     if folder is None or MESHES.missing():
         return {}, f"The arm is drawn by its capsules: for the vendor's surfaces, run {MESHES.command}"
 
-    import trimesh
-
-    divided: Any = trimesh.remesh.subdivide_to_size
-
     def read(name: str) -> tuple[FloatArray, IntArray]:
         mesh = trimesh.load_scene(folder / f"{name}.dae").to_mesh()
-        vertices, faces = divided(mesh.vertices, mesh.faces, max_edge=_EDGE_M)
+        vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=_EDGE_M)
         return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
 
     found = {i: coarse(*read(link.removeprefix("panda_"))) for i, link in enumerate(model.links) if _has_one(link)}
@@ -58,7 +54,8 @@ def coarse(vertices: FloatArray, faces: IntArray, cell: float = CELL_M) -> Mesh:
     kept = kept[np.sort(first)]
     used, renumbered = np.unique(kept, return_inverse=True)
     corners = renumbered.reshape(-1, 3).astype(np.int64)
-    return Mesh(merged[used], corners, normals_of(merged[used], corners))
+    found = trimesh.Trimesh(merged[used], corners, process=False)
+    return Mesh(merged[used], corners, np.array(found.vertex_normals))
 
 
 def _has_one(link: str) -> bool:
