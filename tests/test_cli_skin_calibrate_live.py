@@ -20,7 +20,7 @@ from pretouch.errors import HardwareError, RecordingError
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.sensing.skin import load_skin
-from pretouch.session.signals import signals_noted
+from pretouch.signals import noted_in_motion
 from pretouch.types import RobotState
 from tests.calibrated_arm import swinging
 from tests.ports import free_port
@@ -131,7 +131,7 @@ def test_ctrl_c_comes_once_the_arm_is_at_rest(session, panda_model):
 def test_signals_that_are_ignored_stay_so():
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with signals_noted() as came:
+        with noted_in_motion() as came:
             signal.raise_signal(signal.SIGHUP)
         assert came == []
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
@@ -149,7 +149,7 @@ def test_the_signal_that_came_first_ends_the_command_whatever_comes_while_others
             signal.raise_signal(signal.SIGINT)
         return before
 
-    with ends_raise(), suppress(Terminated, KeyboardInterrupt), signals_noted() as came:
+    with ends_raise(), suppress(Terminated, KeyboardInterrupt), noted_in_motion() as came:
         monkeypatch.setattr(signal, "signal", interrupted)
         signal.raise_signal(signal.SIGTERM)
         signal.raise_signal(signal.SIGINT)

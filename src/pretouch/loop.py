@@ -1,13 +1,11 @@
 """The only clock of the package, and the loop that turns the controller: read, step, command, record."""
 
 import math
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from types import FrameType
+from signal import SIGINT, SIGTERM
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +15,7 @@ from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
 from pretouch.ports import Clock, Points, Robot, Skin, imu_of, touch_of
+from pretouch.signals import noted
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, TouchReadings
 from pretouch.values import value
 
@@ -197,7 +196,7 @@ def run(
             if done(cycle.step):
                 return
     finally:
-        with undisturbed():
+        with noted(SIGINT, SIGTERM):  # until the arm is at rest
             come_to_rest(controller.limits, robot, clock, state.watch.robot.q_commanded, sent)
 
 
@@ -226,27 +225,6 @@ def _instant(
             stamps = np.asarray(stamp, dtype=np.float64)
             latest = max(latest, float(stamps[(stamps > tick) & (stamps <= tick + period)].max(initial=tick)))
     return latest
-
-
-@contextmanager
-def undisturbed() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM wait until what is under way has ended: an arm on its way to rest."""
-    came: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        came.append(number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield  # signals reach the main thread alone
-        return
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for ours, handler in before.items():
-            signal.signal(ours, handler)
-        for number in came[:1]:
-            signal.raise_signal(number)
 
 
 def come_to_rest(limits: JointLimits, robot: Robot, clock: Clock, q: FloatArray, qd: FloatArray) -> None:

@@ -4,13 +4,10 @@ import ctypes
 import gc
 import math
 import os
-import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from types import FrameType
 
 import numpy as np
 
@@ -19,6 +16,7 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.ports import Points, Robot, Skin
+from pretouch.signals import ended_in_order
 from pretouch.types import (
     ControlStep,
     FloatArray,
@@ -80,7 +78,7 @@ def run(
             " make them the same (params.at_rate makes a profile for another rate)."
         )
     warm_up(controller, robot.read(), points is not None)
-    with _ended_in_order(), real_time(priority, cpu) as missing:
+    with ended_in_order(), real_time(priority, cpu) as missing:
         for sentence in missing:
             tell(sentence)
         _await_news(robot)
@@ -97,24 +95,6 @@ def _await_news(robot: Robot) -> None:
     now = begun = looks.tick()
     while not robot.read().stamp >= begun and now < begun + _NEWS_S:
         now = looks.tick()
-
-
-@contextmanager
-def _ended_in_order() -> Iterator[None]:
-    """Turn the signals that end a process at once into an exception, so that the loop can brake."""
-
-    def end(number: int, _frame: FrameType | None) -> None:
-        raise SystemExit(128 + number)
-
-    numbers = (signal.SIGTERM, signal.SIGHUP) if threading.current_thread() is threading.main_thread() else ()
-    ours = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
-    for number in ours:
-        signal.signal(number, end)
-    try:
-        yield
-    finally:
-        for number in ours:
-            signal.signal(number, signal.SIG_DFL)
 
 
 @contextmanager

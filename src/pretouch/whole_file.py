@@ -1,8 +1,10 @@
-"""A text file that is replaced whole or not at all."""
+"""A file that is replaced whole or not at all."""
 
 import json
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -17,13 +19,19 @@ def write_whole(path: Path, text: str) -> None:
     if place.exists() and not place.is_file() and not place.is_dir():
         place.write_text(text, encoding="utf-8")
         return
+    with replaced_whole(place) as unfinished, unfinished.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextmanager
+def replaced_whole(place: Path) -> Iterator[Path]:
+    """Give a path beside a file's place; what is written there replaces the file, or is gone after an exception."""
     name = sha256(os.fsencode(place.name)).hexdigest()[:16]  # as short for a long name
     unfinished = place.with_name(f".{name}.{os.getpid()}.tmp")
     try:
-        with unfinished.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
+        yield unfinished
         if place.is_file():
             shutil.copymode(place, unfinished)
         os.replace(unfinished, place)

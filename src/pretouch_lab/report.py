@@ -2,12 +2,11 @@
 
 from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
 
-from pretouch import __version__
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.text_table import TextTable
+from pretouch.reporting.html import Html, document, element, joined, titled_table
+from pretouch.text_table import markdown
 from pretouch_lab.campaign import Request, recording_file
 from pretouch_lab.cell import Cell
 from pretouch_lab.experiment import Experiment, Picture, Row, Sources
@@ -15,30 +14,10 @@ from pretouch_lab.registry import GROUPS
 from pretouch_lab.trace import Trace, read_trace
 from pretouch_lab.worlds import sentence
 
-_PAGE = Template(
-    """<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>$title</title>
-<style>
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
-table { border-collapse: collapse; margin: 1rem 0; font-size: .85rem; }
-th, td { border-bottom: 1px solid #ccc; padding: .3rem .6rem; text-align: right; }
-th:first-child, td:first-child, .two th:nth-child(2), .two td:nth-child(2) { text-align: left; }
-img { max-width: 100%; }
-.note { color: #555; }
-</style>
-<h1>$title</h1>
-<details><summary>What was run</summary><p>$about</p></details>
-<ul>
-$contents
-</ul>
-$body
-<p class="note">Simulation is not hardware: all of this ran on a simulated Panda whose masses, friction, noise and
-delays are errors of the size found on real arms. Pretouch $version.</p>
-</html>
-"""
+_TITLE = "Contact anticipation in simulation"
+_NOTE = (
+    "Simulation is not hardware: all of this ran on a simulated Panda whose masses, friction, noise and delays are"
+    " errors of the size found on real arms."
 )
 
 
@@ -54,29 +33,27 @@ def write_report(parts: list[tuple[Request, Path]], summary: dict[str, Any], fol
 
 
 def _write(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: Path) -> Path:
-    contents, body, words = [], [], []
+    contents: list[Html] = []
+    sections: list[Html] = []
+    words: list[str] = []
     for title, group in GROUPS.items():
         shown = [experiment for experiment in group if experiment.name in summary]
-        if shown:
-            links = ", ".join(f'<a href="#{e.name}">{e.name}</a>' for e in shown)
-            contents.append(f"<li>{escape(title)}: {links}</li>")
-            body.append(f"<h2>{escape(title)}</h2>")
+        if not shown:
+            continue
+        links = joined((Html(f'<a href="#{e.name}">{e.name}</a>') for e in shown), ", ")
+        contents.append(element("li", joined([f"{title}: ", links], "")))
+        parts_of: list[Html] = [element("h2", title)]
         for experiment in shown:
             made = experiment.tables(summary[experiment.name])
-            body.append(f'<div id="{experiment.name}">')
-            body += [_table(table) for table in made]
-            words += [_markdown(table) for table in made]
-            body += [*_pictures(parts, experiment, summary[experiment.name], folder), "</div>"]
-    body += ["<h2>This implementation</h2>", _picture(_framework(), folder)]
+            words += [markdown(table, 2) for table in made]
+            drawn = _pictures(parts, experiment, summary[experiment.name], folder)
+            parts_of.append(element("div", joined([*map(titled_table, made), *drawn]), anchor=experiment.name))
+        sections.append(element("section", joined(parts_of)))
+    own = [element("h2", "This implementation"), _picture(_framework(), folder)]
+    ran = element("summary", "What was run") + element("p", joined((_about(request) for request, _ in parts), "<br>"))
+    head = [element("h1", _TITLE), element("details", Html(ran)), element("ul", joined(contents))]
     page = folder / "index.html"
-    text = _PAGE.substitute(
-        title="Contact anticipation in simulation",
-        about="<br>".join(escape(_about(request)) for request, _ in parts),
-        contents="\n".join(contents),
-        body="\n".join(body),
-        version=__version__,
-    )
-    page.write_text(text, encoding="utf-8")
+    page.write_text(document(_TITLE, joined([*head, *sections, element("section", joined(own))]), _NOTE), "utf-8")
     (folder / "tables.md").write_text("\n".join(words), encoding="utf-8")
     return page
 
@@ -97,13 +74,13 @@ def _framework() -> Picture:
     return Picture("framework", "One control step, block by block", framework_figure())
 
 
-def _picture(picture: Picture, folder: Path) -> str:
+def _picture(picture: Picture, folder: Path) -> Html:
     file = f"{picture.name}.png"
     picture.figure.savefig(folder / file, dpi=120)
-    return f'<p><img src="{escape(file)}" alt="{escape(picture.text)}"></p>'
+    return element("figure", Html(f'<img src="{escape(file)}" alt="{escape(picture.text)}">'))
 
 
-def _pictures(parts: list[tuple[Request, Path]], experiment: Experiment, summary: Row, folder: Path) -> list[str]:
+def _pictures(parts: list[tuple[Request, Path]], experiment: Experiment, summary: Row, folder: Path) -> list[Html]:
     """Draw what an experiment's recordings of the first seed and its summary allow; return it as HTML."""
     sources = Sources(summary, lambda cell: find_trace([out for _, out in parts], cell), parts[0][0].context().skin.ids)
     return [_picture(picture, folder) for picture in experiment.draw(sources)]
@@ -117,25 +94,3 @@ def find_trace(folders: list[Path], cell: Cell) -> Trace | None:
         except PretouchError:
             continue
     return None
-
-
-def _table(table: TextTable) -> str:
-    head = "".join(f"<th>{_lines(text)}</th>" for text in table.header)
-    rows = "\n".join("<tr>" + "".join(f"<td>{_lines(text)}</td>" for text in row) + "</tr>" for row in table.rows)
-    note = f'<p class="note">{escape(table.note)}</p>'
-    kind = ' class="two"' if table.names > 1 else ""
-    return f"<h3>{escape(table.title)}</h3>\n<table{kind}><tr>{head}</tr>\n{rows}</table>\n{note}"
-
-
-def _markdown(table: TextTable) -> str:
-    lines = [f"## {table.title}", "", _markdown_row(table.header), _markdown_row(("---",) * len(table.header))]
-    return "\n".join([*lines, *map(_markdown_row, table.rows), "", table.note, ""])
-
-
-def _markdown_row(texts: tuple[str, ...]) -> str:
-    cells = (text.replace("|", "\\|").replace("\n", "<br>") for text in texts)
-    return f"| {' | '.join(cells)} |"
-
-
-def _lines(text: str) -> str:
-    return escape(text).replace("\n", "<br>")

@@ -1,8 +1,9 @@
 """The summaries of the three experiments as tables, for the terminal and for the page."""
 
+from collections.abc import Callable
 from typing import Any
 
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 
 Row = dict[str, Any]
 
@@ -139,22 +140,19 @@ def _its_ratio(ratios: list[Row], cell: Row) -> list[Row]:
 
 def dynamic_tables(part: Row) -> list[TextTable]:
     """How the arm answered the pushes."""
-    rows = tuple(
-        (
-            controller(cell, part["cells"]),
-            f"{cell['detected']} of {cell['pushes']}",
-            number(cell["delay_s"], 0, 1000),
-            number(cell["direction_error_deg"], 1),
-            number(cell["peak_estimate_n"], 1),
-            str(cell["reactions_towards_person"]),
-            str(cell["false_detections"]),
-        )
-        for cell in part["cells"]
+    columns = (
+        ("profile", lambda cell: controller(cell, part["cells"])),
+        ("felt", share("detected", "pushes", between=" of ")),
+        ("delay\n[ms]", median("delay_s", 0, 1000)),
+        ("direction\n[deg]", median("direction_error_deg", 1)),
+        ("peak\n[N]", median("peak_estimate_n", 1)),
+        ("towards\nperson", plain("reactions_towards_person")),
+        ("false", plain("false_detections")),
     )
-    table = TextTable(
+    table = tabulated(
         "A person pushes the moving arm: medians",
-        ("profile", "felt", "delay\n[ms]", "direction\n[deg]", "peak\n[N]", "towards\nperson", "false"),
-        rows,
+        columns,
+        part["cells"],
         "Pushes of 15 to 30 N for 0.2 to 0.5 s. Direction: between reaction and true force. Peak: of the estimate."
         " Towards person: pushes after which a reaction began against the push.",
         names=1,
@@ -164,34 +162,21 @@ def dynamic_tables(part: Row) -> list[TextTable]:
 
 def avoidance_tables(part: Row) -> list[TextTable]:
     """What a hand beside the path or in it changes."""
-    rows = tuple(
-        (
-            cell["place"],
-            controller(cell, part["cells"]),
-            f"{100 * cell['contact_fraction']:.0f}",
-            number(cell["true_peak_n"], 1),
-            number(cell["least_gap_m"], 3),
-            number(cell["deviation_m"], 3),
-            number(cell["least_speed_scale"], 2),
-            number(cell["travelled_m"], 2),
-            str(cell["false_detections"]),
-        )
-        for cell in part["cells"]
+    columns = (
+        ("hand", plain("place")),
+        ("profile", lambda cell: controller(cell, part["cells"])),
+        ("contact\n[%]", plain("contact_fraction", ".0f", 100)),
+        ("true\n[N]", median("true_peak_n", 1)),
+        ("least\ngap [m]", median("least_gap_m", 3)),
+        ("off path\n[m]", median("deviation_m", 3)),
+        ("least\nspeed", median("least_speed_scale", 2)),
+        ("way\n[m]", median("travelled_m", 2)),
+        ("false", plain("false_detections")),
     )
-    table = TextTable(
+    table = tabulated(
         "A person holds a hand beside the path or into it: medians",
-        (
-            "hand",
-            "profile",
-            "contact\n[%]",
-            "true\n[N]",
-            "least\ngap [m]",
-            "off path\n[m]",
-            "least\nspeed",
-            "way\n[m]",
-            "false",
-        ),
-        rows,
+        columns,
+        part["cells"],
         "Beside is 3 cm clear of the robot's hand on its free path, inside half of the person's hand is in its way."
         " True: peak of the true force. Gap: between the person's hand and the arm, negative in contact. Least speed:"
         " factor of eqs. 3 and 4. Way: travelled along the path in 40 s.",
@@ -208,6 +193,21 @@ def controller(cell: Row, cells: list[Row]) -> str:
 def number(value: Row | None, digits: int, factor: float = 1.0) -> str:
     """Write the median of a spread, or a dash where there is none."""
     return "-" if value is None else f"{factor * value['median']:.{digits}f}"
+
+
+def plain(key: str, written: str = "", factor: float | None = None) -> Callable[[Row], str]:
+    """Write a row's value in a format, times a factor if one is given."""
+    return lambda row: format(row[key] if factor is None else factor * row[key], written)
+
+
+def median(key: str, digits: int, factor: float = 1.0) -> Callable[[Row], str]:
+    """Write the median of a row's spread by `number`."""
+    return lambda row: number(row[key], digits, factor)
+
+
+def share(key: str, whole: str = "trials", between: str = "/") -> Callable[[Row], str]:
+    """Write how many of a row's trials, or of another number of it."""
+    return lambda row: f"{row[key]}{between}{row[whole]}"
 
 
 def with_spread(value: Row | None, digits: int, factor: float = 1.0) -> str:

@@ -7,7 +7,8 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
-from types import FrameType
+
+from pretouch.signals import kept_from_children, leave_to_parent, noted
 
 
 @contextmanager
@@ -30,21 +31,13 @@ def interrupt_held_back() -> Iterator[None]:
 
     Here it may come by another thread of a library, which this one's mask does not keep from calling the handler.
     """
-    came: list[tuple[int, FrameType | None]] = []
-    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append((number, frame)))
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
+    with noted(signal.SIGINT), kept_from_children({signal.SIGINT}):
         yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        signal.signal(signal.SIGINT, handler)
-        if came and callable(handler):
-            handler(*came[0])
 
 
 def _start() -> None:
     """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_to_parent({signal.SIGINT})
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     Thread(target=_end_with_parent, daemon=True).start()
 

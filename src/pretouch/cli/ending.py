@@ -3,12 +3,13 @@
 Code that a signal comes by in a callback of a C library may swallow what is raised there; a loop asks `ended` too.
 """
 
-import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from signal import SIGINT
 from types import FrameType
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+from pretouch.signals import ENDING, handled
+
 _received: list[int] = []
 
 
@@ -22,17 +23,11 @@ def ends_raise() -> Iterator[None]:
 
     def handle(number: int, _frame: FrameType | None) -> None:
         _received.append(number)
-        raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+        raise KeyboardInterrupt if number == SIGINT else Terminated
 
     _received.clear()
-    # nohup has SIGHUP ignored, and wants it so
-    ours = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, handle) for number in ours}
-    try:
+    with handled(ENDING, handle):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def ended() -> bool:

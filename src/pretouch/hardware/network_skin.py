@@ -6,10 +6,10 @@ memory between them has no name that could be left over.
 """
 
 import os
-import signal
-from collections.abc import Callable, Sequence
-from multiprocessing import current_process, get_context, resource_tracker
+from collections.abc import Sequence
+from multiprocessing import current_process, get_context
 from multiprocessing.connection import Connection
+from signal import SIGINT
 from typing import Self
 
 import numpy as np
@@ -21,6 +21,7 @@ from pretouch.hardware.receiver import keys_of, touch_readings
 from pretouch.hardware.receiver_process import Outlets, Traffic, serve
 from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch, imu_readings
 from pretouch.hardware.udp import demand_port
+from pretouch.signals import kept_from_children
 from pretouch.types import ImuReadings, RangeReadings, RangeStatus, TouchReadings
 
 _START_S = 60.0
@@ -67,7 +68,8 @@ class NetworkSkin:
         ours, theirs = context.Pipe(duplex=False)
         arguments = (self._owner, units, (host, port), self._params, priority, self._outlets, theirs)
         self._process = context.Process(target=serve, args=arguments, daemon=True)
-        _start_without_interrupts(self._process.start)
+        with kept_from_children({SIGINT}):
+            self._process.start()
         theirs.close()
         try:
             with ours:
@@ -140,16 +142,6 @@ class NetworkSkin:
         self._samples += came
         self._imu += [received for received in came if received.sample.imu_count]
         del self._samples[:-most], self._imu[:-most]
-
-
-def _start_without_interrupts(start: Callable[[], None]) -> None:
-    """Start a process that Ctrl-C does not reach, from its first instruction on: its parent ends it."""
-    resource_tracker.ensure_running()  # begun with the first process, it would unblock Ctrl-C
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _greeted(started: Connection) -> tuple[tuple[str, int], int, bool]:

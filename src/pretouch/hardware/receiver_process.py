@@ -3,13 +3,13 @@
 import gc
 import os
 import pickle
-import signal
 import struct
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from signal import SIGINT
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
@@ -18,6 +18,7 @@ from pretouch.hardware.mailbox import Mailbox, Ring
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.traffic import Received, UnitTraffic
 from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, sample_of
+from pretouch.signals import leave_to_parent
 
 _PAUSE_S = 0.008
 """Pause after each look at the socket [s]: what arrives meanwhile is taken in at once. Waking up for each sample would
@@ -187,8 +188,7 @@ def serve(
     started: Connection,
 ) -> None:
     """Receive until the parent is gone, or kills this process; tell it the address, or as a sentence what is wrong."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    leave_to_parent({SIGINT})
     try:
         _go_first(priority)
         service = Service(units, address, params, outlets)

@@ -2,14 +2,13 @@
 
 import atexit
 import math
-import signal
-import threading
 from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -39,6 +38,7 @@ from pretouch.recording.standard import STANDARD, Standard, imu_items, nanosecon
 from pretouch.recording.state_codec import STATE, encode_state
 from pretouch.recording.truth import Truth
 from pretouch.robot.model import RobotModel
+from pretouch.signals import ended_in_order
 from pretouch.types import ControlStep, FloatArray, SeenPoints
 
 SNAPSHOT_S = 3.0
@@ -84,8 +84,7 @@ class Recording:
         self._closed: Closed | None = None
         self._points: tuple[SeenPoints | None, int] = None, 0
         """Those written last, and the number of the step that they are with."""
-        self._signals: list[signal.Signals] = []
-        """Those that raise SystemExit for as long as this is a context."""
+        self._as_context = ExitStack()
         self._model: RobotModel | None = None
         """For the thread: one model serves one thread."""
         prepare(TOPICS.values(), STANDARD, DRAWN)
@@ -185,19 +184,14 @@ class Recording:
         return Closed(self.place, self._steps, duration, sentence)
 
     def __enter__(self) -> Self:
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGTERM, signal.SIGHUP):
-                if signal.getsignal(number) is signal.SIG_DFL:
-                    signal.signal(number, _end)
-                    self._signals.append(number)
+        self._as_context.enter_context(ended_in_order())
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-        while self._signals:
-            signal.signal(self._signals.pop(), signal.SIG_DFL)
+        self._as_context.close()
 
 
 def _copies(
@@ -206,7 +200,3 @@ def _copies(
     """Yield what a cycle is to tools that do not know our messages."""
     yield from standard.items(inputs, step, number, time)
     yield from scene.drawn(step, number, time)
-
-
-def _end(number: int, _frame: FrameType | None) -> None:
-    raise SystemExit(128 + number)

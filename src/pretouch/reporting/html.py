@@ -1,9 +1,13 @@
-"""Pieces of a page. All text is escaped but what is `Html` already."""
+"""A page, one HTML file with all in it, and its pieces. All text is escaped but what is `Html` already."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from string import Template
 
 import numpy as np
+
+from pretouch import __version__
+from pretouch.text_table import TextTable
 
 NOTHING = "–"
 """Stands where there is no number."""
@@ -14,6 +18,61 @@ class Html(str):
 
     __slots__ = ()
 
+
+_PAGE = Template(
+    """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>$title</title>
+<style>$style</style>
+</head>
+<body>
+<main>
+$body
+<footer>Written by Pretouch $version. $note</footer>
+</main>
+</body>
+</html>
+"""
+)
+
+_STYLE = """
+:root { --ink: #1f2933; --soft: #616e7c; --line: #dde3e9; --ground: #fff; --other: #fdf3d8; --bad: #c53030;
+  --bar: #7b93ab; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { --ink: #e4e7eb; --soft: #9aa5b1; --line: #3a4653; --ground: #171c22; --other: #4a3d16; --bad: #fc8181;
+    --bar: #829ab1; }
+  figure img { filter: invert(.9) hue-rotate(180deg); }
+}
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--ground); margin: 0; }
+main { max-width: 68rem; margin: 2rem auto; padding: 0 1.2rem; }
+h1 { font-size: 1.7rem; line-height: 1.2; } h2 { font-size: 1.35rem; overflow-wrap: anywhere; }
+h1, h2 { margin: 0 0 .6rem; } h3 { font-size: 1.08rem; margin: 2rem 0 .5rem; } h4 { margin: 1rem 0 .3rem; }
+section { border-top: 2px solid var(--ink); margin-top: 2.5rem; padding-top: 1rem; }
+.summary { font-size: 1.05rem; max-width: 52rem; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .82rem; margin: .5rem 0; font-variant-numeric: tabular-nums; }
+th, td { border-bottom: 1px solid var(--line); padding: .22rem .55rem; text-align: right; vertical-align: top; }
+td { white-space: nowrap; } td.w { white-space: normal; }
+th { font-weight: 600; } thead th { vertical-align: bottom; color: var(--soft); border-bottom-color: var(--soft); }
+.w { text-align: left; } .facts th { color: var(--soft); font-weight: 400; white-space: nowrap; }
+.facts td { overflow-wrap: anywhere; }
+.columns { display: flex; flex-wrap: wrap; gap: 0 3rem; }
+.vector { white-space: pre; } .note, figcaption, footer { color: var(--soft); font-size: .82rem; max-width: 52rem; }
+.bad { color: var(--bad); font-weight: 600; } .other { background: var(--other); padding: 0 .3rem; }
+.bar { width: 9rem; height: .55rem; margin-top: .35rem; background: var(--line); }
+.bar div { height: 100%; background: var(--bar); } .over div { background: var(--bad); }
+figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; background: #fff; }
+a { color: inherit; } footer { border-top: 1px solid var(--line); margin-top: 2.5rem; padding-top: .5rem; }
+@media print {
+  body { font-size: 10pt; } main { max-width: none; margin: 0; } section { break-before: page; }
+  section:first-of-type { break-before: auto; } figure, tr { break-inside: avoid; } h3 { break-after: avoid; }
+  .bar div { print-color-adjust: exact; } .scroll { overflow: visible; }
+}
+"""
 
 _FIGURE_SPACE = "\u2007"
 """As wide as a digit."""
@@ -60,6 +119,22 @@ def table(head: Sequence[Text], rows: Sequence[Sequence[Text]], words: int = 1) 
     body = joined(line(row, "td") for row in rows)
     whole = element("thead", line(head, "th")) + element("tbody", body)
     return element("div", element("table", Html(whole)), "scroll")
+
+
+def titled_table(made: TextTable) -> Html:
+    """Make a table with its title above and its note below."""
+
+    def lines(text: str) -> Html:
+        return joined(text.split("\n"), "<br>")
+
+    rows = [[lines(text) for text in row] for row in made.rows]
+    shown = table([lines(text) for text in made.header], rows, made.names)
+    return joined([element("h3", made.title), shown, note(made.note)])
+
+
+def document(title: str, body: Html, remark: str) -> str:
+    """Make a page of what is in its body, with a remark at its foot."""
+    return _PAGE.substitute(title=html(title), style=_STYLE, body=body, version=__version__, note=html(remark))
 
 
 def facts(rows: Iterable[tuple[Text, Text]]) -> Html:

@@ -16,7 +16,7 @@ from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock, Recorder
 from pretouch.ports import Skin
 from pretouch.session.arm import Arm
-from pretouch.session.signals import signals_noted
+from pretouch.signals import noted_in_motion
 from pretouch.types import ControlStep
 
 
@@ -109,7 +109,7 @@ def follow(
 
 def _moved(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> None:
     """Let an arm take commands while `move` gives them; it is handed the signals that came, and says why it stopped."""
-    with signals_noted() as came:
+    with noted_in_motion() as came:
         try:
             arm.begin()
             ending.stopped = move(came)

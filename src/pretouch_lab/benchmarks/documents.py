@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from pretouch.errors import ExperimentError
-from pretouch.text_table import TextTable
 from pretouch_lab.experiment import Picture
 
 DOCUMENT = "results/benchmarks.md"
@@ -60,10 +59,3 @@ def around(path: Path, part: str) -> tuple[str, str]:
     if not found or not also:
         raise ExperimentError(f"The document {path} has no place for {part}: write {begin} and {end} into it.")
     return before, after
-
-
-def markdown(table: TextTable) -> str:
-    """Write a table with its title and note."""
-    rows = [table.header, ("---",) * len(table.header), *table.rows]
-    lines = ["| " + " | ".join(cell.replace("\n", "<br>") for cell in row) + " |" for row in rows]
-    return "\n".join([f"### {table.title}", "", *lines, "", table.note, ""])

@@ -13,7 +13,7 @@ import numpy as np
 from pretouch import __version__
 from pretouch.errors import ExperimentError
 from pretouch.types import FloatArray
-from pretouch.whole_file import write_json
+from pretouch.whole_file import replaced_whole, write_json
 from pretouch_lab.benchmarks.scenario_files import checksums
 from pretouch_lab.results_file import failure_said
 from pretouch_lab.workers import interrupt_held_back, workers
@@ -100,12 +100,8 @@ def run_tasks(tasks: list[Task], out: Path, progress: Callable[[float], None], p
 
 def write_arrays(arrays: dict[str, FloatArray], path: Path) -> None:
     """Write arrays to an .npz file, whole or not at all."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp.npz")
-    try:
-        np.savez(temporary, **arrays)  # type: ignore[arg-type]  # names of arrays, not `allow_pickle`
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replaced_whole(path) as unfinished, unfinished.open("wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]  # names of arrays, not `allow_pickle`
 
 
 def read_rows(tasks: Iterable[Task]) -> list[Row]:

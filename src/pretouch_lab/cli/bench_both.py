@@ -31,7 +31,8 @@ def bench_both(command: Both) -> None:
     from rich.console import Console
 
     from pretouch.cli.tables import show
-    from pretouch_lab.benchmarks.documents import DOCUMENT, around, markdown, put
+    from pretouch.text_table import markdown
+    from pretouch_lab.benchmarks.documents import DOCUMENT, around, put
     from pretouch_lab.benchmarks.front import front_table
     from pretouch_lab.benchmarks.goals import goal_table
 

@@ -12,14 +12,14 @@ from pretouch.sim.board import PANDA_SIDE
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.sim.pushes import Holder, Push
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Row
 from pretouch_lab.groups import cells_of
 from pretouch_lab.metrics import peak, rounded
-from pretouch_lab.tables import number
+from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, Setup, play
 
 NAME = "clamp"
@@ -128,24 +128,21 @@ def summarise(rows: list[Row]) -> Row:
 
 def tables(part: Row) -> list[TextTable]:
     """What was between arm and board."""
-    rows = tuple(
-        (
-            f"{cell['held_s']:g}",
-            f"{cell['stiffness_n_per_m'] / 1000:g}",
-            cell["profile"],
-            f"{cell['touched']}/{cell['trials']}",
-            number(cell["board_peak_20ms_n"], 0),
-            number(cell["board_mean_n"], 0),
-            number(cell["board_s"], 2),
-            str(cell["leaning"]),
-            str(cell["latched"]),
-        )
-        for cell in part["cells"]
+    columns = (
+        ("held\n[s]", plain("held_s", "g")),
+        ("N/mm", lambda cell: f"{cell['stiffness_n_per_m'] / 1000:g}"),
+        ("profile", plain("profile")),
+        ("touched", share("touched")),
+        ("peak\n[N]", median("board_peak_20ms_n", 0)),
+        ("mean\n[N]", median("board_mean_n", 0)),
+        ("for\n[s]", median("board_s", 2)),
+        ("leaning", plain("leaning")),
+        ("latched", plain("latched")),
     )
-    table = TextTable(
+    table = tabulated(
         "Pushed against a board: medians",
-        ("held\n[s]", "N/mm", "profile", "touched", "peak\n[N]", "mean\n[N]", "for\n[s]", "leaning", "latched"),
-        rows,
+        columns,
+        part["cells"],
         f"A push of {_PUSH_N:g} N towards a board {_GAP_M:g} m away that restricts nothing. Peak: of the force between"
         " arm and board, 20 ms mean. Mean, for: while they touch. Leaning: trials in which they still touch in the last"
         " second. Latched: trials that end in a HOLD until a person resumes.",

@@ -14,14 +14,14 @@ from pretouch.robot.self_distance import nearest_points
 from pretouch.sim.hand import HandGoal
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Row
 from pretouch_lab.groups import cells_of
 from pretouch_lab.metrics import peak, rounded
-from pretouch_lab.tables import number
+from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, Setup, play
 
 NAME = "pinch"
@@ -163,36 +163,22 @@ def summarise(rows: list[Row]) -> Row:
 
 def tables(part: Row) -> list[TextTable]:
     """What was between the links."""
-    rows = tuple(
-        (
-            cell["place"],
-            f"{cell['speed_m_s']:g}",
-            cell["profile"],
-            f"{cell['caught']}/{cell['trials']}",
-            str(cell["recognised"]),
-            str(cell["links"]),
-            number(cell["peak_20ms_n"], 0),
-            number(cell["squeezed_s"], 2),
-            number(cell["contacts"], 0),
-            str(cell["latched"]),
-        )
-        for cell in part["cells"]
+    columns = (
+        ("place", plain("place")),
+        ("speed\n[m/s]", plain("speed_m_s", "g")),
+        ("profile", plain("profile")),
+        ("caught", share("caught")),
+        ("recognised", plain("recognised")),
+        ("links", plain("links")),
+        ("peak\n[N]", median("peak_20ms_n", 0)),
+        ("for\n[s]", median("squeezed_s", 2)),
+        ("contacts", median("contacts", 0)),
+        ("latched", plain("latched")),
     )
-    table = TextTable(
+    table = tabulated(
         "A limb between two things: medians",
-        (
-            "place",
-            "speed\n[m/s]",
-            "profile",
-            "caught",
-            "recognised",
-            "links",
-            "peak\n[N]",
-            "for\n[s]",
-            "contacts",
-            "latched",
-        ),
-        rows,
+        columns,
+        part["cells"],
         f"A limb 9 to 11 cm thick between upper arm and forearm, or on the floor under the hand, for {_END_S:g} s of"
         " going to and fro. Peak: of the force that squeezes it, mean of 20 ms. For: while squeezed. Recognised: trials"
         " in which the arm said that something was caught. Links: those in which it named the right ones. Latched:"

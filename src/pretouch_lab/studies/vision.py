@@ -13,7 +13,7 @@ from pretouch.sim.depth_camera import looking
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.pushes import Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.avoidance.measures import contact
 from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape, nearest
@@ -23,7 +23,7 @@ from pretouch_lab.experiment import Experiment, Row
 from pretouch_lab.groups import cells_of
 from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.avoidance import visits
-from pretouch_lab.tables import number
+from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, Setup, play
 
 NAME = "vision"
@@ -171,34 +171,27 @@ def summarise(rows: list[Row]) -> Row:
 
 def tables(part: Row) -> list[TextTable]:
     """One table: what was seen, what was touched, and what it cost."""
-    rows = tuple(
-        (
-            cell["profile"],
-            cell["scene"],
-            cell["sensing"],
-            cell["view"],
-            number(cell["first_seen_m"], 2),
-            number(cell["seen_fraction"], 0, 100),
-            number(cell["unseen_close_s"], 2),
-            f"{cell['contact']}/{cell['trials']}",
-            number(cell["seen_before_s"], 1),
-            number(cell["impact_speed_m_s"], 3),
-            number(cell["true_peak_20ms_n"], 0),
-            number(cell["way_m"], 2),
-            number(cell["false_fraction"], 1, 100),
-            f"{cell['held']}/{cell['trials']}",
-        )
-        for cell in part["cells"]
+    columns = (
+        ("profile", plain("profile")),
+        ("scene", plain("scene")),
+        ("senses", plain("sensing")),
+        ("view", plain("view")),
+        ("first\n[m]", median("first_seen_m", 2)),
+        ("seen\n[%]", median("seen_fraction", 0, 100)),
+        ("unseen\n[s]", median("unseen_close_s", 2)),
+        ("hit", share("contact")),
+        ("before\n[s]", median("seen_before_s", 1)),
+        ("speed\n[m/s]", median("impact_speed_m_s", 3)),
+        ("peak\n[N]", median("true_peak_20ms_n", 0)),
+        ("way\n[m]", median("way_m", 2)),
+        ("false\n[%]", median("false_fraction", 1, 100)),
+        ("held", share("held")),
     )
-    header = (
-        "profile", "scene", "senses", "view", "first\n[m]", "seen\n[%]", "unseen\n[s]", "hit", "before\n[s]",
-        "speed\n[m/s]", "peak\n[N]", "way\n[m]", "false\n[%]", "held",
-    )  # fmt: skip
     return [
-        TextTable(
+        tabulated(
             "Seven units, a depth camera, or both: medians",
-            header,
-            rows,
+            columns,
+            part["cells"],
             "Front: the camera looks at what comes near. Behind: the arm is between. First: true distance of the object"
             f" from the arm when it is first seen. Seen: share of the time with the object within {_NEAR_M:g} m in"
             f" which a sensed point shows it. Unseen: time within {_CLOSE_M:g} m in which none does. Before: from first"

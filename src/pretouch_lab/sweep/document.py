@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from pretouch import __version__
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, markdown
 from pretouch.whole_file import write_json
-from pretouch_lab.benchmarks.documents import markdown, put, shown
+from pretouch_lab.benchmarks.documents import put, shown
 from pretouch_lab.experiment import Picture
 from pretouch_lab.sweep.indices import indices
 from pretouch_lab.sweep.results import write_table

@@ -1,13 +1,13 @@
 """What a sweep leaves: one Parquet file with a row for each point of its design."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
 
 from pretouch import __version__
 from pretouch.types import FloatArray
+from pretouch.whole_file import replaced_whole
 from pretouch_lab.sweep.design import SEED
 from pretouch_lab.sweep.run import Run
 from pretouch_lab.sweep.store import unwritable
@@ -48,11 +48,8 @@ def write_table(run: Run, path: Path) -> None:
     about = json.dumps({"version": __version__, "code": code(run.sweep.experiment), "sweep": run.sweep.described()})
     arrays = {name: pa.array(values, types.get(name)) for name, values in columns.items()}
     table = pa.table(arrays).replace_schema_metadata({"pretouch": about})
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        parquet.write_table(table, temporary)
-        os.replace(temporary, path)
+        with replaced_whole(path) as unfinished:
+            parquet.write_table(table, unfinished)
     except OSError as error:
         raise unwritable(path, error) from error
-    finally:
-        temporary.unlink(missing_ok=True)

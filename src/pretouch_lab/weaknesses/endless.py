@@ -8,7 +8,7 @@ import numpy as np
 
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import TOUCH_N
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
@@ -16,7 +16,7 @@ from pretouch_lab.experiment import Experiment, Picture, Row, Sources
 from pretouch_lab.groups import cells_of
 from pretouch_lab.metrics import peak, rounded
 from pretouch_lab.paper import static
-from pretouch_lab.tables import number
+from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trace import Trace
 from pretouch_lab.trial import Record, Setup, play
 
@@ -98,38 +98,23 @@ def summarise(rows: list[Row]) -> Row:
 
 def tables(part: Row) -> list[TextTable]:
     """How often the arm touched one and the same object."""
-    rows = tuple(
-        (
-            f"{cell['trajectory']} {cell['side']}",
-            cell["profile"],
-            cell["restrictions"],
-            f"{cell['stiffness_n_per_m'] / 1000:g}",
-            number(cell["contacts"], 0),
-            number(cell["detections"], 0),
-            number(cell["interval_s"], 2),
-            number(cell["first_peak_n"], 1),
-            number(cell["last_peak_n"], 1),
-            number(cell["touching_fraction"], 0, 100),
-            f"{cell['ended']}/{cell['trials']}",
-        )
-        for cell in part["cells"]
+    columns = (
+        ("where", lambda cell: f"{cell['trajectory']} {cell['side']}"),
+        ("profile", plain("profile")),
+        ("mode", plain("restrictions")),
+        ("N/mm", lambda cell: f"{cell['stiffness_n_per_m'] / 1000:g}"),
+        ("con-\ntacts", median("contacts", 0)),
+        ("detec-\ntions", median("detections", 0)),
+        ("every\n[s]", median("interval_s", 2)),
+        ("first\n[N]", median("first_peak_n", 1)),
+        ("last\n[N]", median("last_peak_n", 1)),
+        ("touch\n[%]", median("touching_fraction", 0, 100)),
+        ("ended", share("ended")),
     )
-    table = TextTable(
+    table = tabulated(
         f"A static object stays on the path for {_DURATION_S:g} s: medians",
-        (
-            "where",
-            "profile",
-            "mode",
-            "N/mm",
-            "con-\ntacts",
-            "detec-\ntions",
-            "every\n[s]",
-            "first\n[N]",
-            "last\n[N]",
-            "touch\n[%]",
-            "ended",
-        ),
-        rows,
+        columns,
+        part["cells"],
         f"Mode: of the restrictions. Contacts: touches at least {_APART_S:g} s apart. Every: time between detections."
         " First, last: peak of the true force, 20 ms mean, in the first and the last contact. Touch: share of the time"
         f" in contact. Ended: trials without a contact in the last {_QUIET_S:g} s.",

@@ -10,13 +10,13 @@ from pretouch.params import RestrictionMode, profile
 from pretouch.sim.plant import TOUCH_N
 from pretouch.sim.pushes import FACES, Holder, Push, Pusher, against
 from pretouch.sim.scene import HandSpec, SceneSpec
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Row, Sources
 from pretouch_lab.groups import grouped
 from pretouch_lab.metrics import peak, rounded, spread
-from pretouch_lab.tables import number
+from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, Setup, play
 
 if TYPE_CHECKING:
@@ -194,40 +194,24 @@ def _base(name: str) -> str:
 def tables(part: Row) -> list[TextTable]:
     """How often a release was taken for a push towards the person."""
     several = len({cell["restrictions"] for cell in part["cells"]}) > 1
-    rows = tuple(
-        (
-            f"{cell['held_s']:g}",
-            _base(cell["profile"]) + (f"\n{cell['restrictions']}" if several else ""),
-            f"{_decay_s(cell['profile']):g}",
-            f"{cell['felt']}/{cell['pushes']}",
-            str(cell["out"]),
-            number(cell["reactions"], 0),
-            str(cell["against_while_held"]),
-            str(cell["against_after_release"]),
-            number(cell["mean_peak_n"], 1),
-            number(cell["speed_towards_m_s"], 2),
-            number(cell["reaction_speed_towards_m_s"], 2),
-            f"{cell['stuck']}/{cell['trials']}",
-        )
-        for cell in part["cells"]
+    columns = (
+        ("held\n[s]", plain("held_s", "g")),
+        ("profile", lambda cell: _base(cell["profile"]) + (f"\n{cell['restrictions']}" if several else "")),
+        ("decay\n[s]", lambda cell: f"{_decay_s(cell['profile']):g}"),
+        ("felt", share("felt", "pushes")),
+        ("out", plain("out")),
+        ("reac-\ntions", median("reactions", 0)),
+        ("against\nwhile", plain("against_while_held")),
+        ("against\nafter", plain("against_after_release")),
+        ("mean\n[N]", median("mean_peak_n", 1)),
+        ("back\n[m/s]", median("speed_towards_m_s", 2)),
+        ("reacting\n[m/s]", median("reaction_speed_towards_m_s", 2)),
+        ("stuck", share("stuck")),
     )
-    table = TextTable(
+    table = tabulated(
         "A push is held, then released: medians",
-        (
-            "held\n[s]",
-            "profile",
-            "decay\n[s]",
-            "felt",
-            "out",
-            "reac-\ntions",
-            "against\nwhile",
-            "against\nafter",
-            "mean\n[N]",
-            "back\n[m/s]",
-            "reacting\n[m/s]",
-            "stuck",
-        ),
-        rows,
+        columns,
+        part["cells"],
         "Pushes of 15 to 30 N. Decay: length of a reaction. Out: planned pushes that are not counted, for they slipped"
         " off, met a singularity, or an arm that got stuck cut them short; so the rows hold different pushes."
         " Reactions: for each push, until 3 s after its release. Against: pushes with a reaction towards the person,"

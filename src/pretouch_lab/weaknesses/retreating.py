@@ -7,13 +7,13 @@ import numpy as np
 from pretouch.control.path import WayPoints
 from pretouch.params import RestrictionMode
 from pretouch.sim.scene import Box, SceneSpec
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
 from pretouch_lab.groups import cells_of
 from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.static import least_sensed
-from pretouch_lab.tables import number
+from pretouch_lab.tables import median, plain
 from pretouch_lab.trial import Record, Setup, play
 
 NAME = "retreating"
@@ -123,30 +123,23 @@ def _lost(row: dict[str, Any], blind: dict[str, Any] | None) -> dict[str, Any]:
 
 def tables(part: dict[str, Any]) -> list[TextTable]:
     """Show speeds before and after the turn, and what the retreat costs."""
-    rows = tuple(
-        (
-            cell["profile"],
-            cell["restrictions"],
-            number(cell["approach_m_s"], 3),
-            number(cell["retreat_m_s"], 3),
-            number(cell["way_back_s"], 2),
-            number(cell["lost_s"], 2),
-            number(cell["cycle_s"], 2),
-            number(cell["lost_fraction"], 0, 100),
-            number(cell["short_of_end_m"], 2),
-            f"{100 * cell['contact_fraction']:.0f}",
-        )
-        for cell in part["cells"]
+    columns = (
+        ("profile", plain("profile")),
+        ("mode", plain("restrictions")),
+        ("to\n[m/s]", median("approach_m_s", 3)),
+        ("from\n[m/s]", median("retreat_m_s", 3)),
+        ("back\n[s]", median("way_back_s", 2)),
+        ("lost\n[s]", median("lost_s", 2)),
+        ("cycle\n[s]", median("cycle_s", 2)),
+        ("share\n[%]", median("lost_fraction", 0, 100)),
+        ("short\n[m]", median("short_of_end_m", 2)),
+        ("hit\n[%]", plain("contact_fraction", ".0f", 100)),
     )
-    header = (
-        "profile", "mode", "to\n[m/s]", "from\n[m/s]", "back\n[s]", "lost\n[s]", "cycle\n[s]", "share\n[%]",
-        "short\n[m]", "hit\n[%]",
-    )  # fmt: skip
     return [
-        TextTable(
+        tabulated(
             "To and fro on the line, a board beyond one end but out of the way: medians",
-            header,
-            rows,
+            columns,
+            part["cells"],
             "To and from: mean speed in the last 0.3 m before the end by the board, and in the same 0.3 m on the way"
             " back. Back: time from that end to the other. Lost: that against blind with the same seed. Cycle: there"
             " and back. Share: of the lost time in the cycle. Short: how much is missing to the end after 40 s. A dash:"

@@ -17,9 +17,9 @@ from pretouch.errors import RobotError
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.params import FrankaParams
-from pretouch.hardware.franka.process import LEFT_TO_THE_PROGRAM
 from pretouch.params import profile
 from pretouch.robot.model import RobotModel
+from pretouch.signals import OF_TERMINAL
 from tests.hardware.franka.served import Served, child, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
@@ -75,7 +75,7 @@ def test_the_arm_follows_commands_and_ends_at_rest_and_the_terminals_signals_are
         assert abs(time.monotonic() - idle.stamp) < 0.2
         assert idle.wrench is not None
         arm.begin()
-        for number in LEFT_TO_THE_PROGRAM:
+        for number in OF_TERMINAL:
             os.kill(arm.pid, number)
         q = arm.read().q_commanded[6]
         keep(arm, -0.3, lambda: arm.read().q_commanded[6] < q - 0.1)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from pretouch.errors import ExperimentError
-from pretouch_lab.benchmarks.documents import begin_mark, end_mark, markdown, put
+from pretouch.text_table import TextTable, markdown
+from pretouch.whole_file import write_json
+from pretouch_lab.benchmarks.documents import begin_mark, end_mark, put
 from pretouch_lab.benchmarks.store import Task, missing, open_bench, read_rows, run_tasks, write_arrays
-from pretouch_lab.results_file import write_json
-from pretouch_lab.tables import TextTable
 
 
 def squared(number, file):

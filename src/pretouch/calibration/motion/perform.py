@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from signal import SIGINT, SIGTERM
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.control.joint_box import box_and_brake, joint_limits
 from pretouch.errors import CalibrationError
 from pretouch.faults import sound_robot
-from pretouch.loop import come_to_rest, undisturbed
+from pretouch.loop import come_to_rest
 from pretouch.ports import Clock, Robot
 from pretouch.robot.model import RobotModel
+from pretouch.signals import noted
 from pretouch.traces import JointTrace
 from pretouch.types import FloatArray, RobotState
 
@@ -240,7 +242,7 @@ class _Follower:
     def come_to_rest(self) -> str | None:
         """Brake within the limits, whoever interrupts; return what failed, as a sentence, or None."""
         try:
-            with undisturbed():
+            with noted(SIGINT, SIGTERM):  # until the arm is at rest
                 come_to_rest(self._limits, self._robot, self._clock, self._q, self._sent)
         except Exception as error:
             return f"The arm could not be brought to rest without an error: {_named(error)}"

@@ -13,7 +13,7 @@ from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.ports import Clock, Robot
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
-from pretouch.session.signals import signals_noted
+from pretouch.signals import noted_in_motion
 from pretouch.types import FloatArray
 
 _STEADY_S, _PATIENCE_S = 3.0, 20.0
@@ -83,7 +83,7 @@ class Session:
             if came:
                 raise Interrupted
 
-        with signals_noted() as came:
+        with noted_in_motion() as came:
             return perform(self._rig, self._rig, self._model, plan, on_tick=on_tick).stopped
 
     def stand(self) -> None:

@@ -23,9 +23,9 @@ from pretouch.session.preflight import PreflightParams
 from pretouch.session.push import Direction, GuidedPush, PushParams
 from pretouch.session.remembered import Remembered, state_folder
 from pretouch.session.session import Session
-from pretouch.session.signals import signals_noted
 from pretouch.session.standing import Standing
 from pretouch.session.start import way_to_start
+from pretouch.signals import noted_in_motion
 
 if TYPE_CHECKING:
     from pretouch.cli.run.options import Run
@@ -49,7 +49,7 @@ def run(command: "Run") -> int:
         try:
             return _run(command, made, found, last)
         finally:
-            last.enter_context(signals_noted())  # until arm and units are closed
+            last.enter_context(noted_in_motion())  # until arm and units are closed
 
 
 def _run(command: "Run", made: Parts, found: Opened, last: ExitStack) -> int:

@@ -11,7 +11,7 @@ from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import CollisionParams, collision_behavior, largest_threshold
 from pretouch.session.franka import FrankaSessionArm, identity
 from pretouch.session.session import NoUnits
-from pretouch.session.signals import children_undisturbed
+from pretouch.signals import children_undisturbed
 
 if TYPE_CHECKING:
     from pretouch.cli.run.options import Run

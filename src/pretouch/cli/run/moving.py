@@ -18,11 +18,11 @@ from pretouch.session.free_motion import FreeMotion
 from pretouch.session.keeping import Kept, keeping
 from pretouch.session.motion import Ending, Wishes, follow, go, named
 from pretouch.session.session import Session
-from pretouch.session.signals import signals_noted
 from pretouch.session.start import check_start
 from pretouch.session.terminal import EnterKey, Narrator
 from pretouch.session.units import Units
 from pretouch.session.watching import Watcher
+from pretouch.signals import noted_in_motion
 from pretouch.types import ControlStep
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def moved(command: "Run", session: Session, found: Opened, way: Way, learnt: Fre
             if _arrived(session, way.approach, tell, ending):
                 _follow(command, session, way, watcher, enter, clock, tell, ending, learnt)
         finally:
-            last.enter_context(signals_noted())
+            last.enter_context(noted_in_motion())
             tell.close()
             _report(session, watcher, clock, kept, ending, further.notes if further else ())
     return int(ending.early or bool(kept.trouble))

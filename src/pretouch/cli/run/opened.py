@@ -15,8 +15,8 @@ from pretouch.ports import Skin
 from pretouch.session.arm import Arm
 from pretouch.session.push import Direction
 from pretouch.session.remembered import Identity
-from pretouch.session.signals import children_undisturbed
 from pretouch.session.units import Units
+from pretouch.signals import children_undisturbed
 
 if TYPE_CHECKING:
     from pretouch.cli.run.options import Run

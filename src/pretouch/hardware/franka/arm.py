@@ -1,11 +1,9 @@
 """A Franka arm in real time: the port `Robot`, over a process that speaks with the arm each millisecond."""
 
 import os
-import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from multiprocessing import get_context, resource_tracker
+from collections.abc import Callable
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Self
 
@@ -15,11 +13,12 @@ from pretouch.hardware.franka.collision import CollisionBehavior
 from pretouch.hardware.franka.limits import motion_limits
 from pretouch.hardware.franka.orders import Boxes, Order, Told, Wish
 from pretouch.hardware.franka.params import FrankaParams
-from pretouch.hardware.franka.process import LEFT_TO_THE_PROGRAM, Task, serve
+from pretouch.hardware.franka.process import Task, serve
 from pretouch.hardware.franka.report import CommunicationReport
 from pretouch.hardware.franka.state import JOINTS, FrankaState, robot_state
 from pretouch.realtime import check_wishes
 from pretouch.robot.model import RobotModel
+from pretouch.signals import OF_TERMINAL, kept_from_children
 from pretouch.types import FloatArray, RobotState
 
 _START_S = 30.0
@@ -60,7 +59,7 @@ class FrankaArm:
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
         self._process = context.Process(target=serve, args=(task, self._boxes, theirs), daemon=True)
-        with _terminal_kept_out():
+        with kept_from_children(OF_TERMINAL):
             self._process.start()
         theirs.close()
         try:
@@ -198,17 +197,6 @@ class FrankaArm:
                 or f"The process that moves the arm at {self._address} has ended: the arm stops by itself; look whether"
                 " it stands, then connect anew."
             )
-
-
-@contextmanager
-def _terminal_kept_out() -> Iterator[None]:
-    """Start a process in here, and no Ctrl-C or Ctrl-Z reaches it from its first instruction on."""
-    resource_tracker.ensure_running()  # begun with the first process, it would unblock Ctrl-C
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, LEFT_TO_THE_PROGRAM)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _greeted(started: Connection, address: str) -> str:

@@ -3,11 +3,7 @@
 For a simulated arm that waits for each command (`pretouch serve-fci --lockstep`). A real arm waits for nobody.
 """
 
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable
 
 import numpy as np
 
@@ -21,6 +17,7 @@ from pretouch.hardware.franka.state import JOINTS, FrankaState, robot_state
 from pretouch.loop import Cycle, Recorder
 from pretouch.ports import touch_of
 from pretouch.realtime import warm_up
+from pretouch.signals import noted
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings
 
 _REST = [0.0] * JOINTS
@@ -63,7 +60,7 @@ def run_in_lockstep(
     warm_up(controller, robot_state(client.read(), 0.0))
     limiter = SetPointLimiter(motion_limits(controller.model, client.kind), params or LimiterParams())
     turning = _Turning(controller, skin_at, recorder, done, resume, every, learnt)
-    with _asked_to_end() as came:
+    with noted() as came:
 
         def answer(state: FrankaState, _since: float) -> tuple[FloatArray, bool]:
             wanted = _REST if came else turning.wanted(state)
@@ -120,26 +117,3 @@ class _Turning:
         self._recorder.record(Cycle(inputs, before, step, self._state))
         self._wanted = step.command.tolist()
         self.ended = self._done(step)
-
-
-@contextmanager
-def _asked_to_end() -> Iterator[list[int]]:
-    """Give a list in which signals that end a program are noted while the arm moves; they take effect afterwards."""
-    came: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        came.append(number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield came  # signals reach the main thread alone
-        return
-    # nohup has SIGHUP ignored, and wants it so
-    ending = [s for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(s) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, note) for number in ending}
-    try:
-        yield came
-    finally:
-        for ours, handler in before.items():
-            signal.signal(ours, handler)
-        for number in came[:1]:
-            signal.raise_signal(number)

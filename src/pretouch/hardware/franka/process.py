@@ -27,9 +27,8 @@ from pretouch.hardware.franka.orders import Boxes, Order, Told, Wish
 from pretouch.hardware.franka.params import FrankaParams
 from pretouch.hardware.franka.report import Communication
 from pretouch.realtime import real_time
+from pretouch.signals import OF_TERMINAL, leave_to_parent
 
-LEFT_TO_THE_PROGRAM = frozenset({signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU})
-"""Signals that a terminal sends to all processes in it. Whoever starts `serve` blocks them meanwhile."""
 _TOLD_TO_END = "The process that moves the arm was told to end, so the arm was brought to rest: connect anew."
 
 
@@ -49,9 +48,7 @@ class Task:
 
 def serve(task: Task, boxes: Boxes, started: Connection) -> None:
     """Serve orders until told to quit or the program is gone; tell it '', or as a sentence what is wrong."""
-    for number in LEFT_TO_THE_PROGRAM:
-        signal.signal(number, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, LEFT_TO_THE_PROGRAM)
+    leave_to_parent(OF_TERMINAL)
     with ExitStack() as opened:
         try:
             client = opened.enter_context(connect(task.address, task.kind, task.params.demand_real_time))

@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+from pretouch.text_table import markdown
 from pretouch_lab.benchmarks import documents
 from pretouch_lab.benchmarks.ablations import BASE
 from pretouch_lab.benchmarks.avoidance.scenario import scenarios
 from pretouch_lab.benchmarks.avoidance.tables import tables
-from pretouch_lab.benchmarks.documents import markdown, shown
+from pretouch_lab.benchmarks.documents import shown
 from pretouch_lab.benchmarks.store import Row
 from pretouch_lab.experiment import Picture
 

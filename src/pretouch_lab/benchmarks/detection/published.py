@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from pretouch import __version__
+from pretouch.text_table import markdown
 from pretouch_lab.benchmarks import documents
 from pretouch_lab.benchmarks.detection.campaign import NAME, Bench, Rows
 from pretouch_lab.benchmarks.detection.contenders import CONTENDERS
@@ -15,7 +16,7 @@ from pretouch_lab.benchmarks.detection.results import (
     resolution,
 )
 from pretouch_lab.benchmarks.detection.tables import detection_tables
-from pretouch_lab.benchmarks.documents import markdown, shown
+from pretouch_lab.benchmarks.documents import shown
 from pretouch_lab.benchmarks.store import Row
 from pretouch_lab.experiment import Picture
 

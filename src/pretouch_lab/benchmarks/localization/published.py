@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from pretouch_lab.benchmarks.documents import markdown, put
+from pretouch.text_table import markdown
+from pretouch_lab.benchmarks.documents import put
 from pretouch_lab.benchmarks.localization.campaign import NAME
 from pretouch_lab.benchmarks.localization.results import tables_of
 from pretouch_lab.benchmarks.store import Row

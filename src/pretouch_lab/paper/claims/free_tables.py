@@ -1,10 +1,10 @@
 """Tables of the experiments in which nothing touches the arm."""
 
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.experiment import Row
 from pretouch_lab.paper.claims.detectors import TABLE_I
 from pretouch_lab.paper.claims.free_run import rate_text
-from pretouch_lab.tables import number
+from pretouch_lab.tables import median, number, plain
 
 
 def free_motion_tables(part: Row) -> list[TextTable]:
@@ -15,22 +15,22 @@ def free_motion_tables(part: Row) -> list[TextTable]:
 
 
 def _estimate(part: Row) -> TextTable:
-    rows = tuple(
+    columns = (
+        ("speed\n[m/s]", plain("speed_m_s", "g")),
+        ("|offset|", lambda cell: "/".join(f"{value:.1f}" for value in cell["offset_n"])),
+        ("std", lambda cell: _axes(cell["std_n"])),
+        ("largest\ndeviation", lambda cell: "/".join(f"{value:.1f}" for value in cell["largest_deviation_n"])),
         (
-            f"{cell['speed_m_s']:g}",
-            "/".join(f"{value:.1f}" for value in cell["offset_n"]),
-            _axes(cell["std_n"]),
-            "/".join(f"{value:.1f}" for value in cell["largest_deviation_n"]),
-            "/".join(number(cell[f"norm_{part}_n"], 1) for part in ("median", "p95", "p99")),
-            f"{cell['norm_max_n']:.1f}",
-            number(cell["path_rms_m"], 1, 1000),
-        )
-        for cell in part["cells"]
+            "norm 50/\n95/99 %",
+            lambda cell: "/".join(number(cell[f"norm_{p}_n"], 1) for p in ("median", "p95", "p99")),
+        ),
+        ("norm\nmax", plain("norm_max_n", ".1f")),
+        ("off path\n[mm]", median("path_rms_m", 1, 1000)),
     )
-    return TextTable(
+    return tabulated(
         "Force estimate of an arm that nothing touches, by speed: x/y/z [N]",
-        ("speed\n[m/s]", "|offset|", "std", "largest\ndeviation", "norm 50/\n95/99 %", "norm\nmax", "off path\n[mm]"),
-        rows,
+        columns,
+        part["cells"],
         "Circle and line together. Offset: mean over the arms of its size, for its sign is another with each arm. Std:"
         " median. Largest deviation: from the offset of the trial, of all trials. Norm: of the whole estimate, offset"
         " included; medians of its percentiles, and the largest of all. Off path: median of the rms distance.",
@@ -114,19 +114,16 @@ def noise_tables(part: Row) -> list[TextTable]:
 
 
 def _noise(part: Row) -> TextTable:
-    rows = tuple(
-        (
-            f"{cell['noise_factor']:g}",
-            _axes(cell["std_n"]),
-            _axes(cell["f_sigma_n"], 2),
-            "/".join(f"{100 * value:.0f}" for value in cell["f_sigma_capped"]),
-        )
-        for cell in part["cells"]
+    columns = (
+        ("noise\nfactor", plain("noise_factor", "g")),
+        ("std\n[N]", lambda cell: _axes(cell["std_n"])),
+        ("F_sigma\n[N]", lambda cell: _axes(cell["f_sigma_n"], 2)),
+        ("at F_std\n[%]", lambda cell: "/".join(f"{100 * value:.0f}" for value in cell["f_sigma_capped"])),
     )
-    return TextTable(
+    return tabulated(
         "Robustness to noise: the estimate of an arm that nothing touches, x/y/z",
-        ("noise\nfactor", "std\n[N]", "F_sigma\n[N]", "at F_std\n[%]"),
-        rows,
+        columns,
+        part["cells"],
         "On the circle at 0.3 m/s. Factor: on the noise and ripple of the torque sensors and on the noise of the joint"
         " velocities. Std, F_sigma of eq. 10: medians. At F_std: part of the time in which sigma is sigma_max or more,"
         " so that F_sigma is its largest, F_std = 3 N, and the band widens no more with the noise.",

@@ -7,14 +7,14 @@ import sys
 
 import pytest
 
-from pretouch.session.signals import children_undisturbed, signals_noted
+from pretouch.signals import children_undisturbed, noted_in_motion
 
 
 def test_the_first_signal_is_raised_at_the_end_and_the_others_are_not():
     noted = []
 
     def moved():
-        with signals_noted() as came:
+        with noted_in_motion() as came:
             os.kill(os.getpid(), signal.SIGINT)
             os.kill(os.getpid(), signal.SIGTERM)
             noted.extend(came)
@@ -27,7 +27,7 @@ def test_the_first_signal_is_raised_at_the_end_and_the_others_are_not():
 def test_what_was_ignored_stays_ignored():
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with signals_noted() as came:
+        with noted_in_motion() as came:
             os.kill(os.getpid(), signal.SIGHUP)
         assert not came
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN

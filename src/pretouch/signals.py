@@ -1,0 +1,89 @@
+"""Signals: noted while an arm moves, raised so that a program ends in order, and left to the parent of a process."""
+
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from multiprocessing import resource_tracker
+from types import FrameType
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_STOPPING = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+OF_TERMINAL = frozenset({signal.SIGINT, signal.SIGHUP, *_STOPPING})
+"""Signals that a terminal sends to all processes in it."""
+
+Handler = Callable[[int, FrameType | None], object] | signal.Handlers
+
+
+@contextmanager
+def handled(numbers: Iterable[int], handler: Handler) -> Iterator[dict[int, object]]:
+    """Handle signals so until the context ends, but those that are ignored, as nohup wants SIGHUP.
+
+    Gives the handlers from before. Signals reach the main thread alone: in another one nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield {}
+        return
+    ours = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, handler) for number in ours}
+    try:
+        yield dict(before)
+    finally:
+        for number, former in before.items():
+            signal.signal(number, former)
+
+
+@contextmanager
+def noted(*numbers: int) -> Iterator[list[int]]:
+    """Only note signals, all `ENDING` ones by default, until the context ends: the first comes then, before others."""
+    came: list[int] = []
+    with handled(numbers or ENDING, lambda number, _frame: came.append(number)) as before:
+        try:
+            yield came
+        finally:
+            for number in came[:1]:
+                signal.signal(number, before[number])  # type: ignore[arg-type]
+                signal.raise_signal(number)
+
+
+@contextmanager
+def noted_in_motion() -> Iterator[list[int]]:
+    """Only note `ENDING` signals, and ignore those of a terminal that would stop the program where it is: Ctrl-Z."""
+    with handled(_STOPPING, signal.SIG_IGN), noted() as came:
+        yield came
+
+
+def ended_in_order() -> AbstractContextManager[object]:
+    """Turn SIGTERM and SIGHUP, where they would end the process at once, into SystemExit."""
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        raise SystemExit(128 + number)
+
+    at_once = [one for one in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(one) is signal.SIG_DFL]
+    return handled(at_once, end)
+
+
+def children_undisturbed() -> AbstractContextManager[object]:
+    """Let processes that are started meanwhile ignore a terminal that closes, and Ctrl-Z: their parent ends them."""
+    return handled((signal.SIGHUP, signal.SIGTSTP), signal.SIG_IGN)  # stays ignored in a program that is started
+
+
+@contextmanager
+def kept_from_children(numbers: Iterable[int]) -> Iterator[None]:
+    """Start a process in here, and the signals do not reach it from its first instruction on.
+
+    It calls `leave_to_parent` as soon as it can, and its parent ends it.
+    """
+    resource_tracker.ensure_running()  # begun with the first process, it would unblock Ctrl-C
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def leave_to_parent(numbers: Iterable[int]) -> None:
+    """Ignore signals in this process, which was started with them blocked."""
+    for number in numbers:
+        signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)
