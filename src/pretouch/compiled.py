@@ -24,15 +24,25 @@ def compiled(function: Function) -> Function:
     kept beside the module, or in the user's cache where an installation is read-only. Where neither can be written it
     is compiled anew in each process: that takes seconds, and works.
     """
+    return _kept(function, forceinline=False)
+
+
+def inlined(function: Function) -> Function:
+    """Compile a function into the one that calls it, at one place: large groups are not copied to it.
+
+    Elsewhere it would only make the machine code longer, and what does not fit the processor's cache is slow.
+    """
+    return _kept(function, forceinline=True)
+
+
+def _kept(function: Function, forceinline: bool) -> Function:
     # Numba looks at the function's own file only to tell whether what it kept is out of date. What got into a function
     # from another file, a constant or a call, it would go on using as it was: so the name it keeps it under tells all.
-    # a group goes to another function field by field, over the stack: inlined, none of it is copied
-    grouped = any(hasattr(kind, "_fields") for kind in function.__annotations__.values())
     try:
         function.__qualname__ += f"-{source_digest(function)[:12]}"
-        kept = njit(cache=True, error_model="numpy", forceinline=grouped)(function)
+        kept = njit(cache=True, error_model="numpy", forceinline=forceinline)(function)
     except (RuntimeError, SourceError):  # nowhere to keep it, or no text to tell whether it is out of date
-        return cast(Function, njit(error_model="numpy", forceinline=grouped)(function))
+        return cast(Function, njit(error_model="numpy", forceinline=forceinline)(function))
     _keep_if_possible(kept)
     return cast(Function, kept)
 
@@ -88,7 +98,7 @@ def entry(function: Callable[..., Result]) -> Entry[Result]:
     exec(compile(code, function.__code__.co_filename, "exec"), scope)  # noqa: S102  made of the names of its parameters
     called = scope[name]
     called.__doc__, called.__wrapped__ = function.__doc__, function
-    scope["_body"] = compiled(function)
+    scope["_body"] = inlined(function)
     scope["_flat"] = called.flat = compiled(scope[f"{name}_flat"])
     return cast(Entry[Result], called)
 

@@ -222,7 +222,7 @@ class Controller:
             speed_scale=scale, range_distance=seen.distance, obstacles=seen.obstacles,
             force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
             filtered_force=feeling.window.newest, thresholds=felt.thresholds, armed=felt.armed, contact=contact,
-            reaction_velocity=desired if reacting else np.zeros(3), restricted=motion.restricted,
+            reaction_velocity=desired if reacting else _STILL, restricted=motion.restricted,
             approach_limit=motion.approach_limit,
             qp=qp, command=qp.qd, residual=felt.residual, evidence=felt.evidence, touched=felt.touched,
         )  # fmt: skip
@@ -251,4 +251,6 @@ class Controller:
         return jolts if cues is None else together(cues, jolts), touched, (impact,)
 
 
+_STILL = np.zeros(3)
+"""One for all steps: its numbers are not written to."""
 _TROUBLE = {QpOutcome.FAILED: Event.SOLVER_FAILED, QpOutcome.INFEASIBLE: Event.BLOCKED}

@@ -1,5 +1,7 @@
 """What sensor units say of a touch beside the arm's torques: where one is likelier, and where there is one."""
 
+from functools import cache
+
 import numpy as np
 
 from pretouch.types import FloatArray, IntArray
@@ -23,8 +25,9 @@ class Cues:
     """(C,) size of the force there [N], NaN where the unit measures none; nothing is inferred from it."""
 
 
+@cache
 def no_cues(links: int) -> Cues:
-    """Return what units that say nothing say, of an arm with so many links."""
+    """Return what units that say nothing say, of an arm with so many links: one for all steps, to be read only."""
     return Cues(np.ones(links), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, inlined
 from pretouch.control.restriction import Rows
 from pretouch.control.touch_speed import TouchLimits, mass_along, touch_speed
 from pretouch.groups import Chain, ObstacleArrays
@@ -86,7 +86,7 @@ def braking_cap(distance: float, touch: float, deceleration: float, latency: flo
     return np.sqrt(lag * lag + touch * touch + 2.0 * deceleration * left) - lag
 
 
-@compiled
+@inlined
 def braking_rows(
     slots: Slots, obstacles: ObstacleArrays, chain: Chain, mass: Mass, touching: TouchLimits, limits: BrakingLimits,
     rows: Rows,

@@ -84,7 +84,7 @@ def near_motion(
         G, h, which = np.empty((room, n)), np.empty(room), np.empty(len(obstacles.unit), WHOLE)
         if len(obstacles.unit) and profile.anticipation.effective_mass:
             counts = True
-            mass = model.mass_matrix(robot.q) + profile.anticipation.rotor_inertia_kg_m2 * np.eye(n)
+            mass = model.mass_matrix(robot.q) + setup.rotors
     else:
         rows, which = approach_rows(kin, model.moved_by, obstacles, r)
         G, h, room = rows.G, rows.h, len(rows.h)

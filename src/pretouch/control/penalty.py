@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, inlined
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 SOLVED, NOT_FINITE, NOT_CONVEX, BUDGET = range(4)
@@ -63,7 +63,7 @@ class _Piece(NamedTuple):
     violated: BoolArray
 
 
-@compiled
+@inlined
 def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
     """Write the minimum, and say how that ended; `budget` counts the factorisations after which to give up."""
     H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
@@ -118,7 +118,7 @@ def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatA
     return which[:found]
 
 
-@compiled
+@inlined
 def _finite(problem: Problem) -> bool:
     H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
     # a number that is not finite spoils any sum of products with zero
@@ -187,7 +187,7 @@ def _differs(G: FloatArray, h: FloatArray, which: IntArray, x: FloatArray, viola
     return False
 
 
-@compiled
+@inlined
 def _shorten(problem: Problem, which: IntArray, x: FloatArray, y: FloatArray) -> None:
     """Draw y back towards x to the least of the cost on the way from x to it."""
     H, f, G, h, weight = problem.H, problem.f, problem.G, problem.h, problem.weight
@@ -324,7 +324,7 @@ def _newton_step(H: FloatArray, gradient: FloatArray, free: IntArray, L: FloatAr
     return True
 
 
-@compiled
+@inlined
 def _certify(problem: Problem, piece: _Piece, at_bound: IntArray, answer: Minimum) -> None:
     """Write slack (K,) and multipliers (n + K,) of the minimum x."""
     hessian, linear, x, slack, multipliers = piece.hessian, piece.linear, answer.x, answer.slack, answer.multipliers

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry
+from pretouch.compiled import ByName, compiled, entry, inlined
 from pretouch.groups import ObstacleArrays
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
@@ -121,7 +121,7 @@ def _rows(
     return rows_into(kin, moved_by, obstacles, p, rows)
 
 
-@compiled
+@inlined
 def rows_into(kin: Kinematics, moved_by: BoolArray, obstacles: ObstacleArrays, p: ApproachParams, rows: Rows) -> int:
     """Write the rows of `approach_rows` and the indices of their obstacles; return how many."""
     anchor, axis = kin.anchor, kin.axis

@@ -59,6 +59,8 @@ class MotionSetup:
     numbers: MotionNumbers
     near: NearSettings | None
     """None for a profile without anticipation."""
+    rotors: FloatArray
+    """(n, n) inertia of the drives, which the touch speed counts too [kg m^2]."""
     fields: tuple[Any, ...]
     """Of arm and numbers, for compiled code."""
     near_fields: tuple[Any, ...]
@@ -108,8 +110,9 @@ def motion_setup(model: RobotModel, limits: JointLimits, profile: Profile) -> Mo
         approach_params(r), cost_params(t), t.orientation_gain_1_s, t.orientation == "hold",
         r.slack_weight if r.mode != "hard" else 0.0, profile.failure.solver_iterations, limits.table, model.q_mid,
     )  # fmt: skip
-    near, arm = near_settings(profile), model.arm
-    return MotionSetup(model, limits, profile, numbers, near, flattened(arm, numbers), flattened(arm, numbers, near))
+    near, arm, rotors = near_settings(profile), model.arm, profile.anticipation.rotor_inertia_kg_m2 * np.eye(model.n)
+    fields = flattened(arm, numbers)
+    return MotionSetup(model, limits, profile, numbers, near, rotors, fields, flattened(arm, numbers, near))
 
 
 def anticipates(profile: Profile) -> bool:

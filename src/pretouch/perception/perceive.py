@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry, flattened
+from pretouch.compiled import entry, flattened, inlined
 from pretouch.groups import CapsuleArrays, Chain, Sensors, SkinArrays
 from pretouch.params import PerceptionParams
 from pretouch.perception.closest import ClosestArrays, closest, distances, no_obstacles
@@ -257,7 +257,7 @@ class NewShown(NamedTuple):
     """(K,) whether each is new."""
 
 
-@compiled
+@inlined
 def _take_readings(
     tracks: _Tracks, kin: Kinematics, scene: Scene, skin: SkinArrays, readings: _Readings, p: SightNumbers,
     instant: Instant, shown: NewShown,
