@@ -199,7 +199,8 @@ def test_an_entry_is_kept_between_processes_until_what_it_calls_changes(tmp_path
     package = tmp_path / "pretouch"
     package.mkdir()
     (package / "__init__.py").touch()
-    shutil.copy(PACKAGE / "compiled.py", package)
+    for needed in ("compiled.py", "errors.py", "source_digest.py"):
+        shutil.copy(PACKAGE / needed, package)
     (package / "module.py").write_text(MODULE)
     (package / "callee.py").write_text(CALLEE)
     assert in_python(CALL, PYTHONPATH=str(tmp_path)).split() == ["3.0", "0"]

@@ -20,13 +20,13 @@ QD = np.array([0.8, -0.2, 0.1, 0.3, 0.0, 0.4, 0.6])
 def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[float]:
     """How far from a plane ahead of a unit its points are [m], while the arm turns and the readings are late."""
     unit, rng, q0 = skin.ids.index("hand_left"), np.random.default_rng(1000), model.description.q_ready
-    position, rotation = placed(model, skin, q0)
+    position, rotation, _ = placed(model, skin, q0)
     normal, on = rotation[unit, :, 2].copy(), position[unit] + 0.5 * rotation[unit, :, 2]
     state, found = track_init(len(skin)), []
     for i in range(6, 60):
         now = 0.01 * i
         then = now - LATE_S
-        at, turned = placed(model, skin, q0 + QD * then)
+        at, turned, _ = placed(model, skin, q0 + QD * then)
         beam = turned[unit, :, 2]
         distance = float((on - at[unit]) @ normal / (beam @ normal)) + noise * rng.standard_normal()
         heard = np.arange(len(skin)) == unit

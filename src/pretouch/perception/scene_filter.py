@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled, entry, inlined
 from pretouch.errors import FixtureError
 from pretouch.groups import CapsuleArrays, Sensors
 from pretouch.perception.closest import bounds, to_axis, to_spheres
@@ -174,7 +174,7 @@ def plane_return(
     return least if least <= within else np.inf
 
 
-@compiled
+@inlined
 def _cone_meets(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, within: float) -> bool:
     """Whether the cone of sensor k can meet capsule c at a distance of at most `within` [m]; never wrongly no.
 
@@ -211,7 +211,7 @@ def _cone_meets(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, withi
     return bool(least <= reach)
 
 
-@compiled
+@inlined
 def _cast(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, rays: FloatArray, enough: float) -> float:
     """Least distance [m] to capsule c along the rays of sensor k, or the first one of `enough` or less."""
     position, rotation, a, b, radius = sensors.position, sensors.rotation, capsules.a, capsules.b, capsules.radius[c]
