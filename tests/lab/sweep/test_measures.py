@@ -72,4 +72,4 @@ def test_the_published_sweeps_can_be_played_and_their_document_has_a_place_for_e
 
 def test_every_experiment_that_can_be_swept_is_described():
     text = (DOCS / "how-to" / "sweep.md").read_text(encoding="utf-8")
-    assert all(f"`{name}`" in text for name in MEASURES)
+    assert all(f"`{name}`" in text for name in MEASURES if name != "ishigami")  # which is these tests' own
