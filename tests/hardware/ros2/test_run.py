@@ -95,7 +95,7 @@ def test_a_run_that_is_killed_in_motion_leaves_the_arm_at_rest(domain: int, tmp_
         sleep(0.6)
     log = arm.stop()
     fast, time = speeds(log), log[1:, 0]
-    assert fast[(time > killed - 0.05) & (time < killed)].max() > 0.05
+    assert fast[time < killed][-50:].max() > 0.05  # samples, not a time: a busy machine may log none for a while
     assert time[fast > 1e-6][-1] - killed < 0.4
     limits = panda().qdd_max
     qd = np.diff(log[:, 1:], axis=0) / np.diff(log[:, 0])[:, None]
