@@ -168,7 +168,7 @@ def test_the_order_of_changes_does_not_matter():
         ("paper:speed=0.1", "The group 'speed' of 'speed=0.1' is unknown: choose from perception, task, reduction,"),
         ("paper:task.sped=0.1", "The parameter 'task.sped' is unknown: choose from speed_m_s,"),
         ("pretouch:anticipation.detour=yes", "The parameter 'anticipation.detour' is gone: the arm no longer goes"),
-        ("paper:task.speed_m_s", "has no value: write GROUP.FIELD=VALUE"),
+        ("paper:task.speed_m_s", "has no value: write PATH=VALUE"),
         ("paper:", "has no value"),
         ("paper:name=x", "The group 'name' of 'name=x' is unknown"),
         ("paper:task.speed_m_s=fast", "task.speed_m_s is 'fast': write a number"),

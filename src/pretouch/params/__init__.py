@@ -3,6 +3,8 @@
 A profile is a frozen set of them. `replace(profile, ...)` of the standard library makes a variant, checked again.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from pretouch.params.anticipation import AnticipationParams as AnticipationParams
 from pretouch.params.anticipation import BodyRegion as BodyRegion
 from pretouch.params.baselines import BaselineParams as BaselineParams
@@ -13,11 +15,21 @@ from pretouch.params.near import ReductionParams as ReductionParams
 from pretouch.params.near import RestrictionMode as RestrictionMode
 from pretouch.params.near import RestrictionParams as RestrictionParams
 from pretouch.params.perception import PerceptionParams as PerceptionParams
-from pretouch.params.profile import PROFILES as PROFILES
-from pretouch.params.profile import Profile as Profile
-from pretouch.params.profile import at_rate as at_rate
-from pretouch.params.profile import profile as profile
 from pretouch.params.reaction import ReactionParams as ReactionParams
 from pretouch.params.task import Orientation as Orientation
 from pretouch.params.task import TaskParams as TaskParams
 from pretouch.params.touch import ThresholdParams as ThresholdParams
+
+if TYPE_CHECKING:
+    from pretouch.profile import Profile as Profile
+    from pretouch.profiles import PROFILES as PROFILES
+    from pretouch.profiles import at_rate as at_rate
+    from pretouch.profiles import profile as profile
+
+
+def __getattr__(name: str) -> Any:
+    if name not in ("PROFILES", "Profile", "at_rate", "profile"):
+        raise AttributeError(name)
+    import pretouch.profiles
+
+    return getattr(pretouch.profiles, name)

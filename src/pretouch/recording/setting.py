@@ -12,13 +12,15 @@ from weakref import finalize
 
 import numpy as np
 
+from pretouch.composition import as_table
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError, RecordingError
 from pretouch.params import Profile
 from pretouch.perception.scene_filter import Fixtures
+from pretouch.profiles import profile_from
 from pretouch.recording.messages import FORMAT, PACKAGE, decoded, encoded, make
-from pretouch.recording.plain import JSON, as_json, from_json, profile_from, sound
+from pretouch.recording.plain import JSON, as_json, from_json, sound
 from pretouch.recording.recorded_path import RecordedPath, Tangents
 from pretouch.recording.versions import versions
 from pretouch.robot.body import Capsules
@@ -88,7 +90,7 @@ def encode_run(sequence: int, controller: Controller, about: Mapping[str, JSON])
     kind, numbers = _path_numbers(controller.path)
     return encoded(RUN, make(
         RUN, sequence, FORMAT, time.time(), as_json(versions()), as_json(dict(about)),
-        as_json(asdict(controller.profile)), as_json(_description(model.description) | _sigmas(skin) | _touch(skin)),
+        as_json(as_table(controller.profile)), as_json(_description(model.description) | _sigmas(skin) | _touch(skin)),
         _mjcf(model.description),
         list(skin.ids),
         [unit.link for unit in skin.units], skin.T_link_sensor.reshape(-1).copy(),
@@ -104,7 +106,7 @@ def decode_run(data: bytes, tangents: Callable[[int], Tangents]) -> Run:
         raise RecordingError(
             f"The recording has format {m.format}, this version of pretouch knows {FORMAT}: open it with a later one."
         )
-    profile, unlike = profile_from(from_json(m.profile))
+    profile, unlike = sound(lambda: profile_from(from_json(m.profile)))
     return Run(
         m.sequence, from_json(m.versions), m.started, from_json(m.about), profile, unlike, m,
         lambda: tangents(m.sequence),

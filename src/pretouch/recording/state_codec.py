@@ -1,6 +1,7 @@
 """All the controller remembers, to a message and back, to the bit.
 
-Both ways follow the annotations of `ControllerState`, so a field added there is kept without a change here.
+Both ways follow the annotations of `ControllerState`, so a field added there is kept without a change here. What a part
+of the profile remembers is annotated with `object`, and kept with the name of the part whose `State` it is.
 """
 
 from collections.abc import Iterator
@@ -12,8 +13,9 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from pretouch.composition import Part
 from pretouch.controller import ControllerState
-from pretouch.errors import RecordingError
+from pretouch.errors import PretouchError, RecordingError
 from pretouch.recording.messages import PACKAGE, decoded, encoded, make, plain_text
 from pretouch.types import IntArray
 
@@ -74,7 +76,9 @@ def _take(parts: _Parts, name: str, hint: Any, value: Any) -> None:
     if name == _UNREAD:
         value = _readable(value)
     hint, kind = _kind(hint, value)
-    if kind == "parts":
+    if kind == "state":
+        parts.add(name, kind, _owner(hint))
+    if kind in ("parts", "state"):
         for field, inner in _hints(hint):
             _take(parts, f"{name}.{field}" if name else field, inner, getattr(value, field))
     elif kind == "tuple":
@@ -102,6 +106,10 @@ def _readable(value: Any) -> Any:
 
 def _kind(hint: Any, value: Any) -> tuple[Any, str]:
     """Return the type a value is annotated with, without None, and how it is kept."""
+    if hint is object:
+        if value is None or _is_made_of_fields(type(value)):
+            return type(value), "none" if value is None else "state"
+        hint = np.ndarray if isinstance(value, np.ndarray) else type(value)
     if get_origin(hint) in (Union, UnionType):
         if value is None:
             return hint, "none"
@@ -110,11 +118,40 @@ def _kind(hint: Any, value: Any) -> tuple[Any, str]:
         return hint, "parts"
     if get_origin(hint) is tuple:
         return hint, "tuple"
-    if get_origin(hint) is np.ndarray:
+    if np.ndarray in (hint, get_origin(hint)):
         return hint, "array"
     if isinstance(hint, type) and issubclass(hint, Enum):
         return hint, "text"
-    return hint, {float: "float", int: "int", bool: "bool", str: "text"}[hint]
+    if hint not in _PLAIN.values():
+        raise RecordingError(
+            f"A part of the profile remembers a {hint.__name__}, which a recording cannot hold: let it remember a"
+            " number, an array of numbers, or a class of such fields, named as `State` of the part."
+        )
+    return hint, next(kind for kind, plain in _PLAIN.items() if plain is hint)
+
+
+_PLAIN: dict[str, Any] = {"float": float, "int": int, "bool": bool, "text": str}
+
+
+def _owner(state: type) -> str:
+    """Name the part whose state a class is: its group and its name."""
+    for group, interface in Part.interfaces.items():
+        for name, part in interface.known.items():
+            if part.State is state:
+                return f"{group} {name}"
+    raise RecordingError(
+        f"No named part of a profile has {state.__name__} as its `State`: name the class there, and give the part a"
+        ' name, as class MyDetector(Detector, name="mine").'
+    )
+
+
+def _state_of(owner: str) -> type:
+    """Return the class of the state of a part."""
+    group, _, name = owner.partition(" ")
+    try:
+        return Part.interfaces[group].called(name).State
+    except (KeyError, PretouchError) as error:
+        raise RecordingError(f"The part {owner} of the recorded profile is not installed: {error}") from error
 
 
 def _without_none(hint: Any) -> Any:
@@ -143,6 +180,14 @@ class _Reading:
         found = self._at < len(self._parts) and self._parts[self._at][:2] == (name, "none")
         self._at += int(found)
         return found
+
+    def of_part(self, name: str) -> Any:
+        """Return the type of what a part remembered, kept under a name."""
+        _, kind, shape = self._parts[self._at]
+        if kind != "state":
+            return _PLAIN.get(kind, np.ndarray)
+        self.next(name)
+        return _state_of(shape)
 
     def next(self, name: str) -> tuple[str, str]:
         if self._at == len(self._parts):
@@ -188,10 +233,10 @@ def decode_state(data: bytes) -> tuple[bool, ControllerState]:
 def _give(parts: _Reading, name: str, hint: Any) -> Any:
     """Return the next value, annotated with a type."""
     optional = get_origin(hint) in (Union, UnionType)
-    if optional:
+    if optional or hint is object:
         if parts.none(name):
             return None
-        hint = _without_none(hint)
+        hint = parts.of_part(name) if hint is object else _without_none(hint)
     if _is_made_of_fields(hint):
         kind = hint if isinstance(hint, type) else type(hint)
         given, may_lack = {}, _with_default(kind)

@@ -1,20 +1,21 @@
 """What people may change in a live page. Each control puts an action into the queue; the loop does it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
+from pretouch.composition import differences
 from pretouch.errors import RecordingError
 from pretouch.params import PROFILES, Profile, RestrictionMode
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
 from pretouch.viewer.commands import Commands
 from pretouch.viewer.gui import SETTLE_S, TYPED_S, add_button, add_view_boxes, put, when_changed
-from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs, written
+from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs
 from pretouch.viewer.settings import ObjectName, PathName
 from pretouch.viewer.simulation import LiveSimulation
 from pretouch.viewer.unit_panel import UnitPanel
@@ -40,22 +41,9 @@ class Running:
 
 
 def named(profile: Profile, base: str) -> Profile:
-    """Name a profile by the one it was made from and what is different, as `pretouch.params.profile` reads it."""
-    parts = [base]
-    for group in fields(Profile):
-        mine, theirs = getattr(profile, group.name), getattr(PROFILES[base], group.name)
-        if group.name != "name":
-            parts += [
-                f"{group.name}.{f.name}={_text(getattr(mine, f.name))}"
-                for f in fields(mine) if getattr(mine, f.name) != getattr(theirs, f.name)
-            ]  # fmt: skip
-    return replace(profile, name=":".join(parts))
-
-
-def _text(value: object) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return written(value) if isinstance(value, float) else str(value)
+    """Name a profile by the one it was made from and what is different, as `pretouch.profiles.profile` reads it."""
+    mine, theirs = (replace(p, name="") for p in (profile, PROFILES[base]))
+    return replace(profile, name=":".join([base, *differences(mine, theirs)]))
 
 
 class Controls:

@@ -1,41 +1,31 @@
-"""A profile is a frozen set of all parameters; the named ones, and how to make variants of them."""
+"""The named profiles, and how to make variants of them.
+
+`replace(profile, ...)` of the standard library makes a variant in a program, `profile("NAME:CHANGE:...")` from a text.
+"""
 
 import math
-from dataclasses import dataclass, field, fields, replace
-from numbers import Integral, Real
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
 
-from pretouch.checks import Checked
+from pretouch.composition import changed, from_table
 from pretouch.errors import ParameterError
-from pretouch.params.anticipation import AnticipationParams
-from pretouch.params.baselines import BaselineParams
-from pretouch.params.detection import DetectionParams
-from pretouch.params.failure import FailureParams
-from pretouch.params.localisation import LocalisationParams
-from pretouch.params.near import ReductionParams, RestrictionMode, RestrictionParams
-from pretouch.params.perception import PerceptionParams
-from pretouch.params.reaction import ReactionParams
-from pretouch.params.task import TaskParams
-from pretouch.params.touch import ThresholdParams
+from pretouch.params import (
+    AnticipationParams,
+    DetectionParams,
+    PerceptionParams,
+    ReactionParams,
+    ReductionParams,
+    RestrictionMode,
+    RestrictionParams,
+    TaskParams,
+    ThresholdParams,
+)
+from pretouch.plugins import load, names
+from pretouch.profile import Profile
 
-
-@dataclass(frozen=True)
-class Profile(Checked):
-    """A named set of parameters for the whole controller."""
-
-    name: str = "paper"
-    """Name shown in tables and files."""
-    perception: PerceptionParams = field(default_factory=PerceptionParams)
-    task: TaskParams = field(default_factory=TaskParams)
-    reduction: ReductionParams = field(default_factory=ReductionParams)
-    restriction: RestrictionParams = field(default_factory=RestrictionParams)
-    anticipation: AnticipationParams = field(default_factory=AnticipationParams)
-    threshold: ThresholdParams = field(default_factory=ThresholdParams)
-    reaction: ReactionParams = field(default_factory=ReactionParams)
-    failure: FailureParams = field(default_factory=FailureParams)
-    detection: DetectionParams = field(default_factory=DetectionParams)
-    localisation: LocalisationParams = field(default_factory=LocalisationParams)
-    baselines: BaselineParams = field(default_factory=BaselineParams)
-
+GROUP = "pretouch.profiles"
+"""Group of entry points under which other distributions name profiles of theirs."""
 
 _PAPER = Profile()
 _BLIND = Profile(name="blind", perception=PerceptionParams(enabled=False), restriction=RestrictionParams(mode="off"))
@@ -104,6 +94,67 @@ paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.m
 `flacco` and `ding`: published ways to avoid obstacles, to compare with (docs/explanation/baselines.md)."""
 
 
+def profile_names() -> tuple[str, ...]:
+    """Return the names of all profiles, those of other distributions last."""
+    return tuple(dict.fromkeys((*PROFILES, *names(GROUP))))
+
+
+def profile(text: str) -> Profile:
+    """Look a profile up: by its name, or as `NAME:CHANGE:...`, that profile with some parts or parameters changed.
+
+    A change is a part by its name or a parameter by its value, as `paper:detect=sequential:task.speed_m_s=0.2`, and
+    `none` leaves a part out. Names of earlier versions are read as well. Raises ParameterError for a profile, part or
+    parameter there is not, naming those there are, and for a value that is not allowed.
+    """
+    base, *changes = text.split(":")
+    found = _named(base)
+    return replace(changed(found, _paths(changes)), name=text) if changes else found
+
+
+def _named(name: str) -> Profile:
+    if name in PROFILES:
+        return PROFILES[name]
+    if name not in names(GROUP):
+        raise ParameterError(f"The profile {name!r} is unknown: choose from {', '.join(profile_names())}.")
+    found = load(GROUP, name)
+    if not isinstance(found, Profile):
+        raise ParameterError(f"The profile {name!r} is {found!r} in its distribution: it must be a Profile.")
+    return found
+
+
+def _paths(changes: list[str]) -> dict[str, str]:
+    """Read changes, of this version's names or an earlier one's: path -> text."""
+    found: dict[str, str] = {}
+    groups = [f.name for f in fields(Profile) if f.name != "name"]
+    for change in changes:
+        path, given, text = change.partition("=")
+        if not given:
+            raise ParameterError(f"The change {change!r} has no value: write PATH=VALUE.")
+        if path in REMOVED:
+            raise ParameterError(f"The parameter {path!r} is gone: {REMOVED[path]}")
+        found |= of_today(path, text)
+        group = next(iter(found)).partition(".")[0]
+        if group not in groups:
+            raise ParameterError(f"The group {group!r} of {change!r} is unknown: choose from {', '.join(groups)}.")
+    return found
+
+
+def of_today(path: str, text: str) -> dict[str, str]:
+    """Return what a change by a name of an earlier version is today: path -> text."""
+    if path in SWITCHES:
+        if text not in SWITCHES[path]:
+            raise ParameterError(f"{path} is {text!r}: choose from {', '.join(SWITCHES[path])}.")
+        return dict([SWITCHES[path][text]])
+    return {RENAMED.get(path, path): text}
+
+
+RENAMED: dict[str, str] = {}
+"""Names of earlier versions, and what each is today."""
+
+SWITCHES: dict[str, dict[str, tuple[str, str]]] = {}
+"""Switches of earlier versions: for each value the change that it is today."""
+
+
 _NO_DETOUR = "the arm no longer goes round what blocks its path, which kept it from none of 8 boards. Leave it out."
 REMOVED = {
     f"anticipation.{name}": _NO_DETOUR for name in ("detour", "detour_distance_m", "detour_speed_m_s", "detour_hold_s")
@@ -111,41 +162,14 @@ REMOVED = {
 """Parameters that earlier versions had, and what to do without each."""
 
 
-def profile(name: str) -> Profile:
-    """Look a profile up: by its name, or as `NAME:GROUP.FIELD=VALUE:...`, that profile with some parameters changed.
+def profile_from(table: Mapping[str, Any]) -> tuple[Profile, tuple[str, ...]]:
+    """Make a profile from the table that `composition.as_table` makes of one.
 
-    `paper:threshold.window_samples=500:reduction.enabled=no`, for example. Raises ParameterError for a profile, group
-    or field there is not, naming those there are, and for a value the field does not allow.
+    Names what another version knew that this one does not. Raises ParameterError where a value does not belong.
     """
-    base, *changes = name.split(":")
-    try:
-        found = PROFILES[base]
-    except KeyError:
-        raise ParameterError(f"The profile {base!r} is unknown: choose from {', '.join(PROFILES)}.") from None
-    values: dict[str, dict[str, object]] = {}
-    for change in changes:
-        group, field_name, value = _change(found, change)
-        values.setdefault(group, {})[field_name] = value
-    # all of a group at once, for some are only allowed together
-    return replace(found, name=name, **{g: replace(getattr(found, g), **changed) for g, changed in values.items()})
-
-
-def _change(profile: Profile, change: str) -> tuple[str, str, object]:
-    """Read the change of one parameter, given as GROUP.FIELD=VALUE: its group, its name and its value."""
-    where, given, text = change.partition("=")
-    group, _, name = where.partition(".")
-    if not given:
-        raise ParameterError(f"The change {change!r} has no value: write GROUP.FIELD=VALUE.")
-    groups = [f.name for f in fields(Profile) if f.name != "name"]
-    if group not in groups:
-        raise ParameterError(f"The group {group!r} of {change!r} is unknown: choose from {', '.join(groups)}.")
-    params = getattr(profile, group)
-    known = [f.name for f in fields(params)]
-    if where in REMOVED:
-        raise ParameterError(f"The parameter {where!r} is gone: {REMOVED[where]}")
-    if name not in known:
-        raise ParameterError(f"The parameter {where!r} is unknown: choose from {', '.join(known)}.")
-    return group, name, _read(where, text, getattr(params, name))
+    unlike: list[str] = []
+    made = from_table(Profile, dict(table), "", unlike)
+    return made, tuple(unlike)
 
 
 def at_rate(profile: Profile, rate: float) -> Profile:
@@ -166,24 +190,3 @@ def at_rate(profile: Profile, rate: float) -> Profile:
         threshold=replace(p.threshold, window_samples=samples, alpha=alpha),
         reaction=replace(p.reaction, decay_cycles=max(1, round(p.reaction.decay_cycles * more))),
     )  # fmt: skip
-
-
-_WORDS = {"yes": True, "true": True, "no": False, "false": False}
-
-
-def _read(where: str, text: str, now: object) -> object:
-    """Read a value of the kind the parameter has now."""
-    if isinstance(now, bool):
-        if text not in _WORDS:
-            raise ParameterError(f"{where} is {text!r}: write yes or no.")
-        return _WORDS[text]
-    if not isinstance(now, Real | tuple):
-        return text
-    try:
-        if isinstance(now, tuple):
-            return tuple(float(part) for part in text.split(","))
-        return int(text) if isinstance(now, Integral) else float(text)
-    except ValueError:
-        kind = "a whole number" if isinstance(now, Integral) else "a number"
-        kind = "numbers with commas between" if isinstance(now, tuple) else kind
-        raise ParameterError(f"{where} is {text!r}: write {kind}.") from None
