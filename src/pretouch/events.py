@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.contact import reaction
 from pretouch.contact.clamp import ClampState
-from pretouch.contact.detect import Detection
+from pretouch.contact.detector import Detection
 from pretouch.contact.place import given_up
 from pretouch.contact.response import Doing, ResponseState, moves, presses_on, waits
 from pretouch.modes import Event, ModeState
@@ -43,10 +43,10 @@ def events_of(
         events[Event.SKIN_SILENT] = silent
     if lost:
         events[Event.POINTS_LOST] = lost
-    if not felt.armed and p.detection.method != "thresholds" and bool(np.isnan(felt.residual).any()):
+    if not felt.armed and p.detect.by_torques and bool(np.isnan(felt.residual).any()):
         events.setdefault(Event.NO_FORCE, f"up to {p.failure.force_timeout_s:g} s")
     elif not felt.armed:
-        events[Event.WINDOW_FILLING] = f"{samples} of {p.threshold.window_samples} samples"
+        events[Event.WINDOW_FILLING] = f"{samples} of {p.window.samples} samples"
     if blocked >= p.anticipation.blocked_after_s:
         events[Event.PATH_BLOCKED] = f"{blocked:.1f} s"
     return events

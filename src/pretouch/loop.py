@@ -206,7 +206,7 @@ def turn(
 ) -> Cycle:  # fmt: skip
     """Turn the controller once, at a tick [s]: read, step, command."""
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
-    imu = imu_of(skin) if controller.profile.detection.use_imu else None
+    imu = imu_of(skin) if "imu" in controller.profile.detect.reads else None
     seen = None if points is None else points.read()
     stamp = _instant(tick, controller.limits.period, report, readings, touch)
     inputs = Inputs(stamp, report, readings, resume, touch, imu, seen)

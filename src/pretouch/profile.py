@@ -3,18 +3,18 @@
 from dataclasses import dataclass, field
 
 from pretouch.checks import Checked
+from pretouch.contact.detector import Detector
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.params import (
     AnticipationParams,
     BaselineParams,
-    DetectionParams,
     FailureParams,
-    LocalisationParams,
     PerceptionParams,
     ReactionParams,
     ReductionParams,
     RestrictionParams,
     TaskParams,
-    ThresholdParams,
+    WindowParams,
 )
 
 
@@ -29,9 +29,10 @@ class Profile(Checked):
     reduction: ReductionParams = field(default_factory=ReductionParams)
     restriction: RestrictionParams = field(default_factory=RestrictionParams)
     anticipation: AnticipationParams = field(default_factory=AnticipationParams)
-    threshold: ThresholdParams = field(default_factory=ThresholdParams)
+    window: WindowParams = field(default_factory=WindowParams)
+    """The window of the external force: contacts are told once it is full (eq. 8)."""
+    detect: Detector = field(default_factory=MovingThresholds)
+    """How a contact is told from free motion (eqs. 9-11)."""
     reaction: ReactionParams = field(default_factory=ReactionParams)
     failure: FailureParams = field(default_factory=FailureParams)
-    detection: DetectionParams = field(default_factory=DetectionParams)
-    localisation: LocalisationParams = field(default_factory=LocalisationParams)
     baselines: BaselineParams = field(default_factory=BaselineParams)

@@ -8,18 +8,21 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
-from pretouch.composition import changed, from_table
+from pretouch.composition import at, changed, from_table
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.contact.tactile import TouchSensors
 from pretouch.errors import ParameterError
 from pretouch.params import (
     AnticipationParams,
-    DetectionParams,
+    LocalisationParams,
     PerceptionParams,
     ReactionParams,
     ReductionParams,
     RestrictionMode,
     RestrictionParams,
     TaskParams,
-    ThresholdParams,
+    WindowParams,
 )
 from pretouch.plugins import load, names
 from pretouch.profile import Profile
@@ -30,10 +33,6 @@ GROUP = "pretouch.profiles"
 _PAPER = Profile()
 _BLIND = Profile(name="blind", perception=PerceptionParams(enabled=False), restriction=RestrictionParams(mode="off"))
 
-OBSERVER_NM = (3.2, 5.2, 3.2, 4.0, 1.8, 1.1, 1.4)
-"""Bounds of the profile `observer` [Nm]: five times what a real Panda's model leaves of its torques in free motion,
-0.64 1.03 0.64 0.79 0.35 0.22 0.28 Nm rms."""
-
 
 def _avoiding(name: RestrictionMode) -> Profile:
     """Return a published way to avoid obstacles: contacts are felt as without proximity, nothing else slows the arm."""
@@ -42,27 +41,21 @@ def _avoiding(name: RestrictionMode) -> Profile:
         name=name,
         reduction=ReductionParams(enabled=False),
         restriction=RestrictionParams(mode=name),
-        threshold=ThresholdParams(f_d_n=0.0),
+        detect=MovingThresholds(f_d_n=0.0),
     )
 
 
 PROFILES: dict[str, Profile] = {
     "paper": _PAPER,
     "blind": _BLIND,
-    "slowing-only": replace(_PAPER, name="slowing-only", threshold=ThresholdParams(f_d_n=0.0)),
+    "slowing-only": replace(_PAPER, name="slowing-only", detect=MovingThresholds(f_d_n=0.0)),
     "thresholds-only": replace(_PAPER, name="thresholds-only", reduction=ReductionParams(enabled=False)),
     "paper-0.5m": replace(
         _PAPER,
         name="paper-0.5m",
         reduction=ReductionParams(d_max_m=0.5),
         restriction=RestrictionParams(d_notice_m=0.5),
-        threshold=ThresholdParams(d_max_m=0.5),
-    ),
-    "fixed": replace(_BLIND, name="fixed", detection=DetectionParams(method="fixed")),
-    "observer": replace(
-        _BLIND,
-        name="observer",
-        detection=DetectionParams(method="fixed", joint_torques_nm=OBSERVER_NM, force_n=1000.0),
+        detect=MovingThresholds(d_max_m=0.5),
     ),
     "pretouch": Profile(
         name="pretouch",
@@ -77,7 +70,8 @@ PROFILES: dict[str, Profile] = {
         reduction=ReductionParams(enabled=False),
         restriction=RestrictionParams(mode="braking"),
         anticipation=AnticipationParams(effective_mass=True, closing_speed=True, tangential=True, null_space=True),
-        detection=DetectionParams(method="sequential", freeze_while_reacting=True, localise=True, use_touch=True),
+        window=WindowParams(freeze_while_reacting=True),
+        detect=SequentialTest(cues=(TouchSensors(),), localise=LocalisationParams()),
         reaction=ReactionParams(
             method="admittance", clamps=True, gives_up=True, soft_hold=True, static_friction_nm=3.0, pinches=True
         ),
@@ -88,8 +82,7 @@ PROFILES: dict[str, Profile] = {
 """`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0.
 `slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity each (restrictions are apart from
 both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
-text (section V-C). `fixed`: as `blind`, with the bounds of the vendor's examples on torques and force. `observer`: as
-that, with tighter constant bounds on the torques of the momentum observer. `pretouch`: ours, each departure from the
+text (section V-C). `pretouch`: ours, each departure from the
 paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md).
 `flacco` and `ding`: published ways to avoid obstacles, to compare with (docs/explanation/baselines.md)."""
 
@@ -139,6 +132,19 @@ def _paths(changes: list[str]) -> dict[str, str]:
     return found
 
 
+def value_of(found: Profile, path: str) -> object:
+    """Return a part's or parameter's value, by its name of today or of an earlier version.
+
+    A switch of an earlier version is True or False, or its text. Raises ParameterError for a parameter there is not.
+    """
+    if path in SWITCHES:
+        for text, (today, chosen) in SWITCHES[path].items():
+            if changed(found, {today: chosen}) == found:
+                return {"yes": True, "no": False}.get(text, text)
+    (today,) = _paths([f"{path}=" if path not in SWITCHES else f"{path}={next(iter(SWITCHES[path]))}"])
+    return at(found, today)
+
+
 def of_today(path: str, text: str) -> dict[str, str]:
     """Return what a change by a name of an earlier version is today: path -> text."""
     if path in SWITCHES:
@@ -148,10 +154,44 @@ def of_today(path: str, text: str) -> dict[str, str]:
     return {RENAMED.get(path, path): text}
 
 
-RENAMED: dict[str, str] = {}
+_WINDOW = {"threshold.window_samples": "samples", "threshold.alpha": "alpha", "threshold.lambda_": "lambda_"}
+_THRESHOLDS = ("f_base_n", "f_std_n", "sigma_max_n", "f_d_n", "d_max_m", "d_min_m", "compare")
+_PROXIMITY = {"near_gain": "gain", "near_m": "distance_m", "near_horizon_s": "horizon_s"}
+_TOUCH = {
+    "false_touches_per_hour": "false_touches_per_hour", "false_touch_s": "false_touch_s", "touch_fresh_s": "fresh_s",
+    "touch_patience_s": "patience_s", "touch_forgiveness": "forgiveness",
+}  # fmt: skip
+_IMU = {
+    "imu_gain": "gain", "imu_memory_s": "memory_s", "imu_contact_gain": "contact_gain", "imu_tails": "tails",
+    "imu_follow_1_s": "follow_1_s", "imu_motion_doubt": "motion_doubt", "rotor_kg_m2": "rotor_kg_m2",
+}  # fmt: skip
+_DETECT = (
+    "joint_torques_nm", "force_n", "false_alarms_per_hour", "slack_nats", "contact_gain", "tails", "clear_m", "suspect",
+    "inertia", "relearn_after_s", "widen_at_turns", "memory_s", "spread_memory_s", "observer_gain_1_s",
+    "offset_prior_nm", "friction_prior_nm", "mass_prior", "payload_prior_kg", "velocity_prior_rad_s2",
+    "torque_prior_nm", "noise_floor_nm", "bias_floor_nm", "still_rad_s", "confirm_samples",
+)  # fmt: skip
+RENAMED: dict[str, str] = {
+    **{old: f"window.{new}" for old, new in _WINDOW.items()},
+    "detection.freeze_while_reacting": "window.freeze_while_reacting",
+    **{f"threshold.{name}": f"detect.{name}" for name in _THRESHOLDS},
+    **{f"detection.{name}": f"detect.{name}" for name in _DETECT},
+    **{f"detection.{old}": f"detect.proximity.{new}" for old, new in _PROXIMITY.items()},
+    **{f"detection.{old}": f"detect.cues.touch.{new}" for old, new in _TOUCH.items()},
+    **{f"detection.{old}": f"detect.cues.imu.{new}" for old, new in _IMU.items()},
+    **{f"localisation.{f.name}": f"detect.localise.{f.name}" for f in fields(LocalisationParams)},
+}
 """Names of earlier versions, and what each is today."""
 
-SWITCHES: dict[str, dict[str, tuple[str, str]]] = {}
+SWITCHES: dict[str, dict[str, tuple[str, str]]] = {
+    "detection.method": {name: ("detect", name) for name in ("thresholds", "fixed", "sequential")},
+    "detection.use_proximity": {"yes": ("detect.proximity", "on"), "no": ("detect.proximity", "none")},
+    "detection.use_touch": {"yes": ("detect.cues", "touch"), "no": ("detect.cues", "none")},
+    "detection.use_imu": {"yes": ("detect.cues", "touch,imu"), "no": ("detect.cues", "touch")},
+    "detection.learn": {"yes": ("detect.learn", "watched"), "no": ("detect.learn", "never")},
+    "detection.learn_unseen": {"yes": ("detect.learn", "always"), "no": ("detect.learn", "watched")},
+    "detection.localise": {"yes": ("detect.localise", "on"), "no": ("detect.localise", "none")},
+}
 """Switches of earlier versions: for each value the change that it is today."""
 
 
@@ -182,11 +222,11 @@ def at_rate(profile: Profile, rate: float) -> Profile:
     if not (math.isfinite(rate) and rate * p.failure.overrun_s > 1):
         least = 1 / p.failure.overrun_s
         raise ParameterError(f"The rate is {rate:g} Hz: it must be more than {least:g} Hz, or each step would be late.")
-    samples, alpha = max(2, round(p.threshold.window_samples * more)), 1 - (1 - p.threshold.alpha) ** (1 / more)
+    samples, alpha = max(2, round(p.window.samples * more)), 1 - (1 - p.window.alpha) ** (1 / more)
     return p if more == 1 else replace(
         p,
         task=replace(p.task, control_period_s=1 / rate),
         reduction=replace(p.reduction, l_max_cycles=max(1, round(p.reduction.l_max_cycles * more))),
-        threshold=replace(p.threshold, window_samples=samples, alpha=alpha),
+        window=replace(p.window, samples=samples, alpha=alpha),
         reaction=replace(p.reaction, decay_cycles=max(1, round(p.reaction.decay_cycles * more))),
     )  # fmt: skip

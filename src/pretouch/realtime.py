@@ -209,7 +209,7 @@ def warm_up(controller: Controller, robot: RobotState, points: bool = False) -> 
     lost = np.full(len(robot.q), np.nan)
     for seen in (RangeStatus.SIGNAL, RangeStatus.OK):
         rehearsal = _Rehearsal(controller, robot, points)
-        for _ in range(controller.profile.threshold.window_samples):
+        for _ in range(controller.profile.window.samples):
             rehearsal.step(None, quiet)
         for wrench in (robot.wrench, None, quiet, push):
             for _ in range(_WARM_UP_STEPS):

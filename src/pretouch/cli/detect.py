@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
 from pretouch.foreign.detect import detect_foreign, units_topics
@@ -101,7 +102,7 @@ def _unheard(skin: Skin | None, foreign: Foreign) -> list[str]:
 
 def _said(foreign: Foreign, columns: list[Column], skin: Skin | None) -> list[str]:
     said = [sentence for p, d, _ in columns for sentence in findings(foreign, d, p)]
-    if skin is None and any(p.perception.enabled and p.threshold.f_d_n for p, _, _ in columns):
+    if skin is None and any(p.perception.enabled and thresholds_of(p.detect).f_d_n for p, _, _ in columns):
         said.append("Without ranges (--skin) nothing is near: eq. 11 lowers no threshold.")
     return said
 

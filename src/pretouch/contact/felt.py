@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, entry
 from pretouch.contact.cues import Cues
-from pretouch.contact.fixed import force_map_into
+from pretouch.contact.force_map import force_map_into
 from pretouch.contact.hypotheses import NearPrior, write_hypotheses
 from pretouch.contact.lasting_load import (
     WeightPart,
@@ -36,7 +36,7 @@ from pretouch.contact.residual_model import (
 from pretouch.contact.sequential import LENGTHS, LONGEST, Hypotheses, alarm_level, judge, window_means
 from pretouch.contact.turning import learn_turning, turning_doubt, turning_init
 from pretouch.groups import Mechanism, ObstacleArrays
-from pretouch.params import DetectionParams
+from pretouch.params import ProximityPriorParams, SequentialParams
 from pretouch.robot.mass_matrix import mass_matrix_into
 from pretouch.robot.model import Kinematics, RobotModel, jacobian_into
 from pretouch.types import FloatArray, Obstacles, RobotState
@@ -100,7 +100,7 @@ class Felt:
     """Whether it is being found out if what is felt is a load or a step of an estimate."""
 
 
-def sequential_init(model: RobotModel, p: DetectionParams, learnt: ResidualModel | None = None) -> SequentialState:
+def sequential_init(model: RobotModel, p: SequentialParams, learnt: ResidualModel | None = None) -> SequentialState:
     """Return the state before the first sample; `learnt` is what an earlier session knew of the arm."""
     known = residual_init(model.n, p) if learnt is None else learnt
     return SequentialState(
@@ -109,8 +109,9 @@ def sequential_init(model: RobotModel, p: DetectionParams, learnt: ResidualModel
 
 
 def take_sample(
-    state: SequentialState, model: RobotModel, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-    reacting: bool, watched: bool, period: float, p: DetectionParams, cues: Cues,
+    state: SequentialState, model: RobotModel, kin: Kinematics, robot: RobotState,
+    obstacles: Obstacles | ObstacleArrays, reacting: bool, watched: bool, period: float, p: SequentialParams,
+    cues: Cues,
 ) -> tuple[Felt, SequentialState]:  # fmt: skip
     """Hold one sample of the external torques against free motion, and learn from it if nothing can be a contact.
 
@@ -131,14 +132,14 @@ def take_sample(
     means, S, doubt = np.zeros((len(LENGTHS), n)), np.empty((n, n)), np.empty(n)
     ring, block, queue, prior = state.ring.copy(), m.block.copy(), m.queue, _NONE
     weights, covariance, spread, seen = m.weights, m.covariance, m.spread, m.seen
-    settle = round(p.relearn_after_s / period) if p.learn else 0
+    settle = round(p.relearn_after_s / period) if p.learn != "never" else 0
     if m.filled + 1 == BLOCK or 0 < settle <= state.steady:  # in no other step are they written to
         queue = queue.copy()
         if m.waiting == QUEUE or 0 < settle <= state.steady:
             prior = prior_of(n, p)
             weights, covariance, spread, seen = weights.copy(), covariance.copy(), spread.copy(), seen.copy()
     lasting, turning = state.lasting.copy(), state.turning.copy()
-    may = p.learn and (watched or p.learn_unseen)
+    may, nearness = p.learn == "always" or (watched and p.learn == "watched"), p.proximity or _NO_PROXIMITY
     o = obstacles
     evidence, calm, filled, waiting, steady = _take.flat(
         robot.qd, robot.qd_commanded, robot.tau_ext,
@@ -148,9 +149,9 @@ def take_sample(
         ring, state.at, min(state.count + 1, LONGEST), state.calm, lasting, state.steady, turning, m.speed,
         math.exp(-p.observer_gain_1_s * period), period, settle, alarm_level(p, period), may, reacting,
         (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2, cues.gain,
-        p.inertia, p.widen_at_turns, p.offset_prior_nm, p.use_proximity, p.contact_gain, p.tails, p.near_gain,
-        p.near_m, p.near_horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm, p.still_rad_s,
-        p.memory_s, p.spread_memory_s,
+        p.inertia, p.widen_at_turns, p.offset_prior_nm, p.proximity is not None, p.contact_gain, p.tails, nearness.gain,
+        nearness.distance_m, nearness.horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm,
+        p.still_rad_s, p.memory_s, p.spread_memory_s,
         residual, speed, force, bands, means, S, doubt, *kin, *model.mechanism_fields,
     )  # fmt: skip
     at, count = (state.at + 1) % LONGEST, min(state.count + 1, LONGEST)
@@ -167,6 +168,7 @@ def take_sample(
 
 
 _NONE = np.zeros(0)
+_NO_PROXIMITY = ProximityPriorParams(gain=1.0)
 
 
 class _Blocks(NamedTuple):
@@ -224,7 +226,7 @@ class _Now(NamedTuple):
 
 
 class _Params(NamedTuple):
-    """What is taken of `DetectionParams`."""
+    """What is taken of `SequentialParams`."""
 
     inertia: bool
     widen_at_turns: bool

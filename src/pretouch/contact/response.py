@@ -16,7 +16,7 @@ from pretouch.contact.admittance import (
     yielded,
 )
 from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
-from pretouch.contact.detect import Detection
+from pretouch.contact.detector import Detection
 from pretouch.contact.pinch import pinched, pressed
 from pretouch.contact.place import PlaceState, given_up, met, passed, place_init, pushed, waited
 from pretouch.params import Profile, ReactionParams

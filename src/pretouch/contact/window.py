@@ -3,6 +3,7 @@
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.params import WindowParams
 from pretouch.types import FloatArray
 from pretouch.values import value
 
@@ -93,10 +94,12 @@ def weighted_value(
     return value
 
 
-def add(state: WindowState, reading: FloatArray, alpha: float, lambda_: float) -> WindowState:
-    """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on."""
+def add(state: WindowState, reading: FloatArray | None, p: WindowParams) -> WindowState:
+    """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on; None: nothing."""
+    if reading is None:
+        return state
     chunk, at, sums = place(state)
-    add_to(chunk, at, sums, state.count, state.full, reading, alpha, lambda_)
+    add_to(chunk, at, sums, state.count, state.full, reading, p.alpha, p.lambda_)
     return added(state, chunk, sums)
 
 

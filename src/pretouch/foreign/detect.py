@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pretouch.contact.detect import detect
+from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.contact.reaction import active, advance, reaction_init, start_reaction
-from pretouch.contact.window import window_init
+from pretouch.contact.window import add, window_init
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
@@ -32,10 +32,10 @@ def detect_foreign(foreign: Foreign, profile: Profile, skin: Skin | None = None)
     turned, so that what its units saw counts; without one there are no obstacles. Times count from the first sample.
     Raises RecordingError for a recording too short or too slow to detect anything.
     """
-    if profile.detection.method != "thresholds":
+    if profile.detect.by_torques:
         raise RecordingError(
             f"The profile {profile.name} detects by joint torques, and {foreign.place} is read for its force: choose"
-            " one with detection.method=thresholds."
+            " one with detect=thresholds."
         )
     timeout, gap = profile.failure.force_timeout_s, float(np.median(np.diff(foreign.force.time))) / 1e9
     if gap > timeout:
@@ -53,7 +53,7 @@ def detect_foreign(foreign: Foreign, profile: Profile, skin: Skin | None = None)
         period, usable = profile.task.control_period_s, int(np.isfinite(decisions.force[:, 0]).sum())
         raise RecordingError(
             f"{foreign.place} has {usable * period:.2f} s of usable force, and the window of {profile.name} takes"
-            f" {profile.threshold.window_samples * period:g} s to fill: give a longer recording."
+            f" {profile.window.samples * period:g} s to fill: give a longer recording."
         )
     return decisions
 
@@ -86,10 +86,12 @@ def _forces(force: Series, ticks: IntArray, profile: Profile) -> FloatArray:
 def _force_alone(ticks: IntArray, begin: int, force: FloatArray, profile: Profile) -> Decisions:
     """Detect without obstacles; as in the controller, nothing is a contact while a reaction would be under way."""
     p, decided = profile, Decided(profile.name)
-    window, mode, react = window_init(p.threshold.window_samples), mode_init(), reaction_init(p.reaction)
+    window, mode, react = window_init(p.window.samples), mode_init(), reaction_init(p.reaction)
+    thresholds = thresholds_of(p.detect)
     for time, sample in zip(((ticks - begin) / 1e9).tolist(), force, strict=True):
-        present = not np.isnan(sample[0])
-        felt, window = detect(window, sample if present else None, _NOWHERE, _NOTHING, p.threshold)
+        force_now = None if np.isnan(sample[0]) else sample
+        armed, window = window.full, add(window, force_now, p.window)
+        felt = thresholds.judged(window, force_now, armed, _NOWHERE, _NOTHING)
         events = {Event.WINDOW_FILLING: ""} if not felt.armed else {}
         if felt.contact is not None:
             events[Event.CONTACT] = ""
@@ -101,7 +103,7 @@ def _force_alone(ticks: IntArray, begin: int, force: FloatArray, profile: Profil
         contact = felt.contact if begins else None
         react = start_reaction(contact.force, p.reaction) if contact else react
         react = advance(react) if reacting else reaction_init(p.reaction)
-        compared = window.newest if present and p.threshold.compare == "filtered" else sample
+        compared = window.newest if force_now is not None and thresholds.compare == "filtered" else sample
         decided.add(time, sample, compared, felt.thresholds, felt.armed, reacting, contact)
     return decided.decisions()
 

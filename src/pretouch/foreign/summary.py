@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.foreign.samples import Foreign
 from pretouch.params import Profile
 from pretouch.recording.compare import Decisions
@@ -51,8 +52,8 @@ def summary(decisions: Decisions, profile: Profile) -> Summary:
         sigma=d.force[free].std(axis=0) if some else nothing,
         sigma_window=np.median(d.sigma[free], axis=0) if some else nothing,
         width=np.median((d.upper - d.lower)[free] / 2, axis=0) if some else nothing,
-        f_base_free=profile.threshold.f_base_n + float(beyond[free].max()) if some else np.nan,
-        f_base_all=profile.threshold.f_base_n + float(beyond[told].max()) if told.any() else np.nan,
+        f_base_free=thresholds_of(profile.detect).f_base_n + float(beyond[free].max()) if some else np.nan,
+        f_base_all=thresholds_of(profile.detect).f_base_n + float(beyond[told].max()) if told.any() else np.nan,
     )
 
 
@@ -70,13 +71,13 @@ def guidance(decisions: Decisions, found: Summary, profile: Profile) -> str:
     if not count:
         return (
             f"{decisions.name}: no contact in {minutes:.1f} min; an F_b below {found.f_base_all:.1f} N would have given"
-            f" one (it is {profile.threshold.f_base_n:g} N)."
+            f" one (it is {thresholds_of(profile.detect).f_base_n:g} N)."
         )
     contacts = "1 false contact" if count == 1 else f"{count} false contacts"
     return (
         f"{decisions.name}: if nobody touched the arm, {contacts} in {minutes:.1f} min; an F_b above"
         f" {found.f_base_all:.1f} N would have given none, one above {found.f_base_free:.1f} N none but"
-        f" {'this' if count == 1 else 'these'} (it is {profile.threshold.f_base_n:g} N)."
+        f" {'this' if count == 1 else 'these'} (it is {thresholds_of(profile.detect).f_base_n:g} N)."
     )
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from pretouch.params.anticipation import AnticipationParams as AnticipationParams
 from pretouch.params.anticipation import BodyRegion as BodyRegion
 from pretouch.params.baselines import BaselineParams as BaselineParams
-from pretouch.params.detection import DetectionParams as DetectionParams
 from pretouch.params.failure import FailureParams as FailureParams
 from pretouch.params.localisation import LocalisationParams as LocalisationParams
 from pretouch.params.near import ReductionParams as ReductionParams
@@ -16,9 +15,13 @@ from pretouch.params.near import RestrictionMode as RestrictionMode
 from pretouch.params.near import RestrictionParams as RestrictionParams
 from pretouch.params.perception import PerceptionParams as PerceptionParams
 from pretouch.params.reaction import ReactionParams as ReactionParams
+from pretouch.params.sequential import ProximityPriorParams as ProximityPriorParams
+from pretouch.params.sequential import SequentialParams as SequentialParams
+from pretouch.params.sequential import TouchSensorParams as TouchSensorParams
 from pretouch.params.task import Orientation as Orientation
 from pretouch.params.task import TaskParams as TaskParams
-from pretouch.params.touch import ThresholdParams as ThresholdParams
+from pretouch.params.thresholds import ThresholdParams as ThresholdParams
+from pretouch.params.window import WindowParams as WindowParams
 
 if TYPE_CHECKING:
     from pretouch.profile import Profile as Profile

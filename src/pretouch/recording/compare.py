@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import RecordingError, RobotStateError
 from pretouch.params import Profile, at_rate
@@ -78,7 +79,7 @@ class Decided:
 
     def add_step(self, step: ControlStep, profile: Profile) -> None:
         """Take in a controller's step; the profile says which force it compared."""
-        filtered = profile.detection.method == "thresholds" and profile.threshold.compare == "filtered"
+        filtered = isinstance(profile.detect, MovingThresholds) and profile.detect.compare == "filtered"
         compared = step.filtered_force if filtered else step.force
         without = np.isnan(step.force).any()
         self.add(

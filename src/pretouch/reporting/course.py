@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.types import BoolArray, Contact, FloatArray, IntArray, Mode, QpOutcome
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ class Course:
     @property
     def by_thresholds(self) -> bool:
         """Whether any of the profiles feels contacts by the paper's thresholds."""
-        return any(run.profile.detection.method == "thresholds" for run in self.runs)
+        return any(isinstance(run.profile.detect, MovingThresholds) for run in self.runs)
 
     def of_runs(self, value: Callable[["Run"], float]) -> FloatArray:
         """Value (S,) that each step's run has."""

@@ -7,12 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from pretouch.contact.feel import FeelState, learnt
 from pretouch.contact.residual_model import ResidualModel, kept, residual_init, resumed
 from pretouch.contact.rested import rested
+from pretouch.contact.sequential_test import SequentialTest
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RobotModelError
 from pretouch.loop import Cycle
@@ -59,9 +60,12 @@ class FreeMotion:
             now: tells the time [s since 1970].
         """
         self._home, self._model, self._now = home, controller.model, now
-        self._params, self._period = controller.profile.detection, controller.limits.period
+        detector = controller.profile.detect
+        if not isinstance(detector, SequentialTest):
+            raise ParameterError(f"The profile {controller.profile.name} learns no free motion.")
+        self._params, self._period = detector, controller.limits.period
         self._since, self._unusable = now(), False
-        self._newest: FeelState | None = None
+        self._newest: ResidualModel | None = None
         self.begin = None
         self.found = ("Nothing is known yet of this robot's free motion: at first only firm pushes are felt.",)
         if os.path.exists(home.place):
@@ -72,11 +76,12 @@ class FreeMotion:
 
     def record(self, cycle: Cycle) -> None:
         """Remember what is known after one turn of the loop."""
-        self._newest = cycle.after.feel
+        state: Any = cycle.after.detector  # of this detector
+        self._newest = self._params.learnt(state)
 
     def keep(self) -> tuple[str, ...]:
         """Write what is known by now, if anything was learnt; return a sentence on it. Nothing is raised."""
-        model = None if self._newest is None else learnt(self._newest)
+        model = self._newest
         if model is None or self._same(model):
             return ()
         place = self._home.place

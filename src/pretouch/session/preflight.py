@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
+from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.controller import Controller
 from pretouch.session.finding import Finding
 from pretouch.session.standing import Standing
@@ -81,7 +82,7 @@ def _rest(controller: Controller, seen: Standing, params: PreflightParams) -> It
 
 
 def _force(controller: Controller, seen: Standing, params: PreflightParams) -> Iterator[Finding]:
-    threshold = controller.profile.threshold
+    threshold = thresholds_of(controller.profile.detect)
     if seen.unfelt > params.unfelt:
         yield Finding(
             "no force",

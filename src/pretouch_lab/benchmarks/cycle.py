@@ -124,7 +124,7 @@ class _Timed:
 def _settled(controller: Controller, work: Workload) -> ControllerState:
     """Turn the controller until the arm moves; return its state."""
     state = controller.init(work.inputs().robot)
-    for _ in range(controller.profile.threshold.window_samples + _SETTLE):
+    for _ in range(controller.profile.window.samples + _SETTLE):
         step, state = controller.step(state, work.inputs())
         work.move(step.command)
     return state

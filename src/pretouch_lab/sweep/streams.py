@@ -51,7 +51,7 @@ def _sensing(setting: Setting) -> Sensing:
 
 
 def _detector(setting: Setting) -> Contender:
-    by_force = setting.profile.detection.method == "thresholds"
+    by_force = not setting.profile.detect.by_torques
     return Contender("swept", setting.profile_text, "f_base_n" if by_force else "scale")
 
 
@@ -68,7 +68,7 @@ def _free(setting: Setting, stream: Stream) -> Numbers:
     counted = made.stamp >= scene.warm_up_s
     alarms = int(counted[begun(made.alarm, setting.profile.reaction.decay_cycles)].sum())
     most = float(made.statistic[counted].max(initial=-np.inf))
-    margin = setting.profile.threshold.f_base_n - most if detector.sweep == "f_base_n" and np.isfinite(most) else None
+    margin = detector.default - most if detector.sweep == "f_base_n" and np.isfinite(most) else None
     hours = float(counted.sum()) * PERIOD_S / 3600
     return {"false_alarms_per_hour": alarms / hours, "alarms": float(alarms), "least_margin_n": margin}
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from pretouch.cli.run.asking import say
 from pretouch.cli.writing import check_writable
+from pretouch.contact.sequential_test import SequentialTest
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.session.free_motion import FreeMotion, Home, home_of
@@ -25,7 +26,7 @@ def free_motion(
         robot: what it is known by.
         remembered: whether it has a file of its own where none is named.
     """
-    if controller.profile.detection.method != "sequential":
+    if not isinstance(controller.profile.detect, SequentialTest):
         if options.learnt or options.learn_anew:
             raise ParameterError(
                 f"The profile {controller.profile.name} learns no free motion: choose --profile pretouch, or leave out"

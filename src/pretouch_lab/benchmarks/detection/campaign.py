@@ -149,7 +149,7 @@ def _contacts_s(cell: ContactCell) -> float:
 
 
 def _replay_cost(contender: Contender) -> float:
-    return _REPLAY_COST[contender.profile.detection.method]
+    return _REPLAY_COST[contender.profile.detect.name]
 
 
 def _where(cell: FreeCell) -> tuple[str, str, float, str]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pretouch.contact.detect import Detection
+from pretouch.contact.detector import Detection
 from pretouch.contact.response import Felt, answered, began, noticed, response_init, seen_near
 from pretouch.params import Profile
 from pretouch.robot.body import Capsules

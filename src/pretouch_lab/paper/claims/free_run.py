@@ -70,7 +70,7 @@ def leave_alone(what: Solitude, cell: Cell, seed: int, context: Context) -> Reco
         recording=context.recording,
         plant=what.plant,
     )
-    end = SETTLE_S + profile.threshold.window_samples * _PERIOD_S + what.duration_s
+    end = SETTLE_S + profile.window.samples * _PERIOD_S + what.duration_s
     return play(setup, lambda step, _: step.stamp >= end - 0.5 * _PERIOD_S)
 
 

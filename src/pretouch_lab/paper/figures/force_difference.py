@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.params import profile
 from pretouch_lab.paper.figures.marks import BLIND, OURS, SENSING, Y, touching
 from pretouch_lab.trace import Trace
@@ -51,7 +52,7 @@ def _force(axes: Axes, trace: Trace, push: float, name: str, colour: str, hatch:
     time = trace.time - trace.time[touched[0]]
     found = np.flatnonzero(trace.detected & (time >= 0))
     before = time <= (time[found[0]] if len(found) else time[-1])
-    if profile(name).detection.method == "thresholds":
+    if isinstance(profile(name).detect, MovingThresholds):
         axes.fill_between(
             time[before], push * trace.lower[before, Y], push * trace.upper[before, Y], facecolor=(colour, 0.15),
             edgecolor=(colour, 0.5), lw=0.8, ls=style, hatch=hatch, label=f"{name}: between thresholds",

@@ -61,7 +61,7 @@ BLOCKS = (
             ("eq. 8: window", "contact.window.add"),
             ("eqs. 9-10: thresholds", "contact.thresholds.thresholds"),
             ("eq. 11: anticipation", "contact.thresholds.obstacle_force"),
-            ("crossed: contact", "contact.detect.detect"),
+            ("crossed: contact", "contact.moving_thresholds.MovingThresholds"),
         ),
     ),
     Block(

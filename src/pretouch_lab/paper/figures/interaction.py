@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.params import Profile
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import spans
@@ -17,7 +18,7 @@ def interaction_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     distances(top, trace, units)
     d_max = profile.reduction.d_max_m
-    if profile.reduction.enabled or profile.detection.method == "thresholds":
+    if profile.reduction.enabled or isinstance(profile.detect, MovingThresholds):
         top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"activation, d_max {d_max:g} m")
     top.set(ylim=(0.0, 1.4), title=f"Three pushes in thirty seconds, profile {profile.name}")
     force_with_thresholds(middle, trace, Y, profile)

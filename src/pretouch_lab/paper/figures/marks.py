@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.params import Profile
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import spans
@@ -73,7 +74,7 @@ def force_with_thresholds(axes: Axes, trace: Trace, axis: int, profile: Profile)
 
     Of a detector without thresholds, the bands in which one sample alone is no contact.
     """
-    paper = profile.detection.method == "thresholds"
+    paper = isinstance(profile.detect, MovingThresholds)
     bounds = "thresholds" if paper else "bands of one sample"
     axes.plot(trace.time, trace.upper[:, axis], color="black", lw=1, label=bounds)
     axes.plot(trace.time, trace.lower[:, axis], color="black", lw=1)

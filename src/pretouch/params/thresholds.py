@@ -1,22 +1,16 @@
-"""Parameters of contact detection: the force window and the thresholds (eqs. 8-11)."""
+"""Parameters of the moving contact thresholds (eqs. 9-11)."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Literal
 
-from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
+from pretouch.checks import Checked, NonNegative, Positive
 from pretouch.errors import ParameterError
 
 
 @dataclass(frozen=True)
 class ThresholdParams(Checked):
-    """The force window and the contact thresholds (eqs. 8-11)."""
+    """The contact thresholds, which move with the force's statistics and with what is near (eqs. 9-11)."""
 
-    window_samples: Annotated[int, Check(low=2)] = 100
-    """Samples in the sliding window at the control rate; the paper does not say, the authors' code has 500."""
-    alpha: Fraction = 0.1
-    """Influence of an outlier on the value that enters the window, eq. 8 (Table I)."""
-    lambda_: NonNegative = 0.75
-    """Standard deviations beyond which a sample is an outlier, eq. 8 (Table I)."""
     f_base_n: Positive = 10.0
     """Base force F_b above the mean that makes a contact, eq. 9 [N] (Table I)."""
     f_std_n: NonNegative = 3.0

@@ -6,22 +6,22 @@ that follow gains on the links of the sequential test, for a short while; where 
 """
 
 import math
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import ByName, compiled, entry
-from pretouch.contact.cues import Cues, no_cues
-from pretouch.contact.impact_pattern import likelihoods, responses
+from pretouch.contact.cues import Cue, Cues, no_cues
+from pretouch.contact.detector import Body, Sample
 from pretouch.groups import Mechanism, SkinArrays
-from pretouch.params import DetectionParams, Profile
 from pretouch.robot.link_motion import chain_motion, lever_acceleration
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.imu_scale import STANDARD_GRAVITY
-from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, FloatArray, ImuReadings, IntArray, RobotState
+from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value
+from pretouch_lab.baselines.impact_pattern import likelihoods, responses
 
 BIN_S = 0.01
 """Length of a bin [s]: about that of an impact of a hand, and four samples."""
@@ -84,24 +84,52 @@ def impact_init(model: RobotModel, units: int) -> ImpactState:
     )  # fmt: skip
 
 
-def listen(
-    state: ImpactState, model: RobotModel, skin: Skin, kin: Kinematics, robot: RobotState, imu: ImuReadings,
-    now: float, profile: Profile,
-) -> tuple[Cues, ImpactState]:  # fmt: skip
+@dataclass(frozen=True)
+class AccelerometerParams(Checked):
+    """How a jolt that the units' accelerometers measure raises the prior of a contact on the links that explain it."""
+
+    gain: Annotated[float, Check(low=1.0, high=1e4)] = 100.0
+    """Times the prior of all links together is larger, at most, after a jolt [1]. It is never lowered."""
+    memory_s: Positive = 0.05
+    """Time in which that fades to a third [s]: the torques follow an impact so late."""
+    contact_gain: Positive = 30.0
+    """Times the spread of the accelerations is larger with an impact, in each direction it can push [1]."""
+    tails: Annotated[float, Check(low=3.0, high=1000.0)] = 8.0
+    """Degrees of freedom of the Student distribution of the accelerations without one: real vibration has outliers."""
+    follow_1_s: Positive = 50.0
+    """How fast the arm follows a commanded velocity [1/s]: as a critically damped joint impedance of 3000 Nm/rad
+    does, that carries 1.2 kg m^2."""
+    motion_doubt: Fraction = 0.5
+    """Part of what the commanded motion accelerates a unit by that may be otherwise [1], one standard deviation."""
+    rotor_kg_m2: NonNegative = 0.1
+    """Inertia of a drive at its joint [kg m^2], for what an impact accelerates (as the simulated arm's)."""
+
+
+@dataclass(frozen=True)
+class Accelerometers(AccelerometerParams, Cue, name="imu"):
+    """The units' accelerometers; they tell of no contact sooner than the torques (docs/explanation/detection.md)."""
+
+    State = ImpactState
+    reads = "imu"
+
+    def step(self, state: ImpactState | None, body: Body, sample: Sample) -> tuple[Cues | None, ImpactState | None]:
+        """Take in new samples; without any, nothing is said and nothing changes."""
+        if sample.imu is None:
+            return None, state
+        return listen(state or impact_init(body.model, len(body.skin)), body, sample, self)
+
+
+def listen(state: ImpactState, body: Body, sample: Sample, p: AccelerometerParams) -> tuple[Cues, ImpactState]:
     """Take in the samples that came since the last step, and return what they say of an impact.
 
     Args:
         state: memory.
-        model: the arm.
-        skin: its units.
-        kin: its posture.
-        robot: its state.
-        imu: samples; units and numbers must be sound.
-        now: instant of the step [s].
-        profile: parameters.
+        body: the arm and its units.
+        sample: of this step, with IMU samples whose units and numbers are sound.
+        p: parameters.
     """
-    p, s, period = profile.detection, state, profile.task.control_period_s
-    number = math.floor((now - 0.5 * period) / BIN_S)
+    s, model, skin, robot, imu, period = state, body.model, body.skin, sample.robot, sample.imu, body.period
+    number = math.floor((sample.stamp - 0.5 * period) / BIN_S)
     gap = number - s.number
     if not 0 <= gap < BINS:  # the first step, or time has jumped: no bin is whole
         fresh = impact_init(model, len(skin))
@@ -112,14 +140,14 @@ def listen(
         gap = 0
     felt, heard, expected, moved, told = s.felt.copy(), s.heard.copy(), s.expected.copy(), s.moved.copy(), s.told.copy()
     mean, spread, usual, seen = s.mean.copy(), s.spread.copy(), s.usual.copy(), s.seen.copy()
-    speed, behind, excess = s.speed.copy(), s.behind.copy(), s.excess * math.exp(-period / p.imu_memory_s)
+    speed, behind, excess = s.speed.copy(), s.behind.copy(), s.excess * math.exp(-period / p.memory_s)
     likelihood = np.zeros((BINS, len(model.parts)))
     judged = _listen(
-        kin, model.mechanism, skin.arrays, robot.qd_commanded, imu,
+        sample.kin, model.mechanism, skin.arrays, robot.qd_commanded, imu,
         (
             number, gap, (felt, heard, expected, moved, told), (mean, spread, usual, seen), speed, behind
         ),
-        _Params(period, p.imu_follow_1_s, p.imu_motion_doubt, p.rotor_kg_m2, p.imu_contact_gain, p.imu_tails),
+        _Params(period, p.follow_1_s, p.motion_doubt, p.rotor_kg_m2, p.contact_gain, p.tails),
         likelihood,
     )  # fmt: skip
     if judged:
@@ -130,12 +158,12 @@ def listen(
     return replace(no_cues(len(model.links)), gain=1.0 + excess), after
 
 
-def _raise(excess: FloatArray, likelihood: FloatArray, parts: IntArray, p: DetectionParams) -> None:
+def _raise(excess: FloatArray, likelihood: FloatArray, parts: IntArray, p: AccelerometerParams) -> None:
     """Raise the gains (L,) of links to what the bin that says most, of likelihood ratios (B, P), says of them.
 
     Their mean is the ratio of an impact anywhere; it is what is bounded, so that all links together weigh so much more.
     """
-    anywhere, most = likelihood.mean(axis=1), p.imu_gain - 1.0
+    anywhere, most = likelihood.mean(axis=1), p.gain - 1.0
     b = int(anywhere.argmax())
     if anywhere[b] > 0.0:
         excess[parts] = np.maximum(excess[parts], min(1.0, most / float(anywhere[b])) * likelihood[b])
@@ -176,7 +204,7 @@ class _Memory(NamedTuple):
 
 
 class _Params(NamedTuple):
-    """The period, and what is taken of `DetectionParams`."""
+    """The period, and what is taken of `AccelerometerParams`."""
 
     period: float
     follow: float

@@ -1,34 +1,10 @@
-"""Constant bounds on torques and force, as the vendor's examples set them."""
+"""The force at the end-effector that explains joint torques best."""
 
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
-from pretouch.params import DetectionParams
 from pretouch.types import FloatArray
-
-
-def bounds_of(p: DetectionParams, n: int) -> FloatArray:
-    """Bounds (n,) on the joints' torques [Nm]: of the given ones those at the same place between base and hand."""
-    given = np.array(p.joint_torques_nm)
-    return given[np.rint(np.linspace(0, len(given) - 1, n)).astype(np.int64)]
-
-
-def share_of_bounds(tau_ext: FloatArray, force: FloatArray | None, p: DetectionParams) -> float:
-    """Largest torque (n,) [Nm] or norm of the force (3,) [N] as a part of its bound: a contact from 1 on."""
-    share = float(np.max(np.abs(tau_ext) / bounds_of(p, len(tau_ext))))
-    return share if force is None else max(share, float(np.sqrt(force @ force)) / p.force_n)
-
-
-@compiled
-def share_of_band(force: FloatArray, parts: FloatArray) -> float:
-    """Largest |x - mu| of a force (3,) as a part of its band, by the parts (6, 3) of `Thresholds`."""
-    largest = 0.0
-    for i in range(3):
-        off = force[i] - parts[2, i]
-        band = parts[0, i] - parts[2, i] if off > 0.0 else parts[1, i] - parts[2, i]
-        largest = max(largest, off / band)
-    return largest
 
 
 def force_map(jacobian: FloatArray) -> FloatArray:
