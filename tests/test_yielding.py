@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.modes import ModeState
-from pretouch.params import PROFILES, Profile, ReactionParams, ThresholdParams, profile
+from pretouch.params import PROFILES, Profile, ReactionParams, profile
 from pretouch.recording.state_codec import decode_state, encode_state
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -15,7 +15,7 @@ from tests.following_arm import DT, Arm
 from tests.fuzz.invariants import same
 
 RIGHT = 1  # unit of the paper's skin that looks along -y in the ready posture
-OURS = replace(PROFILES["pretouch"], threshold=ThresholdParams(compare="raw"))
+OURS = PROFILES["pretouch"]
 NO_LAG = replace(OURS, reaction=replace(OURS.reaction, lag_s=0.0))
 
 

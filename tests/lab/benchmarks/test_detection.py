@@ -5,8 +5,8 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 import pytest
-
 from pretouch.contact.detect import Detection
+
 from pretouch.contact.reaction import reaction_velocity
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
