@@ -67,8 +67,10 @@ DAMAGED = {
 
 def test_damaged_files_are_told_and_their_cells_played_again(tmp_path):
     run = opened_ishigami(tmp_path, samples=2)
-    play(run, HERE, ignore)
     store, damaged = Store(run.folder / "cells", ISHIGAMI), run.cells[: len(DAMAGED)]
+    for job in run.jobs:
+        for cell, result in store.answered(job, work.work(job.written())):
+            store.keep(cell, result)
     for cell, text in zip(damaged, DAMAGED, strict=True):
         store.file(cell.key).write_text(text.replace("VALUES", json.dumps(cell.values)))
     again = opened_ishigami(tmp_path, samples=2)
