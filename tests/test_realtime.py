@@ -31,11 +31,17 @@ FAST = at_rate(PROFILES["paper"], 1000.0)
 
 @pytest.fixture(autouse=True)
 def collector() -> Iterator[None]:
-    gc.unfreeze()
     gc.enable()
     yield
     assert gc.isenabled()
+
+
+@pytest.fixture
+def nothing_frozen() -> Iterator[None]:
+    """Undo what `tests.conftest` freezes for as long as a test looks at that."""
     gc.unfreeze()
+    yield
+    gc.freeze()
 
 
 @pytest.fixture
@@ -48,6 +54,7 @@ def at_rest(model: RobotModel, stamp: float = 0.0) -> RobotState:
     return RobotState(stamp, q, zero, q, zero, zero, np.zeros(6))
 
 
+@pytest.mark.usefixtures("nothing_frozen")
 def test_nothing_is_collected_meanwhile():
     with realtime.real_time() as missing:
         assert not gc.isenabled()
@@ -57,6 +64,7 @@ def test_nothing_is_collected_meanwhile():
     assert missing == () or sys.platform != "linux"
 
 
+@pytest.mark.usefixtures("nothing_frozen")
 def test_the_collector_comes_back_after_an_error():
     with pytest.raises(RuntimeError, match="lost"), realtime.real_time():
         raise RuntimeError("lost")
@@ -64,6 +72,7 @@ def test_the_collector_comes_back_after_an_error():
     assert gc.get_freeze_count() == 0
 
 
+@pytest.mark.usefixtures("nothing_frozen")
 def test_a_collector_somebody_switched_off_and_froze_stays_so():
     gc.disable()
     gc.freeze()

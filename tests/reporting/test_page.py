@@ -201,8 +201,8 @@ def test_an_exceeded_limit_is_marked(panda_model, paper_skin):
     assert '<span class="bad">Exceeded: velocity of joint 1' in fast
 
 
-@pytest.mark.parametrize("evil", ["<script>alert(1)</script>", '"><img src=x onerror=alert(1)>', "$x^{$ & </style>"])
-def test_text_of_a_file_stays_text(evil, panda_model, paper_skin):
+def test_text_of_a_file_stays_text(panda_model, paper_skin):
+    evil = '<script>alert(1)</script>"><img src=x onerror=alert(1)>$x^{$ & </style>'
     skin = Skin([replace(paper_skin.units[0], id=evil), *paper_skin.units[1:]], panda_model)
     steps = [made.step(panda_model, stamp=0.01 * i, mode=Mode.HOLD, reason=f"{evil} {i}") for i in range(3)]
     run = made.Run(panda_model, skin, replace(profile("paper"), name=evil), versions={evil: evil}, about={evil: [evil]})

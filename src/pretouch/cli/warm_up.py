@@ -13,16 +13,16 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.types import RobotState
 
-_PROFILES = ("paper", "paper:restriction.mode=hard", "paper:restriction.mode=off")
+_PROFILES = ("paper", "paper:restriction.mode=hard", "paper:restriction.mode=off", "pretouch:detection.use_imu=yes")
 _RATE_HZ = 1000.0
 
 
 def compile_step() -> str:
-    """Compile a control step, in each restriction mode, and say where that is kept; '' for nowhere."""
+    """Compile a control step of each kind, with points from outside too, and say where that is kept; '' for nowhere."""
     model = RobotModel(panda())
     q, rest = model.description.q_ready, np.zeros(model.n)
     robot = RobotState(0.0, q, rest, q, rest, rest, np.zeros(6))
     for name in _PROFILES:
         params = at_rate(profile(name), _RATE_HZ)
-        warm_up(Controller(model, paper_skin(model), no_fixtures(), Circle(), params), robot)
+        warm_up(Controller(model, paper_skin(model), no_fixtures(), Circle(), params), robot, points=True)
     return kept_in()

@@ -72,7 +72,7 @@ def test_the_arm_follows_commands_and_ends_at_rest_and_the_terminals_signals_are
 ) -> None:
     with FrankaArm(served.address, served.kind, model, behavior=collision_behavior(profile("paper"), model)) as arm:
         idle = arm.read()
-        assert abs(time.monotonic() - idle.stamp) < 0.2
+        assert abs(time.monotonic() - idle.stamp) < 1.0
         assert idle.wrench is not None
         arm.begin()
         for number in OF_TERMINAL:

@@ -93,7 +93,7 @@ def test_a_pushed_arm_yields_to_the_push(
     lag = np.array([step.q_commanded - step.q for step in steps])
     assert np.percentile(np.abs(lag), 95) < 0.05
     # left behind, the arm stands
-    sleep(0.3)
+    sleep(0.6)
     log = arm.stop()
     assert np.abs(np.diff(log[-100:, 1:], axis=0)).max() < 1e-9
 
@@ -180,6 +180,6 @@ def test_an_arm_whose_machine_pauses_in_motion_ends_at_rest(
             steps = run.until(done, 20)
             assert steps[-1].mode is Mode.HOLD
         pause.join()
-    sleep(0.4)
+    sleep(0.8)
     log = arm.stop()
     assert np.abs(np.diff(log[-20:, 1:], axis=0)).max() < 1e-9

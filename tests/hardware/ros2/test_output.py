@@ -47,6 +47,11 @@ class Listener:
         return self._node.wait_for(lambda: all(s.publishers for s in self.subscriptions.values()), 10)
 
 
+def matched(node: Ros2Node) -> bool:
+    """Wait until all that a node publishes has its listener: what is sent before is lost."""
+    return node.wait_for(lambda: all(publisher.subscribers for publisher in node._publishers), 10)
+
+
 class Course:
     """An arm that follows its commands, whose turns are recorded."""
 
@@ -72,7 +77,7 @@ def listener(other: Ros2Node) -> Listener:
 def course(panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener) -> Iterator[Course]:
     course = Course(panda_model, paper_skin, node, links=True, diagnostics_hz=10.0)
     assert listener.found()
-    sleep(0.1)  # until they have matched the other way too
+    assert matched(node)
     yield course
     course.output.close()
 
@@ -180,7 +185,7 @@ def test_the_last_steps_are_published_before_the_end(
 ) -> None:
     course = Course(panda_model, paper_skin, node, links=True)
     assert listener.found()
-    sleep(0.1)
+    assert matched(node)
     course.turn()
     course.output.close()
     assert listener.last("/pretouch/mode").data.startswith("HOLD")

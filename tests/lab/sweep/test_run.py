@@ -54,28 +54,32 @@ def test_a_sweep_that_is_done_is_not_played_again_and_more_samples_play_the_new_
     assert len(opened_ishigami(tmp_path, samples=16).wanted) == 79
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("{", "Expecting property name"),
-        ("[]", "holds no object"),
-        ('{"values": {}}', "is of another cell"),
-        ('{"values": VALUES, "seed": 1000, "seconds": 1}', "neither numbers nor a reason"),
-        ('{"values": VALUES, "seed": 1000, "seconds": 1, "metrics": {"value": "3"}}', "something else than numbers"),
-        ('{"values": VALUES, "seed": 1000, "seconds": 1, "metrics": {}}', "not hold the numbers of ishigami"),
-        ('{"values": VALUES, "seed": 1000, "metrics": {"value": 3}}', "says not how long"),
-    ],
-)
-def test_a_damaged_file_is_told_and_its_cell_played_again(tmp_path, text, words):
+DAMAGED = {
+    "{": "Expecting property name",
+    "[]": "holds no object",
+    '{"values": {}}': "is of another cell",
+    '{"values": VALUES, "seed": 1000, "seconds": 1}': "neither numbers nor a reason",
+    '{"values": VALUES, "seed": 1000, "seconds": 1, "metrics": {"value": "3"}}': "something else than numbers",
+    '{"values": VALUES, "seed": 1000, "seconds": 1, "metrics": {}}': "not hold the numbers of ishigami",
+    '{"values": VALUES, "seed": 1000, "metrics": {"value": 3}}': "says not how long",
+}
+
+
+def test_damaged_files_are_told_and_their_cells_played_again(tmp_path):
     run = opened_ishigami(tmp_path, samples=2)
-    cell, store = run.cells[0], Store(run.folder / "cells", ISHIGAMI)
-    store.keep(cell, store.answered(run.jobs[0], work.work(run.jobs[0].written()))[0][1])
-    store.file(cell.key).write_text(text.replace("VALUES", json.dumps(cell.values)))
+    store, damaged = Store(run.folder / "cells", ISHIGAMI), run.cells[: len(DAMAGED)]
+    for job in run.jobs:
+        for cell, result in store.answered(job, work.work(job.written())):
+            store.keep(cell, result)
+    for cell, text in zip(damaged, DAMAGED, strict=True):
+        store.file(cell.key).write_text(text.replace("VALUES", json.dumps(cell.values)))
     again = opened_ishigami(tmp_path, samples=2)
-    assert any(cell.key in note and words in note and "played again" in note for note in again.notes)
-    assert cell.key in {one.key for one in again.wanted}
+    for cell, words in zip(damaged, DAMAGED.values(), strict=True):
+        assert any(cell.key in note and words in note and "played again" in note for note in again.notes), words
+    assert {one.key for one in again.wanted} == {cell.key for cell in damaged}
     play(again, HERE, ignore)
-    assert json.loads(store.file(cell.key).read_text())["metrics"] == {"value": known(cell)}
+    for cell in damaged:
+        assert json.loads(store.file(cell.key).read_text())["metrics"] == {"value": known(cell)}
 
 
 @pytest.mark.parametrize(
