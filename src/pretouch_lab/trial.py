@@ -186,8 +186,7 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
     with _mounted(setup, plant) as units:
         finders, traffic = (units.range_finders, units.receiver.units) if isinstance(units, WireSkin) else (units, ())
-        who = setup.person
-        hand = Hand(plant, setup.hand, who.speed_max, who.stiffness, who.damping) if setup.hand else None
+        hand = Hand(plant, setup.hand, setup.person) if setup.hand else None
         camera = None if setup.camera is None else DepthCamera(plant, setup.camera, setup.seeing, setup.seed)
         if setup.prepare:
             setup.prepare(plant, finders)
