@@ -14,7 +14,7 @@ from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.hardware.traffic import UnitTraffic
-from pretouch.loop import Cycle, run
+from pretouch.loop import Cycle, Options, run
 from pretouch.params import Profile
 from pretouch.recording.reader import Recorded
 from pretouch.recording.truth import Truth, truth_of
@@ -197,7 +197,8 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         plant.advance(SETTLE_S)
         with _recording(setup, controller) as recording:
             recorder = _Recorder(plant, hand, recording)
-            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant), points=camera)
+            options = Options(points=camera)
+            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant), options)
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),
