@@ -82,8 +82,8 @@ class Plant:
             self._ripple_phase = np.array(params.ripple_phases_rad)
         if params.mass_factors:
             self.error = replace(self.error, mass_factor=np.array(params.mass_factors))
-        if params.payloads_kg:
-            self.error = replace(self.error, payload=params.payloads_kg[0])
+        if params.payload_kg is not None:
+            self.error = replace(self.error, payload=params.payload_kg)
 
     @property
     def offset_nm(self) -> FloatArray:
