@@ -67,6 +67,14 @@ class Estimate:
     gravity: FloatArray
     """(3,) proper acceleration of what is at rest, base frame [m/s^2]."""
 
+    @property
+    def rest(self) -> FloatArray:
+        """All unknowns but the pose (17,), in the order of the fit."""
+        return np.concatenate([
+            self.acceleration_bias, self.angular_velocity_bias, [self.late, self.lag], self.acceleration_scale,
+            self.angular_velocity_scale, self.gravity,
+        ])  # fmt: skip
+
     def moved(self, x: FloatArray) -> "Estimate":
         """Return the estimate that differs from this one by x (23,): the pose by x on the manifold, the rest is x."""
         return Estimate(
@@ -191,10 +199,7 @@ def fit(
         robust: let large differences count less.
     """
     problem = Problem(motion, measured, begin, noise, params)
-    x = np.concatenate([
-        np.zeros(6), begin.acceleration_bias, begin.angular_velocity_bias, [begin.late, begin.lag],
-        begin.acceleration_scale, begin.angular_velocity_scale, begin.gravity,
-    ])  # fmt: skip
+    x = np.concatenate([np.zeros(6), begin.rest])
     for _ in range(_REWEIGHTINGS if robust else 1):
         weights = problem.weights(x) if robust else problem.equal
         # MINPACK: beside other programs the threads of LAPACK, which other methods call, cost ten times as much

@@ -15,6 +15,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.drive import Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import ArmError, SceneSpec, build, stiffen
+from pretouch.sim.under_way import ROUNDING_S
 from pretouch.types import FloatArray, RobotState
 
 TOUCH_N = 1.0
@@ -191,7 +192,7 @@ class Plant:
 
     def _take_late_commands(self) -> None:
         """Let what was commanded long enough ago be the set-point."""
-        while self._late_commands and self._late_commands[0][0] <= self.time + 1e-9:
+        while self._late_commands and self._late_commands[0][0] <= self.time + ROUNDING_S:
             self._qd_set = self._late_commands.popleft()[1]
 
     def advance(self, duration: float) -> None:

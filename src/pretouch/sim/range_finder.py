@@ -1,6 +1,5 @@
 """Model of the VL53L1X time-of-flight sensors of a skin, seen through the simulated room."""
 
-import heapq
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
@@ -14,6 +13,7 @@ from pretouch.errors import ParameterError
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE, cone_rays
 from pretouch.sim.plant import Plant
+from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, RangeReadings, RangeStatus
 
 
@@ -126,7 +126,7 @@ class RangeFinders:
         count = len(skin)
         self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
         self._due: list[float] = self._rng.uniform(0, params.period_s, count).tolist()
-        self._arriving: list[tuple[float, int, float, float, int]] = []
+        self._sent = UnderWay[tuple[int, float, float, int]]()
         self._stamp = np.full(count, -np.inf)
         self._distance = np.zeros(count)
         self._status = np.full(count, RangeStatus.NONE, dtype=np.int64)
@@ -149,8 +149,7 @@ class RangeFinders:
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""
-        while self._arriving and self._arriving[0][0] <= self._plant.time + 1e-9:
-            _, unit, stamp, distance, status = heapq.heappop(self._arriving)
+        for unit, stamp, distance, status in self._sent.arrived(self._plant.time + ROUNDING_S):
             if stamp > self._stamp[unit]:
                 self._stamp[unit], self._distance[unit], self._status[unit] = stamp, distance, status
         return RangeReadings(self._stamp.copy(), self._distance.copy(), self._status.copy())
@@ -171,7 +170,7 @@ class RangeFinders:
             if self._send:
                 self._send(RangeSample(unit, time, distance, status, sigma, *_light(strength, self._light)))
             elif not lost:
-                heapq.heappush(self._arriving, (arrival, unit, time, distance, status))
+                self._sent.send(arrival, (unit, time, distance, status))
         self._next_due = min(self._due)
 
     def _measure(self, unit: int) -> tuple[float, int, float, float]:
