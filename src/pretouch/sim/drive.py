@@ -11,70 +11,48 @@ from pretouch.types import FloatArray
 class Joints(NamedTuple):
     """The joints (n,) in MuJoCo's memory."""
 
-    q: FloatArray
-    """Positions [rad]."""
-    qd: FloatArray
-    """Velocities [rad/s]."""
-    qdd: FloatArray
-    """Accelerations of the last step [rad/s^2]."""
-    applied: FloatArray
-    """Torques that act in the next step [Nm]."""
+    q: FloatArray  # positions [rad]
+    qd: FloatArray  # velocities [rad/s]
+    qdd: FloatArray  # accelerations of the last step [rad/s^2]
+    applied: FloatArray  # torques that act in the next step [Nm]
 
 
 class MotionGenerator(NamedTuple):
     """What turns the velocity set-points into a motion (n,)."""
 
-    q_d: FloatArray
-    """Desired positions [rad]."""
-    qd_d: FloatArray
-    """Desired velocities [rad/s]."""
-    dt: float
-    """Period [s]."""
-    follow: float
-    """Share of the way to a new set-point that the desired velocity goes in one period."""
+    q_d: FloatArray  # desired positions [rad]
+    qd_d: FloatArray  # desired velocities [rad/s]
+    dt: float  # period [s]
+    follow: float  # share of the way to a new set-point that the desired velocity goes in one period
 
 
 class Impedance(NamedTuple):
     """The joint controller (n,)."""
 
-    stiffness: FloatArray
-    """[Nm/rad]"""
-    damping: FloatArray
-    """[Nm s/rad]"""
-    tau_max: FloatArray
-    """Torque limits [Nm]."""
+    stiffness: FloatArray  # [Nm/rad]
+    damping: FloatArray  # [Nm s/rad]
+    tau_max: FloatArray  # torque limits [Nm]
 
 
 class Friction(NamedTuple):
     """Of the joints (n,); see `PlantParams`."""
 
-    f1: FloatArray
-    """[Nm]"""
-    f2: FloatArray
-    """[s/rad]"""
-    f3: FloatArray
-    """[rad/s]"""
+    f1: FloatArray  # [Nm]
+    f2: FloatArray  # [s/rad]
+    f3: FloatArray  # [rad/s]
 
 
 class TorqueSensors(NamedTuple):
     """How the joint torque sensors (n,) err."""
 
-    offset: FloatArray
-    """[Nm]"""
-    ripple: FloatArray
-    """Amplitude of the gear ripple [Nm]."""
-    cycles: FloatArray
-    """Cycles of it in a turn."""
-    phase: FloatArray
-    """[rad]"""
-    noise: FloatArray
-    """Coloured noise of the last step [Nm]."""
-    keep: float
-    """Share of it that the next step keeps."""
-    armature: float
-    """Rotor inertia, on the motor's side of the sensors [kg m^2]."""
-    compensated: float
-    """Share of the friction that is known and taken off."""
+    offset: FloatArray  # [Nm]
+    ripple: FloatArray  # amplitude of the gear ripple [Nm]
+    cycles: FloatArray  # cycles of it in a turn
+    phase: FloatArray  # [rad]
+    noise: FloatArray  # coloured noise of the last step [Nm]
+    keep: float  # share of it that the next step keeps
+    armature: float  # rotor inertia, on the motor's side of the sensors [kg m^2]
+    compensated: float  # share of the friction that is known and taken off
 
 
 @entry
@@ -84,13 +62,7 @@ def drive(
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Advance the motion generator, apply motor torques less friction, and return both (n,) [Nm].
 
-    Args:
-        qd_set: (n,) velocity set-points [rad/s].
-        bias: (n,) Coriolis and gravity torques of the nominal model [Nm].
-        joints: the state before the step; `applied` is written.
-        generator: `q_d` and `qd_d` are advanced.
-        impedance: the control law.
-        friction: of the joints.
+    `qd_set` (n,) are the velocity set-points [rad/s], `bias` (n,) Coriolis and gravity torques of the nominal model.
     """
     n, q_d, qd_d = len(joints.q), generator.q_d, generator.qd_d
     tau, lost = np.empty(n), np.empty(n)
@@ -113,12 +85,7 @@ def drive(
 def sensed(tau: FloatArray, lost: FloatArray, drawn: FloatArray, joints: Joints, sensors: TorqueSensors) -> FloatArray:
     """Joint torques (n,) [Nm] as the link-side sensors report them, known friction already taken off.
 
-    Args:
-        tau: (n,) motor torques of the step [Nm].
-        lost: (n,) friction in it [Nm].
-        drawn: (n,) what is new in the noise [Nm].
-        joints: the state after the step.
-        sensors: how they err; `noise` is advanced.
+    Of a step that led to `joints`: `tau` and `lost` as of `drive`, and what is new in the noise, `drawn` (n,) [Nm].
     """
     noise, sensed = sensors.noise, np.empty(len(tau))
     for i in range(len(tau)):

@@ -96,15 +96,9 @@ class _Arm(NamedTuple):
 def _spring(
     last: FloatArray, goal: ByName[_Goal], x: FloatArray, v: FloatArray, dt: float, arm: ByName[_Arm]
 ) -> tuple[FloatArray, FloatArray]:
-    """Move the spring's far end towards the goal, and return it with the force (3,) [N] on the hand.
+    """Move the spring's far end (3,) [m], which was at `last` a step before, and return it with the force on the hand.
 
-    Args:
-        last: (3,) where the far end was one step before [m].
-        goal: where it is wanted.
-        x: (3,) position of the hand [m].
-        v: (3,) its velocity [m/s].
-        dt: length of a step [s].
-        arm: of the person.
+    The force is (3,) [N]; x [m] and v [m/s] (3,) are the hand's position and velocity.
     """
     at = last + _shortened(goal.position - last, arm.speed_max * dt)
     # never farther ahead than the largest force stretches the spring: a person who lets go pulls back at once

@@ -77,66 +77,46 @@ class ImuSample(NamedTuple):
 class _Bodies(NamedTuple):
     """MuJoCo's bodies, in the simulation's memory; all in the base frame."""
 
-    position: FloatArray
-    """(L, 3) origins [m]."""
-    rotation: FloatArray
-    """(L, 9) rows of the rotation matrices."""
-    center: FloatArray
-    """(L, 3) centre of mass of each body and all that hangs on it [m]."""
-    velocity: FloatArray
-    """(L, 6) angular [rad/s] and linear [m/s] velocity of the body's point at its tree's centre."""
-    acceleration: FloatArray
-    """(L, 6) likewise [rad/s^2, m/s^2]; see `_true`."""
+    position: FloatArray  # (L, 3) origins [m]
+    rotation: FloatArray  # (L, 9) rows of the rotation matrices
+    center: FloatArray  # (L, 3) centre of mass of each body and all that hangs on it [m]
+    velocity: FloatArray  # (L, 6) angular [rad/s], then linear [m/s], of the body's point at its tree's centre
+    acceleration: FloatArray  # (L, 6) likewise [rad/s^2, m/s^2]; see `_true`
 
 
 class _Mounting(NamedTuple):
     """Where K sensors sit."""
 
-    link: IntArray
-    """(K,)"""
-    root: IntArray
-    """(K,) first body of the tree that the link is in: `center` is that of its tree."""
-    T_link_sensor: FloatArray
-    """(K, 4, 4)"""
+    link: IntArray  # (K,)
+    root: IntArray  # (K,) first body of the tree that the link is in: `center` is that of its tree
+    T_link_sensor: FloatArray  # (K, 4, 4)
 
 
 class _Sensors(NamedTuple):
     """How K sensors err; gyroscope first."""
 
-    rate: FloatArray
-    """(K,) [Hz]"""
-    mix: FloatArray
-    """(K, 2, 3, 3) from true to sensed values."""
-    bias: FloatArray
-    """(K, 6) [rad/s, m/s^2]"""
-    noise: FloatArray
-    """(K, 6) standard deviation of a sample [rad/s, m/s^2]."""
-    lsb: FloatArray
-    """(6,) a count [rad/s, m/s^2]."""
-    follow: FloatArray
-    """(6,) share of the way to the true value that the low-pass goes in one physics step."""
-    dt: float
-    """Physics step [s]."""
+    rate: FloatArray  # (K,) [Hz]
+    mix: FloatArray  # (K, 2, 3, 3) from true to sensed values
+    bias: FloatArray  # (K, 6) [rad/s, m/s^2]
+    noise: FloatArray  # (K, 6) standard deviation of a sample [rad/s, m/s^2]
+    lsb: FloatArray  # (6,) a count [rad/s, m/s^2]
+    follow: FloatArray  # (6,) share of the way to the true value that the low-pass goes in one physics step
+    dt: float  # physics step [s]
 
 
 class _Memory(NamedTuple):
     """What K sensors keep from one physics step to the next."""
 
-    filtered: FloatArray
-    """(K, 6) what the low-pass gives [rad/s, m/s^2], NaN before the first step."""
-    due: FloatArray
-    """(K,) when the next sample is taken [s]."""
+    filtered: FloatArray  # (K, 6) what the low-pass gives [rad/s, m/s^2], NaN before the first step
+    due: FloatArray  # (K,) when the next sample is taken [s]
 
 
 class _Taken(NamedTuple):
     """Room for the M samples of a step."""
 
-    unit: IntArray
-    """(M,)"""
-    time: FloatArray
-    """(M,) [s]"""
-    counts: IntArray
-    """(M, 6)"""
+    unit: IntArray  # (M,)
+    time: FloatArray  # (M,) [s]
+    counts: IntArray  # (M, 6)
 
 
 class Imus:
@@ -238,18 +218,8 @@ def _take(
 ) -> int:  # fmt: skip
     """Follow the motion to `now`, one physics step after the last call [s], and take what samples are due.
 
-    Args:
-        now: instant that the bodies' motion belongs to [s].
-        shaken: (K, 3) vibration [m/s^2], sensor frames.
-        draws: (D, 6) of a normal distribution, one row for each sample.
-        bodies: the motion.
-        mounting: where the sensors sit.
-        sensors: how they err.
-        memory: is advanced.
-        taken: is written.
-
-    Returns:
-        How many samples were taken.
+    Advances `memory`, writes `taken`, and returns how many samples that are. `shaken` is the vibration (K, 3) [m/s^2]
+    in sensor frames, `draws` (D, 6) are normal, a row for each sample.
     """
     dt, filtered, due = sensors.dt, memory.filtered, memory.due
     count, sensed, before = 0, np.zeros(6), np.zeros(6)

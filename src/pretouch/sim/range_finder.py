@@ -240,12 +240,9 @@ _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
 class _Returns(NamedTuple):
     """What N rays met."""
 
-    distance: FloatArray
-    """(N,) [m], negative of a ray that met nothing."""
-    rays: FloatArray
-    """(N, 3) unit vectors of the rays, base frame."""
-    normal: FloatArray
-    """(N, 3) outward normals where they met something, base frame."""
+    distance: FloatArray  # (N,) [m], negative of a ray that met nothing
+    rays: FloatArray  # (N, 3) unit vectors of the rays, base frame
+    normal: FloatArray  # (N, 3) outward normals where they met something, base frame
 
 
 class _Errors(NamedTuple):
@@ -269,14 +266,7 @@ def _reading(
     The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
     distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
     `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
-
-    Args:
-        returns: of the sensor's rays; distances of rays that began inside a body become 0.
-        distance_max: greatest distance of the mode [m].
-        calibration: factor on the distance; see `_flat_wall`.
-        offset: the sensor's constant error [m].
-        draw: of a normal distribution.
-        errors: how the sensor sees and errs.
+    `calibration` is that of `_flat_wall`, `offset` the sensor's constant error [m], `draw` normal.
     """
     distance, rays, normal = returns.distance, returns.rays, returns.normal
     brightness = errors.reflectance / errors.reflectance_limit
