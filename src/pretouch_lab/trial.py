@@ -23,7 +23,6 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.wire_skin import WireSkin
-from pretouch.sim.depth_camera import DepthCamera, DepthCameraParams
 from pretouch.sim.hand import Hand, HandScript, PersonArm
 from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
@@ -31,6 +30,7 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, described, fixtures
 from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
+from pretouch_lab.depth_camera import DepthCamera, DepthCameraParams
 from pretouch_lab.worlds import Parts, in_world
 
 SETTLE_S = 0.2
