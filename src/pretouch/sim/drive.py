@@ -9,11 +9,10 @@ from pretouch.types import FloatArray
 
 
 class Joints(NamedTuple):
-    """The joints (n,) in MuJoCo's memory."""
+    """The joints (n,) in MuJoCo's memory, before a step."""
 
     q: FloatArray  # positions [rad]
     qd: FloatArray  # velocities [rad/s]
-    qdd: FloatArray  # accelerations of the last step [rad/s^2]
     applied: FloatArray  # torques that act in the next step [Nm]
 
 
@@ -82,16 +81,19 @@ def drive(
 
 
 @entry
-def sensed(tau: FloatArray, lost: FloatArray, drawn: FloatArray, joints: Joints, sensors: TorqueSensors) -> FloatArray:
+def sensed(
+    tau: FloatArray, lost: FloatArray, drawn: FloatArray, q: FloatArray, qdd: FloatArray, sensors: TorqueSensors
+) -> FloatArray:
     """Joint torques (n,) [Nm] as the link-side sensors report them, known friction already taken off.
 
-    Of a step that led to `joints`: `tau` and `lost` as of `drive`, and what is new in the noise, `drawn` (n,) [Nm].
+    Of a step that led to q (n,) [rad] by qdd (n,) [rad/s^2]: `tau` and `lost` as of `drive`; `drawn` (n,) [Nm] is what
+    is new in the noise.
     """
     noise, sensed = sensors.noise, np.empty(len(tau))
     for i in range(len(tau)):
         noise[i] = sensors.keep * noise[i] + drawn[i]
-        rippled = sensors.ripple[i] * np.sin(sensors.cycles[i] * joints.q[i] + sensors.phase[i])
+        rippled = sensors.ripple[i] * np.sin(sensors.cycles[i] * q[i] + sensors.phase[i])
         # the torque that accelerates the rotor never reaches a sensor on the link's side
-        passed = tau[i] - sensors.armature * joints.qdd[i]
+        passed = tau[i] - sensors.armature * qdd[i]
         sensed[i] = passed + sensors.offset[i] + rippled + noise[i] - sensors.compensated * lost[i]
     return sensed

@@ -161,8 +161,7 @@ class Imus:
 
     def _sample(self, time: float) -> None:
         """Take the samples due by one step before `time`: what MuJoCo derives from a state is one step behind it."""
-        plant, room = self._plant, self._taken
-        most = len(room.unit)
+        plant, room, most = self._plant, self._taken, len(self._taken.unit)
         if self._drawn + most > len(self._draws):
             self._draws, self._drawn = self._rng.standard_normal((max(_DRAWS, most), 6)), 0
         dt, qvel = plant.params.period_s, self._qvel.copy()

@@ -98,8 +98,8 @@ class Plant:
     def _reset(self, q: FloatArray) -> None:
         n, data = self._n, self.mj_data
         # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
-        joints = Joints(data.qpos[:n], data.qvel[:n], data.qacc[:n], data.qfrc_applied[:n])
-        self._q, self._qd = joints.q, joints.qd
+        joints = Joints(data.qpos[:n], data.qvel[:n], data.qfrc_applied[:n])
+        self._q, self._qd, self._qdd = joints.q, joints.qd, data.qacc[:n]
         self.link_position, self.link_rotation = data.xpos, data.xmat.reshape(-1, 3, 3)
         """(L', 3) origins [m] and (L', 3, 3) orientations of the links, then of whatever else moves; base frame."""
         self._q[:] = q
@@ -117,7 +117,7 @@ class Plant:
         dt = self.params.period_s
         self._states: deque[_Past] = deque(maxlen=1 + round(self.params.state_delay_s / dt))
         self._late_commands: deque[tuple[float, FloatArray]] = deque()
-        self._remember()
+        self._states.append(self._now())
         self.true_force = _NO_FORCE
         """(3,) sum of the contact forces on the arm by everything else, base frame [N], at the last physics step."""
         self.true_log: list[tuple[float, FloatArray]] = []
@@ -129,8 +129,8 @@ class Plant:
     def _group(self, joints: Joints, impedance: Impedance) -> None:
         """Put together what `drive` and `sensed` are given at each step."""
         p, n = self.params, self._n
-        keep = np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s)
-        follow = 1.0 - np.exp(-2 * np.pi * p.set_point_hz * p.period_s)
+        keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
+        follow = 1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s))
         generator = MotionGenerator(self._q_d, np.zeros(n), p.period_s, follow)
         f1, f2, f3 = np.array([p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s])
         ripple, cycles = np.array([p.ripple_nm, p.ripple_cycles])
@@ -139,7 +139,7 @@ class Plant:
             p.friction_compensated,
         )  # fmt: skip
         self._driven = flattened(joints, generator, impedance, Friction(f1, f2, f3))
-        self._sensing = flattened(joints, sensors)
+        self._sensing = flattened(sensors)
         # what is added to coloured noise at each step, so that its variance stays that of the sensor
         self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
 
@@ -186,10 +186,6 @@ class Plant:
     def _now(self) -> _Past:
         return self.time, self._q_meas, self._qd_meas, self._q_d.copy(), self._qd_set.copy(), self._observer.residual
 
-    def _remember(self) -> None:
-        if self.params.state_delay_s:
-            self._states.append(self._now())
-
     def _take_late_commands(self) -> None:
         """Let what was commanded long enough ago be the set-point."""
         while self._late_commands and self._late_commands[0][0] <= self.time + ROUNDING_S:
@@ -202,23 +198,26 @@ class Plant:
         draws = self._rng.standard_normal((steps, 2, n))
         velocity_noise = p.velocity_noise_rad_s * draws[:, 0]
         torque_noise = self._torque_noise * draws[:, 1]
+        model, data, driving, sensing = self.mj_model, self.mj_data, drive.flat, sensed.flat
         for i in range(steps):
             for call in self._before_step:
                 call(self.time)
-            self._take_late_commands()
-            tau, lost = drive.flat(self._qd_set, self._bias, *self._driven)
+            if self._late_commands:
+                self._take_late_commands()
+            tau, lost = driving(self._qd_set, self._bias, *self._driven)
             before = self._qd.copy()
-            mujoco.mj_step(self.mj_model, self.mj_data)
+            mujoco.mj_step(model, data)
             # the state after the step goes with the torques that led to it
             q, qd = self._q.copy(), self._qd + velocity_noise[i]
-            told = sensed.flat(tau, lost, torque_noise[i], *self._sensing)
+            told = sensing(tau, lost, torque_noise[i], q, self._qdd, *self._sensing)
             mass, self._bias = self.model.mass_matrix_and_bias(q, qd, np.empty(n))
             self._observer = observe(self._observer, mass, self._bias, qd, told, p.observer_gain_1_s, dt)
             self.time += dt
             self._q_meas, self._qd_meas = q, qd
-            self._remember()
+            if p.state_delay_s:
+                self._states.append(self._now())
             touched = self.true_force is not _NO_FORCE
-            self.true_force = self._contact_force() if self.mj_data.ncon else _NO_FORCE
+            self.true_force = self._contact_force() if data.ncon else _NO_FORCE
             self.true_log.append((self.time, self.true_force))
             if self.true_force is not _NO_FORCE and not touched:
                 self.touches.append(self._touch(before))

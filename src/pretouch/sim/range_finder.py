@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import ByName, compiled, entry
+from pretouch.compiled import compiled, entry
 from pretouch.errors import ParameterError
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE, cone_rays
@@ -122,6 +122,7 @@ class RangeFinders:
         self._calibration = _flat_wall(self._rays[:, 2])
         rays = len(self._rays)
         self._geom, self._hit, self._normal = np.zeros(rays, np.int32), np.zeros(rays), np.zeros(3 * rays)
+        self._normals, self._errors = self._normal.reshape(-1, 3), _errors(params)
         self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
         count = len(skin)
         self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
@@ -145,7 +146,7 @@ class RangeFinders:
         for name in ("mode", "rings", "offset_max_m"):
             if getattr(params, name) != getattr(self._params, name):
                 raise ParameterError(f"RangeFinderParams.{name} cannot change while the sensors run: mount them anew.")
-        self._params = params
+        self._params, self._errors = params, _errors(params)
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""
@@ -174,14 +175,16 @@ class RangeFinders:
         self._next_due = min(self._due)
 
     def _measure(self, unit: int) -> tuple[float, int, float, float]:
-        p, link = self._params, int(self._skin.link[unit])
+        link = int(self._skin.link[unit])
         origin, rays = _beams(self._xpos[link], self._xmat[link], self._skin.T_link_sensor[unit], self._rays)
         mujoco.mj_multiRay(
             self._plant.mj_model, self._plant.mj_data, origin, rays.reshape(-1), None, True, link,
             self._geom, self._hit, self._normal, len(rays), self._mode.distance_max_m,
         )  # fmt: skip
-        returns, draw = (self._hit, rays, self._normal.reshape(-1, 3)), self._rng.standard_normal()
-        return _reading(returns, self._mode.distance_max_m, self._calibration, self._offset[unit], draw, p)
+        return _reading.flat(
+            self._hit, rays, self._normals, self._mode.distance_max_m, self._calibration, self._offset[unit],
+            self._rng.standard_normal(), *self._errors,
+        )  # fmt: skip
 
 
 _SIGNAL_LIMIT_MCPS = 1.024
@@ -257,9 +260,13 @@ class _Errors(NamedTuple):
     sigma_limit_m: float
 
 
+def _errors(params: RangeFinderParams) -> _Errors:
+    return _Errors(*(getattr(params, name) for name in _Errors._fields))
+
+
 @entry
 def _reading(
-    returns: _Returns, distance_max: float, calibration: float, offset: float, draw: float, errors: ByName[_Errors]
+    returns: _Returns, distance_max: float, calibration: float, offset: float, draw: float, errors: _Errors
 ) -> tuple[float, int, float, float]:
     """One reading [m], its status, its standard deviation [m], and the strength of what it shows.
 
