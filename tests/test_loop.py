@@ -250,10 +250,8 @@ def test_a_latched_hold_goes_on_when_resume_says_so(controller: Controller, worl
         world.broken = count == 30
 
     recorder = FakeRecorder(on_step=break_down)
-    loop.run(
-        controller, world, world.skin(), world, recorder, lambda step: step.stamp >= 0.8,
-        resume=lambda: asked and len(recorder.steps) == 60,
-    )  # fmt: skip
+    options = loop.Options(resume=lambda: asked and len(recorder.steps) == 60)
+    loop.run(controller, world, world.skin(), world, recorder, lambda step: step.stamp >= 0.8, options)
     modes = [step.mode for step in recorder.steps]
     assert set(modes[30:60]) == {Mode.HOLD}
     assert set(modes[60:]) == {Mode.TRACK if asked else Mode.HOLD}

@@ -220,10 +220,9 @@ def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypat
         monkeypatch.setattr(os, "sched_setaffinity", refuse)
     clock, told = MonotonicClock(0.001), []
     arm = Arm(controller)
-    realtime.run(
-        controller, arm, NoReadings(arm.units), clock, arm, lambda step: len(arm.steps) == 20,
-        cpu=0 if sys.platform != "linux" else min(os.sched_getaffinity(0)), tell=told.append,
-    )  # fmt: skip
+    cpu = 0 if sys.platform != "linux" else min(os.sched_getaffinity(0))
+    options = realtime.Options(cpu=cpu, tell=told.append)
+    realtime.run(controller, arm, NoReadings(arm.units), clock, arm, lambda step: len(arm.steps) == 20, options)
     assert len(told) == 1
     assert arm.collecting == [False] * 20
     assert clock.timing().cycles == 20

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch import realtime
 from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.ending import Terminated, ends_raise
 from pretouch.control.path import line
@@ -15,7 +16,7 @@ from pretouch.loop import MonotonicClock
 from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.sensing.skin import Skin
-from pretouch.session.motion import Ending, Wishes, follow, go
+from pretouch.session.motion import Ending, follow, go
 from pretouch.session.session import NoUnits
 from pretouch.types import Mode
 from tests.session.arms import FollowingArm
@@ -45,10 +46,8 @@ class Keeper:
 def followed(controller, arm, keeper, cycles=80):
     ending = Ending()
     clock = MonotonicClock(0.01)
-    follow(
-        arm, NoUnits(), controller, clock, keeper, lambda _: len(keeper.steps) >= cycles, lambda: False, Wishes(),
-        lambda _: None, ending,
-    )  # fmt: skip
+    options = realtime.Options(tell=lambda _: None)
+    follow(controller, arm, NoUnits(), clock, keeper, lambda _: len(keeper.steps) >= cycles, options, ending)
     return ending
 
 

@@ -74,6 +74,9 @@ def test_what_an_experiment_varies_stays():
         ("[plant.ripple_nm]\nvalue = 0.1\n", "give a list of numbers"),
         ("[plant.offsets_nm]\nvalue = [nan]\n", "give a list of numbers"),
         ("[ranging.mode]\nvalue = 'wide'\n", "choose one of short, long"),
+        ("[plant.payloads_kg]\nvalue = [0.5]\n", "write plant.payload_kg, value = 0.5 in place of"),
+        ("[plant.payload_kg]\nvalue = [0.5]\n", "give a number"),
+        ("[plant.payload_kg]\nuniform = [0.9, 1.1]\ntimes = true\n", "no usual value that it could be a factor on"),
         ("nothing", "no TOML file"),
     ],
 )
@@ -91,4 +94,4 @@ def test_a_name_that_is_none_says_which_there_are():
 
 def test_all_fields_of_a_plant_can_be_set():
     names = {f.name for f in fields(PlantParams)}
-    assert {"state_delay_s", "command_delay_s", "offsets_nm", "payloads_kg"} <= names
+    assert {"state_delay_s", "command_delay_s", "offsets_nm", "payload_kg"} <= names

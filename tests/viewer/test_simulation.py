@@ -13,7 +13,7 @@ from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import run
 from pretouch.params import at_rate, profile
-from pretouch.sim.hand import Hand
+from pretouch.sim.hand import Hand, PersonArm
 from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -42,7 +42,7 @@ def test_a_session_runs_as_an_experiment_does(live, panda_model, paper_skin):
     scene = SceneSpec(hand=hand)
     plant = Plant(panda_model, scene, PlantParams(), brought_to(panda_model, path.point(0.0)), 7)
     units = RangeFinders(plant, paper_skin, RangeFinderParams(), 7)
-    Hand(plant, Mouse(np.array(hand.start), scene, hand), HAND_SPEED_M_S)
+    Hand(plant, Mouse(np.array(hand.start), scene, hand), PersonArm(HAND_SPEED_M_S))
     plant.advance(0.2)
     kept: list[ControlStep] = []
 

@@ -1,6 +1,5 @@
 """A network that loses, delays, overtakes and doubles datagrams, as a wireless one does. No socket, no clock."""
 
-import heapq
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Generic, TypeVar
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.errors import ParameterError
+from pretouch.sim.under_way import UnderWay
 
 Item = TypeVar("Item")
 
@@ -76,8 +76,7 @@ class Way(Generic[Item]):
 
     def __init__(self, params: WayParams, rng: np.random.Generator) -> None:
         self._params, self._rng = params, rng
-        self._arriving: list[tuple[float, int, Item]] = []
-        self._count = 0
+        self._sent = UnderWay[Item]()
         self._losing = False
         self.lost = 0
         """How many were lost so far."""
@@ -88,15 +87,11 @@ class Way(Generic[Item]):
             self.lost += 1
             return
         for _ in range(1 + int(self._rng.random() < self._params.doubled)):
-            heapq.heappush(self._arriving, (now + self._delay(), self._count, item))
-            self._count += 1
+            self._sent.send(now + self._delay(), item)
 
     def take(self, now: float) -> list[Item]:
         """Return what has arrived by a time [s] and was not taken yet, in the order of arrival."""
-        taken = []
-        while self._arriving and self._arriving[0][0] <= now:
-            taken.append(heapq.heappop(self._arriving)[2])
-        return taken
+        return list(self._sent.arrived(now))
 
     def _loses(self) -> bool:
         """Whether this one is lost; in runs, by the chain of two states that has this loss and this mean run."""

@@ -10,7 +10,6 @@ import numpy as np
 from pretouch import realtime
 from pretouch.calibration.motion.perform import PerformParams, perform
 from pretouch.calibration.motion.plan import Plan
-from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock, Recorder
@@ -68,29 +67,10 @@ def go(arm: Arm, controller: Controller, way: Plan, ending: Ending) -> None:
     _moved(arm, move, ending)
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """What the loop asks of the machine."""
-
-    priority: int | None = None
-    """See `realtime.real_time`."""
-    cpu: int | None = None
-    """See `realtime.real_time`."""
-
-
 def follow(
-    arm: Arm,
-    skin: Skin,
-    controller: Controller,
-    clock: MonotonicClock,
-    recorder: Recorder,
-    done: Callable[[ControlStep], bool],
-    resume: Callable[[], bool],
-    wishes: Wishes,
-    tell: Callable[[str], None],
-    ending: Ending,
-    learnt: ResidualModel | None = None,
-) -> None:
+    controller: Controller, arm: Arm, skin: Skin, clock: MonotonicClock, recorder: Recorder,
+    done: Callable[[ControlStep], bool], options: realtime.Options, ending: Ending,
+) -> None:  # fmt: skip
     """Turn the controller until `done` says so, a signal comes, or something fails. The arguments are `realtime.run`'s.
 
     Everything is compiled before the arm takes commands. A signal is raised after the arm has come to rest.
@@ -98,10 +78,7 @@ def follow(
     realtime.warm_up(controller, arm.read())
 
     def move(came: list[int]) -> str:
-        realtime.run(
-            controller, arm, skin, clock, recorder, lambda step: bool(came) or done(step), resume,
-            priority=wishes.priority, cpu=wishes.cpu, tell=tell, learnt=learnt,
-        )  # fmt: skip
+        realtime.run(controller, arm, skin, clock, recorder, lambda step: bool(came) or done(step), options)
         return ""
 
     _moved(arm, move, ending)

@@ -12,7 +12,7 @@ from pretouch.ports import Skin as UnitPort
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.board import Side, board_beside
-from pretouch.sim.hand import Hand
+from pretouch.sim.hand import Hand, PersonArm
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
@@ -60,7 +60,7 @@ class Room:
         if self._simulated and len(skin.touching):
             felt = TouchSensors(self.plant, skin, TouchSensorParams(), settings.seed)
             self.units = FeelingSkin(self._simulated, felt)
-        self.hand = Hand(self.plant, self.mouse, speed_max=HAND_SPEED_M_S)
+        self.hand = Hand(self.plant, self.mouse, PersonArm(speed_max=HAND_SPEED_M_S))
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._wanted = settings.stiffness
         self._skin, self._sound = skin, settings.ranging

@@ -92,7 +92,8 @@ def current(name: str, base: Profile, scene: Checked) -> Value:
     else:
         value = getattr(groups[group], field)
     if not isinstance(value, Real | str):
-        raise ExperimentError(f"The parameter {name} holds one value a joint: sweep one that holds a single value.")
+        held = "no usual value" if value is None else "one value a joint"
+        raise ExperimentError(f"The parameter {name} holds {held}: sweep one that holds a single value.")
     return value  # type: ignore[return-value]  # a bool is a Real
 
 

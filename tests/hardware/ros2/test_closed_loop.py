@@ -45,7 +45,7 @@ class Run:
         self.steps, clock = [], loop.MonotonicClock(0.01)
         loop.run(
             self.controller, self.robot, self.units, clock, self,
-            lambda step: done(step) or len(self.steps) * 0.01 > longest, lambda: resume,
+            lambda step: done(step) or len(self.steps) * 0.01 > longest, loop.Options(lambda: resume),
         )  # fmt: skip
         return self.steps
 

@@ -15,7 +15,6 @@ from pretouch.loop import run
 from pretouch.params import profile
 from pretouch.perception.closest import no_obstacles
 from pretouch.sensing.skin import paper_skin
-from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
@@ -35,6 +34,7 @@ from pretouch_lab.benchmarks.detection.results import delays, rate, resolution
 from pretouch_lab.benchmarks.detection.stream import StreamRecorder, load_stream, save_stream
 from pretouch_lab.benchmarks.detection.tables import reached
 from pretouch_lab.benchmarks.store import read_rows, run_tasks
+from pretouch_lab.ghost import Ghost
 
 HAND = 10
 PAPER = Contender("paper", "paper", "f_base_n")

@@ -64,7 +64,7 @@ def test_the_file_sets_a_simulation_to_that_arm(found, tmp_path):
     plant.check_joints(MODEL.n, len(MODEL.links))
     own = found.fit.of_joints(found.fit.numbers)
     assert plant.offsets_nm == pytest.approx(own[:, 0], rel=1e-4)
-    assert plant.payloads_kg == pytest.approx([found.fit.numbers[-2]], rel=1e-4)
+    assert plant.payload_kg == pytest.approx(found.fit.numbers[-2], rel=1e-4)
     assert plant.friction_compensated == PLANT.friction_compensated
     assert "friction_compensated stays at 0.2" in place.read_text()
     assert len(tomllib.loads(place.read_text())["plant"]["mass_factors"]["value"]) == len(MODEL.links)

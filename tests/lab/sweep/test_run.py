@@ -11,7 +11,7 @@ from pyarrow import parquet
 
 from pretouch.errors import ExperimentError
 from pretouch_lab.sweep import local, work
-from pretouch_lab.sweep.definition import sweep_of
+from pretouch_lab.sweep.definition import Asked, sweep_of
 from pretouch_lab.sweep.document import picture, tables, written
 from pretouch_lab.sweep.results import values_of
 from pretouch_lab.sweep.run import Where, opened, play
@@ -169,11 +169,11 @@ PARENT = """
 import sys
 from pathlib import Path
 import pytest
-from pretouch_lab.sweep.definition import sweep_of
+from pretouch_lab.sweep.definition import Asked, sweep_of
 from pretouch_lab.sweep.run import Where, opened, play
 from tests.lab.sweep.made import register
 register(pytest.MonkeyPatch())
-sweep = sweep_of("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1)
+sweep = sweep_of(Asked("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1))
 play(opened(sweep, Path(sys.argv[1])), Where(1), lambda _: print("done", flush=True))
 """
 
@@ -185,7 +185,7 @@ def test_a_sweep_whose_process_is_killed_goes_on_where_it_was(tmp_path):
         for _ in range(5):
             assert process.stdout.readline() == "done\n"
         process.kill()
-    sweep = sweep_of("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1)
+    sweep = sweep_of(Asked("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1))
     run = opened(sweep, tmp_path)
     assert run.notes == []  # each file is whole
     assert 5 <= len(files(run)) < 256

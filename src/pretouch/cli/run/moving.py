@@ -13,10 +13,11 @@ from pretouch.cli.run.asking import say
 from pretouch.cli.run.opened import Opened
 from pretouch.errors import HardwareError, PretouchError
 from pretouch.loop import MonotonicClock
+from pretouch.realtime import Options
 from pretouch.session.finding import refusals
 from pretouch.session.free_motion import FreeMotion
 from pretouch.session.keeping import Kept, keeping
-from pretouch.session.motion import Ending, Wishes, follow, go, named
+from pretouch.session.motion import Ending, follow, go, named
 from pretouch.session.session import Session
 from pretouch.session.start import check_start
 from pretouch.session.terminal import EnterKey, Narrator
@@ -57,9 +58,10 @@ def moved(command: "Run", session: Session, found: Opened, way: Way, learnt: Fre
         folder = Path(command.holds)
         kept = stack.enter_context(keeping(controller, session.arm.name, place, folder, tell, learnt, further))
         watcher = Watcher(kept.recorder, tell, latched, controller.limits.period)
+        options = Options(enter, learnt.begin if learnt else None, None, command.priority, command.cpu, tell)
         try:
             if _arrived(session, way.approach, tell, ending):
-                _follow(command, session, way, watcher, enter, clock, tell, ending, learnt)
+                _follow(session, way, watcher, clock, options, ending)
         finally:
             last.enter_context(noted_in_motion())
             tell.close()
@@ -85,16 +87,12 @@ def _arrived(session: Session, approach: Plan | None, tell: Callable[[str], None
 
 
 def _follow(
-    command: "Run", session: Session, way: Way, watcher: Watcher, enter: EnterKey, clock: MonotonicClock,
-    tell: Callable[[str], None], ending: Ending, learnt: FreeMotion | None,
-) -> None:  # fmt: skip
+    session: Session, way: Way, watcher: Watcher, clock: MonotonicClock, options: Options, ending: Ending
+) -> None:
     """Let the controller move the arm."""
-    until, wishes = _Until(way.seconds, session.units), Wishes(command.priority, command.cpu)
+    until = _Until(way.seconds, session.units)
     try:
-        follow(
-            session.arm, session.skin, session.controller, clock, watcher, until, enter, wishes, tell, ending,
-            learnt.begin if learnt else None,
-        )  # fmt: skip
+        follow(session.controller, session.arm, session.skin, clock, watcher, until, options, ending)
     except PretouchError as error:  # before the arm took the controller's commands
         if way.approach is None:
             raise

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pretouch.robot.description import panda
-from pretouch.sim.depth_camera import DepthCamera, DepthCameraParams, looking, measured_depth
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch_lab.depth_camera import DepthCamera, DepthCameraParams, looking, measured_depth
 
 EXACT = DepthCameraParams(
     columns=42, rows=24, noise_1_m=0.0, jitter_s=0.0, frame_loss=0.0, pixel_loss=0.0, edge_loss=0.0, flying=0.0,

@@ -4,12 +4,12 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, GhostSpec, SceneSpec
 from pretouch.types import RangeStatus
+from pretouch_lab.ghost import Ghost
 
 FORWARD = np.array([[0.0, 0.0, 1.0, 0.027], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.03], [0.0, 0.0, 0.0, 1.0]])
 """Pose on the hand whose beam points along +x of the base in the ready posture, from (0.334, 0, 0.560) m."""

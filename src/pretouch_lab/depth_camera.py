@@ -1,8 +1,7 @@
 """A simulated depth camera beside the arm: the port `Points`, seen by rays through the simulated room."""
 
-import heapq
 from dataclasses import dataclass
-from itertools import count, product
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -10,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive, PositiveCount
 from pretouch.sim.plant import Plant
+from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, SeenPoints
 
 
@@ -86,8 +86,7 @@ class DepthCamera:
         rays = len(self._rays)
         self._geom, self._hit, self._normal = np.zeros(rays, np.int32), np.zeros(rays), np.zeros(3 * rays)
         self._due = float(self._rng.uniform(0, 1 / params.rate_hz))
-        self._arriving: list[tuple[float, int, SeenPoints]] = []
-        self._number = count()
+        self._sent = UnderWay[SeenPoints]()
         self._newest = SeenPoints(-np.inf, np.zeros(0), np.zeros((0, 3)), np.zeros(0))
         self.silenced = False
         """Whether it no longer sends."""
@@ -95,8 +94,7 @@ class DepthCamera:
 
     def read(self) -> SeenPoints:
         """Return the points of the newest frame that has arrived by now."""
-        while self._arriving and self._arriving[0][0] <= self._plant.time + 1e-9:
-            frame = heapq.heappop(self._arriving)[2]
+        for frame in self._sent.arrived(self._plant.time + ROUNDING_S):
             if frame.heard > self._newest.heard:
                 self._newest = frame
         return self._newest
@@ -109,7 +107,7 @@ class DepthCamera:
         frame = self._frame(time)
         arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.frame_loss
         if not lost and not self.silenced:
-            heapq.heappush(self._arriving, (arrival, next(self._number), frame))
+            self._sent.send(arrival, frame)
 
     def _frame(self, time: float) -> SeenPoints:
         """Measure; the points are where they would be if the camera were where it is believed to be."""
