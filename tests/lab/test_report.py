@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError, RecordingError
 from pretouch.recording.reader import open_recording
 from pretouch.text_table import TextTable
-from pretouch.whole_file import write_json
 from pretouch_lab.campaign import Request, open_folder, recording_file, trial_file
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper import dynamic, static

@@ -8,8 +8,8 @@ import numpy as np
 
 from pretouch.contact.observer import observe, observer_init
 from pretouch.errors import RecordingError
-from pretouch.foreign.csv import listed, read_rows, read_table, relative_time
-from pretouch.foreign.samples import OUT_OF_RANGE_RAD
+from pretouch.imported_data.csv import listed, read_rows, read_table, relative_time
+from pretouch.imported_data.samples import OUT_OF_RANGE_RAD
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel

@@ -8,9 +8,9 @@ import numpy as np
 
 from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.foreign.csv import UNITS, listed, read_rows, read_table, relative_time
-from pretouch.foreign.samples import BAGS, OUT_OF_RANGE_RAD, TABLES
-from pretouch.foreign.source import Series, in_order
+from pretouch.imported_data.csv import UNITS, listed, read_rows, read_table, relative_time
+from pretouch.imported_data.samples import BAGS, OUT_OF_RANGE_RAD, TABLES
+from pretouch.imported_data.source import Series, in_order
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
 from pretouch.values import value
@@ -22,7 +22,7 @@ _LATE_S = 0.5
 
 
 @value
-class ForeignJoints:
+class ImportedJoints:
     """Where an arm's joints were, as another program recorded it."""
 
     trace: JointTrace
@@ -33,7 +33,7 @@ class ForeignJoints:
     """What was found on the way and a person should know, a sentence each."""
 
 
-def read_joints(place: Path, model: RobotModel, topic: str = "") -> ForeignJoints:
+def read_joints(place: Path, model: RobotModel, topic: str = "") -> ImportedJoints:
     """Read the positions of an arm's joints.
 
     Args:
@@ -61,7 +61,7 @@ def read_joints(place: Path, model: RobotModel, topic: str = "") -> ForeignJoint
         )
     series, more = _usable(place, series)
     _check_reach(place, series, model)
-    return ForeignJoints(JointTrace(series.time / 1e9, series.values), said, (*notes, *more))
+    return ImportedJoints(JointTrace(series.time / 1e9, series.values), said, (*notes, *more))
 
 
 def _places(place: Path, names: tuple[str, ...], model: RobotModel) -> dict[int, int]:
@@ -137,7 +137,7 @@ def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    from pretouch.foreign.bag import JOINTS, Topic, believed, fill, one_topic, read_errors_said
+    from pretouch.imported_data.bag import JOINTS, Topic, believed, fill, one_topic, read_errors_said
 
     with read_errors_said(place):
         reader = AnyReader([place], default_typestore=get_typestore(Stores.ROS2_HUMBLE))

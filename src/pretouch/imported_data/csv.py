@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.foreign.source import Choice, Series, Source
+from pretouch.imported_data.source import Choice, Series, Source
 from pretouch.types import FloatArray, IntArray
 
 UNITS = {

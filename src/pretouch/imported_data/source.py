@@ -1,4 +1,4 @@
-"""What a reader takes from a foreign recording, and what a person says of it that it does not say itself."""
+"""What a reader takes from an imported recording, and what a person says of it that it does not say itself."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -16,7 +16,7 @@ Arm = Literal["auto", "panda", "fr3"]
 
 @dataclass(frozen=True)
 class Choice:
-    """What a foreign recording does not say of itself."""
+    """What an imported recording does not say of itself."""
 
     wrench: str = ""
     """Topic of the force; needed if there are several."""
@@ -70,7 +70,7 @@ class RangeTopic:
 
 @value
 class Source:
-    """What stands in a foreign recording, in SI units but in its own sign and frame."""
+    """What stands in an imported recording, in SI units but in its own sign and frame."""
 
     said: str
     """Where the force was taken from, as the end of a sentence."""

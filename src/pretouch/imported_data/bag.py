@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RecordingError
-from pretouch.foreign.source import Arm, Choice, RangeTopic, Series, Source
+from pretouch.imported_data.source import Arm, Choice, RangeTopic, Series, Source
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.types import RangeStatus
 
