@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.recording.messages import Item, encoded, make, plain_text
+from pretouch.recording.messages import Item, encoded, make
 from pretouch.recording.standard import JOINT_STATE, header, nanoseconds
 from pretouch.traces import JointTrace
 from pretouch.types import FloatArray
@@ -30,7 +30,7 @@ def joint_items(
     instead: int, stamp: FloatArray, q: FloatArray, qd: FloatArray | None, names: Sequence[str]
 ) -> Iterator[Item]:
     """Yield states of joints at instants (M,) [s]: (M, n) [rad], [rad/s]; what is no time stands at `instead` [ns]."""
-    nothing, texts = np.zeros(0), [plain_text(name) for name in names]
+    nothing, texts = np.zeros(0), list(names)
     for i, t in enumerate(stamp.tolist()):
         time = nanoseconds(t, instead)
         velocity = nothing if qd is None else np.array(qd[i], dtype=np.float64)
