@@ -132,7 +132,7 @@ def test_another_number_of_joints_than_the_arm_has_is_refused(tmp_path):
 
 def test_degrees_taken_for_radians_are_noticed(tmp_path):
     columns = force_columns(FORCE) | {f"q{i + 1}_rad": np.full(50, np.degrees(Q[i])) for i in range(7)}
-    with pytest.raises(RecordingError, match=r"Joint 1 .* is at 5\.73 rad, out of reach of panda"):
+    with pytest.raises(RecordingError, match=r"panda_joint1 .* is at 5\.73 rad, out of its range"):
         read_imported(write_csv(tmp_path / "a.csv", columns), EE)
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.imported_data.csv import UNITS, listed, read_rows, read_table, relative_time
-from pretouch.imported_data.samples import BAGS, OUT_OF_RANGE_RAD, TABLES
-from pretouch.imported_data.source import Series, in_order
+from pretouch.imported_data.csv import UNITS, listed, read_header, read_table
+from pretouch.imported_data.samples import BAGS, TABLES
+from pretouch.imported_data.source import Series, check_reach, in_order
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
 from pretouch.values import value
@@ -60,7 +60,7 @@ def read_joints(place: Path, model: RobotModel, topic: str = "") -> ImportedJoin
             f"{place} has an ending that is none of {', '.join((*BAGS, *TABLES))}: give such a file, or a bag's folder."
         )
     series, more = _usable(place, series)
-    _check_reach(place, series, model)
+    check_reach(place, series.values, model)
     return ImportedJoints(JointTrace(series.time / 1e9, series.values), said, (*notes, *more))
 
 
@@ -86,11 +86,7 @@ def _places(place: Path, names: tuple[str, ...], model: RobotModel) -> dict[int,
 def _of_csv(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tuple[str, ...]]:
     if topic:
         raise RecordingError(f"{place} is a CSV file and has no topics: leave out --topic.")
-    rows = read_rows(place)
-    header = next(rows, None)
-    if header is None:
-        raise RecordingError(f"{place} is empty: give a CSV file with a header, as time_s,q1_rad,q2_rad and so on.")
-    names = [name.strip().lstrip("#").strip() for name in header[1]]
+    rows, names = read_header(place, "time_s,q1_rad,q2_rad and so on")
     parted = [_parted(name.lower()) for name in names]
     times = [i for i, (base, _) in enumerate(parted) if base == "time"]
     if len(times) != 1:
@@ -106,13 +102,8 @@ def _of_csv(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
             f" {model.joints[0]}_rad and so on."
         )
     used = [times[0], *(places[j] for j in range(model.n))]
-    factors = [_factor(place, names[i], parted[i][1], "q" if k else "time") for k, i in enumerate(used)]
-    table = read_table(place, rows, names, used) * np.array(factors)
-    time, notes = relative_time(place, table[:, 0])
-    table = table[np.isfinite(table[:, 0])]
-    unused = [name for i, name in enumerate(names) if i not in used]
-    if unused:
-        notes.append(f"Columns that are not used: {listed(unused)}.")
+    factors = {i: _factor(place, names[i], parted[i][1], "q" if k else "time") for k, i in enumerate(used)}
+    table, time, notes = read_table(place, rows, names, factors)
     begin = round(float(table[0, 0]) * 1e9)
     return f"the columns {names[used[1]]} to {names[used[-1]]}", Series(begin + time, table[:, 1:]), tuple(notes)
 
@@ -207,16 +198,4 @@ def _check_overlap(place: Path, series: Series) -> None:
         raise RecordingError(
             f"The time in {place} goes back by {back[first]:.3g} s at sample {first + 1} of {len(series)}: give one"
             " recording of one arm, cut where its time goes on without a break."
-        )
-
-
-def _check_reach(place: Path, series: Series, model: RobotModel) -> None:
-    """Refuse positions that this arm cannot have: their unit or the arm is another one."""
-    q = series.values
-    beyond = (q < model.q_min - OUT_OF_RANGE_RAD) | (q > model.q_max + OUT_OF_RANGE_RAD)
-    if beyond.any():
-        i, j = np.argwhere(beyond)[0]
-        raise RecordingError(
-            f"{model.joints[j]} in {place} is at {q[i, j]:.4g} rad, out of its range of {model.q_min[j]:.2f} to"
-            f" {model.q_max[j]:.2f} rad: check the unit and the arm."
         )

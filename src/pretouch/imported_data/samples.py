@@ -8,7 +8,7 @@ import numpy as np
 
 from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.imported_data.source import Choice, RangeTopic, Series, Source, in_order, interpolated
+from pretouch.imported_data.source import Choice, RangeTopic, Series, Source, check_reach, in_order, interpolated
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
@@ -16,8 +16,6 @@ from pretouch.values import value
 
 POSTURE_GAP_S = 0.2
 """Time between two joint positions within which the posture is taken to move evenly [s]."""
-OUT_OF_RANGE_RAD = 0.5
-"""Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
 BAGS = (".mcap", ".db3", ".bag")
 TABLES = (".csv", ".tsv", ".txt")
 _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
@@ -100,13 +98,7 @@ def _model(place: Path, source: Source, choice: Choice) -> RobotModel:
         raise RecordingError(
             f"{place} has {given.shape[1]} joints, and {model.description.name} has {model.n}: choose another --arm."
         )
-    beyond = (given < model.q_min - OUT_OF_RANGE_RAD) | (given > model.q_max + OUT_OF_RANGE_RAD)
-    if beyond.any():
-        i, j = np.argwhere(beyond)[0]
-        raise RecordingError(
-            f"Joint {j + 1} in {place} is at {given[i, j]:.4g} rad, out of reach of {model.description.name}"
-            f" ({model.q_min[j]:.2f} to {model.q_max[j]:.2f} rad): check the unit and the arm."
-        )
+    check_reach(place, given, model)
     return model
 
 
