@@ -2,7 +2,6 @@
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -128,12 +127,12 @@ def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    from pretouch.imported_data.bag import JOINTS, Topic, believed, fill, one_topic, read_errors_said
+    from pretouch.imported_data.bag import JOINTS, JointPicker, Topic, believed, fill, one_topic, read_errors_said
 
     with read_errors_said(place):
         reader = AnyReader([place], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         reader.open()
-    picked = _Picked(place, model)
+    picked = JointPicker(model.n, lambda names: _places(place, names, model))
     try:
         there = [c for c in reader.connections if c.msgcount]
         connections = one_topic(place, there, JOINTS, "--topic", topic)
@@ -147,30 +146,6 @@ def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
         )
     headers, notes = believed([states])
     return f"the topic {states.name}", states.series(headers), notes
-
-
-class _Picked:
-    """Picks the model's joints out of messages: the order may be another one, and a gripper's states lie between."""
-
-    def __init__(self, place: Path, model: RobotModel) -> None:
-        self._place, self._model = place, model
-        self._orders: dict[tuple[str, ...], list[int]] = {}
-
-    def __call__(self, message: Any) -> tuple[float, ...] | None:
-        """Positions in the order of the model's joints, or None of a message that has not all of them."""
-        names, n = tuple(message.name), self._model.n
-        if names not in self._orders:
-            places = _places(self._place, names, self._model)
-            unnamed = list(range(n)) if not names and len(message.position) == n else []
-            self._orders[names] = [places[j] for j in range(n)] if len(places) == n else unnamed
-        order = self._orders[names]
-        if not order or len(message.position) <= max(order):
-            return None
-        return tuple(float(message.position[i]) for i in order)
-
-    def seen(self) -> str:
-        """All joints that were named."""
-        return "; ".join(", ".join(names) for names in self._orders) or "none"
 
 
 def _usable(place: Path, series: Series) -> tuple[Series, tuple[str, ...]]:

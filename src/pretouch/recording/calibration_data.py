@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
-from pretouch.recording.imu import ImuRows
-from pretouch.recording.joints import JointRows
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.skin_reader import holds_units, read_skin
 from pretouch.recording.standard import IMU
+from pretouch.recording.traces import ImuRows, JointRows
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, LARGEST_COUNT
 from pretouch.sensing.skin import Skin
 from pretouch.traces import ImuTrace, JointTrace

@@ -20,8 +20,7 @@ from pretouch.recording.codec import (
 )
 from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
-from pretouch.recording.recorded_path import Tangents
-from pretouch.recording.setting import Run, decode_run
+from pretouch.recording.setting import Run, Tangents, decode_run
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.recording.state_codec import decode_state
 from pretouch.recording.truth import Truth

@@ -12,9 +12,9 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pretouch.recording.disk import Disk
-from pretouch.recording.joints import check_joints, joint_items
 from pretouch.recording.messages import PACKAGE, Item, encoded, fields_of, make, prepare
 from pretouch.recording.standard import IMU, JOINT_STATE, RANGE, header, imu_items, nanoseconds, range_item, topic_name
+from pretouch.recording.traces import check_joints, joint_items
 from pretouch.types import FloatArray
 
 UNIT_SAMPLE = f"{PACKAGE}/msg/UnitSample"
