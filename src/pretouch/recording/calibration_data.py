@@ -87,9 +87,8 @@ def read_measured(place: Path) -> Measured:
 def _of_run(recorded: Recorded) -> Measured:
     run = recorded.runs[0]
     joints = JointRows(recorded.place, run.model.joints)
-    for kept in recorded:
-        if kept.inputs is not None:
-            joints.add(kept.inputs.robot.stamp, kept.inputs.robot.q)
+    for robot in recorded.robot_states():
+        joints.add(robot.stamp, robot.q)
     units = {name: MeasuredUnit(imu, None) for name, imu in _imus(recorded.place).items()}
     return Measured(joints.trace(), joints.names, units, run.skin, recorded.complete)
 

@@ -46,19 +46,16 @@ def read_free_motion(
         samples, said = _of_csv(place, arm, -1.0 if sign == "by-robot" else 1.0, gain)
     else:
         recorded = open_recording(place)
-        arm, kept = recorded.runs[0].model, [cycle.inputs.robot for cycle in recorded if cycle.inputs is not None]
+        arm, kept = recorded.runs[0].model, list(recorded.robot_states())
         if model is not None and model.description.name != arm.description.name:
             raise RecordingError(
                 f"{place} is of {arm.description.name}, and --arm is {model.description.name}: leave out --arm."
             )
         if not kept:
             raise RecordingError(f"{place} holds no state of the robot: give another recording.")
-        time = np.array([r.stamp for r in kept])
-        first = np.append(True, np.diff(time) > 0.0)  # a state that was told twice counts once
-        samples = ArmSamples(
-            time[first], np.array([r.q for r in kept])[first], np.array([r.qd for r in kept])[first],
-            np.array([r.tau_ext for r in kept])[first],
-        )  # fmt: skip
+        states = ([r.stamp for r in kept], [r.q for r in kept], [r.qd for r in kept], [r.tau_ext for r in kept])
+        told = ArmSamples(*(np.array(column) for column in states))
+        samples = told.at(np.append(True, np.diff(told.stamp) > 0.0))  # a state that was told twice counts once
         said = f"{place}: states of {arm.description.name} as the controller had them"
     if samples.q.shape[1] == arm.n:  # `identify` says it otherwise
         check_reach(place, samples.q, arm)
