@@ -92,6 +92,14 @@ def _field_of(name: str, hint: Any, shape: tuple[int, ...]) -> Callable[[Any], A
     return get
 
 
+def _made(kind: type, message: Any) -> Any:
+    """Return a value of a class from a message; one that cannot be is a RecordingError."""
+    try:
+        return _made_of(kind)(message)
+    except ValueError as error:
+        raise RecordingError(f"A {kind.__name__} in the recording cannot be read: {error}") from error
+
+
 def _number(given: Any) -> float:
     """Return a time stamp, if as a float it is the same to the controller."""
     number = float(given)
@@ -184,7 +192,7 @@ def decode_inputs(data: bytes) -> tuple[int, Inputs | None, str]:
     m = decoded(INPUTS, data)
     if m.unreadable:
         return m.sequence, None, m.unreadable
-    robot, readings = _made_of(RobotState)(m.robot), _made_of(RangeReadings)(m.readings)
+    robot, readings = _made(RobotState, m.robot), _made(RangeReadings, m.readings)
     return m.sequence, Inputs(m.stamp, robot, readings, m.resume), ""
 
 
@@ -197,8 +205,7 @@ def encode_touch(sequence: int, inputs: Inputs) -> bytes | None:
 
 def decode_touch(data: bytes) -> TouchReadings:
     """Return what units said of a touch."""
-    made: TouchReadings = _made_of(TouchReadings)(decoded(TOUCH, data))
-    return made
+    return _made(TouchReadings, decoded(TOUCH, data))
 
 
 def encode_points(sequence: int, points: SeenPoints, same_as: int) -> bytes:
@@ -211,7 +218,7 @@ def encode_points(sequence: int, points: SeenPoints, same_as: int) -> bytes:
 def decode_points(data: bytes) -> tuple[int, SeenPoints]:
     """Return the number of the step whose message holds the points, and those in this one."""
     m = decoded(POINTS, data)
-    return m.same_as, _made_of(SeenPoints)(m)
+    return m.same_as, _made(SeenPoints, m)
 
 
 def encode_imu(sequence: int, time: float, imu: ImuReadings) -> bytes | None:
@@ -230,12 +237,7 @@ def encode_imu(sequence: int, time: float, imu: ImuReadings) -> bytes | None:
 
 def decode_imu(data: bytes) -> ImuReadings:
     """Return the IMU samples of a step."""
-    m = decoded(IMU, data)
-    try:
-        made: ImuReadings = _made_of(ImuReadings)(m)
-    except ValueError as error:
-        raise RecordingError(f"IMU samples in the recording cannot be read: {error}") from error
-    return made
+    return _made(ImuReadings, decoded(IMU, data))
 
 
 def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = None) -> bytes:
@@ -249,10 +251,7 @@ def decode_step(data: bytes) -> tuple[int, ControlStep, FloatArray]:
         m = decoded(STEP, data)
     except RecordingError:
         m = decoded(STEP, data + _NO_PLACES)
-    try:
-        return m.sequence, _made_of(ControlStep)(m), m.path_tangent
-    except ValueError as error:
-        raise RecordingError(f"A step in the recording cannot be read: {error}") from error
+    return m.sequence, _made(ControlStep, m), m.path_tangent
 
 
 def encode_truth(sequence: int, truth: Truth) -> bytes:

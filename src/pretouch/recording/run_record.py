@@ -29,6 +29,10 @@ class TrueForces:
     """Beginnings of contacts: instant [s], name of the link, (3,) velocity of the touching point [m/s]."""
 
 
+def _threshold_part(row: int, what: str) -> property:
+    return property(lambda record: record.thresholds[:, row], doc=what)
+
+
 @dataclass(frozen=True, kw_only=True)
 class DetectorRecord:
     """What a contact detector was given and compared it with, in S cycles. Forces on the robot, base frame."""
@@ -45,35 +49,12 @@ class DetectorRecord:
     def __len__(self) -> int:
         return len(self.time)
 
-    @property
-    def upper(self) -> FloatArray:
-        """(S, 3) T_u of eq. 9."""
-        return self.thresholds[:, 0]
-
-    @property
-    def lower(self) -> FloatArray:
-        """(S, 3) T_l of eq. 9."""
-        return self.thresholds[:, 1]
-
-    @property
-    def mean(self) -> FloatArray:
-        """(S, 3) mean of the force window."""
-        return self.thresholds[:, 2]
-
-    @property
-    def sigma(self) -> FloatArray:
-        """(S, 3) standard deviation of the force window."""
-        return self.thresholds[:, 3]
-
-    @property
-    def obstacle_positive(self) -> FloatArray:
-        """(S, 3) F_obs+ of eq. 11, by which the lower threshold is raised."""
-        return self.thresholds[:, 4]
-
-    @property
-    def obstacle_negative(self) -> FloatArray:
-        """(S, 3) F_obs-, by which the upper threshold is lowered."""
-        return self.thresholds[:, 5]
+    upper = _threshold_part(0, "(S, 3) T_u of eq. 9.")
+    lower = _threshold_part(1, "(S, 3) T_l of eq. 9.")
+    mean = _threshold_part(2, "(S, 3) mean of the force window.")
+    sigma = _threshold_part(3, "(S, 3) standard deviation of the force window.")
+    obstacle_positive = _threshold_part(4, "(S, 3) F_obs+ of eq. 11, by which the lower threshold is raised.")
+    obstacle_negative = _threshold_part(5, "(S, 3) F_obs-, by which the upper threshold is lowered.")
 
 
 @dataclass(frozen=True, kw_only=True)
