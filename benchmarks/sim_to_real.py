@@ -96,12 +96,12 @@ def said(samples: ArmSamples) -> dict[str, object]:
     for name, text in _DETECTORS.items():
         p, evidence, alarms, quiet = profile(text), [], 0, 0
         detector = DetectorAlone(p, MODEL)
-        for i in range(len(samples.time)):
+        for i in range(len(samples.stamp)):
             robot = RobotState(
-                float(samples.time[i]), samples.q[i], samples.qd[i], samples.q[i], samples.qd[i], samples.tau[i], None
+                float(samples.stamp[i]), samples.q[i], samples.qd[i], samples.q[i], samples.qd[i], samples.tau[i], None
             )  # fmt: skip
             felt = detector.step(MODEL.kinematics(samples.q[i]), robot, none)
-            if i > len(samples.time) // 3:
+            if i > len(samples.stamp) // 3:
                 evidence.append(felt.evidence)
                 # not `contact`: without a wrench the paper's window never fills, and nothing is armed
                 alarms += felt.evidence >= 1.0 and i > quiet
@@ -131,11 +131,11 @@ def study(world: str, seed: int, seconds: float) -> dict[str, object]:
 
 def rough(samples: ArmSamples, seed: int) -> ArmSamples:
     """As a recording may be: noise and steps of encoders, stamps late by up to 2 ms, samples lost, gaps of 60 ms."""
-    rng, count = np.random.default_rng(seed), len(samples.time)
+    rng, count = np.random.default_rng(seed), len(samples.stamp)
     kept = (rng.random(count) > 0.005) & (np.arange(count) % 500 > 5)
     q = 1e-5 * np.round((samples.q + 2e-5 * rng.standard_normal(samples.q.shape)) / 1e-5)
-    late = replace(samples, time=samples.time + rng.uniform(0.0, 0.002, count), q=q)
-    return ArmSamples(late.time[kept], late.q[kept], late.qd[kept], late.tau[kept])
+    late = replace(samples, stamp=samples.stamp + rng.uniform(0.0, 0.002, count), q=q)
+    return late.at(kept)
 
 
 def swung(seed: int, world: str, seconds: float, roughly: bool) -> dict[str, object]:

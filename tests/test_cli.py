@@ -82,8 +82,8 @@ def test_help_names_the_commands(capsys):
 
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
+    from pretouch.atomic_write import write_json
     from pretouch.cli.writing import check_writable
-    from pretouch.whole_file import write_json
 
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -97,7 +97,7 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
 
 
 def test_a_link_is_followed(tmp_path):
-    from pretouch.whole_file import write_json
+    from pretouch.atomic_write import write_json
 
     (tmp_path / "link").symlink_to(tmp_path / "real")
     write_json([1], tmp_path / "link")

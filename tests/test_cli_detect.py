@@ -9,15 +9,15 @@ from matplotlib.image import imread
 
 from pretouch.cli.detect import detect
 from pretouch.errors import ParameterError, PretouchError, RecordingError
-from pretouch.foreign.source import Choice
+from pretouch.imported_data.source import Choice
 from pretouch.loop import Cycle
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
-from tests.foreign.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 from tests.hardware.traffic import heard
+from tests.imported_data.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
-from tests.foreign.files import pushed
+from tests.imported_data.files import pushed
 
 PUSHES = ((2.0, 0.6, (0.0, 40.0, 0.0)),)
 

@@ -11,7 +11,7 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.calibrate import live
-from pretouch.foreign.joints import read_joints
+from pretouch.imported_data.joints import read_joints
 from pretouch.robot.self_distance import capsule_ends, kinematics_of
 from pretouch.serving.simulated_arm import SimulatedArm
 

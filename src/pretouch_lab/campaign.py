@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from pretouch import __version__
+from pretouch.atomic_write import write_json
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.params import Orientation, RestrictionMode, profile
@@ -19,7 +20,6 @@ from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
 from pretouch.sim.randomisation import world_set
-from pretouch.whole_file import write_json
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.registry import EXPERIMENTS
 from pretouch_lab.result_key import parameters_digest, result_key

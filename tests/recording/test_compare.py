@@ -14,7 +14,7 @@ from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
-from tests.foreign.files import pushed
+from tests.imported_data.files import pushed
 from tests.reference.contact import Touch
 
 PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]

@@ -12,11 +12,10 @@ from pretouch.loop import Cycle, turn
 from pretouch.params import PROFILES
 from pretouch.recording import verify as verifying
 from pretouch.recording.codec import STEP, decode_step, encode_step
-from pretouch.recording.difference import differing
 from pretouch.recording.messages import decoded, encoded
 from pretouch.recording.reader import open_recording
 from pretouch.recording.state_codec import STATE
-from pretouch.recording.verify import verify
+from pretouch.recording.verify import differing, verify
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

@@ -133,8 +133,6 @@ def infinite(model, skin):
 
 
 ODD = {
-    "empty": lambda model, skin: made.recorded(model, skin, []),
-    "no run": lambda model, skin: made.Recorded((), []),
     "one step": one_step,
     "no unit": lambda model, skin: one_step(model, Skin((), model)),
     "nan": nothing_but_nan,

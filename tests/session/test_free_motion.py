@@ -261,8 +261,8 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 os.fsync = lambda _: os.kill(os.getpid(), signal.SIGKILL)
-from pretouch.whole_file import write_whole
-write_whole(Path(sys.argv[1]), "half of it")
+from pretouch.atomic_write import atomic_write
+atomic_write(Path(sys.argv[1]), "half of it")
 """
 
 

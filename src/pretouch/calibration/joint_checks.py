@@ -45,7 +45,7 @@ def checked_joints(
     for kept, named in ((_own_stamp, _repeated), (_spaced, _bunched), (_renewed, _held)):
         keep = kept(joints, params)
         findings += [] if keep.all() else [named(keep)]
-        joints = JointTrace(joints.stamp[keep], joints.q[keep])
+        joints = joints.at(keep)
     _check_rate(joints, params)
     return joints, (*findings, *_missing(joints.stamp, params))
 

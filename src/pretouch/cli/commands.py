@@ -93,7 +93,7 @@ class Detect:
     """ROS 2 bag (folder, .mcap, .db3), ROS 1 .bag, or .csv with columns time_s, force_x_N, force_y_N, force_z_N."""
     profiles: str = "paper"
     """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter."""
-    # the choices of pretouch.foreign.source, spelt out: the help is to need none of the heavy packages
+    # the choices of pretouch.imported_data.source, spelt out: the help is to need none of the heavy packages
     sign: Literal["on-robot", "by-robot"] = "on-robot"
     """Whose force it is: on the robot by its environment, or by the robot, as Franka's O_F_ext_hat_K."""
     frame: Literal["base", "ee"] = "base"
@@ -118,7 +118,7 @@ class Detect:
     def run(self) -> None:
         """Run the detectors, and show and write what they found."""
         from pretouch.cli.detect import detect
-        from pretouch.foreign.source import Choice
+        from pretouch.imported_data.source import Choice
 
         choice = Choice(self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, ranges=bool(self.skin))
         skin, out, json = (Path(text) if text else None for text in (self.skin, self.out, self.json))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from pretouch.atomic_write import write_json
 from pretouch.cli.robot_check import joint_table, ready_said
 from pretouch.cli.tables import show
 from pretouch.cli.words import words
@@ -17,7 +18,6 @@ from pretouch.importing.folder import check_free, write_folder
 from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
 from pretouch.text_table import TextTable
-from pretouch.whole_file import write_json
 
 if TYPE_CHECKING:
     from pretouch.cli.robot_commands import Import

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from pretouch.atomic_write import write_json
 from pretouch.cli.calibrate.outputs import check_free, same_file
 from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
 from pretouch.cli.tables import show
@@ -24,7 +25,6 @@ from pretouch.robot.description import fr3, panda
 from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
-from pretouch.whole_file import write_json
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_coverage_options import Coverage as Asked

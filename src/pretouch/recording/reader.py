@@ -20,12 +20,11 @@ from pretouch.recording.codec import (
 )
 from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
-from pretouch.recording.recorded_path import Tangents
-from pretouch.recording.setting import Run, decode_run
+from pretouch.recording.setting import Run, Tangents, decode_run
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.recording.state_codec import decode_state
 from pretouch.recording.truth import Truth
-from pretouch.types import ControlStep, FloatArray, Inputs
+from pretouch.types import ControlStep, FloatArray, Inputs, RobotState
 from pretouch.values import value
 
 __all__ = ["Kept", "Recorded", "Run", "open_recording"]
@@ -117,6 +116,14 @@ class Recorded:
 
     def __iter__(self) -> Iterator[Kept]:
         return (self[i] for i in range(len(self)))
+
+    def robot_states(self) -> Iterator[RobotState]:
+        """Yield the robot's state of each step whose inputs were kept."""
+        for number in self._numbers:
+            data = self._raw["/pretouch/inputs"].get(number)
+            inputs = None if data is None else decode_inputs(data)[1]
+            if inputs is not None:
+                yield inputs.robot
 
     def number(self, i: int) -> int:
         """Return the number a step had when it was recorded: where some are missing it is not `i`."""

@@ -10,12 +10,11 @@ import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
-from pretouch.recording.imu import ImuRows, no_imu
-from pretouch.recording.joints import JointRows
 from pretouch.recording.messages import TOPICS, decoded
 from pretouch.recording.reader import is_ours
 from pretouch.recording.skin_recording import UNIT_SAMPLE
 from pretouch.recording.standard import IMU, JOINT_STATE
+from pretouch.recording.traces import ImuRows, JointRows, no_imu
 from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value

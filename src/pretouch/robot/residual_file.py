@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from pretouch.atomic_write import atomic_write
 from pretouch.errors import RobotModelError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch.whole_file import write_whole
 
 FORMAT = 1
 _LARGEST = 1e6
@@ -46,7 +46,7 @@ def save_residual(path: Path, model: RobotModel, residual: Residual) -> None:
         "since": residual.since, "saved": residual.saved, "array": arrays,
     })  # fmt: skip
     try:
-        write_whole(path, text)
+        atomic_write(path, text)
     except OSError as error:
         raise RobotModelError(f"What was learnt cannot be written to {path}: {error.strerror}.") from error
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pretouch.atomic_write import atomic_write
 from pretouch.errors import RobotError
-from pretouch.whole_file import write_whole
 
 _FILE = "force-sign.json"
 
@@ -52,7 +52,7 @@ class Remembered:
         entries = self._read() | {robot.key: robot.through}
         try:
             self.place.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(self.place, json.dumps(entries, indent=1))
+            atomic_write(self.place, json.dumps(entries, indent=1))
         except OSError as error:
             raise RobotError(
                 f"The confirmed push cannot be noted in {self.place} ({error.strerror}): make that folder writable, or"

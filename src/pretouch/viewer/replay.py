@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.errors import RecordingError
 from pretouch.loop import MonotonicClock
 from pretouch.recording.codec import decode_step
 from pretouch.recording.reader import Kept, Recorded, Run
@@ -194,10 +193,8 @@ def serve_replay(
 ) -> None:
     """Show a recording as a page until told to stop, with another profile's thresholds if they are given.
 
-    A ViewerError says that the port is taken or the extra is missing, a RecordingError that there is nothing to show.
+    A ViewerError says that the port is taken or the extra is missing.
     """
-    if not len(recorded):
-        raise RecordingError(f"{recorded.place} holds no control step: there is nothing to show.")
     with served(options, recorded.place.name) as server:
         page = ReplayPage(server, recorded, comparison)
         say(f"The recording is at {url_of(options)} (Ctrl-C ends it).")

@@ -61,7 +61,7 @@ def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
 
 
 def _row(request, out):
-    from pretouch.whole_file import write_json
+    from pretouch.atomic_write import write_json
     from pretouch_lab.campaign import trial_file
 
     cell, seed = request.tasks()[0]

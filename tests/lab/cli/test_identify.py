@@ -14,7 +14,7 @@ def table(tmp_path_factory):
     names = ["time_s"] + [f"{what}{j}_{unit}" for what, unit in (("q", "rad"), ("qd", "rad_s"), ("tau_ext", "Nm"))
                           for j in range(1, 8)]  # fmt: skip
     place = tmp_path_factory.mktemp("free") / "free.csv"
-    columns = np.column_stack([samples.time, samples.q, samples.qd, samples.tau])
+    columns = np.column_stack([samples.stamp, samples.q, samples.qd, samples.tau])
     np.savetxt(place, columns, delimiter=",", header=",".join(names), comments="")
     return place
 

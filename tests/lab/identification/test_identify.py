@@ -100,7 +100,7 @@ def test_samples_that_are_no_numbers_and_gaps_are_left_out_and_said(samples):
 
 
 def short(samples, count):
-    return ArmSamples(*(column[:count] for column in (samples.time, samples.q, samples.qd, samples.tau)))
+    return ArmSamples(*(column[:count] for column in (samples.stamp, samples.q, samples.qd, samples.tau)))
 
 
 @pytest.mark.parametrize(
@@ -109,10 +109,10 @@ def short(samples, count):
         (lambda s: short(s, 1000), "record 20 s or more of free motion"),
         (lambda s: replace(s, q=s.q[:1] + 0.0 * s.q), "The arm stands"),
         (lambda s: replace(s, tau=s.tau * np.nan), "no two samples with numbers"),
-        (lambda s: replace(s, time=10.0 * s.time), "The samples come at 10 Hz"),
+        (lambda s: replace(s, stamp=10.0 * s.stamp), "The samples come at 10 Hz"),
         (lambda s: replace(s, q=s.q[:, :6]), "has 6 joints and 7 torques"),
         (
-            lambda s: replace(s, tau=s.tau + 15.0 * (np.sin(np.arange(len(s.time)) / 300.0) > 0.3)[:, None]),
+            lambda s: replace(s, tau=s.tau + 15.0 * (np.sin(np.arange(len(s.stamp)) / 300.0) > 0.3)[:, None]),
             "looks like contacts",
         ),
     ],

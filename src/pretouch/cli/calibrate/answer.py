@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from pretouch.atomic_write import write_json
 from pretouch.calibration.result import Calibration, UnitCalibration
 from pretouch.calibration.skin_of import skin_of
 from pretouch.cli.calibrate.numbers import numbers
@@ -16,7 +17,6 @@ from pretouch.cli.writing import unwritable_said
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, save_skin
-from pretouch.whole_file import write_json
 
 _COLUMNS = (
     "unit", "link", "position\n[mm]", "sigma\n[mm]", "sigma\n[deg]", "clock\n[ms]", "residual\n[m/s^2]", "verdict",

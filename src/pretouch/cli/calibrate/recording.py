@@ -13,8 +13,8 @@ from pretouch.calibration.stamps import instants, retimed
 from pretouch.cli.calibrate.answer import Answer, give
 from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.errors import CalibrationError
-from pretouch.foreign.joints import read_joints
-from pretouch.foreign.samples import TABLES
+from pretouch.imported_data.joints import read_joints
+from pretouch.imported_data.samples import TABLES
 from pretouch.recording.calibration_data import Measured, MeasuredUnit, read_measured
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin

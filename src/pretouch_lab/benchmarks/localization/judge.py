@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from pretouch.atomic_write import write_json
 from pretouch.params import profile
 from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, IntArray, Touched
-from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching, touches_of
 from pretouch_lab.benchmarks.detection.replay import NOTHING

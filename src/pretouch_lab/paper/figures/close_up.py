@@ -6,13 +6,13 @@ from matplotlib.figure import Figure
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.params import Profile, ProximityPriorParams
+from pretouch.recording.run_record import RunRecord
 from pretouch_lab.paper.figures.marks import Y, distances, force_with_thresholds, shade, touching
-from pretouch_lab.trace import Trace
 
 _BEFORE_S, _AFTER_S = 4.0, 2.5
 
 
-def close_up_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -> Figure:
+def close_up_figure(trace: RunRecord, units: tuple[str, ...], profile: Profile) -> Figure:
     """Distances with the region that matters, and force along y with thresholds, about the first touch."""
     figure = Figure(figsize=(9, 6.4), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
@@ -42,7 +42,7 @@ def close_up_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -> F
     return figure
 
 
-def _window(trace: Trace) -> tuple[float, float]:
+def _window(trace: RunRecord) -> tuple[float, float]:
     """First and last instant to show [s]: about the first touch, or all where there is none."""
     touched = np.flatnonzero(touching(trace))
     if len(touched) == 0:

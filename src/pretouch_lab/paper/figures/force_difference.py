@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.params import profile
+from pretouch.recording.run_record import RunRecord
 from pretouch_lab.paper.figures.marks import BLIND, OURS, SENSING, Y, touching
-from pretouch_lab.trace import Trace
 
 _TRAJECTORIES, _SIDES = ("circle", "line"), ("-y", "+y")
 
 
-def force_difference_figure(traces: Mapping[tuple[str, str, str], Trace], profiles: Sequence[str]) -> Figure:
+def force_difference_figure(traces: Mapping[tuple[str, str, str], RunRecord], profiles: Sequence[str]) -> Figure:
     """Force along y with the band between the thresholds, before and after contact.
 
     Blind is blue, the first of the others red, the second green.
@@ -43,7 +43,7 @@ def force_difference_figure(traces: Mapping[tuple[str, str, str], Trace], profil
     return figure
 
 
-def _force(axes: Axes, trace: Trace, push: float, name: str, colour: str, hatch: str) -> None:
+def _force(axes: Axes, trace: RunRecord, push: float, name: str, colour: str, hatch: str) -> None:
     """Draw the estimate and its detection; of a detector by thresholds, these until then and the value of eq. 8 too."""
     style, filtered, marker = ("--", ":", "o") if hatch else ("-", "-.", "s")
     touched = np.flatnonzero(touching(trace))

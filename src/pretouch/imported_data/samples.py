@@ -8,7 +8,7 @@ import numpy as np
 
 from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.foreign.source import Choice, RangeTopic, Series, Source, in_order, interpolated
+from pretouch.imported_data.source import Choice, RangeTopic, Series, Source, check_reach, in_order, interpolated
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
@@ -16,16 +16,14 @@ from pretouch.values import value
 
 POSTURE_GAP_S = 0.2
 """Time between two joint positions within which the posture is taken to move evenly [s]."""
-OUT_OF_RANGE_RAD = 0.5
-"""Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
 BAGS = (".mcap", ".db3", ".bag")
 TABLES = (".csv", ".tsv", ".txt")
 _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 
 
 @value
-class Foreign:
-    """Force, and perhaps postures and ranges, of a foreign recording, as our controller would be given them."""
+class ImportedData:
+    """Force, and perhaps postures and ranges, of an imported recording, as our controller would be given them."""
 
     place: Path
     said: str
@@ -45,7 +43,7 @@ class Foreign:
         return float(1e9 / np.median(np.diff(self.force.time)))
 
 
-def read_foreign(place: Path, choice: Choice) -> Foreign:
+def read_imported(place: Path, choice: Choice) -> ImportedData:
     """Read a bag, MCAP or CSV file as the choice says. RecordingError for what cannot be used, with the way out."""
     source = _read(place, choice)
     model = _model(place, source, choice) if choice.posture else None
@@ -65,7 +63,7 @@ def read_foreign(place: Path, choice: Choice) -> Foreign:
     looks_ee = choice.frame == "base" and source.frame_id.lower().endswith(_EE_FRAMES)
     if looks_ee:
         notes += (f"The force's frame_id is {source.frame_id!r}: if that is the end-effector's, add --frame ee.",)
-    return Foreign(
+    return ImportedData(
         place, _said(source, choice, model), Series(force.time, ours), joints, model, ranges, source.notes + notes
     )
 
@@ -78,11 +76,11 @@ def _read(place: Path, choice: Choice) -> Source:
         if place.is_dir() and not (place / "metadata.yaml").is_file():
             raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
         extras.BAGS.need("A bag or MCAP file")
-        from pretouch.foreign.bag import read_bag
+        from pretouch.imported_data.bag import read_bag
 
         return read_bag(place, choice)
     if ending in TABLES:
-        from pretouch.foreign.csv import read_csv
+        from pretouch.imported_data.csv import read_csv
 
         return read_csv(place, choice)
     raise RecordingError(
@@ -100,13 +98,7 @@ def _model(place: Path, source: Source, choice: Choice) -> RobotModel:
         raise RecordingError(
             f"{place} has {given.shape[1]} joints, and {model.description.name} has {model.n}: choose another --arm."
         )
-    beyond = (given < model.q_min - OUT_OF_RANGE_RAD) | (given > model.q_max + OUT_OF_RANGE_RAD)
-    if beyond.any():
-        i, j = np.argwhere(beyond)[0]
-        raise RecordingError(
-            f"Joint {j + 1} in {place} is at {given[i, j]:.4g} rad, out of reach of {model.description.name}"
-            f" ({model.q_min[j]:.2f} to {model.q_max[j]:.2f} rad): check the unit and the arm."
-        )
+    check_reach(place, given, model)
     return model
 
 

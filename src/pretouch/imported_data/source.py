@@ -1,10 +1,13 @@
-"""What a reader takes from a foreign recording, and what a person says of it that it does not say itself."""
+"""What a reader takes from an imported recording, and what a person says of it that it does not say itself."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from pretouch.errors import RecordingError
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
@@ -12,11 +15,13 @@ Sign = Literal["on-robot", "by-robot"]
 Frame = Literal["base", "ee"]
 Zeros = Literal["auto", "missing", "kept"]
 Arm = Literal["auto", "panda", "fr3"]
+_OUT_OF_RANGE_RAD = 0.5
+"""Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What a foreign recording does not say of itself."""
+    """What an imported recording does not say of itself."""
 
     wrench: str = ""
     """Topic of the force; needed if there are several."""
@@ -70,7 +75,7 @@ class RangeTopic:
 
 @value
 class Source:
-    """What stands in a foreign recording, in SI units but in its own sign and frame."""
+    """What stands in an imported recording, in SI units but in its own sign and frame."""
 
     said: str
     """Where the force was taken from, as the end of a sentence."""
@@ -130,3 +135,14 @@ def interpolated(series: Series, ticks: IntArray, longest_s: float) -> FloatArra
     share = (ticks[inside] - series.time[i]) / np.maximum(gap[inside], 1)
     found[inside] = series.values[i] + share[:, None] * (series.values[j] - series.values[i])
     return found
+
+
+def check_reach(place: Path, q: FloatArray, model: RobotModel) -> None:
+    """Refuse positions (N, n) [rad] that an arm cannot have: their unit or the arm is another one."""
+    beyond = (q < model.q_min - _OUT_OF_RANGE_RAD) | (q > model.q_max + _OUT_OF_RANGE_RAD)
+    if beyond.any():
+        i, j = np.argwhere(beyond)[0]
+        raise RecordingError(
+            f"{model.joints[j]} in {place} is at {q[i, j]:.4g} rad, out of its range of {model.q_min[j]:.2f} to"
+            f" {model.q_max[j]:.2f} rad: check the unit and the arm."
+        )

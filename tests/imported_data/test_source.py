@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.foreign.source import Series, in_order, interpolated, newest
+from pretouch.imported_data.source import Series, in_order, interpolated, newest
 
 TIMES = st.lists(st.integers(0, 30), min_size=1, max_size=20)
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.errors import RecordingError
-from pretouch.foreign.joints import read_joints
+from pretouch.imported_data.joints import read_joints
 from pretouch.recording.skin_recording import SkinRecording
-from tests.foreign.files import JOINTS, PANDA, START, joints, made, stamps, wrenches, write_bag, write_csv
+from tests.imported_data.files import JOINTS, PANDA, START, joints, made, stamps, wrenches, write_bag, write_csv
 
 Q = np.array([0.1, -0.7, 0.2, -2.3, 0.3, 1.6, 0.7])
 MOVING = Q + 0.01 * np.arange(50)[:, None] * np.array([1, 2, -1, 3, 1, -2, 1])

@@ -1,4 +1,4 @@
-"""A file that is replaced whole or not at all."""
+"""Atomic writes: a file has its old content or all of its new one."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 
-def write_whole(path: Path, text: str) -> None:
+def atomic_write(path: Path, text: str) -> None:
     """Write a text file beside its place and put it there; into a device or pipe as it is. Raises OSError.
 
     Where the path is a symbolic link, the file it leads to is replaced. Whatever goes wrong, what was there stays.
@@ -19,14 +19,14 @@ def write_whole(path: Path, text: str) -> None:
     if place.exists() and not place.is_file() and not place.is_dir():
         place.write_text(text, encoding="utf-8")
         return
-    with replaced_whole(place) as unfinished, unfinished.open("w", encoding="utf-8") as file:
+    with atomic_replacement(place) as unfinished, unfinished.open("w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
 
 
 @contextmanager
-def replaced_whole(place: Path) -> Iterator[Path]:
+def atomic_replacement(place: Path) -> Iterator[Path]:
     """Give a path beside a file's place; what is written there replaces the file, or is gone after an exception."""
     name = sha256(os.fsencode(place.name)).hexdigest()[:16]  # as short for a long name
     unfinished = place.with_name(f".{name}.{os.getpid()}.tmp")
@@ -41,5 +41,5 @@ def replaced_whole(place: Path) -> Iterator[Path]:
 
 
 def write_json(value: Any, path: Path) -> None:
-    """Write a value as a JSON file by `write_whole`. Raises OSError, and ValueError for numbers that are not finite."""
-    write_whole(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+    """Write a value as JSON by `atomic_write`. Raises OSError, and ValueError for numbers that are not finite."""
+    atomic_write(path, json.dumps(value, indent=1, allow_nan=False) + "\n")

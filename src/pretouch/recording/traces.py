@@ -1,5 +1,7 @@
-"""Joint positions of an arm in a recording of sensor units: sensor_msgs/JointState, to messages and back."""
+"""What units' IMUs and an arm's joints measured, as standard messages, and read from these as traces."""
 
+import struct
+from array import array
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -7,10 +9,48 @@ from typing import Any
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.recording.messages import Item, encoded, make, plain_text
+from pretouch.recording.messages import Item, encoded, make
 from pretouch.recording.standard import JOINT_STATE, header, nanoseconds
-from pretouch.traces import JointTrace
+from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray
+
+_HEAD = struct.Struct("<4xiII")
+"""Encapsulation header, seconds, nanoseconds, and length of the frame's name with its end."""
+_TAIL = struct.Struct("<3d72x3d72x")
+"""Angular velocity and acceleration, each before its covariance, at the end of a message."""
+
+
+class ImuRows:
+    """Gathers Imu messages by unit: there are thousands a second, so that only what is needed is decoded."""
+
+    def __init__(self) -> None:
+        self._rows: dict[bytes, array[float]] = {}
+
+    def add(self, data: bytes) -> None:
+        """Take in a message, as CDR; what is too short to be one is left out."""
+        if len(data) < _HEAD.size + _TAIL.size:
+            return
+        seconds, rest_ns, length = _HEAD.unpack_from(data)
+        frame = data[_HEAD.size : _HEAD.size + max(length - 1, 0)]
+        rows = self._rows.setdefault(frame, array("d"))
+        rows.append(seconds + rest_ns / 1e9)
+        rows.extend(_TAIL.unpack_from(data, len(data) - _TAIL.size))
+
+    def traces(self) -> dict[str, ImuTrace]:
+        """Return what each unit measured, by its name, in the order of time."""
+        return {frame.decode(errors="replace"): _trace(rows) for frame, rows in self._rows.items()}
+
+
+def no_imu() -> ImuTrace:
+    """Return what a unit without an IMU measured."""
+    return _trace(array("d"))
+
+
+def _trace(rows: "array[float]") -> ImuTrace:
+    table = np.array(rows, dtype=np.float64).reshape(-1, 7)
+    table = table[np.argsort(table[:, 0], kind="stable")]
+    return ImuTrace(table[:, 0], table[:, 4:], table[:, 1:4])
+
 
 TOPIC = "/joint_states"
 
@@ -30,7 +70,7 @@ def joint_items(
     instead: int, stamp: FloatArray, q: FloatArray, qd: FloatArray | None, names: Sequence[str]
 ) -> Iterator[Item]:
     """Yield states of joints at instants (M,) [s]: (M, n) [rad], [rad/s]; what is no time stands at `instead` [ns]."""
-    nothing, texts = np.zeros(0), [plain_text(name) for name in names]
+    nothing, texts = np.zeros(0), list(names)
     for i, t in enumerate(stamp.tolist()):
         time = nanoseconds(t, instead)
         velocity = nothing if qd is None else np.array(qd[i], dtype=np.float64)

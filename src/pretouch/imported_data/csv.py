@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.foreign.source import Choice, Series, Source
+from pretouch.imported_data.source import Choice, Series, Source
 from pretouch.types import FloatArray, IntArray
 
 UNITS = {
@@ -27,6 +27,8 @@ _SHOWN = {
     "q": "q1_rad or q1_deg",
 }
 _NAME = re.compile(r"(time|force|torque|q)(?:(?<=q)(\d{1,2})|_([xyz]))?(?:_([^_]*))?")
+Rows = Iterator[tuple[int, list[str]]]
+"""Lines with their numbers, split into cells."""
 _LONGEST_S = 30 * 86_400.0
 """A recording longer than this [s] has another unit of time."""
 
@@ -37,28 +39,25 @@ def read_csv(place: Path, choice: Choice) -> Source:
         raise RecordingError(f"{place} is a CSV file and has no topics: leave out --wrench and --joints.")
     if choice.ranges:
         raise RecordingError(f"{place} is a CSV file, which tells no ranges: leave out --skin, or give a bag.")
-    rows = read_rows(place)
-    header = next(rows, None)
-    if header is None:
-        raise RecordingError(
-            f"{place} is empty: give a CSV file with a header, as time_s,force_x_N,force_y_N,force_z_N."
-        )
-    names = [name.strip().lstrip("#").strip() for name in header[1]]
+    rows, names = read_header(place, "time_s,force_x_N,force_y_N,force_z_N")
     columns, factors = _columns(place, names)
-    table = read_table(place, rows, names, list(columns.values())) * np.array([factors[key] for key in columns])
-    at = {key: i for i, key in enumerate(columns)}
-    time, notes = relative_time(place, table[:, at["time"]])
-    kept = np.isfinite(table[:, at["time"]])
-    force = table[np.ix_(kept, [at[key] for key in columns if key.startswith(("force", "torque"))])]
-    angles = [at[key] for key in columns if key.startswith("q")]
-    joints = Series(time, table[np.ix_(kept, angles)]) if angles and choice.posture else None
-    unused = [name for name in names if _key(name) is None]
-    if unused:
-        notes.append(f"Columns that are not used: {listed(unused)}.")
+    table, time, notes = read_table(place, rows, names, {i: factors[key] for key, i in columns.items()})
+    force = table[:, [k for k, key in enumerate(columns) if key.startswith(("force", "torque"))]]
+    angles = [k for k, key in enumerate(columns) if key.startswith("q")]
+    joints = Series(time, table[:, angles]) if angles and choice.posture else None
     return Source("the columns force_x, force_y, force_z", Series(time, force), "", joints, "auto", (), tuple(notes))
 
 
-def read_rows(place: Path) -> Iterator[tuple[int, list[str]]]:
+def read_header(place: Path, example: str) -> tuple[Rows, list[str]]:
+    """Return the rows below the header, to be read on, and the columns' names; an empty file is a RecordingError."""
+    rows = _rows(place)
+    header = next(rows, None)
+    if header is None:
+        raise RecordingError(f"{place} is empty: give a CSV file with a header, as {example}.")
+    return rows, [name.strip().lstrip("#").strip() for name in header[1]]
+
+
+def _rows(place: Path) -> Rows:
     """Lines of the file that are not blank, with their numbers, split at the separator that the first one shows."""
     try:
         with place.open(encoding="utf-8-sig", newline="") as file:
@@ -121,16 +120,29 @@ def listed(names: list[str]) -> str:
     return ", ".join(repr(name) for name in names[:8]) + (", ..." if len(names) > 8 else "")
 
 
-def read_table(place: Path, rows: Iterator[tuple[int, list[str]]], names: list[str], wanted: list[int]) -> FloatArray:
-    """Numbers of the wanted columns (N, m), NaN where a cell is empty."""
-    table = array("d")
-    for line, cells in rows:
+def read_table(
+    place: Path, rows: Rows, names: list[str], factors: dict[int, float]
+) -> tuple[FloatArray, IntArray, list[str]]:
+    """Read columns, the first of which is the time, times the factors that bring them to SI.
+
+    Returns:
+        Numbers (N, m) of the rows that have a time, NaN where a cell is empty; instants (N,) [ns] since the first; and
+        what is to be said of the file.
+    """
+    cells = array("d")
+    wanted = list(factors)
+    for line, row in rows:
         try:
-            table.extend([float(cells[i]) for i in wanted])
+            cells.extend([float(row[i]) for i in wanted])
         except (ValueError, IndexError):
-            table.extend([_number(place, line, names, cells, i) for i in wanted])
-    numbers = np.array(table, dtype=np.float64).reshape(-1, len(wanted))
-    return np.where(np.isfinite(numbers), numbers, np.nan)
+            cells.extend([_number(place, line, names, row, i) for i in wanted])
+    numbers = np.array(cells, dtype=np.float64).reshape(-1, len(wanted))
+    table = np.where(np.isfinite(numbers), numbers, np.nan) * np.array(list(factors.values()))
+    time, notes = _relative_time(place, table[:, 0])
+    unused = [name for i, name in enumerate(names) if i not in factors]
+    if unused:
+        notes.append(f"Columns that are not used: {listed(unused)}.")
+    return table[np.isfinite(table[:, 0])], time, notes
 
 
 def _number(place: Path, line: int, names: list[str], cells: list[str], i: int) -> float:
@@ -146,7 +158,7 @@ def _number(place: Path, line: int, names: list[str], cells: list[str], i: int) 
         raise RecordingError(f"{place}, line {line}: {names[i]} is {cell[:40]!r}: {hint}.") from None
 
 
-def relative_time(place: Path, seconds: FloatArray) -> tuple[IntArray, list[str]]:
+def _relative_time(place: Path, seconds: FloatArray) -> tuple[IntArray, list[str]]:
     """Instants [ns] since the first, of the rows that have one, and what is to be said of the others."""
     known = seconds[np.isfinite(seconds)]
     if not len(known):

@@ -1,4 +1,4 @@
-"""The detector on a foreign recording, cycle by cycle as in the controller."""
+"""The detector on an imported recording, cycle by cycle as in the controller."""
 
 import numpy as np
 
@@ -8,8 +8,8 @@ from pretouch.contact.window import add_force, window_init
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
-from pretouch.foreign.samples import POSTURE_GAP_S, Foreign
-from pretouch.foreign.source import RangeTopic, Series, interpolated, newest
+from pretouch.imported_data.samples import POSTURE_GAP_S, ImportedData
+from pretouch.imported_data.source import RangeTopic, Series, interpolated, newest
 from pretouch.modes import Event, mode_init, next_mode
 from pretouch.params import Profile
 from pretouch.perception.scene_filter import no_fixtures
@@ -25,8 +25,8 @@ _NOTHING = Obstacles(
 )  # fmt: skip
 
 
-def detect_foreign(foreign: Foreign, profile: Profile, skin: Skin | None = None) -> Decisions:
-    """Let a profile's detector run over a foreign recording at the profile's rate, the newest sample in each cycle.
+def detect_imported(imported: ImportedData, profile: Profile, skin: Skin | None = None) -> Decisions:
+    """Let a profile's detector run over an imported recording at the profile's rate, the newest sample in each cycle.
 
     A sample is held while no other comes; after `force_timeout_s` there is none. With a skin a whole controller is
     turned, so that what its units saw counts; without one there are no obstacles. Times count from the first sample.
@@ -34,25 +34,25 @@ def detect_foreign(foreign: Foreign, profile: Profile, skin: Skin | None = None)
     """
     if profile.detect.by_torques:
         raise RecordingError(
-            f"The profile {profile.name} detects by joint torques, and {foreign.place} is read for its force: choose"
+            f"The profile {profile.name} detects by joint torques, and {imported.place} is read for its force: choose"
             " one with detect=thresholds."
         )
-    timeout, gap = profile.failure.force_timeout_s, float(np.median(np.diff(foreign.force.time))) / 1e9
+    timeout, gap = profile.failure.force_timeout_s, float(np.median(np.diff(imported.force.time))) / 1e9
     if gap > timeout:
         raise RecordingError(
-            f"The force of {foreign.place} comes every {gap:.3g} s, and the detector needs it within {timeout:g} s:"
+            f"The force of {imported.place} comes every {gap:.3g} s, and the detector needs it within {timeout:g} s:"
             " check the unit of the time."
         )
-    ticks = _ticks(foreign.force.time, profile)
-    force = _forces(foreign.force, ticks, profile)
+    ticks = _ticks(imported.force.time, profile)
+    force = _forces(imported.force, ticks, profile)
     if skin is None:
-        decisions = _force_alone(ticks, foreign.force.time[0], force, profile)
+        decisions = _force_alone(ticks, imported.force.time[0], force, profile)
     else:
-        decisions = _whole_controller(foreign, ticks, force, profile, skin)
+        decisions = _whole_controller(imported, ticks, force, profile, skin)
     if not decisions.armed.any():
         period, usable = profile.task.control_period_s, int(np.isfinite(decisions.force[:, 0]).sum())
         raise RecordingError(
-            f"{foreign.place} has {usable * period:.2f} s of usable force, and the window of {profile.name} takes"
+            f"{imported.place} has {usable * period:.2f} s of usable force, and the window of {profile.name} takes"
             f" {profile.window.samples * period:g} s to fill: give a longer recording."
         )
     return decisions
@@ -108,19 +108,21 @@ def _force_alone(ticks: IntArray, begin: int, force: FloatArray, profile: Profil
     return decided.decisions()
 
 
-def _whole_controller(foreign: Foreign, ticks: IntArray, force: FloatArray, profile: Profile, skin: Skin) -> Decisions:
+def _whole_controller(
+    imported: ImportedData, ticks: IntArray, force: FloatArray, profile: Profile, skin: Skin
+) -> Decisions:
     """Turn a controller; its commands go nowhere, and a HOLD ends as soon as its cause does."""
-    model, joints, begin = foreign.model, foreign.joints, foreign.force.time[0]
+    model, joints, begin = imported.model, imported.joints, imported.force.time[0]
     if model is None or joints is None:
-        raise RecordingError(f"{foreign.place} was read without joint positions: a skin needs them.")
+        raise RecordingError(f"{imported.place} was read without joint positions: a skin needs them.")
     posture = interpolated(joints, ticks, POSTURE_GAP_S)
     known = np.flatnonzero(np.isfinite(posture).all(axis=1))
     if not len(known):
-        raise RecordingError(f"{foreign.place} has no joint positions while it has forces: use those of one run.")
+        raise RecordingError(f"{imported.place} has no joint positions while it has forces: use those of one run.")
     x = model.kinematics(posture[known[0]]).position[model.ee]
     anywhere = line(tuple(x.tolist()), (float(x[0]), float(x[1]) + 0.1, float(x[2])))
     controller, decided = Controller(model, skin, no_fixtures(), anywhere, profile), Decided(profile.name)
-    topics = units_topics(skin, foreign.ranges)
+    topics = units_topics(skin, imported.ranges)
     readings = [newest(topic.readings.time, ticks) if topic else np.full(len(ticks), -1) for topic in topics]
     still, state = np.zeros(model.n), None
     for i in range(known[0], len(ticks)):

@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RecordingError
-from pretouch.foreign.source import Arm, Choice, RangeTopic, Series, Source
+from pretouch.imported_data.source import Arm, Choice, RangeTopic, Series, Source
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.types import RangeStatus
 
@@ -55,9 +55,9 @@ def read_bag(place: Path, choice: Choice) -> Source:
         reader = AnyReader([place], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         reader.open()
     try:
-        wanted, arm = _wanted(place, reader, choice), _Arm()
+        wanted, picker = _wanted(place, reader, choice), JointPicker(7, _numbered)
         force = Topic(wanted[WRENCH][0].topic, 6, _wrench)
-        joints = Topic(wanted[JOINTS][0].topic, 7, arm.positions) if wanted[JOINTS] else None
+        joints = Topic(wanted[JOINTS][0].topic, 7, picker) if wanted[JOINTS] else None
         ranges = [Topic(name, 2, _range) for name in sorted({c.topic for c in wanted[RANGE]})]
         topics = [force, *([joints] if joints else []), *ranges]
         fill(place, reader, [c for connections in wanted.values() for c in connections], topics)
@@ -65,7 +65,7 @@ def read_bag(place: Path, choice: Choice) -> Source:
         reader.close()
     if joints and not joints.logged:
         raise RecordingError(
-            f"{joints.name} of {place} names the joints {arm.seen()}: this needs those of a Panda or FR3, joint1 to"
+            f"{joints.name} of {place} names the joints {picker.seen()}: this needs those of a Panda or FR3, joint1 to"
             " joint7."
         )
     headers, notes = believed(topics)
@@ -74,7 +74,7 @@ def read_bag(place: Path, choice: Choice) -> Source:
         force.series(headers),
         force.frame,
         joints.series(headers) if joints else None,
-        arm.name,
+        picker.arm,
         tuple(RangeTopic(topic.name, topic.frame, topic.series(headers)) for topic in ranges),
         notes,
     )
@@ -167,30 +167,37 @@ def _status(message: Any) -> RangeStatus:
     return RangeStatus.MIN_RANGE if distance < message.min_range else RangeStatus.OK
 
 
-class _Arm:
-    """Finds an arm's joints among those a message names."""
+class JointPicker:
+    """Picks the joints of an arm out of messages: their order may differ, and a gripper's states lie between."""
 
-    def __init__(self) -> None:
-        self._order: dict[tuple[str, ...], list[int] | None] = {}
+    def __init__(self, n: int, places: Callable[[tuple[str, ...]], dict[int, int]]) -> None:
+        """Take the number of joints, and what finds where each of them stands among names."""
+        self._n, self._places = n, places
+        self._orders: dict[tuple[str, ...], list[int]] = {}
+
+    def __call__(self, message: Any) -> Row | None:
+        """Positions of all joints in order, or None of a message that has not all of them."""
+        names, n = tuple(message.name), self._n
+        if names not in self._orders:
+            places = self._places(names)
+            unnamed = list(range(n)) if not names and len(message.position) == n else []
+            self._orders[names] = [places[j] for j in range(n)] if len(places) == n else unnamed
+        order = self._orders[names]
+        if not order or len(message.position) <= max(order):
+            return None
+        return tuple(float(message.position[i]) for i in order)
 
     @property
-    def name(self) -> Arm:
+    def arm(self) -> Arm:
         """The arm the names tell of, if they do."""
-        named = " ".join(name for names, order in self._order.items() if order for name in names)
+        named = " ".join(name for names, order in self._orders.items() if order for name in names)
         return "fr3" if "fr3" in named else "panda" if "panda" in named else "auto"
 
     def seen(self) -> str:
         """All joints that were named."""
-        return "; ".join(", ".join(names) for names in self._order) or "none"
+        return "; ".join(", ".join(names) for names in self._orders) or "none"
 
-    def positions(self, message: Any) -> Row | None:
-        """Positions of joints 1 to 7, or None of a message of other joints, as of a gripper."""
-        names = tuple(message.name)
-        if names not in self._order:
-            places = {int(found[1]): i for i, name in enumerate(names) if (found := _JOINT.fullmatch(name))}
-            unnamed = list(range(7)) if not names and len(message.position) == 7 else None
-            self._order[names] = [places[j] for j in range(1, 8)] if len(places) == 7 else unnamed
-        order = self._order[names]
-        if order is None or len(message.position) <= max(order):
-            return None
-        return tuple(float(message.position[i]) for i in order)
+
+def _numbered(names: tuple[str, ...]) -> dict[int, int]:
+    """Where joints 1 to 7 stand among names."""
+    return {int(found[1]) - 1: i for i, name in enumerate(names) if (found := _JOINT.fullmatch(name))}

@@ -2,15 +2,14 @@
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.foreign.csv import UNITS, listed, read_rows, read_table, relative_time
-from pretouch.foreign.samples import BAGS, OUT_OF_RANGE_RAD, TABLES
-from pretouch.foreign.source import Series, in_order
+from pretouch.imported_data.csv import UNITS, listed, read_header, read_table
+from pretouch.imported_data.samples import BAGS, TABLES
+from pretouch.imported_data.source import Series, check_reach, in_order
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
 from pretouch.values import value
@@ -22,7 +21,7 @@ _LATE_S = 0.5
 
 
 @value
-class ForeignJoints:
+class ImportedJoints:
     """Where an arm's joints were, as another program recorded it."""
 
     trace: JointTrace
@@ -33,7 +32,7 @@ class ForeignJoints:
     """What was found on the way and a person should know, a sentence each."""
 
 
-def read_joints(place: Path, model: RobotModel, topic: str = "") -> ForeignJoints:
+def read_joints(place: Path, model: RobotModel, topic: str = "") -> ImportedJoints:
     """Read the positions of an arm's joints.
 
     Args:
@@ -60,8 +59,8 @@ def read_joints(place: Path, model: RobotModel, topic: str = "") -> ForeignJoint
             f"{place} has an ending that is none of {', '.join((*BAGS, *TABLES))}: give such a file, or a bag's folder."
         )
     series, more = _usable(place, series)
-    _check_reach(place, series, model)
-    return ForeignJoints(JointTrace(series.time / 1e9, series.values), said, (*notes, *more))
+    check_reach(place, series.values, model)
+    return ImportedJoints(JointTrace(series.time / 1e9, series.values), said, (*notes, *more))
 
 
 def _places(place: Path, names: tuple[str, ...], model: RobotModel) -> dict[int, int]:
@@ -86,11 +85,7 @@ def _places(place: Path, names: tuple[str, ...], model: RobotModel) -> dict[int,
 def _of_csv(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tuple[str, ...]]:
     if topic:
         raise RecordingError(f"{place} is a CSV file and has no topics: leave out --topic.")
-    rows = read_rows(place)
-    header = next(rows, None)
-    if header is None:
-        raise RecordingError(f"{place} is empty: give a CSV file with a header, as time_s,q1_rad,q2_rad and so on.")
-    names = [name.strip().lstrip("#").strip() for name in header[1]]
+    rows, names = read_header(place, "time_s,q1_rad,q2_rad and so on")
     parted = [_parted(name.lower()) for name in names]
     times = [i for i, (base, _) in enumerate(parted) if base == "time"]
     if len(times) != 1:
@@ -106,13 +101,8 @@ def _of_csv(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
             f" {model.joints[0]}_rad and so on."
         )
     used = [times[0], *(places[j] for j in range(model.n))]
-    factors = [_factor(place, names[i], parted[i][1], "q" if k else "time") for k, i in enumerate(used)]
-    table = read_table(place, rows, names, used) * np.array(factors)
-    time, notes = relative_time(place, table[:, 0])
-    table = table[np.isfinite(table[:, 0])]
-    unused = [name for i, name in enumerate(names) if i not in used]
-    if unused:
-        notes.append(f"Columns that are not used: {listed(unused)}.")
+    factors = {i: _factor(place, names[i], parted[i][1], "q" if k else "time") for k, i in enumerate(used)}
+    table, time, notes = read_table(place, rows, names, factors)
     begin = round(float(table[0, 0]) * 1e9)
     return f"the columns {names[used[1]]} to {names[used[-1]]}", Series(begin + time, table[:, 1:]), tuple(notes)
 
@@ -137,12 +127,12 @@ def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    from pretouch.foreign.bag import JOINTS, Topic, believed, fill, one_topic, read_errors_said
+    from pretouch.imported_data.bag import JOINTS, JointPicker, Topic, believed, fill, one_topic, read_errors_said
 
     with read_errors_said(place):
         reader = AnyReader([place], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         reader.open()
-    picked = _Picked(place, model)
+    picked = JointPicker(model.n, lambda names: _places(place, names, model))
     try:
         there = [c for c in reader.connections if c.msgcount]
         connections = one_topic(place, there, JOINTS, "--topic", topic)
@@ -156,30 +146,6 @@ def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
         )
     headers, notes = believed([states])
     return f"the topic {states.name}", states.series(headers), notes
-
-
-class _Picked:
-    """Picks the model's joints out of messages: the order may be another one, and a gripper's states lie between."""
-
-    def __init__(self, place: Path, model: RobotModel) -> None:
-        self._place, self._model = place, model
-        self._orders: dict[tuple[str, ...], list[int]] = {}
-
-    def __call__(self, message: Any) -> tuple[float, ...] | None:
-        """Positions in the order of the model's joints, or None of a message that has not all of them."""
-        names, n = tuple(message.name), self._model.n
-        if names not in self._orders:
-            places = _places(self._place, names, self._model)
-            unnamed = list(range(n)) if not names and len(message.position) == n else []
-            self._orders[names] = [places[j] for j in range(n)] if len(places) == n else unnamed
-        order = self._orders[names]
-        if not order or len(message.position) <= max(order):
-            return None
-        return tuple(float(message.position[i]) for i in order)
-
-    def seen(self) -> str:
-        """All joints that were named."""
-        return "; ".join(", ".join(names) for names in self._orders) or "none"
 
 
 def _usable(place: Path, series: Series) -> tuple[Series, tuple[str, ...]]:
@@ -207,16 +173,4 @@ def _check_overlap(place: Path, series: Series) -> None:
         raise RecordingError(
             f"The time in {place} goes back by {back[first]:.3g} s at sample {first + 1} of {len(series)}: give one"
             " recording of one arm, cut where its time goes on without a break."
-        )
-
-
-def _check_reach(place: Path, series: Series, model: RobotModel) -> None:
-    """Refuse positions that this arm cannot have: their unit or the arm is another one."""
-    q = series.values
-    beyond = (q < model.q_min - OUT_OF_RANGE_RAD) | (q > model.q_max + OUT_OF_RANGE_RAD)
-    if beyond.any():
-        i, j = np.argwhere(beyond)[0]
-        raise RecordingError(
-            f"{model.joints[j]} in {place} is at {q[i, j]:.4g} rad, out of its range of {model.q_min[j]:.2f} to"
-            f" {model.q_max[j]:.2f} rad: check the unit and the arm."
         )

@@ -1,9 +1,9 @@
-"""What decisions on a foreign recording say about the arm's force signal and the profile's thresholds."""
+"""What decisions on an imported recording say about the arm's force signal and the profile's thresholds."""
 
 import numpy as np
 
 from pretouch.contact.moving_thresholds import thresholds_of
-from pretouch.foreign.samples import Foreign
+from pretouch.imported_data.samples import ImportedData
 from pretouch.params import Profile
 from pretouch.recording.compare import Decisions
 from pretouch.types import BoolArray, FloatArray
@@ -81,16 +81,16 @@ def guidance(decisions: Decisions, found: Summary, profile: Profile) -> str:
     )
 
 
-def findings(foreign: Foreign, decisions: Decisions, profile: Profile) -> tuple[str, ...]:
+def findings(imported: ImportedData, decisions: Decisions, profile: Profile) -> tuple[str, ...]:
     """Say what to know of the data with this detector: their rate, and the gaps in them."""
-    rate, own = foreign.rate, 1 / profile.task.control_period_s
+    rate, own = imported.rate, 1 / profile.task.control_period_s
     said = []
     if rate < _SLOWER * own:
         said.append(
             f"The force comes at {rate:.4g} Hz and the detector of {profile.name} runs at {own:.4g} Hz: repeated"
             f" samples lower sigma; --rate {rate:.4g} runs it at the data's own rate."
         )
-    gaps = np.diff(foreign.force.time) / 1e9
+    gaps = np.diff(imported.force.time) / 1e9
     long = gaps[gaps > profile.failure.force_timeout_s]
     if len(long):
         many = f"{len(long)} gaps" if len(long) > 1 else "A gap"

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.errors import RecordingError
-from pretouch.foreign.samples import read_foreign
-from pretouch.foreign.source import Choice
-from tests.foreign.files import force_columns, write_csv
+from pretouch.imported_data.samples import read_imported
+from pretouch.imported_data.source import Choice
+from tests.imported_data.files import force_columns, write_csv
 
 FORCE = np.random.default_rng(0).normal(size=(50, 3))
 EE = Choice(frame="ee")
@@ -25,7 +25,7 @@ def written(tmp_path, text, name="a.csv"):
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
 def test_separators_and_line_endings_make_no_difference(tmp_path, separator, ending):
-    found = read_foreign(write_csv(tmp_path / "a.csv", force_columns(FORCE), separator, ending), Choice())
+    found = read_imported(write_csv(tmp_path / "a.csv", force_columns(FORCE), separator, ending), Choice())
     np.testing.assert_array_equal(found.force.values, FORCE)
     np.testing.assert_array_equal(found.force.time, np.arange(50) * 10_000_000)
     assert found.notes == ()
@@ -43,7 +43,7 @@ def test_separators_and_line_endings_make_no_difference(tmp_path, separator, end
     ],
 )
 def test_headers_are_read_as_people_write_them(tmp_path, header, factor):
-    found = read_foreign(written(tmp_path, f"{header}\n0.0,1,2,3\n0.01,4,5,6\n\n"), Choice())
+    found = read_imported(written(tmp_path, f"{header}\n0.0,1,2,3\n0.01,4,5,6\n\n"), Choice())
     np.testing.assert_array_equal(found.force.values, factor * np.array([[1, 2, 3], [4, 5, 6]]))
 
 
@@ -51,34 +51,34 @@ def test_headers_are_read_as_people_write_them(tmp_path, header, factor):
 def test_units_of_time_are_converted(tmp_path, unit, per_second):
     columns = force_columns(FORCE)
     seconds = columns.pop("time_s") + 1.7e9
-    found = read_foreign(write_csv(tmp_path / "a.csv", {f"time_{unit}": seconds * per_second} | columns), Choice())
+    found = read_imported(write_csv(tmp_path / "a.csv", {f"time_{unit}": seconds * per_second} | columns), Choice())
     np.testing.assert_allclose(found.force.time, np.arange(50) * 1e7, atol=1e3)
 
 
 def test_degrees_and_radians_are_the_same_posture(tmp_path):
     def turned(unit, factor):
         columns = force_columns(FORCE) | {f"q{i + 1}_{unit}": np.full(50, factor * Q[i]) for i in range(7)}
-        return read_foreign(write_csv(tmp_path / f"{unit}.csv", columns), EE).force.values
+        return read_imported(write_csv(tmp_path / f"{unit}.csv", columns), EE).force.values
 
     np.testing.assert_allclose(turned("deg", 180 / np.pi), turned("rad", 1.0), atol=1e-12)
 
 
 def test_joints_are_taken_by_their_numbers_not_their_places(tmp_path):
     columns = {f"q{i + 1}_rad": np.full(50, Q[i]) for i in reversed(range(7))} | force_columns(FORCE)
-    found = read_foreign(write_csv(tmp_path / "a.csv", columns), EE)
+    found = read_imported(write_csv(tmp_path / "a.csv", columns), EE)
     np.testing.assert_array_equal(found.joints.values, np.tile(Q, (50, 1)))
 
 
 def test_empty_cells_are_no_estimate_and_rows_without_time_are_left_out(tmp_path):
     text = GOOD + "0.02,,8,9\n,1,1,1\n0.03,nan,1,1\n0.04,1,2,inf\n0.05,7,8,9\n"
-    found = read_foreign(written(tmp_path, text), Choice())
+    found = read_imported(written(tmp_path, text), Choice())
     np.testing.assert_array_equal(np.isnan(found.force.values[:, 0]), [False, False, True, True, True, False])
     assert found.notes[0] == "1 row has no time and was left out."
     assert "3 samples are not finite numbers" in found.notes[1]
 
 
 def test_columns_of_no_use_are_named(tmp_path):
-    found = read_foreign(written(tmp_path, GOOD.replace("time_s", "torso,time_s").replace("\n0", "\n9,0")), Choice())
+    found = read_imported(written(tmp_path, GOOD.replace("time_s", "torso,time_s").replace("\n0", "\n9,0")), Choice())
     assert found.notes == ("Columns that are not used: 'torso'.",)
 
 
@@ -106,7 +106,7 @@ def test_columns_of_no_use_are_named(tmp_path):
 )
 def test_what_is_wrong_is_said_in_one_sentence(tmp_path, text, words):
     with pytest.raises(RecordingError, match=words) as error:
-        read_foreign(written(tmp_path, text), Choice())
+        read_imported(written(tmp_path, text), Choice())
     assert "\n" not in str(error.value)
     assert "a.csv" in str(error.value)
 
@@ -121,19 +121,19 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path, text, words):
 )
 def test_what_a_csv_file_cannot_give_is_said(tmp_path, choice, words):
     with pytest.raises(RecordingError, match=words):
-        read_foreign(written(tmp_path, GOOD), choice)
+        read_imported(written(tmp_path, GOOD), choice)
 
 
 def test_another_number_of_joints_than_the_arm_has_is_refused(tmp_path):
     columns = force_columns(FORCE) | {f"q{i}_rad": np.zeros(50) for i in range(1, 7)}
     with pytest.raises(RecordingError, match="has 6 joints, and panda has 7"):
-        read_foreign(write_csv(tmp_path / "a.csv", columns), EE)
+        read_imported(write_csv(tmp_path / "a.csv", columns), EE)
 
 
 def test_degrees_taken_for_radians_are_noticed(tmp_path):
     columns = force_columns(FORCE) | {f"q{i + 1}_rad": np.full(50, np.degrees(Q[i])) for i in range(7)}
-    with pytest.raises(RecordingError, match=r"Joint 1 .* is at 5\.73 rad, out of reach of panda"):
-        read_foreign(write_csv(tmp_path / "a.csv", columns), EE)
+    with pytest.raises(RecordingError, match=r"panda_joint1 .* is at 5\.73 rad, out of its range"):
+        read_imported(write_csv(tmp_path / "a.csv", columns), EE)
 
 
 NAMES = st.sampled_from(
@@ -170,7 +170,7 @@ TABLES = st.builds(
 def read_or_refused(file, choice):
     """Return what was read, or our error's sentence; any other exception is a failure."""
     try:
-        return read_foreign(file, choice)
+        return read_imported(file, choice)
     except RecordingError as error:
         return str(error)
 
