@@ -6,13 +6,17 @@ from dataclasses import fields, replace
 
 import pytest
 
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
     PROFILES,
+    ClampParams,
     FailureParams,
+    GiveUpParams,
     PerceptionParams,
+    PinchParams,
     Profile,
-    ReactionParams,
     ReductionParams,
     RestrictionParams,
     TaskParams,
@@ -21,8 +25,8 @@ from pretouch.params import (
 )
 
 SETS = [
-    PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), ReactionParams(),
-    FailureParams(),
+    PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), FailureParams(),
+    DecayingVelocity(), Admittance(), ClampParams(), PinchParams(), GiveUpParams(),
 ]  # fmt: skip
 NUMBERS = [
     (s, f.name)

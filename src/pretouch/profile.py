@@ -3,14 +3,15 @@
 from dataclasses import dataclass, field
 
 from pretouch.checks import Checked
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.detector import Detector
 from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.reaction import Reaction
 from pretouch.params import (
     AnticipationParams,
     BaselineParams,
     FailureParams,
     PerceptionParams,
-    ReactionParams,
     ReductionParams,
     RestrictionParams,
     TaskParams,
@@ -33,6 +34,7 @@ class Profile(Checked):
     """The window of the external force: contacts are told once it is full (eq. 8)."""
     detect: Detector = field(default_factory=MovingThresholds)
     """How a contact is told from free motion (eqs. 9-11)."""
-    reaction: ReactionParams = field(default_factory=ReactionParams)
+    react: Reaction = field(default_factory=DecayingVelocity)
+    """How the arm answers a contact (eq. 12)."""
     failure: FailureParams = field(default_factory=FailureParams)
     baselines: BaselineParams = field(default_factory=BaselineParams)

@@ -26,13 +26,13 @@ OFF = {
     "detection.learn": "no",
     "detection.widen_at_turns": "no",
     "detection.localise": "no",
-    "reaction.method": "decay",
-    "reaction.clamps": "no",
-    "reaction.pinches": "no",
-    "reaction.gives_up": "no",
-    "reaction.soft_hold": "no",
-    "reaction.static_friction_nm": "0",
-    "reaction.lag_s": "0",
+    "react": "decay",
+    "react.clamp": "none",
+    "react.pinch": "none",
+    "react.give_up": "none",
+    "react.soft_hold": "no",
+    "react.static_friction_nm": "0",
+    "react.lag_s": "0",
 }
 """What each switch of `pretouch` is when it is off, as `GROUP.FIELD`: the paper's value, or the part without effect."""
 
