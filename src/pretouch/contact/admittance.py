@@ -45,12 +45,8 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     ) -> tuple[dict[Event, str], AdmittanceState]:
         """Let the virtual mass move, look for clamps, count places; name what the reaction is at."""
         doing, near = self._doing(inputs.mode, inputs.detection.armed), self._near(inputs)
-        mass, clamp, q, dt = (
-            self._moved(state, doing, body, inputs),
-            state.clamp,
-            inputs.robot.q_commanded,
-            body.period,
-        )
+        mass, clamp = self._moved(state, doing, body, inputs), state.clamp
+        q, dt = inputs.robot.q_commanded, body.period
         if doing == "react" and self.clamp is not None and not clamp.torque:
             clamp = self._pinched(clamped(clamp, mass.torque, mass.velocity, q, dt, self.clamp), body, inputs)
         elif doing == "task" and self.pinch is not None:

@@ -84,20 +84,20 @@ TABLE_1: tuple[TableEntry, ...] = (
 def field_docs() -> Mapping[tuple[str, str], str]:
     """What the source says of each field of the parameters, by (class, field), on one line; inherited ones too."""
     docs: dict[tuple[str, str], str] = {}
-    for kind in {type(group) for profile in PROFILES.values() for group in _groups(profile)}:
+    for kind in {type(group) for profile in PROFILES.values() for group in groups_of(profile)}:
         for base in reversed(kind.__mro__):
             docs |= {(kind.__name__, field): said for field, said in _told(base).items()}
     return MappingProxyType(docs)
 
 
-def _groups(params: object) -> Iterator[object]:
+def groups_of(params: object) -> Iterator[object]:
     """All sets of parameters that one holds, parts and those of parts included."""
     for item in fields(params) if is_dataclass(params) else ():
         value = getattr(params, item.name)
         for group in value if isinstance(value, tuple) else (value,):
             if is_dataclass(group):
                 yield group
-                yield from _groups(group)
+                yield from groups_of(group)
 
 
 @cache

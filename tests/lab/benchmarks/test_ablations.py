@@ -33,5 +33,5 @@ def test_no_switch_is_in_both_benchmarks():
 def test_an_unknown_switch_is_an_error_and_not_left_out():
     with pytest.raises(ParameterError, match=r"'detection\.lern' is unknown"):
         Contender("own", "pretouch:detection.lern=no", "scale").profile  # noqa: B018  # it reads the text
-    with pytest.raises(ParameterError, match=r"'reaction\.clamp' is unknown.* Contenders are blind"):
-        Request(("pretouch:reaction.clamp=no",))
+    with pytest.raises(ParameterError, match=r"'react\.clam' is unknown.* Contenders are blind"):
+        Request(("pretouch:react.clam=no",))
