@@ -15,7 +15,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pretouch.contact.feel import feel, feel_init
 from pretouch.control.path import WayPoints
 from pretouch.params import profile
 from pretouch.robot.description import panda
@@ -26,6 +25,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import Obstacles, RobotState
+from pretouch_lab.detector_alone import DetectorAlone
 from pretouch_lab.identification.arm_file import arm_toml
 from pretouch_lab.identification.free_motion import read_free_motion
 from pretouch_lab.identification.identify import identify
@@ -38,7 +38,7 @@ PATH = WayPoints(
     closed=True,
 )
 _ALONE = "blind:threshold.f_base_n=1000:task.orientation=free"
-_DETECTORS = {"pretouch": "pretouch:detection.learn_unseen=yes", "fixed": "blind:detection.method=fixed"}
+_DETECTORS = {"pretouch": "pretouch:detect.learn=always", "fixed": "fixed"}
 MODEL = RobotModel(panda())
 
 
@@ -95,12 +95,12 @@ def said(samples: ArmSamples) -> dict[str, object]:
     none = Obstacles(unit=np.zeros(0, np.int64), link=np.zeros(0, np.int64), **nothing)
     for name, text in _DETECTORS.items():
         p, evidence, alarms, quiet = profile(text), [], 0, 0
-        state = feel_init(MODEL, p)
+        detector = DetectorAlone(p, MODEL)
         for i in range(len(samples.time)):
             robot = RobotState(
                 float(samples.time[i]), samples.q[i], samples.qd[i], samples.q[i], samples.qd[i], samples.tau[i], None
             )  # fmt: skip
-            felt, state = feel(state, MODEL, MODEL.kinematics(samples.q[i]), robot, none, False, p)
+            felt = detector.step(MODEL.kinematics(samples.q[i]), robot, none)
             if i > len(samples.time) // 3:
                 evidence.append(felt.evidence)
                 # not `contact`: without a wrench the paper's window never fills, and nothing is armed

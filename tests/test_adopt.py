@@ -60,7 +60,7 @@ def test_units_that_were_not_looked_at_are_not_taken_for_silent(arm: Arm):
 
 
 def test_a_window_of_another_length_is_filled_before_anything_is_felt(arm: Arm):
-    switch(arm, replace(PAPER, threshold=replace(PAPER.threshold, window_samples=50)))
+    switch(arm, replace(PAPER, window=replace(PAPER.window, samples=50)))
     steps = arm.run(52)
     assert {s.mode for s in steps[:50]} == {Mode.HOLD}
     assert "of 50 samples" in steps[10].reason

@@ -154,8 +154,8 @@ def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tm
         assert str(place) in said
         assert verify(open_recording(tmp_path / f"{name}.mcap")).agrees
     first, second = (open_recording(tmp_path / f"{name}.mcap")[0].snapshot for name in "ab")
-    assert not first.feel.sequential[0].model.weights.any()
-    assert second.feel.sequential[0].model.seen.sum() > 50
+    assert not first.detector.test.model.weights.any()
+    assert second.detector.test.model.seen.sum() > 50
     kept = place.read_text()
     assert cli.main([*LEARNING, "--seconds", "2", "--no-learnt"]) == 0
     assert place.read_text() == kept

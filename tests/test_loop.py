@@ -19,7 +19,7 @@ from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus
 
 DT = 0.01
 PAPER = PROFILES["paper"]
-PROFILE = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=2))
+PROFILE = replace(PAPER, window=replace(PAPER.window, samples=2))
 
 
 class World:

@@ -22,7 +22,7 @@ PAPER = PROFILES["paper"]
 BRISK = replace(
     PAPER,
     task=replace(PAPER.task, acceleration_m_s2=50.0, speed_m_s=0.8),
-    threshold=replace(PAPER.threshold, window_samples=20),
+    window=replace(PAPER.window, samples=20),
 )
 
 

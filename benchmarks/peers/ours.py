@@ -129,7 +129,7 @@ class Step:
     def _armed(self) -> ControllerState:
         """Return the state after the force window has filled, from where on the arm tracks."""
         state = self.controller.init(self._inputs(0.0, 0).robot)
-        for cycle in range(self.controller.profile.threshold.window_samples + 10):
+        for cycle in range(self.controller.profile.window.samples + 10):
             _, state = self.controller.step(state, self._inputs(TERMS.period * cycle, 0))
         self.time = TERMS.period * (cycle + 1)
         return state

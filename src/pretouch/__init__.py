@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pretouch.contact.moving_thresholds import MovingThresholds as MovingThresholds
     from pretouch.contact.reaction import Reaction as Reaction
     from pretouch.contact.sequential_test import SequentialTest as SequentialTest
+    from pretouch.contact.window import add_force as add_force
     from pretouch.contact.window import window_init as window_init
     from pretouch.control.joint_box import joint_box as joint_box
     from pretouch.control.joint_box import joint_limits as joint_limits
@@ -40,8 +41,8 @@ if TYPE_CHECKING:
     from pretouch.perception.closest import no_obstacles as no_obstacles
     from pretouch.perception.scene_filter import Fixtures as Fixtures
     from pretouch.perception.scene_filter import no_fixtures as no_fixtures
-    from pretouch.profile import Profile as Profile
     from pretouch.profiles import PROFILES as PROFILES
+    from pretouch.profiles import Profile as Profile
     from pretouch.profiles import at_rate as at_rate
     from pretouch.profiles import profile as profile
     from pretouch.recording.last_seconds import LastSeconds as LastSeconds
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from pretouch.sensing.skin import load_skin as load_skin
     from pretouch.sensing.skin import paper_skin as paper_skin
     from pretouch.sensing.unit import SensorUnit as SensorUnit
+    from pretouch.types import Contact as Contact
     from pretouch.types import ControlStep as ControlStep
     from pretouch.types import Inputs as Inputs
     from pretouch.types import Mode as Mode
@@ -64,6 +66,7 @@ if TYPE_CHECKING:
     from pretouch.types import RangeStatus as RangeStatus
     from pretouch.types import RobotState as RobotState
     from pretouch.types import SeenPoints as SeenPoints
+    from pretouch.types import Thresholds as Thresholds
 
 _PLACES = {
     "contact.admittance": ("Admittance",),
@@ -72,7 +75,7 @@ _PLACES = {
     "contact.detector": ("Body", "Detection", "Detector", "Sample"),
     "contact.moving_thresholds": ("MovingThresholds",),
     "contact.sequential_test": ("SequentialTest",),
-    "contact.window": ("window_init",),
+    "contact.window": ("add_force", "window_init"),
     "control.joint_box": ("joint_box", "joint_limits"),
     "control.path": ("Circle", "WayPoints", "line"),
     "control.restriction": ("approach_rows",),
@@ -82,8 +85,7 @@ _PLACES = {
     "params": ("RestrictionParams", "WindowParams"),
     "perception.closest": ("closest_points", "no_obstacles"),
     "perception.scene_filter": ("Fixtures", "no_fixtures"),
-    "profile": ("Profile",),
-    "profiles": ("PROFILES", "at_rate", "profile"),
+    "profiles": ("PROFILES", "Profile", "at_rate", "profile"),
     "recording.last_seconds": ("LastSeconds",),
     "recording.reader": ("open_recording",),
     "recording.verify": ("verify",),
@@ -92,7 +94,18 @@ _PLACES = {
     "robot.model": ("RobotModel",),
     "sensing.skin": ("Skin", "load_skin", "paper_skin"),
     "sensing.unit": ("SensorUnit",),
-    "types": ("ControlStep", "Inputs", "Mode", "Obstacles", "RangeReadings", "RangeStatus", "RobotState", "SeenPoints"),
+    "types": (
+        "Contact",
+        "ControlStep",
+        "Inputs",
+        "Mode",
+        "Obstacles",
+        "RangeReadings",
+        "RangeStatus",
+        "RobotState",
+        "SeenPoints",
+        "Thresholds",
+    ),
 }
 _PLACE = {name: f"pretouch.{module}" for module, names in _PLACES.items() for name in names}
 

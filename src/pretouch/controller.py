@@ -11,7 +11,7 @@ import numpy as np
 from pretouch.contact.detector import Body, Sample
 from pretouch.contact.reaction import ReactionInputs
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.contact.window import WindowState, add, window_init
+from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.control import path as paths
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.near import NearState, near_init, near_motion, widened
@@ -34,7 +34,7 @@ from pretouch.perception.obstacles import TrackState, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
 from pretouch.perception.perceive import perceive, perception_setup, silent_units
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.profile import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, FloatArray, Inputs, Mode, QpOutcome, RobotState
@@ -174,7 +174,7 @@ class Controller:
         # what is felt: eqs. 8-11
         watched = p.perception.enabled and len(self.skin) > 0 and heard >= 1.0 and not silent
         reacting = state.mode.mode is Mode.REACT
-        window = add(state.window, None if robot.wrench is None else robot.wrench[:3], p.window)
+        window = add_force(state.window, None if robot.wrench is None else robot.wrench[:3], p.window)
         imu = sound_imu(inputs.imu, len(self.skin)) if "imu" in self._detector.reads else None
         sample = Sample(now, kin, robot, window, state.window.full, seen.obstacles, reacting, watched, touches, imu)
         felt, detector = self._detector.step(state.detector, self.body, sample)

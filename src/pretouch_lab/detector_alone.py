@@ -1,8 +1,8 @@
 """A profile's contact detector on its own, given the steps of a stream one after the other."""
 
 from pretouch.contact.detector import Body, Detection, Sample
-from pretouch.contact.window import add, window_init
-from pretouch.profile import Profile
+from pretouch.contact.window import add_force, window_init
+from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ImuReadings, Obstacles, RobotState, TouchReadings
@@ -23,7 +23,7 @@ class DetectorAlone:
     ) -> Detection:  # fmt: skip
         """Take in a step: posture, robot state, what is near, whether it reacts and is watched, and what units felt."""
         before, force = self.window, None if robot.wrench is None else robot.wrench[:3]
-        window = add(before, force, self._params)
+        window = add_force(before, force, self._params)
         sample = Sample(robot.stamp, kin, robot, window, before.full, near, reacting, watched, touches, imu)
         found, self.state = self._detector.step(self.state, self.body, sample)
         self.window = before if reacting and self._params.freeze_while_reacting else window

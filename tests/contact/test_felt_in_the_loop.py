@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.feel import learnt
 from pretouch.control.path import Circle, line
 from pretouch.controller import Controller
 from pretouch.params import profile
@@ -51,12 +50,10 @@ def test_another_method_begins_anew_and_what_was_learnt_can_be_given(panda_model
     step, state = paper.step(state, Inputs(0.01, robot(panda_model, 0.01, np.zeros(7)), NONE))
     assert step.evidence == 0.0
     adopted = ours.adopt(state, paper)
-    model = learnt(adopted.feel)
-    assert model is not None
+    model = adopted.detector.test.model
     assert not model.weights.any()
     known = replace(model, weights=model.weights + 0.5)
-    again = learnt(ours.init(robot(panda_model, 0.0, np.zeros(7)), known).feel)
-    assert again is not None
+    again = ours.init(robot(panda_model, 0.0, np.zeros(7)), known).detector.test.model
     np.testing.assert_array_equal(again.weights, 0.5)
 
 

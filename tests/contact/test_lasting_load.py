@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from tests.contact.alone import begun as feel_init
+from tests.contact.alone import feel
 
-from pretouch.contact.feel import feel, feel_init
 from pretouch.contact.lasting_load import is_load
 from pretouch.params import profile
 from pretouch.perception.closest import no_obstacles

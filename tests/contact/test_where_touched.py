@@ -9,7 +9,7 @@ from tests.contact.places import DOUBT, MODEL, SPREAD, SURFACE, N, exposed, of, 
 from pretouch.contact.cues import Cues
 from pretouch.contact.tactile import gain_of, surface_area
 from pretouch.contact.where_prior import PriorParams, SeenNear, UnitCues, place_surface, prior_of_places
-from pretouch.params import DetectionParams
+from pretouch.params import TouchSensorParams
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.unit import TouchPatch
 from pretouch.types import FloatArray
@@ -19,10 +19,10 @@ SIGMA_M = PATCH.radius / 2
 
 
 def touched(kin: Kinematics, c: int) -> Cues:
-    """What a unit at a place says while it is touched, as `feel_touch` has it."""
+    """What a unit at a place says while it is touched, as `TouchSensors` has it."""
     link, gain = SURFACE.link[c], np.ones(len(MODEL.links))
     share = np.array([np.pi * PATCH.radius**2 / surface_area(MODEL.capsules, int(link))])
-    gain[link] = gain_of(share, DetectionParams())[0]
+    gain[link] = gain_of(share, TouchSensorParams())[0]
     return Cues(gain, np.array([link]), place(kin, c)[0][None], np.array([SIGMA_M]), np.array([5.0]))
 
 

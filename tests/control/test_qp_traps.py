@@ -306,7 +306,7 @@ def test_beyond_its_budget_the_controller_brakes_holds_and_says_so(
 ):
     paper = PROFILES["paper"]
     profile = replace(
-        paper, threshold=replace(paper.threshold, window_samples=5), restriction=replace(paper.restriction, mode=mode),
+        paper, window=replace(paper.window, samples=5), restriction=replace(paper.restriction, mode=mode),
         task=replace(paper.task, acceleration_m_s2=100.0),
     )  # fmt: skip
     hurried = replace(profile, failure=replace(profile.failure, solver_iterations=1))

@@ -29,7 +29,7 @@ def of_force(tmp_path):
 
 def expected(force, p):
     """What the plain detector finds in samples, one a cycle: (cycle, force) of each contact, and all thresholds."""
-    touch, nothing = Touch(p.threshold), type("Nothing", (), {"point": ()})()
+    touch, nothing = Touch(p.detect, p.window), type("Nothing", (), {"point": ()})()
     contacts, limits, busy_until = [], [], -1
     for cycle, sample in enumerate(force):
         there = sample if np.isfinite(sample).all() else None
@@ -151,7 +151,7 @@ def test_base_forces_that_the_summary_names_are_the_borderline(of_force):
     foreign = of_force(pushed(14.0, PUSHES))
     found = summary(detect_foreign(foreign, PAPER), PAPER)
     for f_base, contacts in ((found.f_base_all - 0.01, 1), (found.f_base_all + 0.01, 0)):
-        p = replace(PAPER, threshold=replace(PAPER.threshold, f_base_n=f_base))
+        p = replace(PAPER, detect=replace(PAPER.detect, f_base_n=f_base))
         assert len(detect_foreign(foreign, p).contacts) == contacts
     assert found.f_base_free < 10.0 < found.f_base_all
 

@@ -76,7 +76,7 @@ def check_touched(touched: Touched) -> None:
 def check_finite(step: ControlStep, e: Expected, p: Profile) -> None:
     """Every number is finite but for what is documented to be NaN."""
     unknown = MAY_BE_NAN if e.strained else MAY_BE_NAN | {"residual", "parts"}
-    unknown = unknown | {"parts"} if p.detection.method == "fixed" else unknown
+    unknown = unknown | {"parts"} if p.detect.name == "fixed" else unknown
     numbers = [array.ravel() for name, array in arrays_of(step) if name not in unknown]
     assert np.isfinite(np.concatenate(numbers)).all()
     assert np.isnan(step.force).all() if e.force is None else np.array_equal(step.force, e.force)

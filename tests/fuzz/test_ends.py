@@ -17,7 +17,7 @@ from pretouch.types import Inputs, QpOutcome, RangeReadings, RobotState
 from tests.fuzz.invariants import arrays_of
 
 PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=5))
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 PARAMETERS = [
     f"{group.name}.{item.name}"
     for group in fields(Profile)

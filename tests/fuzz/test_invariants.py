@@ -16,7 +16,7 @@ from tests.fuzz.oracle import Expected, Oracle
 from tests.fuzz.worlds import World
 
 PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=5))
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from tests.fuzz.worlds import World
 MODEL = RobotModel(panda())
 SKIN = paper_skin(MODEL)
 PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=3, compare="raw"))
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=3), detect=replace(PAPER.detect, compare="raw"))
 K, N = len(SKIN), MODEL.n
 READY = MODEL.description.q_ready
 

@@ -3,24 +3,27 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from pretouch.params.detection import DetectionParams
 
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
+from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.params import (
-    PROFILES,
     ClampParams,
     FailureParams,
     GiveUpParams,
+    LocalisationParams,
     PerceptionParams,
     PinchParams,
     Profile,
+    ProximityPriorParams,
     ReductionParams,
     RestrictionParams,
     TaskParams,
-    ThresholdParams,
+    WindowParams,
+    profile,
 )
 from pretouch.params.anticipation import AnticipationParams
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
@@ -28,6 +31,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit
+from pretouch_lab.baselines.fixed_bounds import FixedBounds
 
 # for each parameter its usual value and values far to both sides; what a check bounds, up to the bound
 CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
@@ -49,10 +53,10 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
         "d_repulse_m": (0.1, 1e-3, 1.0), "d_crit_m": (0.1, 1e-3), "d_notice_m": (0.6, 0.2, 5.0),
         "floor_m_s": (0.02, 0.0, 1.0), "slack_weight": (1000.0, 1e-2, 1e6),
     },
-    ThresholdParams: {
-        "window_samples": (5, 2, 30), "alpha": (0.1, 0.0, 1.0), "lambda_": (0.75, 0.0, 5.0), "f_base_n": (10.0, 4.1),
-        "f_std_n": (3.0, 0.0), "sigma_max_n": (3.0, 1e-3), "f_d_n": (4.0, 0.0), "d_max_m": (0.8, 5.0),
-        "d_min_m": (0.05, 0.0, 0.79), "compare": ("filtered", "raw"),
+    WindowParams: {"samples": (5, 2, 30), "alpha": (0.1, 0.0, 1.0), "lambda_": (0.75, 0.0, 5.0)},
+    MovingThresholds: {
+        "f_base_n": (10.0, 4.1), "f_std_n": (3.0, 0.0), "sigma_max_n": (3.0, 1e-3), "f_d_n": (4.0, 0.0),
+        "d_max_m": (0.8, 5.0), "d_min_m": (0.05, 0.0, 0.79), "compare": ("filtered", "raw"),
     },
     DecayingVelocity: {
         "compliance_m_s_n": (0.03, 1e-4, 1.0), "speed_max_m_s": (0.3, 0.01, 2.0), "decay_cycles": (20, 1, 200),
@@ -80,12 +84,14 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "loosen_m_s2": (1.0, 0.1, 100.0), "null_space": (True, False), "null_speed_m_s": (0.1, 2.0),
         "null_joint_rad_s": (0.5, 5.0), "null_rate_rad_s2": (1.0, 100.0), "blocked_after_s": (2.0, 0.05),
     },
-    DetectionParams: {
-        "method": ("sequential", "sequential", "fixed", "thresholds"), "freeze_while_reacting": (True, False),
-        "false_alarms_per_hour": (1.0, 3600.0), "use_proximity": (True, False), "near_gain": (100.0, 1e4),
-        "learn": (True, False), "learn_unseen": (False, True), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0),
-        "suspect": (0.6, 1.0), "confirm_samples": (1, 3), "localise": (True, False),
+    WindowParams: {"freeze_while_reacting": (True, False)},
+    SequentialTest: {
+        "false_alarms_per_hour": (1.0, 3600.0),
+        "proximity": (ProximityPriorParams(), ProximityPriorParams(gain=1e4), None),
+        "learn": ("watched", "always", "never"), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0), "suspect": (0.6, 1.0),
+        "confirm_samples": (1, 3), "localise": (LocalisationParams(), None),
     },
+    FixedBounds: {},
     Admittance: {
         "speed_max_m_s": (0.3, 0.01, 2.0), "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2),
         "inertia_kg_m2": (1.5, 1e-3, 100.0), "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0),
@@ -96,6 +102,7 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
     PinchParams: {"gap_m": (0.2, 5.0), "force_n": (10.0, 0.01)},
     GiveUpParams: {"contacts": (3, 1), "push_j": (0.3, 1e-3, 50.0), "retry_s": (0.3, 30.0)},
 }  # fmt: skip
+DETECTORS = (SequentialTest, SequentialTest, FixedBounds, MovingThresholds)
 NAMED = ("pretouch", "pretouch", "fixed", "observer", "flacco", "ding")
 
 
@@ -118,10 +125,10 @@ class World:
 
 def any_world(rng: np.random.Generator, model: RobotModel) -> World:
     """Draw a world."""
-    profile = any_profile(rng)
-    q, qd = any_start(rng, model, profile.task.position_margin_rad)
+    chosen = any_profile(rng)
+    q, qd = any_start(rng, model, chosen.task.position_margin_rad)
     return World(
-        model, profile, any_skin(rng, model), any_fixtures(rng), any_path(rng, model, q), q, qd,
+        model, chosen, any_skin(rng, model), any_fixtures(rng), any_path(rng, model, q), q, qd,
         lying=rng.random() < 0.15, measured_off=float(rng.choice([0.0, 1e-3, 0.03])),
     )  # fmt: skip
 
@@ -130,12 +137,14 @@ def any_profile(rng: np.random.Generator) -> Profile:
     """Draw each parameter, mostly the usual value in a third of the profiles; a few are named ones as they are."""
     usual = 0.85 if rng.random() < 1 / 3 else 0.4
     if rng.random() < 0.15:
-        named = PROFILES[str(rng.choice(NAMED))]
-        return replace(named, threshold=replace(named.threshold, window_samples=5))
+        named = profile(str(rng.choice(NAMED)))
+        return replace(named, window=replace(named.window, samples=5))
     ours = rng.random() < 0.6
     groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES or (ours and f.type in OURS)}
     choices = {group: CHOICES.get(group, {}) | (OURS.get(group, {}) if ours else {}) for group in groups.values()}
     drawn = {name: group(**_drawn(rng, choices[group], usual)) for name, group in groups.items()}
+    detector = DETECTORS[int(rng.integers(len(DETECTORS)))] if ours else MovingThresholds
+    drawn["detect"] = detector(**_drawn(rng, CHOICES.get(detector, {}) | OURS.get(detector, {}), usual))
     if not ours:
         drawn["restriction"] = replace(drawn["restriction"], mode=str(rng.choice(["slack", "hard", "floor", "off"])))
     return Profile(**{**drawn, "name": "fuzzed", "react": any_reaction(rng, ours, usual)})

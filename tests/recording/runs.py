@@ -18,7 +18,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, RangeReadings, RobotState
 
-SHORT: Profile = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=5))
+SHORT: Profile = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
 """The paper's profile, with a window that is soon full."""
 
 

@@ -117,7 +117,7 @@ def test_a_change_of_profile_and_path_is_followed(controller, tmp_path):
     with Recording(tmp_path / "a.mcap", controller) as recording:
         for i in range(90):
             if i in (30, 60):
-                changed = replace(SHORT, name=f"p{i}", threshold=replace(SHORT.threshold, window_samples=i))
+                changed = replace(SHORT, name=f"p{i}", window=replace(SHORT.window, samples=i))
                 path = line((0.4, 0.0, 0.5), (0.4, i / 100, 0.4))
                 other = controller_of(controller.model, controller.skin, changed, path)
                 run.state, run.controller = other.adopt(run.state, run.controller), other

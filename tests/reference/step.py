@@ -38,7 +38,7 @@ class ReferenceController:
         self.model, self.path, self.profile, self.tree = model, path, profile, tree_of(model)
         self.trust = modes.Trust(robot, profile.failure, model.description.qd_max)
         self.eyes = Eyes(model, skin, fixtures, profile.perception)
-        self.touch = Touch(profile.threshold)
+        self.touch = Touch(profile.detect, profile.window)
         self.fading = Fading(profile.reduction)
         self.progress = Progress(path, profile.task)
         self.behaviour = modes.Behaviour()
@@ -98,7 +98,7 @@ class ReferenceController:
         if silent:
             seen[modes.SILENT] = silent
         if not armed:
-            seen[modes.FILLING] = f"{len(self.touch.samples)} of {p.threshold.window_samples} samples"
+            seen[modes.FILLING] = f"{len(self.touch.samples)} of {p.window.samples} samples"
         self.behaviour.decide(seen, resume)
         begins = self.behaviour.mode is Mode.REACT and before is not Mode.REACT
         if begins:

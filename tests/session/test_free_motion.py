@@ -74,7 +74,7 @@ def test_a_second_run_begins_with_what_the_first_has_learnt(home, arm, another):
     assert str(home.place) in said
     second = begun(home, another, now=1e9 + DAY_S)
     assert "this robot is known since 2001-09-09 01:46 UTC, 3 s of it" in second.found[0]
-    assert_array_equal(second.begin.weights, arm.state.feel.sequential[0].model.weights)
+    assert_array_equal(second.begin.weights, arm.state.detector.test.model.weights)
     again = turned(another, second, 100)
     assert residuals[0] > 1.0
     assert again[:50].max() < 0.3 * residuals[:50].max()
@@ -91,7 +91,7 @@ def test_a_recording_of_a_run_that_began_with_something_is_recomputed_bit_for_bi
     assert verdict.agrees
     assert verdict.exact
     assert verdict.checked == 50
-    assert np.abs(recorded[0].snapshot.feel.sequential[0].model.weights).max() > 0.1
+    assert np.abs(recorded[0].snapshot.detector.test.model.weights).max() > 0.1
 
 
 def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_does_not(home, arm):
@@ -99,7 +99,7 @@ def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_do
     turned(arm, free, 400)
     free.keep()
     at_once, later = (begun(home, arm, now=1e9 + pause).begin.covariance for pause in (0.0, DAY_S))
-    learnt, prior = arm.state.feel.sequential[0].model.covariance, PROFILE.detection
+    learnt, prior = arm.state.detector.test.model.covariance, PROFILE.detect
     assert_array_equal(at_once, learnt)
     grown = (later - learnt)[:, range(12), range(12)]
     assert np.all(grown[:, 0] > 0.4 * (0.25 * prior.offset_prior_nm) ** 2)
@@ -117,7 +117,7 @@ def test_an_arm_that_drifted_in_a_long_pause_feels_no_contact_that_is_none(home,
     turned(arm, free, 3000)
     free.keep()
     turned(another, begun(home, another, now=1e9 + pause), 60, drift=0.2)
-    assert (another.state.feel.sequential[0].calm == 0) is felt
+    assert (another.state.detector.test.calm == 0) is felt
 
 
 def test_a_run_that_learns_nothing_leaves_the_file_as_it_is(home, arm, another):
@@ -143,7 +143,7 @@ def test_it_adds_up_over_runs_and_keeps_since_when(home, arm, another):
     turned(another, second, 200)
     second.keep()
     third = begun(home, another, now=1e9 + 2 * DAY_S)
-    assert third.begin.seen.sum() > 1.5 * arm.state.feel.sequential[0].model.seen.sum()
+    assert third.begin.seen.sum() > 1.5 * arm.state.detector.test.model.seen.sum()
     assert "since 2001-09-09 01:46 UTC" in third.found[0]
     assert "the last 2001-09-10 01:46 UTC" in third.found[0]
 
@@ -222,7 +222,7 @@ def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kin
     ],
 )
 def test_numbers_that_no_arm_can_have_are_not_taken(home, arm, name, change):
-    numbers = kept(arm.state.feel.sequential[0].model)
+    numbers = kept(arm.state.detector.test.model)
     numbers[name] = change(numbers[name])
     home.place.parent.mkdir(parents=True)
     save_residual(home.place, arm.model, Residual(numbers, home.robot, 1e9, 1e9))

@@ -25,7 +25,7 @@ from tests.session.arms import FollowingArm
 def controller(panda_model):
     x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
     blind = PROFILES["blind"]
-    profile = replace(blind, threshold=replace(blind.threshold, window_samples=10))  # moves after a tenth of a second
+    profile = replace(blind, window=replace(blind.window, samples=10))  # moves after a tenth of a second
     path = line((x, y, z), (x, y + 0.4, z))
     return Controller(panda_model, Skin((), panda_model), no_fixtures(), path, profile)
 

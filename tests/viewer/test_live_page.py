@@ -210,7 +210,7 @@ def test_a_number_typed_counts_before_what_is_clicked_afterwards(clock: Clock, s
     give(clock.page, "F_b [N]", "8")
     click(clock.page, "Reset parameters")
     clock.turn(2 * SETTLE_S)
-    assert simulation.world.profile.threshold.f_base_n == 10.0
+    assert simulation.world.profile.detect.f_base_n == 10.0
     assert handle(clock.page, "F_b [N]").value == "10"
 
 

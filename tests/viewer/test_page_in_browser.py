@@ -90,7 +90,7 @@ def test_a_number_typed_key_by_key_is_the_one_that_counts(tmp_path: Path) -> Non
         visitor.type_slowly("d_crit [m]", "0.05", delay=1.2)  # longer than what counts as typed: 0.0 is refused
         visitor.wait_until(lambda: simulation.world.profile.name == "paper:restriction.d_crit_m=0.05")
         visitor.type_slowly("F_b [N]", "12")
-        visitor.wait_until(lambda: simulation.world.profile.threshold.f_base_n == 12.0)
+        visitor.wait_until(lambda: simulation.world.profile.detect.f_base_n == 12.0)
         visitor.field("F_b [N]").fill("")
         visitor.wait_until(lambda: visitor.value("F_b [N]") == "12")
         visitor.field("sigma_max [N]").scroll_into_view_if_needed()

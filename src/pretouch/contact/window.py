@@ -94,7 +94,7 @@ def weighted_value(
     return value
 
 
-def add(state: WindowState, reading: FloatArray | None, p: WindowParams) -> WindowState:
+def add_force(state: WindowState, reading: FloatArray | None, p: WindowParams) -> WindowState:
     """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on; None: nothing."""
     if reading is None:
         return state
@@ -114,7 +114,7 @@ def add_to(
     chunk: FloatArray, at: int, sums: FloatArray, count: int, full: bool, reading: FloatArray, alpha: float,
     lambda_: float,
 ) -> None:  # fmt: skip
-    """Change the chunk, at an index, and the sums (4, 3) as `add` says, for a window of `count` values so far."""
+    """Change the chunk, at an index, and the sums (4, 3) as `add_force` says, for a window of `count` values so far."""
     x = reading
     if full:
         x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), alpha, lambda_)

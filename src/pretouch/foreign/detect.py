@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.contact.decaying_velocity import DecayingVelocity, advanced
 from pretouch.contact.moving_thresholds import thresholds_of
-from pretouch.contact.window import add, window_init
+from pretouch.contact.window import add_force, window_init
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
@@ -90,7 +90,7 @@ def _force_alone(ticks: IntArray, begin: int, force: FloatArray, profile: Profil
     window, mode, react = window_init(p.window.samples), mode_init(), answer.rest()
     for time, sample in zip(((ticks - begin) / 1e9).tolist(), force, strict=True):
         force_now = None if np.isnan(sample[0]) else sample
-        armed, window = window.full, add(window, force_now, p.window)
+        armed, window = window.full, add_force(window, force_now, p.window)
         felt = thresholds.judged(window, force_now, armed, _NOWHERE, _NOTHING)
         events = {Event.WINDOW_FILLING: ""} if not felt.armed else {}
         if felt.contact is not None:

@@ -27,8 +27,8 @@ from pretouch.params.thresholds import ThresholdParams as ThresholdParams
 from pretouch.params.window import WindowParams as WindowParams
 
 if TYPE_CHECKING:
-    from pretouch.profile import Profile as Profile
     from pretouch.profiles import PROFILES as PROFILES
+    from pretouch.profiles import Profile as Profile
     from pretouch.profiles import at_rate as at_rate
     from pretouch.profiles import profile as profile
 

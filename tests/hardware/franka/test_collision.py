@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 
 from pretouch.contact.cues import no_cues
+from pretouch.contact.detector import Body
 from pretouch.contact.felt import sequential_init, take_sample
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.collision import (
     CollisionParams,
     check,
     collision_behavior,
-    felt_from_n,
     largest_threshold,
     longest_levers,
 )
 from pretouch.params import PROFILES, profile
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
 from pretouch.types import Obstacles, RobotState
 
 
@@ -69,7 +70,7 @@ def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel) -> N
 
 def evidence(model: RobotModel, force: np.ndarray) -> float:
     """Evidence of one sample with a force (3,) [N] on the end-effector of an arm that has learnt nothing, and moves."""
-    q, speed, p = model.description.q_ready, np.full(7, 0.3), PROFILES["pretouch"].detection
+    q, speed, p = model.description.q_ready, np.full(7, 0.3), PROFILES["pretouch"].detect
     kin, none, rows, whole = model.kinematics(q), np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
     state = sequential_init(model, p)
     state = replace(state, model=replace(state.model, speed=speed))
@@ -78,8 +79,13 @@ def evidence(model: RobotModel, force: np.ndarray) -> float:
     return take_sample(state, model, kin, robot, free, False, False, 0.01, p, no_cues(len(model.links)))[0].evidence
 
 
+def missed(model: RobotModel) -> float:
+    ours = PROFILES["pretouch"]
+    return ours.detect.largest_missed_n(Body(model, Skin((), model), ours.task.control_period_s), ours.task.speed_m_s)
+
+
 def test_what_the_sequential_detector_may_miss_is_what_it_misses(panda_model: RobotModel) -> None:
-    most = felt_from_n(PROFILES["pretouch"], panda_model)
+    most = missed(panda_model)
     assert 30.0 < most < 45.0
     for axis in np.vstack([np.eye(3), -np.eye(3)]):
         assert evidence(panda_model, 1.02 * most * axis) >= 1.0
@@ -89,7 +95,7 @@ def test_what_the_sequential_detector_may_miss_is_what_it_misses(panda_model: Ro
 def test_ours_stops_by_itself_later_than_it_is_felt_and_before_it_hurts(panda_model: RobotModel) -> None:
     ours = PROFILES["pretouch"]
     behavior = collision_behavior(ours, panda_model)
-    felt = felt_from_n(ours, panda_model)
+    felt = missed(panda_model)
     assert np.all(behavior.lower_force[:3] >= felt + 10.0)
     assert np.all(behavior.upper_force[:3] >= felt + 20.0)
     face_n, bias_n = 65.0, CollisionParams().bias_n

@@ -17,7 +17,7 @@ from pretouch_lab.benchmarks.cycle import CycleRequest, measure
 from pretouch_lab.benchmarks.workload import LARGEST_SKIN, Workload
 
 # a short window, so that the arm soon moves
-SHORT = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=10))
+SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=10))
 FAST = at_rate(SHORT, 1000.0)
 
 

@@ -5,9 +5,9 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 import pytest
-from pretouch.contact.detect import Detection
 
 from pretouch.contact.decaying_velocity import reaction_velocity
+from pretouch.contact.detector import Detection
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller

@@ -20,7 +20,7 @@ def test_each_value_arrives_where_its_name_says():
         "scene.side": "+y",
     }  # fmt: skip
     made = built("paper", StaticScene(), values, 1003)
-    assert made.profile.threshold.f_base_n == 8.25
+    assert made.profile.detect.f_base_n == 8.25
     assert made.profile.restriction.mode == "floor"
     assert not made.profile.reduction.enabled
     assert (made.plant.mass_error, made.plant.payload_max_kg) == (0.1, 0.5)
@@ -30,7 +30,7 @@ def test_each_value_arrives_where_its_name_says():
 
 def test_a_number_arrives_to_its_last_bit():
     value = 1 / 3 + 1e-9
-    assert built("paper", StaticScene(), {"threshold.f_std_n": value}, 0).profile.threshold.f_std_n == value
+    assert built("paper", StaticScene(), {"threshold.f_std_n": value}, 0).profile.detect.f_std_n == value
 
 
 def test_nothing_varied_is_the_profile_and_the_arm_of_all_other_experiments():
@@ -64,9 +64,9 @@ def test_a_cell_knows_the_file_its_world_is_of(tmp_path):
     [
         ("dance", {"a.b": "1:2"}, ExperimentError, "'dance' cannot be swept: choose from static, avoidance"),
         ("static", {}, ExperimentError, "Nothing is varied: give --vary"),
-        ("static", {"f_base_n": "1:2"}, ExperimentError, "'f_base_n' is unknown: write GROUP.FIELD with a group of"),
+        ("static", {"f_base_n": "1:2"}, ExperimentError, "The group 'f_base_n' of .* is unknown: choose from"),
         ("static", {"anticipation.detour_hold_s": "1:2"}, ExperimentError, "'anticipation.detour_hold_s' is gone: the"),
-        ("static", {"threshold.f": "1:2"}, ExperimentError, "'threshold.f' is unknown: threshold has window_samples"),
+        ("static", {"threshold.f": "1:2"}, ExperimentError, "The group 'threshold' of .* is unknown"),
         ("static", {"scene.place": "1:2"}, ExperimentError, "scene has trajectory, side, stiffness_n_m"),
         ("static", {"plant.ripple_nm": "1:2"}, ExperimentError, "one value a joint"),
         ("static", {"threshold.f_base_n": "3:9"}, ExperimentError, "holds 3.0, which is not allowed.*than f_d_n"),

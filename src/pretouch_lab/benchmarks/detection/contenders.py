@@ -67,6 +67,6 @@ CONTENDERS = (
 def ablated() -> tuple[Contender, ...]:
     """Return `pretouch` with each switch of its detection off alone; the paper's thresholds are swept by F_b."""
     return tuple(
-        Contender(a.name, a.profile_text, "f_base_n" if a.switch == "detect" else "scale")
+        Contender(a.name, a.profile_text, "f_base_n" if a.switch == "detection.method" else "scale")
         for a in ablations(of_detection=True)
     )

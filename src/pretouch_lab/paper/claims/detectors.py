@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pretouch.contact.thresholds import noise_force
-from pretouch.contact.window import add, window_init
+from pretouch.contact.window import add_force, window_init
 from pretouch.params import ThresholdParams, WindowParams
 from pretouch.types import BoolArray, FloatArray
 
@@ -30,7 +30,7 @@ def windowed(force: FloatArray, params: WindowParams = WINDOW) -> Windowed:
     state, course = window_init(params.samples), []
     for sample in force:
         armed = state.full
-        state = add(state, sample, params)
+        state = add_force(state, sample, params)
         if armed:
             course.append((state.newest, state.mean(), state.std()))
     filtered, mean, sigma = np.array(course).reshape(-1, 3, 3).swapaxes(0, 1)

@@ -58,7 +58,7 @@ BLOCKS = (
         "Contact",
         (2.6, 2.6),
         (
-            ("eq. 8: window", "contact.window.add"),
+            ("eq. 8: window", "contact.window.add_force"),
             ("eqs. 9-10: thresholds", "contact.thresholds.thresholds"),
             ("eq. 11: anticipation", "contact.thresholds.obstacle_force"),
             ("crossed: contact", "contact.moving_thresholds.MovingThresholds"),

@@ -6,27 +6,30 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_t
 
-from pretouch.contact.impact import BIN_S, SETTLED, ImpactState, impact_init, listen
-from pretouch.contact.impact_pattern import likelihoods, responses
-from pretouch.params import Profile, profile
+from pretouch.contact.cues import Cues
+from pretouch.contact.detector import Body
+from pretouch.perception.closest import no_obstacles
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.imu_scale import STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, ImuReadings, RobotState
+from pretouch_lab.baselines.accelerometers import BIN_S, SETTLED, Accelerometers, ImpactState, impact_init
+from pretouch_lab.baselines.impact_pattern import likelihoods, responses
+from tests.contact.alone import sample
 
-OURS = profile("pretouch:detection.use_imu=yes")
+OURS = Accelerometers()
 NOISE = 0.05
 
 
 def pattern(model: RobotModel, skin: Skin, q: FloatArray) -> FloatArray:
     kin = model.kinematics(q)
-    return responses(kin, model.mechanism, OURS.detection.rotor_kg_m2, skin.arrays)
+    return responses(kin, model.mechanism, OURS.rotor_kg_m2, skin.arrays)
 
 
 class Rig:
     """An arm that stands, and what its units measure: gravity, a bias, noise, and whatever is added."""
 
-    def __init__(self, model: RobotModel, skin: Skin, params: Profile = OURS) -> None:
+    def __init__(self, model: RobotModel, skin: Skin, params: Accelerometers = OURS) -> None:
         self.model, self.skin, self.params = model, skin, params
         self.q, self.still = model.description.q_ready, np.zeros(model.n)
         self.kin, self.state, self.number = model.kinematics(self.q), impact_init(model, len(skin)), 100
@@ -44,8 +47,14 @@ class Rig:
         felt = (self.weight + self.bias + jolt)[units] + self.rng.normal(0.0, NOISE, (len(units), 3))
         imu = ImuReadings(units, stamp, felt, np.zeros_like(felt))
         robot = RobotState(now, self.q, self.still, self.q, self.still, self.still, np.zeros(6))
-        cues, self.state = listen(self.state, self.model, self.skin, self.kin, robot, imu, now, self.params)
+        cues, self.state = self.listen(robot, imu, now)
         return cues.gain
+
+    def listen(self, robot: RobotState, imu: ImuReadings, now: float) -> tuple[Cues, ImpactState]:
+        body = Body(self.model, self.skin, BIN_S)
+        cues, state = self.params.step(self.state, body, sample(self.kin, robot, no_obstacles(), now, imu=imu))
+        assert cues is not None
+        return cues, state
 
     def settle(self, steps: int = 300) -> FloatArray:
         return np.array([self.step() for _ in range(steps)])
@@ -62,7 +71,7 @@ def test_the_pattern_is_that_of_the_equation_of_motion(panda_model, paper_skin):
     h, u = len(panda_model.parts) - 1, 5
     part, link = panda_model.parts[h], paper_skin.link[u]
     at = kin.position[part] + kin.rotation[part] @ panda_model.middle[h]
-    M = panda_model.mass_matrix(q) + OURS.detection.rotor_kg_m2 * np.eye(panda_model.n)
+    M = panda_model.mass_matrix(q) + OURS.rotor_kg_m2 * np.eye(panda_model.n)
     qdd = np.linalg.solve(M, panda_model.jacobian(kin, part, at)[:3].T @ f)
     T = paper_skin.T_link_sensor[u]
     place = kin.position[link] + kin.rotation[link] @ T[:3, 3]
@@ -104,15 +113,15 @@ def test_bias_and_spread_are_learnt_and_free_motion_raises_little(rig):
 @pytest.mark.parametrize("name", ["panda_hand", "panda_link5"])
 def test_an_impact_raises_the_link_that_explains_it_within_the_bound_and_fades(rig, name):
     rig.settle()
-    parts, p = rig.model.parts, OURS.detection
+    parts, p = rig.model.parts, OURS
     h = int(np.flatnonzero(parts == rig.model.link_index(name))[0])
     jolt = pattern(rig.model, rig.skin, rig.q)[h] @ np.array([4.0, 4.0, 2.0])
     gain = rig.step(jolt)
     assert int(gain.argmax()) == parts[h]
     assert gain.min() >= 1.0
-    assert (gain[parts] - 1.0).mean() == pytest.approx(p.imu_gain - 1.0, rel=1e-6)
+    assert (gain[parts] - 1.0).mean() == pytest.approx(p.gain - 1.0, rel=1e-6)
     later = [rig.step(silent=True) for _ in range(5)][-1]
-    assert later[parts[h]] - 1.0 == pytest.approx((gain[parts[h]] - 1.0) * np.exp(-0.05 / p.imu_memory_s), rel=1e-6)
+    assert later[parts[h]] - 1.0 == pytest.approx((gain[parts[h]] - 1.0) * np.exp(-0.05 / p.memory_s), rel=1e-6)
 
 
 def test_what_only_one_unit_feels_is_no_contact_of_a_link(rig):
@@ -140,7 +149,7 @@ def test_late_samples_count_where_they_belong_and_too_late_ones_nowhere(rig):
     stamp = now - np.array([0.035, 0.5])
     imu = ImuReadings(np.zeros(2, np.int64), stamp, np.full((2, 3), 30.0), np.zeros((2, 3)))
     robot = RobotState(now, rig.q, rig.still, rig.q, rig.still, rig.still, np.zeros(6))
-    _, after = listen(before, rig.model, rig.skin, rig.kin, robot, imu, now, rig.params)
+    _, after = rig.listen(robot, imu, now)
     assert after.heard.sum() - before.heard.sum() == 1 - 4 * len(rig.skin), "the oldest bin made room"
     assert after.heard[(rig.number - 4) % 8, 0] == 5
 
@@ -155,7 +164,7 @@ def test_time_that_jumps_empties_the_bins_and_keeps_what_is_learnt(rig):
 
 
 def test_a_commanded_acceleration_is_expected(panda_model, paper_skin):
-    rig = Rig(panda_model, paper_skin, replace(OURS, detection=replace(OURS.detection, imu_follow_1_s=200.0)))
+    rig = Rig(panda_model, paper_skin, replace(OURS, follow_1_s=200.0))
     rig.settle()
     speed = np.zeros(panda_model.n)
     speed[0] = 0.05
