@@ -82,7 +82,7 @@ def test_a_reaction_under_way_goes_on_and_decays(arm: Arm):
 def test_a_longer_decay_does_not_bring_a_past_reaction_back(arm: Arm):
     arm.run(6, force=PUSH)
     arm.run(250)
-    switch(arm, replace(PAPER, reaction=replace(PAPER.reaction, decay_cycles=2000)))
+    switch(arm, replace(PAPER, react=replace(PAPER.react, decay_cycles=2000)))
     steps = arm.run(20)
     assert {s.mode for s in steps} == {Mode.TRACK}
     assert not any(np.any(s.reaction_velocity) for s in steps)

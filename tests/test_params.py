@@ -6,14 +6,18 @@ from dataclasses import fields, replace
 
 import pytest
 
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
     PROFILES,
+    ClampParams,
     FailureParams,
+    GiveUpParams,
     PerceptionParams,
+    PinchParams,
     Profile,
-    ReactionParams,
     ReductionParams,
     RestrictionParams,
     TaskParams,
@@ -23,8 +27,8 @@ from pretouch.params import (
 )
 
 SETS = [
-    PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), ReactionParams(),
-    FailureParams(),
+    PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), FailureParams(),
+    DecayingVelocity(), Admittance(), ClampParams(), PinchParams(), GiveUpParams(),
 ]  # fmt: skip
 NUMBERS = [
     (s, f.name)

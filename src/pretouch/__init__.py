@@ -11,11 +11,14 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from pretouch import loop as loop
     from pretouch import realtime as realtime
+    from pretouch.contact.admittance import Admittance as Admittance
+    from pretouch.contact.decaying_velocity import DecayingVelocity as DecayingVelocity
     from pretouch.contact.detector import Body as Body
     from pretouch.contact.detector import Detection as Detection
     from pretouch.contact.detector import Detector as Detector
     from pretouch.contact.detector import Sample as Sample
     from pretouch.contact.moving_thresholds import MovingThresholds as MovingThresholds
+    from pretouch.contact.reaction import Reaction as Reaction
     from pretouch.contact.sequential_test import SequentialTest as SequentialTest
     from pretouch.contact.window import add_force as add_force
     from pretouch.contact.window import window_init as window_init
@@ -32,7 +35,6 @@ if TYPE_CHECKING:
     from pretouch.loop import Cycle as Cycle
     from pretouch.loop import MonotonicClock as MonotonicClock
     from pretouch.loop import Recorder as Recorder
-    from pretouch.params import ReactionParams as ReactionParams
     from pretouch.params import RestrictionParams as RestrictionParams
     from pretouch.params import WindowParams as WindowParams
     from pretouch.perception.closest import closest_points as closest_points
@@ -67,6 +69,9 @@ if TYPE_CHECKING:
     from pretouch.types import Thresholds as Thresholds
 
 _PLACES = {
+    "contact.admittance": ("Admittance",),
+    "contact.decaying_velocity": ("DecayingVelocity",),
+    "contact.reaction": ("Reaction",),
     "contact.detector": ("Body", "Detection", "Detector", "Sample"),
     "contact.moving_thresholds": ("MovingThresholds",),
     "contact.sequential_test": ("SequentialTest",),
@@ -77,7 +82,7 @@ _PLACES = {
     "controller": ("Controller", "ControllerState"),
     "errors": ("PretouchError", "RecordingError"),
     "loop": ("Cycle", "MonotonicClock", "Recorder"),
-    "params": ("ReactionParams", "RestrictionParams", "WindowParams"),
+    "params": ("RestrictionParams", "WindowParams"),
     "perception.closest": ("closest_points", "no_obstacles"),
     "perception.scene_filter": ("Fixtures", "no_fixtures"),
     "profiles": ("PROFILES", "Profile", "at_rate", "profile"),

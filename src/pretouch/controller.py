@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.contact import response
 from pretouch.contact.detector import Body, Sample
+from pretouch.contact.reaction import ReactionInputs
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.control import path as paths
@@ -18,7 +18,7 @@ from pretouch.control.near import NearState, near_init, near_motion, widened
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.control.setup import MotionRequest, motion_setup
 from pretouch.errors import RobotStateError, SkinError
-from pretouch.events import doing, events_of
+from pretouch.events import events_of
 from pretouch.faults import (
     Watch,
     examine,
@@ -52,7 +52,7 @@ class ControllerState:
     detector: object
     """What the profile's detector remembers."""
     reduction: ReductionState
-    reaction: response.ResponseState
+    reaction: object
     path: paths.PathState
     near: NearState
     mode: ModeState
@@ -85,7 +85,7 @@ class Controller:
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
         self._sight = perception_setup(model, skin, fixtures, profile.perception)
         self._setup = motion_setup(model, self.limits, profile)
-        self.body = Body(model, skin, self.limits.period)
+        self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
         self._detector = profile.detect.on(self.body)
         self._touching = "touch" in profile.detect.reads and len(skin.touching) > 0
         self._mark = mark
@@ -104,7 +104,7 @@ class Controller:
             window=window_init(self.profile.window.samples),
             detector=self._detector.init(self.body, learnt),
             reduction=ReductionState(),
-            reaction=response.response_init(sound.q_commanded, self.profile.reaction),
+            reaction=self.profile.react.init(self.body, sound.q_commanded),
             path=paths.PathState(),
             near=near_init(self.model, len(self.skin)),
             mode=mode_init(),
@@ -132,7 +132,7 @@ class Controller:
             detector=self._detector.adopted(state.detector, self.body, before._detector)
             if same_window
             else self._detector.init(self.body),
-            reaction=response.adopted(state.reaction, mine.reaction, theirs.reaction),
+            reaction=mine.react.adopted(state.reaction, self.body, theirs.react, robot.q_commanded),
             path=way,
             near=near_init(self.model, len(self.skin)) if mine.anticipation != theirs.anticipation else state.near,
             outside=state.outside if same_points else None,
@@ -183,30 +183,26 @@ class Controller:
         mark("contact")
 
         # what to do
-        close = bool(silent or lost) or response.seen_near(seen.obstacles, p.reaction)
-        before = doing(state.mode, felt.armed, p)
-        fixed = self.fixtures
-        push = response.Felt(model, kin, robot, felt, close, state.command, p, fixed.planes, fixed.capsules)
-        react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
-        events |= events_of(
-            unfit, silent, lost, felt, window.count, react, close, before, state.near.blocked, p
+        given = ReactionInputs(
+            state.mode, kin, robot, felt, seen.obstacles, bool(silent or lost), state.command,
+            state.path.phase, inputs.resume,
         )  # fmt: skip
+        answers, react = p.react.sense(state.reaction, self.body, given)
+        events |= answers | events_of(unfit, silent, lost, felt, window.count, state.near.blocked, p)
         mode = next_mode(state.mode, events, inputs.resume)
         contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
-        if contact is not None:
-            react = response.began(react, before, push, state.path.phase, x)
         mark("mode")
 
-        # how fast: eqs. 3-4 on the path, or eq. 12
+        # how fast: eqs. 3-4 on the path, or the reaction
         slowed = speed_scale(seen.nearest, p.reduction.d_max_m) if p.reduction.enabled else 1.0
         scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.reduction)
         way = paths.follow(self.path, state.path, x, p.task)
-        answer, react = response.answered(react, doing(mode, felt.armed, p), push)
+        answer, react = p.react.move(react, self.body, given, mode)
         desired, qd = (way.scaled(scale), None) if answer is None else (answer.velocity, answer.qd)
         mark("path")
 
         # how near: eqs. 5-7, and the joint velocities: eq. 2
-        touch = None if answer is None else answer.touch
+        touch = None if answer is None else answer.touch_speed
         room = len(self.skin) + (0 if outside is None else len(outside.sigma))
         request = MotionRequest(
             desired, state.rotation_goal, mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch

@@ -10,18 +10,23 @@ from typing import Any
 
 from pretouch.checks import Checked
 from pretouch.composition import at, changed, from_table
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.detector import Detector
 from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.tactile import TouchSensors
 from pretouch.errors import ParameterError
 from pretouch.params import (
     AnticipationParams,
     BaselineParams,
+    ClampParams,
     FailureParams,
+    GiveUpParams,
     LocalisationParams,
     PerceptionParams,
-    ReactionParams,
+    PinchParams,
     ReductionParams,
     RestrictionMode,
     RestrictionParams,
@@ -50,7 +55,8 @@ class Profile(Checked):
     """The window of the external force: contacts are told once it is full (eq. 8)."""
     detect: Detector = field(default_factory=MovingThresholds)
     """How a contact is told from free motion (eqs. 9-11)."""
-    reaction: ReactionParams = field(default_factory=ReactionParams)
+    react: Reaction = field(default_factory=DecayingVelocity)
+    """How the arm answers a contact (eq. 12)."""
     failure: FailureParams = field(default_factory=FailureParams)
     baselines: BaselineParams = field(default_factory=BaselineParams)
 
@@ -97,8 +103,8 @@ PROFILES: dict[str, Profile] = {
         anticipation=AnticipationParams(effective_mass=True, closing_speed=True, tangential=True, null_space=True),
         window=WindowParams(freeze_while_reacting=True),
         detect=SequentialTest(cues=(TouchSensors(),), localise=LocalisationParams()),
-        reaction=ReactionParams(
-            method="admittance", clamps=True, gives_up=True, soft_hold=True, static_friction_nm=3.0, pinches=True
+        react=Admittance(
+            soft_hold=True, static_friction_nm=3.0, clamp=ClampParams(), pinch=PinchParams(), give_up=GiveUpParams()
         ),
     ),
     "flacco": _avoiding("flacco"),
@@ -196,5 +202,5 @@ def at_rate(profile: Profile, rate: float) -> Profile:
         task=replace(p.task, control_period_s=1 / rate),
         reduction=replace(p.reduction, l_max_cycles=max(1, round(p.reduction.l_max_cycles * more))),
         window=replace(p.window, samples=samples, alpha=alpha),
-        reaction=replace(p.reaction, decay_cycles=max(1, round(p.reaction.decay_cycles * more))),
+        react=p.react.stretched(more),
     )  # fmt: skip

@@ -5,6 +5,16 @@ from dataclasses import fields
 from pretouch.errors import ParameterError
 from pretouch.params import LocalisationParams
 
+_REACT = {
+    "clamp_nm": "clamp.torque_nm", "open_m_s": "clamp.open_m_s", "open_s": "clamp.open_s",
+    "pinch_gap_m": "pinch.gap_m", "pinch_n": "pinch.force_n",
+    "give_up_contacts": "give_up.contacts", "pushed_j": "give_up.push_j", "retry_s": "give_up.retry_s",
+} | {
+    name: name for name in (
+        "compliance_m_s_n", "speed_max_m_s", "decay_cycles", "soft_hold", "lag_s", "inertia_kg_m2", "damping_nm_s",
+        "dead_band_nm", "dead_band_fraction", "static_friction_nm", "start_energy_j", "quiet_s", "near_m", "patience_s",
+    )
+}  # fmt: skip
 _WINDOW = {"threshold.window_samples": "samples", "threshold.alpha": "alpha", "threshold.lambda_": "lambda_"}
 _THRESHOLDS = ("f_base_n", "f_std_n", "sigma_max_n", "f_d_n", "d_max_m", "d_min_m", "compare")
 _PROXIMITY = {"near_gain": "gain", "near_m": "distance_m", "near_horizon_s": "horizon_s"}
@@ -31,6 +41,7 @@ RENAMED: dict[str, str] = {
     **{f"detection.{old}": f"detect.cues.touch.{new}" for old, new in _TOUCH.items()},
     **{f"detection.{old}": f"detect.cues.imu.{new}" for old, new in _IMU.items()},
     **{f"localisation.{f.name}": f"detect.localise.{f.name}" for f in fields(LocalisationParams)},
+    **{f"reaction.{old}": f"react.{new}" for old, new in _REACT.items()},
 }
 """Names of earlier versions, and what each is today."""
 
@@ -42,14 +53,23 @@ SWITCHES: dict[str, dict[str, tuple[str, str]]] = {
     "detection.learn": {"yes": ("detect.learn", "watched"), "no": ("detect.learn", "never")},
     "detection.learn_unseen": {"yes": ("detect.learn", "always"), "no": ("detect.learn", "watched")},
     "detection.localise": {"yes": ("detect.localise", "on"), "no": ("detect.localise", "none")},
+    "reaction.method": {name: ("react", name) for name in ("decay", "admittance")},
+    "reaction.clamps": {"yes": ("react.clamp", "on"), "no": ("react.clamp", "none")},
+    "reaction.pinches": {"yes": ("react.pinch", "on"), "no": ("react.pinch", "none")},
+    "reaction.gives_up": {"yes": ("react.give_up", "on"), "no": ("react.give_up", "none")},
 }
 """Switches of earlier versions: for each value the change that it is today."""
 
 
 _NO_DETOUR = "the arm no longer goes round what blocks its path, which kept it from none of 8 boards. Leave it out."
+_CONSTANT = "it is a constant of pretouch.contact now, with its reason beside it. Leave it out."
+_CONSTANTS = (
+    "reverse_band", "tank_max_j", "mean_s", "clamp_s", "clamp_window_s", "clamp_turns", "turn_s", "pinch_least_m",
+    "pinch_closing_m_s", "pinch_thickness_m", "pinch_along", "pinch_rest", "pinch_explained", "place_m", "clear_s",
+)  # fmt: skip
 REMOVED = {
     f"anticipation.{name}": _NO_DETOUR for name in ("detour", "detour_distance_m", "detour_speed_m_s", "detour_hold_s")
-}
+} | {f"reaction.{name}": _CONSTANT for name in _CONSTANTS}
 """Parameters that earlier versions had, and what to do without each."""
 
 

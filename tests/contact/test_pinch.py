@@ -5,19 +5,19 @@ import pytest
 
 from pretouch.contact.clamp import caught_between, clamp_begun, clamp_init, gone, opened
 from pretouch.contact.pinch import pinched, pressed
-from pretouch.params import ReactionParams
-from pretouch.robot.body import Capsules
+from pretouch.params import ClampParams, PinchParams
+from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points, segment_distance
 from pretouch.types import NOT_TOUCHED, FloatArray, Touched
 
-P = ReactionParams(method="admittance", clamps=True, pinches=True)
+P = PinchParams()
 FOLDED = np.array([0.0, -1.2, 0.0, -2.95, 0.0, 1.75, 0.785])
 """Forearm and upper arm some 0.1 m apart."""
 FOLDING = np.array([0.0, 0.0, 0.0, -0.3, 0.0, 0.0, 0.0])
 NOISE = np.diag([0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.05]) ** 2
 FLOOR = np.array([[0.0, 0.0, 1.0, -0.2]])
-NONE = Capsules(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+NONE = no_capsules()
 
 
 def gap_of(model: RobotModel, one: str, other: str, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -188,7 +188,7 @@ def come(cycles: int = 60):
 def test_the_arm_opens_the_way_it_came() -> None:
     before, q = come()
     state = caught_between(clamp_begun(before, q, 1.0 * WAY), "one and other", 50.0, 6.0 * WAY)
-    way, state = opened(state, -6.0 * WAY, q, DT, P)
+    way, state = opened(state, -6.0 * WAY, q, DT, ClampParams())
     assert way @ WAY < 0.0
     assert way - (way @ WAY) * WAY == pytest.approx(np.zeros(7))
     assert not state.open
@@ -198,9 +198,9 @@ def test_what_has_been_opened_already_is_not_closed_again() -> None:
     before, q = come()
     state = caught_between(clamp_begun(before, q, 1.0 * WAY), "one and other", 50.0, 6.0 * WAY)
     ahead = q - 0.22 * WAY  # four places of the way farther back
-    way, state = opened(state, -6.0 * WAY, ahead, DT, P)
+    way, state = opened(state, -6.0 * WAY, ahead, DT, ClampParams())
     assert way @ WAY < 0.0
-    beyond, state = opened(state, -6.0 * WAY, -1.0 * WAY, DT, P)
+    beyond, state = opened(state, -6.0 * WAY, -1.0 * WAY, DT, ClampParams())
     assert beyond == pytest.approx(np.zeros(7))
     assert state.open
 

@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 
 from pretouch.contact.place import given_up, met, passed, place_init, pushed, waited
-from pretouch.params import ReactionParams
+from pretouch.params import GiveUpParams
 
-P = ReactionParams(method="admittance", gives_up=True, give_up_contacts=3, place_m=0.1, clear_s=1.0, retry_s=30.0)
+P = GiveUpParams(contacts=3, retry_s=30.0)
 X = np.array([0.5, 0.1, 0.3])
-ENERGY = P.pushed_j + 0.01
+ENERGY = P.push_j + 0.01
 
 
 def after(*phases: float, near: bool = False):
     state = place_init()
     for phase in phases:
-        state = met(passed(state, phase, P), phase, X, near, 0.0, P)
+        state = met(passed(state, phase), phase, X, near, 0.0, P)
     return state
 
 
-def cycles(state, near: bool, params: ReactionParams = P) -> int:
+def cycles(state, near: bool, params: GiveUpParams = P) -> int:
     count = 0
     while given_up(state, params):
         state, count = waited(state, near, 0.01, params), count + 1
@@ -36,12 +36,12 @@ def test_it_gives_up_after_three_contacts_at_one_place(phases, expected):
 
 
 def test_it_never_gives_up_when_that_is_off():
-    assert not given_up(after(*[1.0] * 50), ReactionParams())
+    assert not given_up(after(*[1.0] * 50), None)
 
 
 def test_a_place_that_was_passed_is_forgotten():
-    assert passed(after(1.0, 1.0), 1.09, P).contacts == 2
-    assert passed(after(1.0, 1.0), 1.11, P).contacts == 0
+    assert passed(after(1.0, 1.0), 1.09).contacts == 2
+    assert passed(after(1.0, 1.0), 1.11).contacts == 0
 
 
 def test_it_tries_again_once_what_was_seen_is_gone_and_gives_up_sooner():
@@ -68,5 +68,5 @@ def test_a_person_s_push_counts_for_no_place():
 
 def test_a_thing_met_fast_may_give_back_what_the_arm_brought():
     fast = met(place_init(), 1.0, X, False, 0.2, P)
-    assert pushed(fast, P.pushed_j + 0.39).contacts == 1
-    assert pushed(fast, P.pushed_j + 0.41).contacts == 0
+    assert pushed(fast, P.push_j + 0.39).contacts == 1
+    assert pushed(fast, P.push_j + 0.41).contacts == 0

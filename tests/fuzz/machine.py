@@ -140,7 +140,7 @@ class Course:
         self.machine.reached.update([
             "step", f"arm {self.world.model.description.name}",
             f"mode {step.mode.name}", f"outcome {step.qp.outcome.name}", f"cause {cause}",
-            f"restriction {p.restriction.mode}", f"detection {p.detect.name}", f"reaction {p.reaction.method}",
+            f"restriction {p.restriction.mode}", f"detection {p.detect.name}", f"reaction {p.react.name}",
             f"period {p.task.control_period_s}", f"units {len(self.world.skin)}",
             f"sight {self.weather.sight}", f"force {self.weather.feel}", f"slack {bool(tight)}",
             f"slowed {step.speed_scale < 1}", f"on the axis {bool((step.obstacles.body_distance < -0.04).any())}",

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.params import Profile
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RobotState
 
@@ -78,7 +80,8 @@ class Oracle:
         self.q, self.qd = robot.q_commanded.copy(), robot.qd_commanded.copy()
         self.mode, self.latched, self.reason = Mode.HOLD, False, ""
         self.samples = 0
-        self.reacted = profile.reaction.decay_cycles
+        self.decay_cycles = DecayingVelocity.of(profile.react, profile.task.control_period_s).decay_cycles
+        self.reacted = self.decay_cycles
 
     def expect(self, inputs: Inputs) -> Expected:
         """Judge the inputs of the next step."""
@@ -147,7 +150,7 @@ class Oracle:
         if MODES.get(cause) is Mode.REACT:
             self.reacted = 1 if cause == "contact" or self.mode is not Mode.REACT else self.reacted + 1
         else:
-            self.reacted = self.p.reaction.decay_cycles
+            self.reacted = self.decay_cycles
         self.samples = min(self.samples + (e.force is not None), self.p.window.samples)
         self.mode, self.latched, self.reason = step.mode, cause in LATCHING, step.reason
         self.q, self.qd = self.q + step.command * self.p.task.control_period_s, step.command.copy()
@@ -166,15 +169,12 @@ class Oracle:
         """What decides the mode of a step whose inputs can be believed, before the quadratic program."""
         if self.latched and not resume:
             return "latched"
-        if (
-            self.p.reaction.method == "decay"
-            and self.mode is Mode.REACT
-            and self.reacted < self.p.reaction.decay_cycles
-        ):
+        decays = isinstance(self.p.react, DecayingVelocity)
+        if decays and self.mode is Mode.REACT and self.reacted < self.decay_cycles:
             return "reacting"
         if self.mode is not Mode.REACT and self.feels_contact(e, step):
             return "contact"
-        if self.p.detect.by_torques or self.p.reaction.method != "decay":
+        if self.p.detect.by_torques or not decays:
             return self._told(e, step)
         filling = self.samples < self.p.window.samples
         seen = {"silent": bool(e.silent), "no force": e.no_force, "overrun": e.overrun, "filling": filling}
@@ -204,8 +204,8 @@ class Oracle:
 
     def feels_contact(self, e: Expected, step: ControlStep) -> bool:
         """Whether the force crosses the thresholds the step gives."""
-        r = self.p.reaction
-        sticks = self.mode is Mode.HOLD and r.soft_hold and r.method == "admittance" and r.static_friction_nm > 0
+        r = self.p.react
+        sticks = self.mode is Mode.HOLD and isinstance(r, Admittance) and r.soft_hold and r.static_friction_nm > 0
         if self.p.detect.by_torques or sticks:
             return step.contact is not None
         if e.force is None or self.samples < self.p.window.samples:

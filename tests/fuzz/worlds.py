@@ -4,16 +4,21 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.params import (
+    ClampParams,
     FailureParams,
+    GiveUpParams,
     LocalisationParams,
     PerceptionParams,
+    PinchParams,
     Profile,
     ProximityPriorParams,
-    ReactionParams,
     ReductionParams,
     RestrictionParams,
     TaskParams,
@@ -53,7 +58,7 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
         "f_base_n": (10.0, 4.1), "f_std_n": (3.0, 0.0), "sigma_max_n": (3.0, 1e-3), "f_d_n": (4.0, 0.0),
         "d_max_m": (0.8, 5.0), "d_min_m": (0.05, 0.0, 0.79), "compare": ("filtered", "raw"),
     },
-    ReactionParams: {
+    DecayingVelocity: {
         "compliance_m_s_n": (0.03, 1e-4, 1.0), "speed_max_m_s": (0.3, 0.01, 2.0), "decay_cycles": (20, 1, 200),
     },
     FailureParams: {
@@ -87,18 +92,15 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "confirm_samples": (1, 3), "localise": (LocalisationParams(), None),
     },
     FixedBounds: {},
-    ReactionParams: {
-        "method": ("admittance", "admittance", "decay"), "clamps": (True, False), "gives_up": (True, False),
-        "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2), "inertia_kg_m2": (1.5, 1e-3, 100.0),
-        "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0), "dead_band_fraction": (0.02, 0.0, 0.5),
-        "static_friction_nm": (3.0, 0.0, 20.0),
-        "reverse_band": (2.0, 1.0), "start_energy_j": (0.2, 0.0, 50.0), "tank_max_j": (2.0, 1e-3),
-        "mean_s": (0.5, 0.01), "quiet_s": (0.05, 1.0), "patience_s": (0.1, 10.0), "clamp_nm": (4.0, 0.1),
-        "clamp_s": (0.03, 0.01), "clamp_turns": (2, 1), "open_m_s": (0.1, 2.0), "open_s": (0.05, 0.5),
-        "pinches": (True, False), "pinch_gap_m": (0.2, 5.0), "pinch_closing_m_s": (0.02, 1e-6), "pinch_n": (10.0, 0.01),
-        "pinch_along": (0.85, 0.0), "pinch_rest": (9.0, 1e6), "pinch_explained": (27.0, 1e-6),
-        "give_up_contacts": (3, 1), "place_m": (0.1, 10.0), "clear_s": (0.1, 1.0), "retry_s": (0.3, 30.0),
+    Admittance: {
+        "speed_max_m_s": (0.3, 0.01, 2.0), "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2),
+        "inertia_kg_m2": (1.5, 1e-3, 100.0), "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0),
+        "dead_band_fraction": (0.02, 0.0, 0.5), "static_friction_nm": (3.0, 0.0, 20.0),
+        "start_energy_j": (0.2, 0.0, 50.0), "quiet_s": (0.05, 1.0), "patience_s": (0.1, 10.0),
     },
+    ClampParams: {"torque_nm": (4.0, 0.1), "open_m_s": (0.1, 2.0), "open_s": (0.05, 0.5)},
+    PinchParams: {"gap_m": (0.2, 5.0), "force_n": (10.0, 0.01)},
+    GiveUpParams: {"contacts": (3, 1), "push_j": (0.3, 1e-3, 50.0), "retry_s": (0.3, 30.0)},
 }  # fmt: skip
 DETECTORS = (SequentialTest, SequentialTest, FixedBounds, MovingThresholds)
 NAMED = ("pretouch", "pretouch", "fixed", "observer", "flacco", "ding")
@@ -145,7 +147,16 @@ def any_profile(rng: np.random.Generator) -> Profile:
     drawn["detect"] = detector(**_drawn(rng, CHOICES.get(detector, {}) | OURS.get(detector, {}), usual))
     if not ours:
         drawn["restriction"] = replace(drawn["restriction"], mode=str(rng.choice(["slack", "hard", "floor", "off"])))
-    return Profile(**{**drawn, "name": "fuzzed"})
+    return Profile(**{**drawn, "name": "fuzzed", "react": any_reaction(rng, ours, usual)})
+
+
+def any_reaction(rng: np.random.Generator, ours: bool, usual: float) -> Reaction:
+    """Draw the paper's reaction, or an admittance that looks for clamps, for things caught, for places, or not."""
+    if not ours or rng.random() < 0.2:
+        return DecayingVelocity(**_drawn(rng, CHOICES[DecayingVelocity], usual))
+    drawn = {kind: kind(**_drawn(rng, OURS[kind], usual)) for kind in (ClampParams, PinchParams, GiveUpParams)}
+    clamp, pinch, give_up = (found if rng.random() < 0.8 else None for found in drawn.values())
+    return Admittance(**_drawn(rng, OURS[Admittance], usual), clamp=clamp, pinch=pinch, give_up=give_up)
 
 
 def _drawn(rng: np.random.Generator, choices: dict[str, tuple[object, ...]], usual: float) -> dict[str, object]:

@@ -37,7 +37,7 @@ def expected(force, p):
         limits.append(thresholds)
         if contact is not None and cycle > busy_until:
             contacts.append((cycle, contact.force, contact.axes))
-            busy_until = cycle + p.reaction.decay_cycles
+            busy_until = cycle + p.react.decay_cycles
     return contacts, limits
 
 
@@ -57,7 +57,7 @@ def test_contacts_and_thresholds_are_those_of_the_plain_detector(of_force, name)
 
 
 def test_a_push_that_lasts_is_found_again_after_each_reaction_as_by_the_plain_detector(of_force):
-    p = profile("paper:reaction.decay_cycles=20")
+    p = profile("paper:react.decay_cycles=20")
     force = pushed(8.0, ((2.0, 4.0, (0.0, 60.0, 0.0)),))
     found, (contacts, _) = detect_imported(of_force(force), p), expected(force, p)
     assert len(contacts) > 2

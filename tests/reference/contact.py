@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from pretouch.params import ReactionParams, ThresholdParams, WindowParams
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.params import ThresholdParams, WindowParams
 from pretouch.types import Contact, Obstacles, Thresholds
 
 
@@ -77,7 +78,7 @@ class Touch:
         return min(max((p.d_max_m - distance) / (p.d_max_m - p.d_min_m), 0.0), 1.0) * p.f_d_n
 
 
-def reaction(force: np.ndarray, params: ReactionParams) -> np.ndarray:
+def reaction(force: np.ndarray, params: DecayingVelocity) -> np.ndarray:
     """Velocity (3,) a contact of F_ext starts [m/s]: eq. 12, its norm bounded."""
     velocity = params.compliance_m_s_n * force
     return velocity * min(1.0, params.speed_max_m_s / np.linalg.norm(velocity)) if velocity.any() else velocity

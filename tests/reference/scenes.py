@@ -188,7 +188,7 @@ SINGULAR_PLACE = (
 """The hand's origin cannot move along one line, found by minimising the smallest singular value of its Jacobian."""
 PUSHES: dict[Span, tuple[float, float, float]] = {(30, 45): (0.0, 40.0, 0.0), (70, 75): (-35.0, 0.0, 20.0)}
 
-SHORT = changed(reaction={"decay_cycles": 25})
+SHORT = changed(react={"decay_cycles": 25})
 HARD = changed(SHORT, restriction={"mode": "hard"})
 FLOOR = changed(restriction={"mode": "floor"})
 OFF = changed(restriction={"mode": "off"})
@@ -198,7 +198,7 @@ RAW = changed(SHORT, detect={"compare": "raw"})
 FAST = changed(task={"control_period_s": 0.001})
 AT_ONCE = changed(window={"samples": 2})
 HARD_AT_ONCE = changed(AT_ONCE, restriction={"mode": "hard"})
-GENTLE = changed(AT_ONCE, detect={"compare": "raw"}, reaction={"compliance_m_s_n": 0.002})
+GENTLE = changed(AT_ONCE, detect={"compare": "raw"}, react={"compliance_m_s_n": 0.002})
 YIELDS = ("track", "react", "hold", "solved", "skipped", "filling", "A contact of")
 
 SCENES = (

@@ -1,11 +1,11 @@
 import re
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
-from pretouch.params import Profile, profile
+from pretouch.params import PROFILES, profile
 from pretouch.reporting.html import bad, number, percent, table
 from pretouch.reporting.measures import measure
 from pretouch.reporting.orientation import ISO_TS_15066
@@ -16,7 +16,7 @@ from pretouch.reporting.sections.setting import parameter_section, setting_secti
 from pretouch.reporting.summary import summary
 from pretouch.sensing.skin import Skin
 from pretouch.types import Mode
-from pretouch.viewer.parameters import field_docs
+from pretouch.viewer.parameters import field_docs, groups_of
 from tests.reporting import made
 
 
@@ -251,9 +251,8 @@ def test_directions_and_units_are_named():
 
 def test_units_of_all_parameters_are_those_that_their_documentation_gives():
     wrong, found = {}, 0
-    for group in fields(Profile):
-        params = getattr(Profile(), group.name)
-        for item in fields(params) if is_dataclass(params) else ():
+    for params in (*groups_of(PROFILES["paper"]), *groups_of(PROFILES["pretouch"])):
+        for item in fields(params):
             told = re.findall(r"\[([^\]]*)\]", field_docs().get((type(params).__name__, item.name), ""))
             if told and told[0] != "1":
                 found += 1

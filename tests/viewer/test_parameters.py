@@ -5,7 +5,7 @@ import pytest
 from pretouch.errors import ParameterError
 from pretouch.params import PROFILES, Profile, profile
 from pretouch.viewer.controls import named
-from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs
+from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs, groups_of
 
 TABLE_I = {
     "d_max": 0.8, "d_min": 0.05, "l_max": 200, "V_max": 0.04, "d_repulse": 0.1, "d_crit": 0.1, "d_notice": 0.6,
@@ -60,10 +60,9 @@ def test_what_is_typed_and_is_no_such_number_is_refused(symbol: str, text: str, 
 
 
 def test_the_documentation_of_every_parameter_is_found() -> None:
-    groups = [field.default_factory for field in fields(Profile) if field.name != "name"]
-    for group in groups:
-        for field in fields(group):  # type: ignore[arg-type]
-            assert field_docs()[group.__name__, field.name]  # type: ignore[union-attr]
+    for group in (group for known in PROFILES.values() for group in groups_of(known)):
+        for field in fields(group):
+            assert field_docs()[type(group).__name__, field.name]
 
 
 def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:

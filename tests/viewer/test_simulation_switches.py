@@ -56,7 +56,7 @@ def test_a_profile_switched_in_a_reaction_lets_it_end(running):
     steps = poke(running)
     steps += running.advance(0.5)
     phase = steps[-1].path_phase
-    running.set_profile(profile("paper:reaction.decay_cycles=150:restriction.mode=hard"))
+    running.set_profile(profile("paper:react.decay_cycles=150:restriction.mode=hard"))
     after = running.advance(4.0)
     assert after[0].mode is Mode.REACT
     assert after[0].path_phase == phase
@@ -246,7 +246,7 @@ def test_no_command_leaves_the_limits_whatever_a_person_does(live, seed):
         lambda: session.set_profile(PROFILES[names[rng.integers(len(names))]]),
         lambda: session.set_profile(profile(f"paper:threshold.window_samples={rng.integers(20, 120)}")),
         lambda: session.set_profile(profile(f"paper:restriction.mode={rng.choice(['off', 'hard', 'slack', 'floor'])}")),
-        lambda: session.set_profile(profile("paper:reaction.decay_cycles=50:task.position_margin_rad=0.05")),
+        lambda: session.set_profile(profile("paper:react.decay_cycles=50:task.position_margin_rad=0.05")),
         lambda: set_speed(session, rng.uniform(0.05, 1.0)),
         lambda: session.set_path(str(rng.choice(["circle", "line"]))),
         lambda: session.set_faults(frozenset({ids[rng.integers(len(ids))]}), rng.uniform(0, 10), rng.uniform(0, 0.1)),

@@ -9,6 +9,7 @@ import numpy as np
 from pretouch.composition import Part
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import WindowState
+from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import (
@@ -30,12 +31,16 @@ Readings = Literal["touch", "imu"]
 
 @value
 class Body:
-    """What is fixed of an arm and its units."""
+    """What is fixed of an arm, its units and what stands beside it."""
 
     model: RobotModel
     skin: Skin
     period: float
     """Control period [s]."""
+    planes: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
+    """(P, 4) planes of fixtures, rows (normal, offset), base frame."""
+    standing: Capsules = field(default_factory=no_capsules)
+    """Other fixtures, base frame."""
 
 
 @value

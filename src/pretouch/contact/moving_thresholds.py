@@ -31,6 +31,8 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
     ) -> Detection:
         """Hold a force (3,) [N] against the thresholds by its window and by what is near; the residual is NaN.
 
+        A contact has the force less its mean, F_ext of eq. 12.
+
         Args:
             window: with the force in it.
             force: on the robot, base frame; None where there is no estimate: then nothing is a contact.
@@ -46,7 +48,6 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
         )  # fmt: skip
         limits, contact = Thresholds(parts), None
         if found and armed:
-            # eq. 12: the force less its mean
             contact = Contact(compared - limits.mean, crossed(compared, limits))
         return Detection(limits, contact, armed, _NONE, 0.0 if force is None else share)
 

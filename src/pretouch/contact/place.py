@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.params import ReactionParams
+from pretouch.params.reaction import GiveUpParams
 from pretouch.types import FloatArray
 from pretouch.values import value
 
@@ -36,21 +36,21 @@ def place_init() -> PlaceState:
     return PlaceState(0.0, np.zeros(3), 0, False, 0.0, 0.0, False, 0.0)
 
 
-def given_up(state: PlaceState, params: ReactionParams) -> bool:
+def given_up(state: PlaceState, params: GiveUpParams | None) -> bool:
     """Whether the contacts at one place are too many."""
-    return params.gives_up and state.contacts >= params.give_up_contacts
+    return params is not None and state.contacts >= params.contacts
 
 
 def met(
-    state: PlaceState, phase: float, point: FloatArray, near: bool, kinetic: float, params: ReactionParams
+    state: PlaceState, phase: float, point: FloatArray, near: bool, kinetic: float, params: GiveUpParams
 ) -> PlaceState:
     """Count a contact made on the path at an arc length [m] with the end-effector at a point (3,) [m].
 
     `near` says whether something is seen near the body. `kinetic` is the energy with which the arm met it [J]: a thing
     at rest gives back no more, and as much again allows for the drives, which go on until the contact is felt.
     """
-    bound = params.pushed_j + 2.0 * kinetic
-    if state.contacts and abs(phase - state.phase) <= params.place_m:
+    bound = params.push_j + 2.0 * kinetic
+    if state.contacts and abs(phase - state.phase) <= _PLACE_M:
         return PlaceState(state.phase, state.point, state.contacts + 1, state.seen or near, 0.0, 0.0, True, bound)
     return PlaceState(phase, point, 1, near, 0.0, 0.0, True, bound)
 
@@ -62,18 +62,24 @@ def pushed(state: PlaceState, energy: float) -> PlaceState:
     return replace(state, contacts=state.contacts - 1, counted=False) if state.contacts > 1 else place_init()
 
 
-def passed(state: PlaceState, phase: float, params: ReactionParams) -> PlaceState:
+def passed(state: PlaceState, phase: float) -> PlaceState:
     """Forget the place once the arm is past it on its path."""
-    return place_init() if state.contacts and phase > state.phase + params.place_m else state
+    return place_init() if state.contacts and phase > state.phase + _PLACE_M else state
 
 
-def waited(state: PlaceState, near: bool, dt: float, params: ReactionParams) -> PlaceState:
+def waited(state: PlaceState, near: bool, dt: float, params: GiveUpParams) -> PlaceState:
     """Wait one period at a place given up; after long enough it may be tried once more.
 
     That is when nothing is seen near any more, or, if nothing ever was, after `retry_s`.
     """
     p, seen, clear = params, state.seen or near, 0.0 if near else state.clear + dt
     time = state.waited + dt
-    if clear >= p.clear_s if seen else time >= p.retry_s:
-        return PlaceState(state.phase, state.point, p.give_up_contacts - 1, False, 0.0, 0.0, False, 0.0)
+    if clear >= _CLEAR_S if seen else time >= p.retry_s:
+        return PlaceState(state.phase, state.point, p.contacts - 1, False, 0.0, 0.0, False, 0.0)
     return PlaceState(state.phase, state.point, state.contacts, seen, clear, time, False, 0.0)
+
+
+_PLACE_M = 0.1
+"""Contacts less than this apart along the path are at one place [m]."""
+_CLEAR_S = 1.0
+"""Time for which nothing is seen near before the arm that gave up tries again [s]: several readings of each unit."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pretouch.contact.decaying_velocity import DecayingVelocity, advanced
 from pretouch.contact.moving_thresholds import thresholds_of
-from pretouch.contact.reaction import active, advance, reaction_init, start_reaction
 from pretouch.contact.window import add_force, window_init
 from pretouch.control.path import line
 from pretouch.controller import Controller
@@ -64,7 +64,7 @@ def _ticks(time: IntArray, profile: Profile) -> IntArray:
     Gaps in which nothing can change any more are left out.
     """
     period = round(1e9 * profile.task.control_period_s)
-    decay = (profile.reaction.decay_cycles + 2) * period
+    decay = (DecayingVelocity.of(profile.react, profile.task.control_period_s).decay_cycles + 2) * period
     lasting = round(1e9 * profile.failure.force_timeout_s) + decay
     phase = min(period, int(np.median(np.diff(time)))) // 2
     ends = np.flatnonzero(np.diff(time) > lasting)
@@ -86,8 +86,8 @@ def _forces(force: Series, ticks: IntArray, profile: Profile) -> FloatArray:
 def _force_alone(ticks: IntArray, begin: int, force: FloatArray, profile: Profile) -> Decisions:
     """Detect without obstacles; as in the controller, nothing is a contact while a reaction would be under way."""
     p, decided = profile, Decided(profile.name)
-    window, mode, react = window_init(p.window.samples), mode_init(), reaction_init(p.reaction)
-    thresholds = thresholds_of(p.detect)
+    answer, thresholds = DecayingVelocity.of(p.react, p.task.control_period_s), thresholds_of(p.detect)
+    window, mode, react = window_init(p.window.samples), mode_init(), answer.rest()
     for time, sample in zip(((ticks - begin) / 1e9).tolist(), force, strict=True):
         force_now = None if np.isnan(sample[0]) else sample
         armed, window = window.full, add_force(window, force_now, p.window)
@@ -95,14 +95,14 @@ def _force_alone(ticks: IntArray, begin: int, force: FloatArray, profile: Profil
         events = {Event.WINDOW_FILLING: ""} if not felt.armed else {}
         if felt.contact is not None:
             events[Event.CONTACT] = ""
-        if active(react, p.reaction):
+        if answer.active(react):
             events[Event.REACTING] = ""
         before, mode = mode, next_mode(mode, events, resume=False)
         reacting = mode.mode is Mode.REACT
         begins = reacting and before.mode is not Mode.REACT
         contact = felt.contact if begins else None
-        react = start_reaction(contact.force, p.reaction) if contact else react
-        react = advance(react) if reacting else reaction_init(p.reaction)
+        react = answer.begun(contact.force) if contact else react
+        react = advanced(react) if reacting else answer.rest()
         compared = window.newest if force_now is not None and thresholds.compare == "filtered" else sample
         decided.add(time, sample, compared, felt.thresholds, felt.armed, reacting, contact)
     return decided.decisions()

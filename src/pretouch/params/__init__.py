@@ -14,7 +14,10 @@ from pretouch.params.near import ReductionParams as ReductionParams
 from pretouch.params.near import RestrictionMode as RestrictionMode
 from pretouch.params.near import RestrictionParams as RestrictionParams
 from pretouch.params.perception import PerceptionParams as PerceptionParams
-from pretouch.params.reaction import ReactionParams as ReactionParams
+from pretouch.params.reaction import AdmittanceParams as AdmittanceParams
+from pretouch.params.reaction import ClampParams as ClampParams
+from pretouch.params.reaction import GiveUpParams as GiveUpParams
+from pretouch.params.reaction import PinchParams as PinchParams
 from pretouch.params.sequential import ProximityPriorParams as ProximityPriorParams
 from pretouch.params.sequential import SequentialParams as SequentialParams
 from pretouch.params.sequential import TouchSensorParams as TouchSensorParams

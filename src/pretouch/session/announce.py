@@ -33,15 +33,7 @@ def announcement(controller: Controller, seconds: float, way: Plan | None) -> tu
         else f"The arm moves its end-effector at up to {profile.task.speed_m_s:g} m/s within {room} m (base frame); the"
         " arm itself needs more room."
     )
-    r = profile.reaction
-    decay = r.decay_cycles * profile.task.control_period_s
-    said.append(
-        f"Pushed, it yields at up to {r.speed_max_m_s:g} m/s for as long as it is pushed, and goes on {r.quiet_s:g} s"
-        " later: nothing it could hit may be near it."
-        if r.method == "admittance"
-        else f"Pushed, it yields in the direction of the push, at up to {r.speed_max_m_s:g} m/s and for"
-        f" {decay:g} s: nothing it could hit may be within {r.speed_max_m_s * decay / 2:.1f} m of it."
-    )
+    said.append(profile.react.announced(profile.task.control_period_s))
     said.append(f"It goes on for {seconds:g} s." if np.isfinite(seconds) else "It goes on until it is stopped.")
     said.append(
         "To stop it: the user stop at once, in any case; Ctrl-C brings it to rest within its limits and ends the run."

@@ -2,14 +2,14 @@
 
 import ast
 import inspect
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
-from pathlib import Path
+from itertools import pairwise
 from types import MappingProxyType
 
 from pretouch.errors import ParameterError
-from pretouch.params import Profile
+from pretouch.params import PROFILES, Profile
 
 
 def written(value: float) -> str:
@@ -82,16 +82,33 @@ TABLE_1: tuple[TableEntry, ...] = (
 
 @cache
 def field_docs() -> Mapping[tuple[str, str], str]:
-    """What the source says of each field of the parameters, by (class, field), on one line."""
+    """What the source says of each field of the parameters, by (class, field), on one line; inherited ones too."""
     docs: dict[tuple[str, str], str] = {}
-    groups = [type(getattr(Profile(), f.name)) for f in fields(Profile) if f.name != "name"]
-    sources = {inspect.getsourcefile(group) for group in groups}
-    nodes = [node for path in sources if path for node in ast.parse(Path(path).read_text(encoding="utf-8")).body]
-    for node in nodes:
-        if not isinstance(node, ast.ClassDef):
-            continue
-        for field, text in zip(node.body, node.body[1:], strict=False):
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr):
-                said = ast.literal_eval(text.value)
-                docs[node.name, field.target.id] = " ".join(str(said).split())
+    for kind in {type(group) for profile in PROFILES.values() for group in groups_of(profile)}:
+        for base in reversed(kind.__mro__):
+            docs |= {(kind.__name__, field): said for field, said in _told(base).items()}
     return MappingProxyType(docs)
+
+
+def groups_of(params: object) -> Iterator[object]:
+    """All sets of parameters that one holds, parts and those of parts included."""
+    for item in fields(params) if is_dataclass(params) else ():
+        value = getattr(params, item.name)
+        for group in value if isinstance(value, tuple) else (value,):
+            if is_dataclass(group):
+                yield group
+                yield from groups_of(group)
+
+
+@cache
+def _told(kind: type) -> Mapping[str, str]:
+    """What the source of a class says of the fields that it adds."""
+    if not is_dataclass(kind):
+        return {}
+    (node,) = ast.parse(inspect.getsource(kind)).body
+    body = node.body if isinstance(node, ast.ClassDef) else []
+    return {
+        field.target.id: " ".join(str(ast.literal_eval(text.value)).split())
+        for field, text in pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr)
+    }

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, cast
 import numpy as np
 
 from pretouch.checks import Check, Checked, NonNegative
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch_lab.benchmarks.detection.arm import Sensing, model
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_stream, touches_of
 from pretouch_lab.benchmarks.detection.contenders import Contender
@@ -66,7 +67,8 @@ def _free(setting: Setting, stream: Stream) -> Numbers:
     scene, detector = cast(FreeScene, setting.scene), _detector(setting)
     made = replay(stream, detector, model())
     counted = made.stamp >= scene.warm_up_s
-    alarms = int(counted[begun(made.alarm, setting.profile.reaction.decay_cycles)].sum())
+    busy = DecayingVelocity.of(setting.profile.react, PERIOD_S).decay_cycles
+    alarms = int(counted[begun(made.alarm, busy)].sum())
     most = float(made.statistic[counted].max(initial=-np.inf))
     margin = detector.default - most if detector.sweep == "f_base_n" and np.isfinite(most) else None
     hours = float(counted.sum()) * PERIOD_S / 3600
@@ -111,7 +113,7 @@ ON_STREAMS = (
             "false_alarms_per_hour": "false alarms an hour [1/h]", "alarms": "false alarms counted",
             "least_margin_n": "what the force missed of a threshold, at the least [N]; negative with an alarm",
         },
-        _free, lambda s: _REPLAY_S * _free_s(s), (*_DETECTION, "reaction.decay_cycles"),
+        _free, lambda s: _REPLAY_S * _free_s(s), (*_DETECTION, "react.decay_cycles"),
         _free_stream, lambda s: (0.04 + 0.0006 * _units(s)) * _free_s(s),
     ),
     Measure(

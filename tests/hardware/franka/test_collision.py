@@ -103,7 +103,7 @@ def test_ours_stops_by_itself_later_than_it_is_felt_and_before_it_hurts(panda_mo
 
 
 def test_an_arm_that_is_pushed_yields_in_any_direction_before_it_stops_by_itself(panda_model: RobotModel) -> None:
-    p, q = PROFILES["pretouch"].reaction, panda_model.description.q_ready
+    p, q = PROFILES["pretouch"].react, panda_model.description.q_ready
     J = panda_model.ee_jacobian(panda_model.kinematics(q))[:3]
     band = p.dead_band_nm + p.dead_band_fraction * panda_model.description.tau_max
     draw, force = np.random.default_rng(1), collision_behavior(PROFILES["pretouch"], panda_model).upper_force[0]

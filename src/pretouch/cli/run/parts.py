@@ -82,11 +82,11 @@ def parts(command: "Run") -> Parts:
         skin = Skin((), model)
     else:
         skin = load_skin(FilePath(units.skin), model) if units.skin else paper_skin(model)
-    by_torques = profile.detect.by_torques or profile.reaction.method == "admittance"
+    by_torques = profile.detect.by_torques or profile.react.by_torques
     if command.robot.robot == "ros2" and by_torques:
         raise ParameterError(
             f"The profile {profile.name} feels contacts by external joint torques, and ROS 2 has no message for them:"
-            " choose --profile paper, or pretouch:detect=thresholds:reaction.method=decay."
+            " choose --profile paper, or pretouch:detect=thresholds:react=decay."
         )
     simulated = command.robot.robot == "simulated" or command.robot.lockstep
     floor = (SceneSpec().floor_height if simulated else 0.0) if task.floor is None else task.floor

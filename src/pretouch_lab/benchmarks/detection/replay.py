@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.params import ReactionParams
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.perception.closest import no_obstacles
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -17,7 +17,7 @@ from pretouch_lab.detector_alone import DetectorAlone
 
 NOTHING = no_obstacles()
 """What a profile without proximity is shown."""
-REST = ReactionParams().decay_cycles
+REST = DecayingVelocity().decay_cycles
 """Control cycles for which an alarm is answered, and no other is looked for."""
 
 

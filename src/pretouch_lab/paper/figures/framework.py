@@ -70,8 +70,8 @@ BLOCKS = (
         (
             ("TRACK, REACT, HOLD", "modes.next_mode"),
             ("the path, by its phase", "control.path.follow"),
-            ("eq. 12: with the push", "contact.reaction.reaction_velocity"),
-            ("its linear decay", "contact.reaction.decayed"),
+            ("eq. 12: with the push", "contact.decaying_velocity.reaction_velocity"),
+            ("its linear decay", "contact.decaying_velocity.decayed"),
         ),
     ),
     Block(
