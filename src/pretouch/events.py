@@ -5,7 +5,7 @@ import numpy as np
 from pretouch.contact import reaction
 from pretouch.contact.clamp import ClampState
 from pretouch.contact.detect import Detection
-from pretouch.contact.place import given_up
+from pretouch.contact.repeated_contact import given_up
 from pretouch.contact.response import Doing, ResponseState, moves, presses_on, waits
 from pretouch.modes import Event, ModeState
 from pretouch.params import Profile

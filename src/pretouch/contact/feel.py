@@ -6,10 +6,11 @@ import numpy as np
 
 from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.detect import Detection, detect
-from pretouch.contact.felt import SequentialState, sequential_init, take_sample
 from pretouch.contact.fixed import force_map, share_of_band, share_of_bounds
+from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
+from pretouch.contact.localisation.significance import clearest_mean
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.contact.where import WhereState, clearest_mean, locate, where_init
+from pretouch.contact.sequential_detector import Observation, SequentialState, sequential_init, sequential_step
 from pretouch.contact.window import WindowState, window_init
 from pretouch.params import Profile
 from pretouch.robot.model import Kinematics, RobotModel
@@ -25,7 +26,7 @@ class FeelState:
     """Of the force, eq. 8."""
     sequential: tuple[SequentialState, ...]
     """Of that detector, one; none unless the profile's method is that."""
-    where: tuple[WhereState, ...] = ()
+    where: tuple[LocalisationState, ...] = ()
     """Of the place of a contact, one; none unless the profile localises."""
 
 
@@ -33,7 +34,7 @@ def feel_init(model: RobotModel, profile: Profile, learnt: ResidualModel | None 
     """Return the state before the first sample of an arm; `learnt` is its free motion as an earlier session left it."""
     p = profile.detection
     sequential = (sequential_init(model, p, learnt),) if p.method == "sequential" else ()
-    where = (where_init(),) if sequential and p.localise else ()
+    where = (localisation_init(),) if sequential and p.localise else ()
     return FeelState(window_init(profile.threshold.window_samples), sequential, where)
 
 
@@ -70,7 +71,7 @@ def feel(
         return Detection(found.thresholds, found.contact, found.armed, robot.tau_ext, evidence), FeelState(window, ())
     if math.isnan(robot.tau_ext.sum()):
         nothing = Detection(_no_bands(), None, False, np.full(model.n, np.nan), 0.0)
-        return nothing, FeelState(window, state.sequential, (where_init(),) if state.where else ())
+        return nothing, FeelState(window, state.sequential, (localisation_init(),) if state.where else ())
     if p.method == "fixed":
         felt_force = force_map(model.ee_jacobian(kin)) @ robot.tau_ext if force is None else force
         share = share_of_bounds(robot.tau_ext, force, p)
@@ -80,22 +81,24 @@ def feel(
     before = state.sequential[0] if state.sequential else sequential_init(model, p)
     told, period = no_cues(len(model.links)) if cues is None else cues, profile.task.control_period_s
     alone = watched and not len(told.link)
-    felt, after = take_sample(before, model, kin, robot, obstacles, reacting, alone, period, p, told)
+    seen = Observation(kin, robot, obstacles, told)
+    felt, after = sequential_step(before, model, seen, reacting, alone, period, p)
     bands = Thresholds(felt.bands)
-    contact = _contact(felt.force, bands) if felt.sure and found.armed else None
+    contact = _contact(felt.force, bands) if felt.detected and found.armed else None
     touched: Touched = NOT_TOUCHED
-    where: tuple[WhereState, ...] = ()
+    where: tuple[LocalisationState, ...] = ()
     if p.localise:
-        touched, following = locate(
-            state.where[0] if state.where else where_init(), model, kin, felt.means, after.count, felt.spread,
-            felt.doubt, felt.evidence, robot.qd_commanded, obstacles, told, period, profile.localisation,
+        touched, following = localise(
+            state.where[0] if state.where else localisation_init(), model, seen, felt.windows,
+            felt.log_likelihood_ratio, period, profile.localisation,
         )  # fmt: skip
         where = (following,)
     clear = None
-    if profile.reaction.pinches and felt.evidence >= 1.0:
-        clear = clearest_mean(felt.means, after.count, felt.spread, felt.doubt, period, profile.localisation)
+    if profile.reaction.pinches and felt.log_likelihood_ratio >= 1.0:
+        clear = clearest_mean(felt.windows, period, profile.localisation)
     made = Detection(
-        bands, contact, found.armed, felt.residual, felt.evidence, felt.learning, felt.lasting, touched, clear
+        bands, contact, found.armed, felt.residual, felt.log_likelihood_ratio, felt.learning, felt.lasting, touched,
+        clear,
     )  # fmt: skip
     return made, FeelState(window, (after,), where)
 

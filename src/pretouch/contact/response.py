@@ -17,8 +17,16 @@ from pretouch.contact.admittance import (
 )
 from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
 from pretouch.contact.detect import Detection
-from pretouch.contact.pinch import pinched, pressed
-from pretouch.contact.place import PlaceState, given_up, met, passed, place_init, pushed, waited
+from pretouch.contact.repeated_contact import (
+    RepeatedContactState,
+    count_contact,
+    discount_push,
+    forget_passed,
+    given_up,
+    repeated_contact_init,
+    wait_to_retry,
+)
+from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
 from pretouch.params import Profile, ReactionParams
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
@@ -33,7 +41,7 @@ class ResponseState:
     decay: reaction.ReactionState
     yielding: AdmittanceState
     clamp: ClampState
-    place: PlaceState
+    place: RepeatedContactState
 
 
 @value
@@ -80,7 +88,7 @@ Doing = Literal["task", "learn", "react", "soft", "still"]
 def response_init(q: FloatArray, params: ReactionParams) -> ResponseState:
     """Return the state without a contact, at joint positions (n,) [rad]."""
     return ResponseState(
-        reaction.reaction_init(params), admittance_init(len(q), params), clamp_init(q), place_init()
+        reaction.reaction_init(params), admittance_init(len(q), params), clamp_init(q), repeated_contact_init()
     )  # fmt: skip
 
 
@@ -120,13 +128,13 @@ def noticed(state: ResponseState, doing: Doing, felt: Felt, phase: float, resume
     elif doing == "task" and p.pinches:
         clamp = gone(clamp, felt.robot.q_commanded, dt)
     if doing == "react":
-        place = pushed(place, yielding.tank - p.start_energy_j)
+        place = discount_push(place, yielding.tank - p.start_energy_j)
     if resume:
-        place, clamp = place_init(), clamp_init(felt.robot.q_commanded)
+        place, clamp = repeated_contact_init(), clamp_init(felt.robot.q_commanded)
     elif given_up(place, p) and doing != "react":
-        place = waited(place, felt.near, dt, p)
+        place = wait_to_retry(place, felt.near, dt, p)
     elif doing == "task":
-        place = passed(place, phase, p)
+        place = forget_passed(place, phase, p)
     return ResponseState(state.decay, yielding, clamp, place)
 
 
@@ -136,12 +144,12 @@ def _pinch(clamp: ClampState, felt: Felt) -> ClampState:
     if not p.pinches or clamp.torque or found.clear is None:
         return clamp
     torque, covariance = found.clear
-    pinch = pinched(felt.model, felt.kin, torque, covariance, clamp.came, p)
+    pinch = find_self_clamp(felt.model, felt.kin, torque, covariance, clamp.came, p)
     names = felt.model.links
     if pinch is not None:
         one, other = (names[link] for link in pinch.link)
         return caught_between(clamp, f"{one} and {other}", pinch.force, torque)
-    if pressed(felt.model, felt.kin, found.touched, felt.planes, felt.standing, clamp.came, p):
+    if presses_on_fixture(felt.model, felt.kin, found.touched, felt.planes, felt.standing, clamp.came, p):
         force = float(np.linalg.norm(found.touched.force[0]))
         return caught_between(clamp, f"{names[found.touched.link[0]]} and a fixture", force, torque)
     return clamp
@@ -183,7 +191,7 @@ def began(state: ResponseState, doing: Doing, felt: Felt, phase: float, point: F
     place = replace(state.place, counted=False)
     if mine:
         kinetic = 0.5 * float(felt.command @ felt.model.mass_matrix(felt.robot.q) @ felt.command)
-        place = met(state.place, phase, point, felt.near, kinetic, p)
+        place = count_contact(state.place, phase, point, felt.near, kinetic, p)
     came = felt.command if doing == "task" else np.zeros(len(torque))
     clamp = _pinch(clamp_begun(state.clamp, felt.robot.q_commanded, came), felt)
     return ResponseState(state.decay, yielding, clamp, place)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.contact.cues import no_cues
-from pretouch.contact.felt import sequential_init, take_sample
+from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_step
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.collision import (
     CollisionParams,
@@ -75,7 +75,8 @@ def evidence(model: RobotModel, force: np.ndarray) -> float:
     state = replace(state, model=replace(state.model, speed=speed))
     robot = RobotState(0.0, q, speed, q, speed, model.ee_jacobian(kin)[:3].T @ force, None)
     free = Obstacles(whole, rows, none, rows, whole, rows, none, none)
-    return take_sample(state, model, kin, robot, free, False, False, 0.01, p, no_cues(len(model.links)))[0].evidence
+    seen = Observation(kin, robot, free, no_cues(len(model.links)))
+    return sequential_step(state, model, seen, False, False, 0.01, p)[0].log_likelihood_ratio
 
 
 def test_what_the_sequential_detector_may_miss_is_what_it_misses(panda_model: RobotModel) -> None:

@@ -28,7 +28,7 @@ import numpy as np
 
 from pretouch.checks import Checked, Positive
 from pretouch.contact.cues import no_cues
-from pretouch.contact.felt import sequential_init, take_sample
+from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_step
 from pretouch.errors import ParameterError
 from pretouch.params import Profile
 from pretouch.robot.model import RobotModel
@@ -151,7 +151,8 @@ def felt_from_n(profile: Profile, model: RobotModel) -> float:
 
     def is_felt(force: FloatArray) -> bool:
         robot = RobotState(0.0, q, speed, q, speed, J.T @ force, None)
-        return take_sample(state, model, kin, robot, nothing, False, False, period, p, quiet)[0].evidence >= 1.0
+        seen = Observation(kin, robot, nothing, quiet)
+        return sequential_step(state, model, seen, False, False, period, p)[0].log_likelihood_ratio >= 1.0
 
     latest = 0.0
     for axis in np.eye(3):
