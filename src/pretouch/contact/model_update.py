@@ -124,6 +124,7 @@ def update_model(memory: Memory, now: Situation, p: DetectionNumbers, tested: Te
     sample, whole, noise, alone, suspected = tested.sample, tested.whole, tested.noise, tested.alone, tested.suspected
     # what was gathered before a contact is suspected may be its beginning: it is thrown away, not learnt
     calm = 0 if suspected or now.reacting or not alone else min(recent.calm + 1, CALM)
+    # learnt also where a contact is suspected: an alarm at a reversal would otherwise come at each of them
     if p.widen_at_turns and alone and not now.reacting and whole == len(LENGTHS):
         learn_turning(recent.at, tested.means, noise, sample.doubt, now.period / p.memory_s, recent.turning)
     filled, waiting = 0, 0
@@ -136,6 +137,7 @@ def update_model(memory: Memory, now: Situation, p: DetectionNumbers, tested: Te
             now.most_velocity, now.most_torque,
         )  # fmt: skip
         filled, waiting = _queue_block(blocks, blocks.filled + 1, learnt, pace)
+    # something that lasts is worth finding only if it troubles the arm; calm samples learn it anyway
     steady, in_doubt = 0, recent.steady > 0 or suspected or now.reacting
     if now.settle > 0 and alone and whole == len(LENGTHS) and calm < CALM and in_doubt:
         steady = _lasting_samples(recent, now, tested, learnt, p.offset_prior_nm)
@@ -145,6 +147,7 @@ def update_model(memory: Memory, now: Situation, p: DetectionNumbers, tested: Te
 @compiled
 def _queue_block(blocks: Blocks, filled: int, learnt: Learnt, pace: Pace) -> tuple[int, int]:
     """Let a block that is full wait, and learn the one that has waited longest; return what waits now."""
+    # A contact that begins slowly is suspected late. By then its first samples are in the queue, which is thrown away.
     queue, waiting = blocks.queue, blocks.waiting
     if filled < BLOCK:
         return filled, waiting
@@ -166,6 +169,7 @@ def _lasting_samples(recent: Recent, now: Situation, tested: Tested, known: Lear
     lasting, steady, settle = recent.lasting, recent.steady, now.settle
     residual, x, J, noise, moving = tested.means[-1], tested.sample.x, tested.J, tested.noise, tested.sample.moving
     n = len(residual)
+    # what may be weight and what one joint's offset depend on the posture: both are found anew in each step
     weight = WeightPart(np.empty(n), np.empty(n), np.empty(n))
     weight_part(known.weights, x, weight)
     counts = tested.suspected or now.reacting
@@ -178,6 +182,7 @@ def _lasting_samples(recent: Recent, now: Situation, tested: Tested, known: Lear
         if not find_lasting(residual, weight, J, noise, LONGEST, offset_prior, found):
             # what has lasted may be unexplained for a while; for too long it is a person
             return steady if steady <= 2 * settle else 0
+        # found once more at the end, when it is learnt: a load that came slowly was less at the beginning
         if steady > settle:
             learn_lasting(found, residual, x, noise, LONGEST, offset_prior**2, known)
             return -1

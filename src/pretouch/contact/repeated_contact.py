@@ -51,6 +51,7 @@ def count_contact(
     """
     bound = params.pushed_j + 2.0 * kinetic
     if state.contacts and abs(phase - state.phase) <= params.place_m:
+        # the location stays that of the first contact: one that crept along would never be passed
         return RepeatedContactState(
             state.phase, state.point, state.contacts + 1, state.seen or near, 0.0, 0.0, True, bound
         )  # fmt: skip
@@ -77,6 +78,7 @@ def wait_to_retry(state: RepeatedContactState, near: bool, dt: float, params: Re
 
     That is when nothing is seen near any more, or, if nothing ever was, after `retry_s`.
     """
+    # one sighting is enough: what was once seen there has gone when it is no longer seen
     p, seen, clear = params, state.seen or near, 0.0 if near else state.clear + dt
     time = state.waited + dt
     if clear >= p.clear_s if seen else time >= p.retry_s:

@@ -22,14 +22,8 @@ class SelfClamp:
 
     link: IntArray
     """(2,) index of each."""
-    point: FloatArray
-    """(2, 3) where it touches each, base frame [m]."""
     force: float
     """Force with which it pushes them apart [N]."""
-    rest: float
-    """Square of the torques that this leaves, in standard deviations of free motion [1]."""
-    odds: float
-    """Twice the logarithm of how likely this gap is, among others: by what is left of the torques, and by its size."""
 
 
 def find_self_clamp(
@@ -53,13 +47,14 @@ def find_self_clamp(
     length = np.sqrt((between**2).sum(axis=1))
     gap = length - body.radius[first] - body.radius[second]
     # torques in units of their standard deviations: z = L^-1 tau
-    found, white = None, np.linalg.inv(np.linalg.cholesky(covariance))
+    found, best, white = None, -np.inf, np.linalg.inv(np.linalg.cholesky(covariance))
     z = white @ torque
     size = float(z @ z)
     for k in np.flatnonzero((gap > 0.0) & (gap < p.pinch_gap_m)):
         one, other, u = body.link[first[k]], body.link[second[k]], between[k] / length[k]
-        at = np.array([p1[k] + body.radius[first[k]] * u, p2[k] - body.radius[second[k]] * u])
-        J = model.jacobian(kin, other, at[1])[:3] - model.jacobian(kin, one, at[0])[:3]
+        # it touches both links on their surfaces, where they are nearest to each other
+        at_one, at_other = p1[k] + body.radius[first[k]] * u, p2[k] - body.radius[second[k]] * u
+        J = model.jacobian(kin, other, at_other)[:3] - model.jacobian(kin, one, at_one)[:3]
         # the gap closes at -u^T (J_b - J_a) qd
         if -float(u @ J @ qd) < p.pinch_closing_m_s:
             continue
@@ -67,14 +62,16 @@ def find_self_clamp(
         A = white @ J.T
         force = np.linalg.lstsq(A, z, rcond=1e-3)[0]
         along, rest = float(force @ u), float(((z - A @ force) ** 2).sum())
+        # it pushes the links apart, within a cone about the line between them
         if along < max(p.pinch_n, p.pinch_along * float(np.linalg.norm(force))):
             continue
+        # what is left is noise, and what is explained is not
         if rest > p.pinch_rest or size - rest < p.pinch_explained:
             continue
-        # a Gaussian of what is left, and an exponential prior of the thickness of what is caught
+        # twice a log-posterior: a Gaussian of what is left, an exponential prior of the thickness of what is caught
         odds = -rest - 2.0 * float(gap[k]) / p.pinch_thickness_m
-        if found is None or odds > found.odds:
-            found = SelfClamp(np.array([one, other]), at, along, rest, odds)
+        if odds > best:
+            found, best = SelfClamp(np.array([one, other]), along), odds
     return found
 
 

@@ -130,6 +130,8 @@ def sequential_step(
             noise, learnt = noise.copy(), learnt.copy()
     lasting, turning = state.lasting.copy(), state.turning.copy()
     count = min(state.count + 1, LONGEST)
+    # The fields of Joints, ObstacleArrays, Memory, Situation, DetectionNumbers, Results, Kinematics and Mechanism in
+    # their order, which nothing checks: numbers of one type can change places in silence.
     ratio, calm, filled, waiting, steady = detect_contact.flat(
         robot.qd, robot.qd_commanded, robot.tau_ext,
         o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
@@ -144,7 +146,7 @@ def sequential_step(
         p.memory_s, p.spread_memory_s,
         residual, speed, force, bands, means, covariance, model_variance, *seen.kin, *model.mechanism_fields,
     )  # fmt: skip
-    relearnt = steady < 0  # a load that lasted is free motion now: what was felt of it is no contact
+    relearnt = steady < 0  # the load that lasted is free motion now, and no contact
     if relearnt:
         ratio, force, count, calm, steady, filled, waiting = 0.0, np.zeros(3), 0, 0, 0, 0, 0
     confirmed = state.confirmed + 1 if ratio >= 1.0 else 0

@@ -59,7 +59,8 @@ def detect_contact(
         results.residual[j] = robot.tau_ext[j] - free.mean[j]
         recent.ring[recent.at, j] = results.residual[j]
 
-    # the test against contacts of each joint, of each link and of the nearest objects: ln R / ln A
+    # The test against contacts of each joint, of each link and of the nearest objects: R is the sum of prior weights
+    # times likelihood ratios, A the level that it passes at the chosen rate of false alarms.
     whole = window_means(recent.ring, (recent.at + 1) % LONGEST, recent.held, means)
     most = len(mechanism.links.parts) + (min(MOST, len(distance)) if p.use_proximity else 0)
     contacts = Hypotheses(np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most), np.zeros((most, 3)))
@@ -70,6 +71,7 @@ def detect_contact(
 
     J_ee = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
+    # nothing is learnt while anything that is seen could be what is felt
     alone = now.may_learn and distance.min() >= p.clear_m if len(distance) else now.may_learn
     sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving)
     tested = Tested(sample, means, whole, covariance, J_ee, alone, log_likelihood_ratio >= p.suspect)
@@ -77,6 +79,7 @@ def detect_contact(
 
     for j in range(n):  # only now: what is learnt is learnt of the noise alone
         covariance[j, j] += results.model_variance[j]
+    # the first n hypotheses, wrenches beyond a joint, have no direction
     away = contacts.away[max(which - n, 0)] if which >= n else np.zeros(3)
     _force_and_bands(
         J_ee, means[window], free.mean, covariance, away, math.sqrt(2.0 * now.alarm), results.force, results.bands
@@ -141,7 +144,7 @@ def _force_and_bands(
     """
     n = len(torque)
     W = np.empty((3, n))
-    force_map_into(J, W)
+    force_map_into(J, W)  # damped: near a singularity the force is taken to be smaller than it may be
     against = 0.0
     for i in range(3):
         force[i], usual, variance = 0.0, 0.0, 0.0
@@ -152,6 +155,7 @@ def _force_and_bands(
                 variance += W[i, j] * covariance[j, k] * W[i, k]
         sigma = math.sqrt(variance)
         bands[0, i], bands[1, i], bands[2, i] = usual + sigma * wide, usual - sigma * wide, usual
+        # the objects' parts of eqs. 9-11 are none here: proximity is a prior of the test
         bands[3, i], bands[4, i], bands[5, i] = sigma, 0.0, 0.0
         against += force[i] * away[i]
     # an object that is seen pushes the arm away: the part towards it is an error of the torques

@@ -51,6 +51,7 @@ def covariance_with_contact(S: FloatArray, candidates: Candidates, c: int, size:
     n, normal, p, kin = len(S), candidates.normal[c], candidates.p, candidates.kin
     J = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, candidates.moved_by[candidates.surface.link[c]], candidates.point[c], J)
+    # J^T V J = a J^T J + (F^2 - a) (J^T n)(J^T n)^T with the variance a = (mu size)^2 across the normal
     across = (p.friction * max(size, LEAST_N)) ** 2
     for i in range(n):
         along_i = J[0, i] * normal[0] + J[1, i] * normal[1] + J[2, i] * normal[2]
@@ -106,6 +107,7 @@ def find_pair(S: FloatArray, candidates: Candidates, start: Start, pair: Pair) -
         covariance_with_contact(S, candidates, held, size, C)
         if log_posterior(C, candidates, ln[k], force[k]) < 0.0:
             return -np.inf
+        # two contacts on one rigid body add up to one wrench, which tells little of two from one
         exclude_body(ln[k], body, body[held])
         moved = int(np.argmax(ln[k]))
         # about the best pair both contacts are taken to be independent: p(a, b) = p(a | b) p(b | a) / p(best | best)

@@ -75,7 +75,7 @@ def localise(
     state: LocalisationState, model: RobotModel, seen: Observation, windows: ResidualWindows,
     log_likelihood_ratio: float, period: float, p: LocalisationParams,
 ) -> tuple[Touched, LocalisationState]:  # fmt: skip
-    """Say where the arm is touched in one step, if it is.
+    """Return the contacts in one step, none without a detection.
 
     Args:
         state: memory.
@@ -92,6 +92,7 @@ def localise(
     if state.steps and since < p.update_s * (1.0 - 1e-9):  # sums of periods are not exact
         return state.touched, replace(state, since=since)
     s = model.surface
+    # the state is a value: what is written to is copied
     ln = np.zeros(len(s)) if state.steps == 0 else state.ln.copy()
     pair, link = state.pair.copy(), np.empty(2, np.int64)
     point, force, sigma, probability = np.empty((2, 3)), np.empty((2, 3)), np.empty(2), np.empty(2)
@@ -118,6 +119,7 @@ def _steady_samples(samples: int, qd: FloatArray, period: float, p: Localisation
     By so much a force's torques change in part, if a joint turns so far.
     """
     fastest = float(np.abs(qd).max())
+    # a window of T seconds lies T / 2 back on average
     return samples if fastest * samples * period <= 2.0 * p.relative else int(2.0 * p.relative / (fastest * period)) + 1
 
 
@@ -163,7 +165,7 @@ def _infer(
     prior = np.empty(count)
     log_prior(point, surface, hidden, seen, cues, p, prior)
 
-    # one contact
+    # One contact: the mean that stands out most, held against a force at each candidate.
     S = np.empty((n, n))
     window, square = most_significant(windows, so_far.independent, p.relative, S)
     if window < 0:
@@ -178,7 +180,7 @@ def _infer(
     for c in range(count):
         average[c] = (kept * average[c] + square * (ln[c] - prior[c])) / total
 
-    # two contacts
+    # Two contacts: looked for while one leaves something, from step to step from where the last search ended.
     size = so_far.size
     if unexplained > _UNEXPLAINED or so_far.two:
         found = Pair(np.empty(2, np.int64), np.empty((2, count)), np.empty((2, count, 3)))
@@ -193,6 +195,7 @@ def _infer(
         if double - single > (0.0 if so_far.two else so_far.margin):
             _summarise_pair(found, candidates, rigid, contacts)
             return total, size, 2
+    # the single contact is reported by the average, though compared with two by this step's torques alone
     for c in range(count):
         ln[c] = average[c] + prior[c]
     summarise(ln, candidates, force, contacts, 0)

@@ -32,6 +32,7 @@ def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact
     nearest candidate; a mean of points on a convex body lies inside.
     """
     at, normal, first = candidates.point, candidates.normal, candidates.surface.first
+    # exp(ln - max) cannot overflow; the sum over a body is its probability, up to the sum over all
     most, total, best, body = ln.max(), 0.0, -1.0, 0
     for d in range(len(first) - 1):
         here = 0.0
@@ -58,6 +59,7 @@ def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact
     for i in range(3):
         contacts.point[k, i] = mean[i] - above * normal[nearest, i]
         contacts.force[k, i] = there[nearest, i]
+    # second moment about the reported point, not about the mean: the error of what is reported
     V = np.zeros((3, 3))
     for c in range(first[body], first[body + 1]):
         part = math.exp(ln[c] - most) / best

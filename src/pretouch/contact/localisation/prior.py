@@ -103,6 +103,7 @@ def log_prior(
     count, base, nearest = len(point), 0.0, 0.0
     weight, kernel, touched = np.zeros(count), np.empty(count), np.zeros(count)
     located = np.zeros(len(cues.gain), np.bool_)
+    # touched units, each with its own error; candidates lie too far apart for less than `unit_m`
     for k in range(len(cues.link)):
         sigma = max(cues.sigma[k], p.unit_m)
         if _normal_kernel(point, link, area, hidden, cues.link[k], cues.point[k], sigma, kernel):
@@ -117,6 +118,8 @@ def log_prior(
             base += weight[c]
     for c in range(count):
         weight[c] /= max(base, 1e-300)
+    # What is seen: a unit sees the side of what touches, so its points lie beside the contact by about `seen_m`. The
+    # nearest one says how much of the probability goes there, and all share it by their nearness.
     by_seen = np.zeros(count)
     for k in range(len(distance)):
         nearness = min(1.0, max(0.0, 1.0 - distance[k] / p.near_m))
@@ -145,6 +148,7 @@ def _normal_kernel(
         out[c] = 0.0
         if not hidden[c] and (only < 0 or link[c] == only):
             x, y, z = point[c, 0] - mean[0], point[c, 1] - mean[1], point[c, 2] - mean[2]
+            # times the area that a candidate stands for: a density on the surface, however it is sampled
             out[c] = area[c] * math.exp(-0.5 * (x * x + y * y + z * z) / (sigma * sigma))
             total += out[c]
     if not total > 1e-30:

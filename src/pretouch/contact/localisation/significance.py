@@ -36,6 +36,7 @@ def most_significant(windows: ResidualWindows, independent: float, relative: flo
     `independent` is the part of a sample that says something new. `S` (n, n) is written: the covariance of that mean,
     with an error of the part `relative` of each joint's torque.
     """
+    # z^T S^-1 z grows with the window while the torques last, and falls once it holds samples from before the contact
     n = len(windows.model_variance)
     L, y, best, window = np.zeros((n, n)), np.empty(n), 0.0, -1
     for k in range(len(_LENGTHS)):
@@ -58,6 +59,7 @@ def _covariance_of_mean(windows: ResidualWindows, k: int, independent: float, re
 
     The noise C averages out over N independent samples, the model's variance U does not; windows hold C + U.
     """
+    # samples that follow each other closely have the same noise in part: so many of them say something new
     samples = max(1.0, independent * _LENGTHS[k])
     mean, variance = windows.means[k], windows.model_variance
     for i in range(len(mean)):

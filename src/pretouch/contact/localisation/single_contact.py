@@ -77,9 +77,10 @@ def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: 
                 lever[i] = position[k, i] - position[base, i]
                 for j in range(3):
                     lever[i] += rotation[k, i, j] * surface.point[c, j]
+            # the directions of the force at this candidate, and what the best one along them explains
             _unit_wrenches(normal[c], lever, u)
             explained, freedom = _likeliest_force(G, h, u, p.friction, p.force_n, a)
-            rest = max(square - explained, 0.0)
+            rest = max(square - explained, 0.0)  # rounding may take it below 0
             unexplained = min(unexplained, rest)
             ln[c] = freedom - 0.5 * (p.tails + n) * math.log1p(rest / p.tails) + (candidates.log_prior[c] - log_det)
             for i in range(3):
@@ -153,6 +154,7 @@ def _likeliest_force(
                 total += u[i, k] * part
             g[i, j] = total
             g[j, i] = total
+    # to begin with, the force that explains most if there is none across
     size = b[0] / (g[0, 0] + 1.0 / largest**2)
     normal, across = 1.0 / largest**2, 0.0
     c00 = c10 = c11 = c20 = c21 = c22 = v0 = v1 = v2 = 0.0
@@ -171,6 +173,7 @@ def _likeliest_force(
         v1 = (b[2] - c10 * v0) / c11
         v2 = (b[0] - c20 * v0 - c21 * v1) / c22
         size = v2 / c22
+    # back substitution, the last pivot first
     a[0] = size
     a[2] = (v1 - c21 * size) / c11
     a[1] = (v0 - c10 * a[2] - c20 * size) / c00
