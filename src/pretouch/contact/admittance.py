@@ -7,9 +7,17 @@ import numpy as np
 
 from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
 from pretouch.contact.detector import Body
-from pretouch.contact.pinch import pinched, pressed
-from pretouch.contact.place import PlaceState, given_up, met, passed, place_init, pushed, waited
 from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
+from pretouch.contact.repeated_contact import (
+    RepeatedContactState,
+    count_contact,
+    discount_push,
+    forget_passed,
+    given_up,
+    repeated_contact_init,
+    wait_to_retry,
+)
+from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
 from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
 from pretouch.modes import Event, ModeState
 from pretouch.params.reaction import AdmittanceParams, ClampParams
@@ -26,7 +34,7 @@ class AdmittanceState:
 
     mass: VirtualMass
     clamp: ClampState
-    place: PlaceState
+    place: RepeatedContactState
 
 
 @dataclass(frozen=True)
@@ -38,7 +46,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
 
     def init(self, body: Body, q: FloatArray) -> AdmittanceState:
         """Return the state without a contact, at joint positions (n,) [rad]."""
-        return AdmittanceState(mass_init(len(q), self), clamp_init(q), place_init())
+        return AdmittanceState(mass_init(len(q), self), clamp_init(q), repeated_contact_init())
 
     def sense(
         self, state: AdmittanceState, body: Body, inputs: ReactionInputs
@@ -118,18 +126,18 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         return mass
 
     def _placed(
-        self, place: PlaceState, doing: Doing, energy: float, near: bool, dt: float, inputs: ReactionInputs
-    ) -> PlaceState:
+        self, place: RepeatedContactState, doing: Doing, energy: float, near: bool, dt: float, inputs: ReactionInputs
+    ) -> RepeatedContactState:
         """Judge the contact under way by its energy [J], wait at a place given up, or forget one that is passed."""
         if inputs.resume:
-            return place_init()
+            return repeated_contact_init()
         if self.give_up is None:
             return place
         if doing == "react":
-            return pushed(place, energy)
+            return discount_push(place, energy)
         if given_up(place, self.give_up):
-            return waited(place, near, dt, self.give_up)
-        return passed(place, inputs.path_phase) if doing == "task" else place
+            return wait_to_retry(place, near, dt, self.give_up)
+        return forget_passed(place, inputs.path_phase) if doing == "task" else place
 
     def _begun(self, state: AdmittanceState, body: Body, inputs: ReactionInputs) -> AdmittanceState:
         """Begin to move with the contact that was found; one the arm brought about in its task counts for its place."""
@@ -145,7 +153,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         if mine and self.give_up is not None:
             kinetic = 0.5 * float(command @ model.mass_matrix(inputs.robot.q) @ command)
             point, near = kin.position[model.ee], self._near(inputs)
-            place = met(state.place, inputs.path_phase, point, near, kinetic, self.give_up)
+            place = count_contact(state.place, inputs.path_phase, point, near, kinetic, self.give_up)
         came = command if doing == "task" else np.zeros(len(torque))
         clamp = self._pinched(clamp_begun(state.clamp, inputs.robot.q_commanded, came), body, inputs)
         return AdmittanceState(mass, clamp, place)
@@ -156,12 +164,12 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         if p is None or clamp.torque or found.clear is None:
             return clamp
         torque, covariance = found.clear
-        pinch = pinched(body.model, kin, torque, covariance, clamp.came, p)
+        pinch = find_self_clamp(body.model, kin, torque, covariance, clamp.came, p)
         names = body.model.links
         if pinch is not None:
             one, other = (names[link] for link in pinch.link)
             return caught_between(clamp, f"{one} and {other}", pinch.force, torque)
-        if pressed(body.model, kin, found.touched, body.planes, body.standing, clamp.came, p):
+        if presses_on_fixture(body.model, kin, found.touched, body.planes, body.standing, clamp.came, p):
             force = float(np.linalg.norm(found.touched.force[0]))
             return caught_between(clamp, f"{names[found.touched.link[0]]} and a fixture", force, torque)
         return clamp

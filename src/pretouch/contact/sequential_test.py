@@ -7,9 +7,10 @@ import numpy as np
 
 from pretouch.contact.cues import Cue, Cues, no_cues, together
 from pretouch.contact.detector import Body, Detection, Detector, Readings, Sample, no_torques, strongest
-from pretouch.contact.felt import SequentialState, sequential_init, take_sample
+from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
+from pretouch.contact.localisation.significance import clearest_mean
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.contact.where import WhereState, clearest_mean, locate, where_init
+from pretouch.contact.sequential_detector import Observation, SequentialState, sequential_init, sequential_step
 from pretouch.groups import NOTHING_NEAR
 from pretouch.params import LocalisationParams, SequentialParams
 from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds
@@ -21,7 +22,7 @@ class SequentialTestState:
     """All that the sequential test remembers."""
 
     test: SequentialState
-    localisation: WhereState | None
+    localisation: LocalisationState | None
     """None where no contact is localised."""
     cues: tuple[object, ...]
     """Of each cue."""
@@ -50,36 +51,35 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
     def init(self, body: Body, learnt: ResidualModel | None = None) -> SequentialTestState:
         """Return what is remembered before the first step."""
         test = sequential_init(body.model, self, learnt)
-        return SequentialTestState(test, where_init() if self.localise else None, self._cues_init(body))
+        return SequentialTestState(test, localisation_init() if self.localise else None, self._cues_init(body))
 
     def _cues_init(self, body: Body) -> tuple[object, ...]:
         return tuple(cue.init(body) for cue in self.cues)
 
     def step(self, state: SequentialTestState, body: Body, sample: Sample) -> tuple[Detection, SequentialTestState]:
         """Hold one sample of the torques against free motion, and learn from it if nothing can be a contact."""
-        model, robot, period, location = body.model, sample.robot, body.period, state.localisation
+        model, period, location = body.model, body.period, state.localisation
         cues, remembered = self._heard(state.cues, body, sample)
         found = no_torques(body, sample)
         if found is not None:
-            return found, SequentialTestState(state.test, where_init() if location else None, remembered)
+            return found, SequentialTestState(state.test, localisation_init() if location else None, remembered)
         said = no_cues(len(model.links)) if cues is None else cues
         alone = sample.watched and not len(said.link)
-        felt, test = take_sample(
-            state.test, model, sample.kin, robot, sample.obstacles, sample.reacting, alone, period, self, said
-        )
+        seen = Observation(sample.kin, sample.robot, sample.obstacles, said)
+        felt, test = sequential_step(state.test, model, seen, sample.reacting, alone, period, self)
         bands, touched, clear = Thresholds(felt.bands), NOT_TOUCHED, None
-        contact = strongest(felt.force, bands) if felt.sure and sample.armed else None
+        contact = strongest(felt.force, bands) if felt.detected and sample.armed else None
         if self.localise:
-            touched, location = locate(
-                location or where_init(), model, sample.kin, felt.means, test.count, felt.spread, felt.doubt,
-                felt.evidence, robot.qd_commanded, sample.obstacles, said, period, self.localise,
+            touched, location = localise(
+                location or localisation_init(), model, seen, felt.windows, felt.log_likelihood_ratio, period,
+                self.localise,
             )  # fmt: skip
-        if felt.evidence >= 1.0:
-            usual = self.localise or _USUAL
-            clear = clearest_mean(felt.means, test.count, felt.spread, felt.doubt, period, usual)
+        if felt.log_likelihood_ratio >= 1.0:
+            clear = clearest_mean(felt.windows, period, self.localise or _USUAL)
         made = Detection(
-            bands, contact, sample.armed, felt.residual, felt.evidence, felt.learning, felt.lasting, touched, clear
-        )
+            bands, contact, sample.armed, felt.residual, felt.log_likelihood_ratio, felt.learning, felt.lasting,
+            touched, clear,
+        )  # fmt: skip
         return made, SequentialTestState(test, location if self.localise else None, remembered)
 
     def _heard(self, states: tuple[object, ...], body: Body, sample: Sample) -> tuple[Cues | None, tuple[object, ...]]:
@@ -111,8 +111,9 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
 
         def is_felt(force: FloatArray) -> bool:
             robot = RobotState(0.0, q, qd, q, qd, J.T @ force, None)
-            felt, _ = take_sample(state, model, kin, robot, NOTHING_NEAR, False, False, body.period, self, said)
-            return felt.evidence >= 1.0
+            seen = Observation(kin, robot, NOTHING_NEAR, said)
+            felt, _ = sequential_step(state, model, seen, False, False, body.period, self)
+            return felt.log_likelihood_ratio >= 1.0
 
         latest = 0.0
         for axis in np.eye(3):

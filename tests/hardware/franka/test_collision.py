@@ -5,7 +5,7 @@ import pytest
 
 from pretouch.contact.cues import no_cues
 from pretouch.contact.detector import Body
-from pretouch.contact.felt import sequential_init, take_sample
+from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_step
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.collision import (
     CollisionParams,
@@ -76,7 +76,8 @@ def evidence(model: RobotModel, force: np.ndarray) -> float:
     state = replace(state, model=replace(state.model, speed=speed))
     robot = RobotState(0.0, q, speed, q, speed, model.ee_jacobian(kin)[:3].T @ force, None)
     free = Obstacles(whole, rows, none, rows, whole, rows, none, none)
-    return take_sample(state, model, kin, robot, free, False, False, 0.01, p, no_cues(len(model.links)))[0].evidence
+    seen = Observation(kin, robot, free, no_cues(len(model.links)))
+    return sequential_step(state, model, seen, False, False, 0.01, p)[0].log_likelihood_ratio
 
 
 def missed(model: RobotModel) -> float:

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pretouch.contact.detector import Sample
-from pretouch.contact.felt import SequentialState
 from pretouch.contact.hypotheses import NearPrior, write_hypotheses
 from pretouch.contact.residual_model import spread_of_sample
 from pretouch.contact.sequential import LENGTHS, Hypotheses, judge, window_means
+from pretouch.contact.sequential_detector import SequentialState
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.errors import ExperimentError
 from pretouch.groups import NOTHING_NEAR

@@ -4,11 +4,25 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.contact.places import DOUBT, MODEL, SPREAD, SURFACE, N, exposed, of, place, posture, said, torques
+from tests.contact.localisation.arm import (
+    MODEL,
+    MODEL_VARIANCE,
+    NOISE,
+    SURFACE,
+    N,
+    P,
+    exposed,
+    of,
+    pose_of,
+    poses,
+    posture,
+    said,
+    torques,
+)
 
 from pretouch.contact.cues import Cues
+from pretouch.contact.localisation.prior import LocalisationNumbers, SeenNear, UnitCues, log_prior
 from pretouch.contact.tactile import gain_of, surface_area
-from pretouch.contact.where_prior import PriorParams, SeenNear, UnitCues, place_surface, prior_of_places
 from pretouch.params import TouchSensorParams
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.unit import TouchPatch
@@ -19,11 +33,11 @@ SIGMA_M = PATCH.radius / 2
 
 
 def touched(kin: Kinematics, c: int) -> Cues:
-    """What a unit at a place says while it is touched, as `TouchSensors` has it."""
+    """What a unit at a candidate says while it is touched, as `TouchSensors` has it."""
     link, gain = SURFACE.link[c], np.ones(len(MODEL.links))
     share = np.array([np.pi * PATCH.radius**2 / surface_area(MODEL.capsules, int(link))])
     gain[link] = gain_of(share, TouchSensorParams())[0]
-    return Cues(gain, np.array([link]), place(kin, c)[0][None], np.array([SIGMA_M]), np.array([5.0]))
+    return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([SIGMA_M]), np.array([5.0]))
 
 
 def body(link: int) -> int:
@@ -32,7 +46,7 @@ def body(link: int) -> int:
 
 def noisy(torque: FloatArray, seed: int) -> FloatArray:
     noise = np.random.default_rng(seed).standard_normal(N)
-    return np.asarray(torque + np.linalg.cholesky(SPREAD / 16 + np.diag(DOUBT)) @ noise)
+    return np.asarray(torque + np.linalg.cholesky(NOISE / 16 + np.diag(MODEL_VARIANCE)) @ noise)
 
 
 @pytest.mark.parametrize(("link", "most"), [("panda_link1", 0.9), ("panda_link2", 0.7), ("panda_link3", 0.9)])
@@ -40,7 +54,7 @@ def test_a_touch_tells_the_place_on_links_of_which_torques_tell_little(link, mos
     kin, rng, right, told_off, alone_off = posture(3), np.random.default_rng(4), 0, [], []
     own = np.flatnonzero((SURFACE.link == MODEL.link_index(link)) & exposed(kin))
     for seed, c in enumerate(rng.choice(own, 12)):
-        point, _ = place(kin, int(c))
+        point, _ = pose_of(kin, int(c))
         torque = noisy(torques(kin, (int(c), 30.0)), seed)
         alone, _ = said(kin, torque)
         told, _ = said(kin, torque, cues=touched(kin, int(c)))
@@ -64,8 +78,8 @@ def test_torques_that_contradict_a_false_touch_win(seed, where, one, other, newt
     free = np.flatnonzero(exposed(kin))
     own = free[SURFACE.body[free] == where]
     c, false = int(own[one % len(own)]), int(free[other % len(free)])
-    point, _ = place(kin, c)
-    assume(np.linalg.norm(place(kin, false)[0] - point) > 0.08)
+    point, _ = pose_of(kin, c)
+    assume(np.linalg.norm(pose_of(kin, false)[0] - point) > 0.08)
     torque = noisy(torques(kin, (c, newtons)), seed)
     alone, _ = said(kin, torque, steps=3)
     # what contradicts the touch: the torques alone are sure of the right body, and of where on it
@@ -78,13 +92,14 @@ def test_torques_that_contradict_a_false_touch_win(seed, where, one, other, newt
 
 
 def prior(kin: Kinematics, cues: Cues, hidden: FloatArray) -> FloatArray:
-    """Probability (N,) of each place before torques are looked at, nothing being seen."""
-    at, outwards = np.empty((len(SURFACE), 3)), np.empty((len(SURFACE), 3))
-    place_surface(kin.position, kin.rotation, SURFACE.link, SURFACE.point, SURFACE.normal, at, outwards)
-    ln = np.empty(len(SURFACE))
-    prior_of_places(
-        at, SURFACE.arrays, hidden, SeenNear(np.zeros((0, 3)), np.zeros(0)),
-        UnitCues(cues.gain, cues.link, cues.point, cues.sigma), PriorParams(0.7, 0.06, 0.25, 0.95, 0.015), ln,
+    """Probability (N,) of each candidate before torques are looked at, nothing being seen."""
+    ln, numbers = (
+        np.empty(len(SURFACE)),
+        LocalisationNumbers(*(getattr(P, name) for name in LocalisationNumbers._fields)),
+    )
+    log_prior(
+        poses(kin)[0], SURFACE.arrays, hidden, SeenNear(np.zeros((0, 3)), np.zeros(0)),
+        UnitCues(cues.gain, cues.link, cues.point, cues.sigma), numbers, ln,
     )  # fmt: skip
     return np.exp(ln)
 

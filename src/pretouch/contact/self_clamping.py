@@ -1,8 +1,9 @@
-"""Caught between two of the arm's own links, or between one and what stands beside the arm.
+"""Self-clamping: something caught between two links of the arm, or between a link and a fixture.
 
-Two forces that cancel turn only the joints between the two links. A contact from outside turns the joints before its
-link too, unless its line of action passes through their axes. Between a link and a fixture is what pushes the link away
-from it, a gap's width before it, while the arm comes. See docs/explanation/reaction.md.
+Two opposite forces f on links a and b make the torques (J_b - J_a)^T f, which turn only the joints between the two
+links. A contact from outside turns the joints before its link too, unless its line of action passes through their axes.
+What is between a link and a fixture pushes the link away from it, a gap's width before it, while the arm closes the
+gap. See docs/explanation/reaction.md.
 """
 
 import numpy as np
@@ -16,93 +17,96 @@ from pretouch.values import value
 
 
 @value
-class Pinch:
-    """What is caught between two links."""
+class SelfClamp:
+    """Something caught between two links."""
 
     link: IntArray
     """(2,) index of each."""
-    point: FloatArray
-    """(2, 3) where each touches, base frame [m]."""
     force: float
     """Force with which it pushes them apart [N]."""
-    rest: float
-    """Square of the torques that this leaves, in standard deviations of free motion [1]."""
-    odds: float
-    """Twice the logarithm of how likely this gap is, among others: by what is left of the torques, and by its size."""
 
 
-def pinched(
+def find_self_clamp(
     model: RobotModel, kin: Kinematics, torque: FloatArray, covariance: FloatArray, qd: FloatArray, p: PinchParams
-) -> Pinch | None:
-    """Return what is caught between two links that come nearer to each other, or None.
+) -> SelfClamp | None:
+    """Return what is caught between two links that approach each other, or None.
 
     Args:
         model: the arm.
         kin: its posture.
         torque: (n,) external torques less those of free motion [Nm].
         covariance: (n, n) of what free motion leaves of them [Nm^2].
-        qd: (n,) joint velocities with which the arm came [rad/s].
+        qd: (n,) joint velocities with which the arm came to the contact [rad/s].
         p: parameters.
     """
     body, (first, second) = model.capsules, model.apart.T
     a = kin.position[body.link] + np.einsum("cij,cj->ci", kin.rotation[body.link], body.a)
     b = kin.position[body.link] + np.einsum("cij,cj->ci", kin.rotation[body.link], body.b)
     p1, p2 = nearest_points(a[first], b[first], a[second], b[second])
-    way = p2 - p1
-    length = np.sqrt((way**2).sum(axis=1))
+    between = p2 - p1
+    length = np.sqrt((between**2).sum(axis=1))
     gap = length - body.radius[first] - body.radius[second]
-    found, white = None, np.linalg.inv(np.linalg.cholesky(covariance))
+    # torques in units of their standard deviations: z = L^-1 tau
+    found, best, white = None, -np.inf, np.linalg.inv(np.linalg.cholesky(covariance))
     z = white @ torque
     size = float(z @ z)
     for k in np.flatnonzero((gap > 0.0) & (gap < p.gap_m)):
-        one, other, u = body.link[first[k]], body.link[second[k]], way[k] / length[k]
-        at = np.array([p1[k] + body.radius[first[k]] * u, p2[k] - body.radius[second[k]] * u])
-        J = model.jacobian(kin, other, at[1])[:3] - model.jacobian(kin, one, at[0])[:3]
+        one, other, u = body.link[first[k]], body.link[second[k]], between[k] / length[k]
+        # it touches both links on their surfaces, where they are nearest to each other
+        at_one, at_other = p1[k] + body.radius[first[k]] * u, p2[k] - body.radius[second[k]] * u
+        J = model.jacobian(kin, other, at_other)[:3] - model.jacobian(kin, one, at_one)[:3]
+        # the gap closes at -u^T (J_b - J_a) qd
         if -float(u @ J @ qd) < _CLOSING_M_S:
             continue
+        # J has the rank of the joints between the two links, often less than 3
         A = white @ J.T
         force = np.linalg.lstsq(A, z, rcond=1e-3)[0]
         along, rest = float(force @ u), float(((z - A @ force) ** 2).sum())
+        # it pushes the links apart, within a cone about the line between them
         if along < max(p.force_n, _ALONG * float(np.linalg.norm(force))):
             continue
+        # what is left is noise, and what is explained is not
         if rest > _REST or size - rest < _EXPLAINED:
             continue
+        # twice a log-posterior: a Gaussian of what is left, an exponential prior of the thickness of what is caught
         odds = -rest - 2.0 * float(gap[k]) / _THICKNESS_M
-        if found is None or odds > found.odds:
-            found = Pinch(np.array([one, other]), at, along, rest, odds)
+        if odds > best:
+            found, best = SelfClamp(np.array([one, other]), along), odds
     return found
 
 
-def pressed(
+def presses_on_fixture(
     model: RobotModel, kin: Kinematics, touched: Touched, planes: FloatArray, standing: Capsules, qd: FloatArray,
     p: PinchParams,
 ) -> bool:  # fmt: skip
-    """Whether a link presses something against a fixture: where the surest contact is, and where its force points.
+    """Whether a link presses something against a fixture, by the most certain contact's point and force.
 
     Args:
         model: the arm.
         kin: its posture.
-        touched: where it is touched.
+        touched: the contacts.
         planes: (P, 4) rows (normal, offset) of fixtures, normals into free space, base frame.
         standing: capsules of fixtures, base frame.
-        qd: (n,) joint velocities with which the arm came [rad/s].
+        qd: (n,) joint velocities with which the arm came to the contact [rad/s].
         p: parameters.
     """
     if not len(touched.link):
         return False
     point, force = touched.point[0], touched.force[0]
     size = float(np.sqrt(force @ force))
-    coming = -float(force @ model.jacobian(kin, int(touched.link[0]), point)[:3] @ qd)
-    if size < p.force_n or coming < _CLOSING_M_S * size:
+    # speed at which the contact point moves against the force
+    closing = -float(force @ model.jacobian(kin, int(touched.link[0]), point)[:3] @ qd)
+    if size < p.force_n or closing < _CLOSING_M_S * size:
         return False
     gap, away = planes[:, :3] @ point - planes[:, 3], planes[:, :3]
     if len(standing):
-        # a segment that is a point: how far it is from each axis
+        # distance of the point from each axis: a segment of no length
         there = np.broadcast_to(point, standing.a.shape)
         foot, _ = nearest_points(standing.a, standing.b, there, there)
         far = np.linalg.norm(point - foot, axis=1)
         gap = np.concatenate([gap, far - standing.radius])
         away = np.concatenate([away, (point - foot) / np.maximum(far, _ON_AXIS_M)[:, None]])
+    # nearer than `_LEAST_GAP_M` it is the fixture itself that the arm touches
     return bool(np.any((gap > _LEAST_GAP_M) & (gap < p.gap_m) & (away @ force > _ALONG * size)))
 
 

@@ -1,4 +1,4 @@
-"""Where a contact is: evidence against dense linear algebra, noiseless contacts found again, priors, two at once."""
+"""Contact localisation: likelihoods against linear algebra, noiseless contacts found again, priors, two at once."""
 
 from dataclasses import replace
 
@@ -7,16 +7,31 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests.contact.places import MODEL, SPREAD, SURFACE, N, P, exposed, of, place, posture, said, torques
+from tests.contact.localisation.arm import (
+    MODEL,
+    NOISE,
+    SURFACE,
+    N,
+    P,
+    exposed,
+    of,
+    pose_of,
+    poses,
+    posture,
+    said,
+    torques,
+)
 
 from pretouch.contact.cues import Cues, no_cues
-from pretouch.contact.one_place import ForcePrior, Whitened, covariance_of_mean, evidence_of_places
-from pretouch.contact.two_places import Held, held
-from pretouch.contact.where_prior import PriorParams, SeenNear, UnitCues, place_surface, prior_of_places
+from pretouch.contact.localisation.double_contact import covariance_with_contact
+from pretouch.contact.localisation.prior import LocalisationNumbers, SeenNear, UnitCues, log_prior
+from pretouch.contact.localisation.single_contact import Candidates, log_posterior
 from pretouch.types import Obstacles
 
+NUMBERS = LocalisationNumbers(*(getattr(P, name) for name in LocalisationNumbers._fields))
 
-def test_places_lie_on_the_capsules_and_stand_for_their_area():
+
+def test_candidates_lie_on_the_capsules_and_stand_for_their_area():
     body = MODEL.body
     for c in range(0, len(SURFACE), 7):
         own = body.of_links(SURFACE.link[c : c + 1])
@@ -33,29 +48,28 @@ def test_places_lie_on_the_capsules_and_stand_for_their_area():
     assert 0.5 * whole < found < whole
 
 
-def test_evidence_is_that_of_a_normal_distribution_with_the_force_integrated_out():
-    # with many degrees of freedom, and a force whose size is known, the evidence of a place is N(tau; 0, S + J^T V J)
+def test_the_likelihood_is_that_of_a_normal_distribution_with_the_force_integrated_out():
+    # with many degrees of freedom, and a force whose size is known, it is N(tau; 0, S + J^T V J)
     kin, c = posture(), of("panda_link6", posture())
-    point, normal = place(kin, c)
+    point, normal = pose_of(kin, c)
     torque = torques(kin, (c, 30.0))
-    C = np.empty((N, N))
-    covariance_of_mean(torque, SPREAD, np.zeros(N), 1.0, 0.0, C)
-    L = np.linalg.cholesky(C)
-    y = np.linalg.solve(L, torque)
     ln, force = np.empty(len(SURFACE)), np.empty((len(SURFACE), 3))
-    known = ForcePrior(0.25, 1000.0, 1e9)
-    left = evidence_of_places(kin, MODEL.moved_by, SURFACE.arrays, Whitened(L, y, y @ y), known, ln, force)
+    known = NUMBERS._replace(friction=0.25, force_n=1000.0, tails=1e9)
+    candidates = Candidates(
+        torque, kin, MODEL.moved_by, SURFACE.arrays, *poses(kin), np.zeros(len(SURFACE)), known
+    )  # fmt: skip
+    left = log_posterior(NOISE, candidates, ln, force)
     assert_allclose(force[c], -30.0 * normal, atol=0.5)
     assert left < 0.1
     size = -force[c] @ normal
     whole = np.empty((N, N))
-    held(C, kin, Held(MODEL.moved_by[SURFACE.link[c]], point, normal, size), known, whole)
+    covariance_with_contact(NOISE, candidates, c, size, whole)
     J = MODEL.jacobian(kin, int(SURFACE.link[c]), point)[:3]
     V = 1000.0**2 * np.outer(normal, normal) + (0.25 * size) ** 2 * (np.eye(3) - np.outer(normal, normal))
-    assert_allclose(whole, C + J.T @ V @ J, rtol=1e-9)
+    assert_allclose(whole, NOISE + J.T @ V @ J, rtol=1e-9)
     # only a push is allowed: twice the density
     expected = np.log(2.0) - 0.5 * torque @ np.linalg.solve(whole, torque)
-    expected -= 0.5 * (np.linalg.slogdet(whole)[1] - np.linalg.slogdet(C)[1])
+    expected -= 0.5 * np.linalg.slogdet(whole)[1]
     assert ln[c] == pytest.approx(expected, abs=0.02)
 
 
@@ -65,7 +79,7 @@ def test_a_contact_on_an_outer_link_is_found_where_it_is(link, seed):
     kin = posture(seed)
     c = of(link, kin)
     found, _ = said(kin, torques(kin, (c, 40.0)), steps=4)
-    point, normal = place(kin, c)
+    point, normal = pose_of(kin, c)
     assert len(found.link) == 1
     assert MODEL.rigid[found.link[0]] == MODEL.rigid[SURFACE.link[c]]
     assert np.linalg.norm(found.point[0] - point) < 0.03
@@ -76,7 +90,7 @@ def test_a_contact_on_an_outer_link_is_found_where_it_is(link, seed):
 def test_a_force_line_that_crosses_the_body_twice_is_taken_where_it_pushes_inwards():
     kin = posture(1)
     c = of("panda_hand", kin)
-    point, normal = place(kin, c)
+    point, normal = pose_of(kin, c)
     found, _ = said(kin, torques(kin, (c, 40.0)))
     other, _ = said(kin, -torques(kin, (c, 40.0)))
     assert found.force[0] @ normal < 0 < other.force[0] @ normal
@@ -91,7 +105,7 @@ def test_two_contacts_are_told_from_one():
     assert set(MODEL.rigid[found.link]) == {MODEL.rigid[SURFACE.link[a]], MODEL.rigid[SURFACE.link[b]]}
     assert found.probability[0] >= found.probability[1]
     hand = int(np.argmax(MODEL.rigid[found.link]))
-    assert np.linalg.norm(found.point[hand] - place(kin, b)[0]) < 0.04
+    assert np.linalg.norm(found.point[hand] - pose_of(kin, b)[0]) < 0.04
     # when one of them goes, what is left is one again
     found, _ = said(kin, torques(kin, (b, 30.0)), steps=3, state=state)
     assert len(found.link) == 1
@@ -108,13 +122,13 @@ def test_two_contacts_are_on_two_bodies_even_where_both_of_their_places_spread_t
 def test_nothing_is_said_while_nothing_is_felt_and_nothing_is_remembered_afterwards():
     kin = posture()
     torque = torques(kin, (of("panda_hand", kin), 40.0))
-    found, state = said(kin, torque, evidence=0.9)
+    found, state = said(kin, torque, ratio=0.9)
     assert not len(found.link)
     assert state.steps == 0
     found, state = said(kin, torque)
     assert len(found.link) == 1
-    assert said(kin, torque, evidence=0.6, state=state)[1].steps == 2  # it goes on below the evidence it began with
-    found, state = said(kin, torque, evidence=0.4, state=state)
+    assert said(kin, torque, ratio=0.6, state=state)[1].steps == 2  # it goes on below the ratio it began with
+    found, state = said(kin, torque, ratio=0.4, state=state)
     assert not len(found.link)
     assert not len(state.ln)
 
@@ -122,7 +136,7 @@ def test_nothing_is_said_while_nothing_is_felt_and_nothing_is_remembered_afterwa
 def test_a_touched_unit_and_a_seen_hand_say_where_when_the_torques_do_not():
     kin = posture()
     c = of("panda_link2", kin)
-    point, normal = place(kin, c)
+    point, normal = pose_of(kin, c)
     torque = torques(kin, (c, 60.0))
     alone, _ = said(kin, torque)
     cue = Cues(np.ones(len(MODEL.links)), SURFACE.link[c : c + 1], point[None], np.array([0.01]), np.array([np.nan]))
@@ -137,7 +151,7 @@ def test_a_touched_unit_and_a_seen_hand_say_where_when_the_torques_do_not():
     assert np.linalg.norm(told.point[0] - point) < 0.02
     assert np.linalg.norm(seen.point[0] - point) < 0.06
     assert told.sigma[0] < alone.sigma[0]
-    # and of a link that units call likely more is believed
+    # and a link that units call likely more is believed
     gain = np.ones(len(MODEL.links))
     gain[SURFACE.link[c]] = 100.0
     likely, _ = said(kin, torque, cues=replace(no_cues(len(MODEL.links)), gain=gain))
@@ -146,14 +160,13 @@ def test_a_touched_unit_and_a_seen_hand_say_where_when_the_torques_do_not():
 
 def test_the_prior_is_one_in_all_and_hides_what_cannot_be_touched():
     kin = posture()
-    at, outwards = np.empty((len(SURFACE), 3)), np.empty((len(SURFACE), 3))
-    place_surface(kin.position, kin.rotation, SURFACE.link, SURFACE.point, SURFACE.normal, at, outwards)
+    point, _ = poses(kin)
     hidden, ln = ~exposed(kin), np.empty(len(SURFACE))
     assert 0 < hidden.sum() < len(SURFACE) / 2
-    prior_of_places(
-        at, SURFACE.arrays, hidden, SeenNear(at[:2] + 0.03, np.array([0.03, 0.2])),
+    log_prior(
+        point, SURFACE.arrays, hidden, SeenNear(point[:2] + 0.03, np.array([0.03, 0.2])),
         UnitCues(np.ones(len(MODEL.links)), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)),
-        PriorParams(0.7, 0.06, 0.25, 0.95, 0.015), ln,
+        NUMBERS, ln,
     )  # fmt: skip
     assert np.exp(ln).sum() == pytest.approx(1.0, abs=1e-6)
     assert np.exp(ln[hidden]).max() < 1e-11
