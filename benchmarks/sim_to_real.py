@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from pretouch.control.path import WayPoints
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

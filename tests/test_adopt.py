@@ -8,7 +8,7 @@ import pytest
 from pretouch.control.path import Circle, Path
 from pretouch.controller import Controller
 from pretouch.errors import RobotStateError
-from pretouch.params import PROFILES, Profile
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Mode

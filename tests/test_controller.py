@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.controller import Controller
-from pretouch.params import PROFILES, Profile
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, QpOutcome

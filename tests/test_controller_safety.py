@@ -7,8 +7,8 @@ import pytest
 
 from pretouch.control.path import Circle, Path, line
 from pretouch.controller import Controller
-from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, RangeStatus, RobotState

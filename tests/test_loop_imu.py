@@ -7,8 +7,8 @@ import pytest
 
 from pretouch import loop
 from pretouch.hardware.traffic import ImuBatch, imu_readings
-from pretouch.params import profile
 from pretouch.ports import imu_of
+from pretouch.profiles import profile
 from pretouch.types import ImuReadings, RangeReadings, RangeStatus
 from pretouch_lab.baselines.accelerometers import ImpactState
 from tests.fuzz.invariants import same

@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.contact.reaction import Reaction, ReactionMotion, contact_event
 from pretouch.modes import Event
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.recording.state_codec import decode_state, encode_state
 from pretouch.types import Mode
 from tests.following_arm import PAPER, Arm

@@ -11,20 +11,18 @@ from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
-    PROFILES,
     ClampParams,
     FailureParams,
     GiveUpParams,
     PerceptionParams,
     PinchParams,
-    Profile,
     ReductionParams,
     RestrictionParams,
     TaskParams,
     ThresholdParams,
     WindowParams,
-    profile,
 )
+from pretouch.profiles import PROFILES, Profile, profile
 
 SETS = [
     PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), FailureParams(),

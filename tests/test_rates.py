@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.errors import ParameterError
-from pretouch.params import PROFILES, Profile, at_rate
+from pretouch.profiles import PROFILES, Profile, at_rate
 
 PAPER = PROFILES["paper"]
 

@@ -19,8 +19,8 @@ from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, MonotonicClock
-from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, RangeReadings, RobotState

@@ -8,8 +8,8 @@ import pytest
 from pretouch.controller import Controller
 from pretouch.faults import sound_touch
 from pretouch.loop import turn
-from pretouch.params import PROFILES, profile
 from pretouch.ports import touch_of
+from pretouch.profiles import PROFILES, profile
 from pretouch.recording.messages import own_definition
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
@@ -194,7 +194,7 @@ def test_a_recording_with_touch_is_recomputed_to_the_bit(panda_model, feeling, t
     found = verify(kept)
     assert found.exact
     assert found.agrees
-    assert run.cycles[-1].after.touch[0].account.any()
+    assert run.cycles[-1].after.detector.cues[0].account.any()
 
 
 def test_touch_that_fits_no_message_is_said_to_be_missing(panda_model, feeling, tmp_path):

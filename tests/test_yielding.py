@@ -9,7 +9,8 @@ from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.errors import ParameterError
 from pretouch.modes import ModeState
-from pretouch.params import PROFILES, ClampParams, GiveUpParams, Profile, profile
+from pretouch.params import ClampParams, GiveUpParams
+from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.recording.state_codec import decode_state, encode_state
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

@@ -12,9 +12,10 @@ from pretouch.control.path import line
 from pretouch.control.qp import solve, task_cost
 from pretouch.control.restriction import approach_rows
 from pretouch.controller import Controller, ControllerState
-from pretouch.params import RestrictionParams, TaskParams, profile
+from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin

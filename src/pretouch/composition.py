@@ -131,6 +131,22 @@ def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
     return replace(value, **new) if new else value
 
 
+def leaves(params: Any, where: str = "") -> Iterator[tuple[str, object]]:
+    """Yield each parameter by its path; a part by its name, before its own parameters."""
+    for f in fields(params):
+        path, value = (f"{where}.{f.name}" if where else f.name), getattr(params, f.name)
+        if isinstance(value, tuple) and value and all(isinstance(item, Part) for item in value):
+            yield path, _written(value)
+            for item in value:
+                yield from leaves(item, f"{path}.{item.name}")
+        elif is_dataclass(value):
+            if isinstance(value, Part):
+                yield path, value.name
+            yield from leaves(value, path)
+        else:
+            yield path, value
+
+
 def at(value: Any, path: str, where: str = "") -> Any:
     """Return what stands at a path; a ParameterError where nothing does."""
     first, _, rest = path.partition(".")

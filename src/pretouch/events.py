@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.contact.detector import Detection
 from pretouch.modes import Event
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 
 
 def events_of(

@@ -14,7 +14,8 @@ from pretouch import __version__
 from pretouch.atomic_write import write_json
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
-from pretouch.params import Orientation, RestrictionMode, profile
+from pretouch.params import Orientation, RestrictionMode
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel

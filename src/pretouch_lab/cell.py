@@ -6,7 +6,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import cast
 
-from pretouch.params import Orientation, Profile, RestrictionMode, profile
+from pretouch.params import Orientation, RestrictionMode
+from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import Placement

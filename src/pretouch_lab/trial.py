@@ -15,7 +15,7 @@ from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.hardware.traffic import UnitTraffic
 from pretouch.loop import Cycle, Options, run
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.reader import Recorded
 from pretouch.recording.truth import Truth, truth_of
 from pretouch.recording.writer import Recording

@@ -6,7 +6,7 @@ from tests.contact.alone import begun as feel_init
 from tests.contact.alone import feel
 
 from pretouch.contact.cues import Cues, no_cues, together
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, Obstacles, RobotState
 

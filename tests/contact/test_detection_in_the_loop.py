@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.control.path import Circle, line
 from pretouch.controller import Controller
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec, fixtures

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, mass_init, yielded
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 
 DT, N = 0.01, 7

@@ -13,8 +13,9 @@ from pretouch.control.path import Circle
 from pretouch.control.qp import Cost, solve
 from pretouch.control.restriction import ApproachRows
 from pretouch.controller import Controller
-from pretouch.params import PROFILES, RestrictionMode
+from pretouch.params import RestrictionMode
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, Mode, QpOutcome, QpSolution, RangeReadings, RangeStatus, RobotState

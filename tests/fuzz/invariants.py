@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 
 from pretouch.contact.admittance import Admittance
-from pretouch.params import ClampParams, Profile
+from pretouch.params import ClampParams
+from pretouch.profiles import Profile
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Mode, QpOutcome, Touched

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RobotState
 
 SHOWN, NEAR, NO_TARGET = {0, 6, 11}, {3, 13}, {1, 2, 4, 7}

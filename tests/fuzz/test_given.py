@@ -12,8 +12,8 @@ from numba.core.registry import CPUDispatcher
 from pretouch.control.path import Circle
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import PretouchError
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState

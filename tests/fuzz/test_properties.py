@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pretouch.control.path import Circle, line
-from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin

@@ -17,16 +17,15 @@ from pretouch.params import (
     LocalisationParams,
     PerceptionParams,
     PinchParams,
-    Profile,
     ProximityPriorParams,
     ReductionParams,
     RestrictionParams,
     TaskParams,
     WindowParams,
-    profile,
 )
 from pretouch.params.anticipation import AnticipationParams
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.profiles import Profile, profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin

@@ -10,7 +10,7 @@ from pretouch.imported_data.detect import detect_imported
 from pretouch.imported_data.samples import read_imported
 from pretouch.imported_data.source import Choice
 from pretouch.imported_data.summary import findings, guidance, summary
-from pretouch.params import PROFILES, at_rate, profile
+from pretouch.profiles import PROFILES, at_rate, profile
 from tests.following_arm import Arm
 from tests.imported_data.files import PUSHES, force_columns, joints, pushed, ranging, stamps, write_bag, write_csv
 from tests.imported_data.files import wrenches as wrench_messages

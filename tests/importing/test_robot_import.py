@@ -16,7 +16,7 @@ from pretouch.importing.body import fit_error
 from pretouch.importing.folder import write_folder
 from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import ImportOptions, import_robot
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances

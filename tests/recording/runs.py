@@ -10,8 +10,8 @@ from pretouch.control.path import Circle
 from pretouch.control.path import Path as Course
 from pretouch.controller import Controller, ControllerState
 from pretouch.loop import Cycle
-from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, Profile
 from pretouch.recording.writer import Recording
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel

@@ -8,7 +8,7 @@ import pytest
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
-from pretouch.params import PROFILES, at_rate, profile
+from pretouch.profiles import PROFILES, at_rate, profile
 from pretouch.recording.compare import Found, compare, matched
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording

@@ -261,12 +261,12 @@ def test_a_later_format_is_refused(tiny, tmp_path):
 def test_a_profile_of_another_version_can_be_looked_at_and_not_recomputed(tiny, tmp_path):
     profile = json.loads(decoded(RUN, raw_run(tiny[0])).profile)
     profile["task"]["elbow"] = 1
-    del profile["react"], profile["threshold"]["alpha"]
+    del profile["react"], profile["window"]["alpha"]
     opened = open_recording(run_with(tiny, tmp_path / "a.mcap", profile=json.dumps(profile)))
     assert len(opened) == len(open_recording(tiny[0]))
-    assert opened.runs[0].unlike == ("react", "task.elbow", "threshold.alpha")
-    assert opened.runs[0].profile.threshold.alpha == 0.1
-    with pytest.raises(RecordingError, match=r"differs in react, task\.elbow, threshold\.alpha from .* made it, 0"):
+    assert opened.runs[0].unlike == ("react", "task.elbow", "window.alpha")
+    assert opened.runs[0].profile.window.alpha == 0.1
+    with pytest.raises(RecordingError, match=r"differs in react, task\.elbow, window\.alpha from .* made it, 0"):
         verify(opened)
 
 

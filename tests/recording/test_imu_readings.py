@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.recording.codec import decode_imu, encode_imu
 from pretouch.recording.last_seconds import LastSeconds
 from pretouch.recording.reader import open_recording

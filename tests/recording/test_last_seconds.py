@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.recording.last_seconds import LastSeconds
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify

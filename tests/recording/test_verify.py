@@ -9,7 +9,7 @@ from pretouch.contact.window import window_init
 from pretouch.control.path import line
 from pretouch.control.posture import brought_to
 from pretouch.loop import Cycle, turn
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.recording import verify as verifying
 from pretouch.recording.codec import STEP, decode_step, encode_step
 from pretouch.recording.messages import decoded, encoded

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pretouch.control.path import Circle, Path, line
-from pretouch.params import PROFILES, Profile, WindowParams
+from pretouch.params import WindowParams
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

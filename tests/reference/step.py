@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.params import Profile
 from pretouch.perception.scene_filter import Fixtures
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Contact, ControlStep, Inputs, Mode, QpOutcome, QpSolution, RobotState

@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from pretouch.params import PROFILES, profile
+from pretouch.profiles import PROFILES, profile
 from pretouch.reporting.html import bad, number, percent, table
 from pretouch.reporting.measures import measure
 from pretouch.reporting.orientation import ISO_TS_15066
@@ -77,7 +77,7 @@ def test_everything_that_was_asked_for_is_on_the_page(reader):
     for words in (
         "What ran", "Detected contacts", "True touches (simulation)", "Proximity was not used", "Speed",
         "Modes and quadratic program", "Limits of the arm", "Units, robot and loop", "ISO/TS 15066:2016, table A.2",
-        "for orientation, not conformity", "Parameters", "threshold.f_base_n", "panda_hand", "1 of 100 samples",
+        "for orientation, not conformity", "Parameters", "detect.f_base_n", "panda_hand", "1 of 100 samples",
     ):  # fmt: skip
         assert words in reader.said, words
     assert reader.tags.count("figure") == 5

@@ -11,10 +11,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from pretouch.contact.residual_model import kept
-from pretouch.controller import Controller
-from pretouch.errors import RobotModelError
+from pretouch.errors import ParameterError, RobotModelError
 from pretouch.loop import Cycle
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
@@ -281,9 +280,6 @@ def test_robots_have_files_of_their_own(tmp_path):
     assert strange.parent == tmp_path / "free-motion"
 
 
-def test_the_paper_s_detector_has_nothing_to_keep(home, panda_model, paper_skin):
-    paper = Arm(panda_model, paper_skin)
-    assert isinstance(paper.controller, Controller)
-    free = begun(home, paper)
-    turned(paper, free, 5)
-    assert free.keep() == ()
+def test_the_paper_s_detector_learns_nothing_to_keep(home, panda_model, paper_skin):
+    with pytest.raises(ParameterError, match="The profile paper learns no free motion"):
+        begun(home, Arm(panda_model, paper_skin))

@@ -13,8 +13,8 @@ from pretouch.cli.ending import Terminated, ends_raise
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.loop import MonotonicClock
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.session.motion import Ending, follow, go
 from pretouch.session.session import NoUnits

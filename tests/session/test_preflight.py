@@ -10,8 +10,8 @@ from pretouch.control.path import Circle, line
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.limits import LimiterParams
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.session.preflight import PreflightParams, check
 from pretouch.session.standing import watch

@@ -7,8 +7,8 @@ from pretouch.control.path import Circle, line
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.loop import MonotonicClock
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.session.preflight import PreflightParams
 from pretouch.session.session import NoUnits, Session

@@ -9,7 +9,7 @@ from tests.viewer.browser import Served, chromium
 
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.network_skin import NetworkSkin
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.recording.compare import compare
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda

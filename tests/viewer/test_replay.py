@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.ports import free_port
 
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.recording.compare import Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.types import Mode

@@ -12,7 +12,7 @@ from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import run
-from pretouch.params import at_rate, profile
+from pretouch.profiles import at_rate, profile
 from pretouch.sim.hand import Hand, PersonArm
 from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant import Plant, PlantClock

@@ -5,7 +5,7 @@ import pytest
 from tests.viewer.sessions import ARMED_S, poke, set_speed
 
 from pretouch.errors import RecordingError
-from pretouch.params import PROFILES, profile
+from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.viewer.settings import LiveSettings

@@ -7,7 +7,7 @@ import pytest
 from tests.viewer.sessions import ARMED_S, AWAY, holds, kept_within_limits, modes, poke, set_speed
 
 from pretouch.errors import ParameterError
-from pretouch.params import PROFILES, profile
+from pretouch.profiles import PROFILES, profile
 from pretouch.types import Mode
 from pretouch.viewer.settings import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation

@@ -19,8 +19,8 @@ from pretouch.imported_data.detect import detect_imported, units_topics
 from pretouch.imported_data.samples import ImportedData, read_imported
 from pretouch.imported_data.source import Choice
 from pretouch.imported_data.summary import Summary, findings, guidance, summary
-from pretouch.params import Profile, at_rate
-from pretouch.params import profile as find_profile
+from pretouch.profiles import Profile, at_rate
+from pretouch.profiles import profile as find_profile
 from pretouch.recording.compare import Decisions, Found, matched
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin

@@ -12,7 +12,7 @@ from rich.table import Table
 from pretouch.cli.detect import axes_shown
 from pretouch.cli.ending import ended
 from pretouch.extras import VIEWER
-from pretouch.params import profile as find_profile
+from pretouch.profiles import profile as find_profile
 from pretouch.recording import recover as recovering
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
 from pretouch.recording.reader import Recorded, open_recording

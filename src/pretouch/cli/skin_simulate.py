@@ -11,7 +11,7 @@ from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, save_keys
-from pretouch.params import profile as find_profile
+from pretouch.profiles import profile as find_profile
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import NetworkParams, WayParams

@@ -5,8 +5,8 @@ import numpy as np
 from pretouch.compiled import kept_in
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.params import at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import at_rate, profile
 from pretouch.realtime import warm_up
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel

@@ -11,8 +11,8 @@ from pretouch.errors import RecordingError
 from pretouch.imported_data.samples import POSTURE_GAP_S, ImportedData
 from pretouch.imported_data.source import RangeTopic, Series, interpolated, newest
 from pretouch.modes import Event, mode_init, next_mode
-from pretouch.params import Profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import Profile
 from pretouch.recording.compare import Decided, Decisions
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, Inputs, IntArray, Mode, Obstacles, RangeReadings, RangeStatus, RobotState

@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.imported_data.samples import ImportedData
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.compare import Decisions
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value

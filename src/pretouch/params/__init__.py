@@ -3,8 +3,6 @@
 A profile is a frozen set of them. `replace(profile, ...)` of the standard library makes a variant, checked again.
 """
 
-from typing import TYPE_CHECKING, Any
-
 from pretouch.params.anticipation import AnticipationParams as AnticipationParams
 from pretouch.params.anticipation import BodyRegion as BodyRegion
 from pretouch.params.baselines import BaselineParams as BaselineParams
@@ -25,17 +23,3 @@ from pretouch.params.task import Orientation as Orientation
 from pretouch.params.task import TaskParams as TaskParams
 from pretouch.params.thresholds import ThresholdParams as ThresholdParams
 from pretouch.params.window import WindowParams as WindowParams
-
-if TYPE_CHECKING:
-    from pretouch.profiles import PROFILES as PROFILES
-    from pretouch.profiles import Profile as Profile
-    from pretouch.profiles import at_rate as at_rate
-    from pretouch.profiles import profile as profile
-
-
-def __getattr__(name: str) -> Any:
-    if name not in ("PROFILES", "Profile", "at_rate", "profile"):
-        raise AttributeError(name)
-    import pretouch.profiles
-
-    return getattr(pretouch.profiles, name)

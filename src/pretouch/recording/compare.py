@@ -9,7 +9,7 @@ import numpy as np
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import RecordingError, RobotStateError
-from pretouch.params import Profile, at_rate
+from pretouch.profiles import Profile, at_rate
 from pretouch.recording.run_record import DetectorRecord
 from pretouch.types import BoolArray, Contact, ControlStep, FloatArray, Mode, RobotState, Thresholds
 from pretouch.values import value

@@ -16,9 +16,8 @@ from pretouch.composition import as_table
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError, RecordingError
-from pretouch.params import Profile
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.profiles import profile_from
+from pretouch.profiles import Profile, profile_from
 from pretouch.recording.messages import FORMAT, PACKAGE, decoded, encoded, make
 from pretouch.recording.plain import JSON, as_json, from_json, sound
 from pretouch.recording.versions import versions

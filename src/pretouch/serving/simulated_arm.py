@@ -7,7 +7,7 @@ from pretouch.checks import Checked, NonNegative
 from pretouch.control.path import Circle, Path
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import Keys
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import Fleet, FleetParams

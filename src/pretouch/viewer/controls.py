@@ -10,7 +10,8 @@ import numpy as np
 
 from pretouch.composition import differences
 from pretouch.errors import RecordingError
-from pretouch.params import PROFILES, Profile, RestrictionMode
+from pretouch.params import RestrictionMode
+from pretouch.profiles import PROFILES, Profile
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
 from pretouch.viewer.commands import Commands

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from pretouch.checks import Check, Checked
-from pretouch.params import PROFILES, Profile
+from pretouch.profiles import PROFILES, Profile
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import HandSpec

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, turn
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.surroundings import surroundings
 from pretouch.recording.truth import truth_of
 from pretouch.robot.description import panda

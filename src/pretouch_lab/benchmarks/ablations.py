@@ -54,7 +54,7 @@ class Ablation:
 
     @property
     def profile_text(self) -> str:
-        """As `pretouch.params.profile` reads it."""
+        """As `pretouch.profiles.profile` reads it."""
         return f"{BASE}:{self.switch}={OFF[self.switch]}"
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from pretouch.controller import STAGES, Controller, ControllerState
 from pretouch.errors import ExperimentError
 from pretouch.loop import MonotonicClock
-from pretouch.params import Profile, at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import Profile, at_rate, profile
 from pretouch.realtime import real_time, warm_up
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel

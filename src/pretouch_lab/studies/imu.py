@@ -1,7 +1,7 @@
 """What the units' accelerometers add: delay, contacts missed, false alarms and the touched link, with and without."""
 
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Row
 from pretouch_lab.studies.impacts.judged import judged

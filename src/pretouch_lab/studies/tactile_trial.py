@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch

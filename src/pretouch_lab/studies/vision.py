@@ -6,7 +6,8 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle, Path
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import RestrictionMode
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import static_path, static_scene

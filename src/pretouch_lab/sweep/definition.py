@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.scenario_files import SeedRange
 from pretouch_lab.sweep.measures import Measure
 from pretouch_lab.sweep.registry import MEASURES, measure
@@ -53,7 +53,7 @@ class Sweep:
     """Of its folder."""
     experiment: str
     profile: str
-    """As `pretouch.params.profile` reads it."""
+    """As `pretouch.profiles.profile` reads it."""
     vary: tuple[Dimension, ...]
     fixed: Values
     design: Design

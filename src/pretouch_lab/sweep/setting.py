@@ -13,8 +13,7 @@ from typing import Any
 
 from pretouch.checks import Checked
 from pretouch.errors import ExperimentError, ParameterError
-from pretouch.params import Profile, profile
-from pretouch.profiles import value_of
+from pretouch.profiles import Profile, profile, value_of
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import WorldSet, drawn, world_set
@@ -38,7 +37,7 @@ class Setting:
     """One cell's parameters."""
 
     profile_text: str
-    """As `pretouch.params.profile` reads it."""
+    """As `pretouch.profiles.profile` reads it."""
     plant: PlantParams
     sensing: RangeFinderParams
     units: int

@@ -11,8 +11,9 @@ from pretouch.control.path import line
 from pretouch.control.qp import solve, task_cost
 from pretouch.control.restriction import approach_rows
 from pretouch.control.task import task
-from pretouch.params import Profile, RestrictionMode, profile
+from pretouch.params import RestrictionMode
 from pretouch.perception.obstacles import sensor_poses
+from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import cone_rays

@@ -7,7 +7,8 @@ import numpy as np
 
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import RestrictionMode
+from pretouch.profiles import profile
 from pretouch.sim.plant import TOUCH_N
 from pretouch.sim.pushes import FACES, Holder, Push, Pusher, against
 from pretouch.sim.scene import HandSpec, SceneSpec

@@ -23,8 +23,8 @@ from pretouch.hardware.franka.sentences import MotionAborted
 from pretouch.hardware.franka.state import FrankaState, packed
 from pretouch.hardware.keys import load_keys
 from pretouch.loop import Cycle
-from pretouch.params import profile
 from pretouch.perception.scene_filter import Fixtures
+from pretouch.profiles import profile
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin

@@ -17,7 +17,7 @@ from pretouch.errors import RobotError
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.params import FrankaParams
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.signals import OF_TERMINAL
 from tests.hardware.franka.served import Served, child, wait_for

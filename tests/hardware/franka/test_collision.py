@@ -14,7 +14,7 @@ from pretouch.hardware.franka.collision import (
     largest_threshold,
     longest_levers,
 )
-from pretouch.params import PROFILES, profile
+from pretouch.profiles import PROFILES, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Obstacles, RobotState

@@ -17,7 +17,7 @@ from pretouch.hardware.franka.lockstep import run_in_lockstep
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.hardware.keys import save_keys
 from pretouch.loop import Cycle
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin

@@ -17,8 +17,8 @@ from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, Sign, SkinParams
 from pretouch.hardware.ros2.robot import Ros2Robot
 from pretouch.hardware.ros2.skin import Ros2Skin
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode

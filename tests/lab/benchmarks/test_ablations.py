@@ -2,7 +2,7 @@ import pytest
 
 from pretouch.composition import differences
 from pretouch.errors import ParameterError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.ablations import OFF, Ablation, ablations
 from pretouch_lab.benchmarks.avoidance.run import Request
 from pretouch_lab.benchmarks.detection.contenders import Contender

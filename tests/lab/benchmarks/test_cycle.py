@@ -8,8 +8,8 @@ import pytest
 
 from pretouch.controller import STAGES, Controller
 from pretouch.errors import ExperimentError
-from pretouch.params import PROFILES, Profile, at_rate
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, Profile, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.types import Inputs, Mode
 from pretouch_lab.benchmarks import cycle

@@ -12,8 +12,8 @@ from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import run
-from pretouch.params import profile
 from pretouch.perception.closest import no_obstacles
+from pretouch.profiles import profile
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

@@ -48,7 +48,7 @@ def hurried(fast, seed=9):
     read = np.arange(0.1, 59.9, 0.01) + np.minimum(rng.exponential(0.0015, 5980), 0.009)
     age = np.clip(rng.laplace(0.006, 0.002, len(read)), 0.002, 0.012)
     state = 2 * np.round(np.maximum.accumulate(read - age) / 0.002).astype(int)
-    return replace(some(fast, state), time=read)
+    return replace(some(fast, state), stamp=read)
 
 
 ROUGH = {

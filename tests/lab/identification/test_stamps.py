@@ -24,7 +24,7 @@ TIME = np.arange(0.0, 40.0, 0.01)
 
 def test_stamps_off_by_milliseconds_are_put_right():
     late = np.random.default_rng(2).uniform(0.0, 0.006, len(TIME))
-    given = replace(at(TIME, 1e-5), time=TIME + late)
+    given = replace(at(TIME, 1e-5), stamp=TIME + late)
     found, motions = moved(usable(given))
     # what they are off for long is of no matter: from one to the next is
     before, after = np.diff(given.stamp - TIME), np.diff(found.samples.stamp - TIME)
@@ -43,7 +43,7 @@ def test_noise_of_encoders_moves_no_stamp(noise):
 def test_time_that_goes_slow_for_a_while_shows_in_measured_velocities():
     rng = np.random.default_rng(3)
     slow = 0.004 * np.sin(2 * np.pi * 0.8 * TIME)  # 2 % faster and slower
-    given = replace(at(TIME), time=TIME + slow + rng.uniform(0.0, 0.004, len(TIME)))
+    given = replace(at(TIME), stamp=TIME + slow + rng.uniform(0.0, 0.004, len(TIME)))
     found, motions = moved(usable(given))
     off = given.qd - motions[0].between()(found.samples.stamp, 1)
     blind, without = moved(usable(replace(given, qd=None)))

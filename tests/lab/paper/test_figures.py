@@ -9,8 +9,8 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 from pretouch.errors import ExperimentError, ParameterError, PretouchError, RecordingError
-from pretouch.params import profile
 from pretouch.perception.obstacles import points_of_units
+from pretouch.profiles import profile
 from pretouch.recording.run_record import MODES, RunRecord, TrueForces
 from pretouch.sensing.skin import Skin
 from pretouch.types import Contact, Mode

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
-from pretouch.params import GiveUpParams, Profile, profile
+from pretouch.params import GiveUpParams
+from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import static_path, static_scene

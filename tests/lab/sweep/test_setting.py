@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from pretouch.errors import ExperimentError, ParameterError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch_lab.benchmarks.dense_skin import UNITS, units_of
 from pretouch_lab.sweep.definition import Asked, sweep_of

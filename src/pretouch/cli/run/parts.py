@@ -12,9 +12,9 @@ from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.limits import LimiterParams, planned
-from pretouch.params import Profile
-from pretouch.params import profile as find_profile
 from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
+from pretouch.profiles import Profile
+from pretouch.profiles import profile as find_profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.sim.scene import SceneSpec

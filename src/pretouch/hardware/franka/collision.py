@@ -30,7 +30,7 @@ from pretouch.checks import Checked, Positive
 from pretouch.contact.detector import Body
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.errors import ParameterError
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray

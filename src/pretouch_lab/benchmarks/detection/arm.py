@@ -11,7 +11,7 @@ from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin

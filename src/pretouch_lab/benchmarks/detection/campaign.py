@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
 from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated

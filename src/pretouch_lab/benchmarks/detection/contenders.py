@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.contact.detector import Detection
 from pretouch.contact.moving_thresholds import thresholds_of
-from pretouch.params import Profile, profile
+from pretouch.profiles import Profile, profile
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.ablations import ablations
 
@@ -20,7 +20,7 @@ class Contender:
 
     name: str
     profile_text: str
-    """As `pretouch.params.profile` reads it."""
+    """As `pretouch.profiles.profile` reads it."""
     sweep: Sweep
     """Base force of the paper's thresholds [N], or a factor on the evidence that makes an alarm."""
 

@@ -5,7 +5,7 @@ import numpy as np
 from pretouch.contact.detector import Body, Detection
 from pretouch.contact.reaction import ReactionInputs
 from pretouch.modes import ModeState
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, Mode, Obstacles, RobotState

@@ -9,7 +9,7 @@ import numpy as np
 
 from pretouch.errors import ExperimentError
 from pretouch.loop import Cycle
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState
 from pretouch_lab.benchmarks.store import write_arrays

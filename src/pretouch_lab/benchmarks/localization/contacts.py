@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.loop import run
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures

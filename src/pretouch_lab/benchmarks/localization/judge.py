@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.atomic_write import write_json
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, IntArray, Touched
 from pretouch_lab.benchmarks.detection.arm import model

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.contact.thresholds import obstacle_force
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.scene import HandSpec
 from pretouch.text_table import TextTable
 from pretouch_lab.metrics import rounded, spread

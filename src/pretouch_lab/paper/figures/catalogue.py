@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pretouch.errors import ExperimentError
-from pretouch.params import Profile, profile
+from pretouch.profiles import Profile, profile
 from pretouch.recording.run_record import RunRecord
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper import avoidance, dynamic, static

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.run_record import RunRecord
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.paper.figures.marks import near, shade, slowed

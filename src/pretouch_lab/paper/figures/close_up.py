@@ -5,7 +5,8 @@ from matplotlib.figure import Figure
 
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.params import Profile, ProximityPriorParams
+from pretouch.params import ProximityPriorParams
+from pretouch.profiles import Profile
 from pretouch.recording.run_record import RunRecord
 from pretouch_lab.paper.figures.marks import Y, distances, force_with_thresholds, shade, touching
 

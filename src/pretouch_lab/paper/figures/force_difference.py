@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.recording.run_record import RunRecord
 from pretouch_lab.paper.figures.marks import BLIND, OURS, SENSING, Y, touching
 

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.run_record import RunRecord
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import spans

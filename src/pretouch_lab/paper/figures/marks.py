@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.run_record import RunRecord
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import spans

@@ -13,7 +13,8 @@ from pretouch.contact.sequential_detector import SequentialState
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.errors import ExperimentError
 from pretouch.groups import NOTHING_NEAR
-from pretouch.params import Profile, ProximityPriorParams
+from pretouch.params import ProximityPriorParams
+from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant

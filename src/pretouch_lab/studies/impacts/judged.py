@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching
