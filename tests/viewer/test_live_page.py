@@ -193,7 +193,7 @@ def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: Li
 
 @pytest.mark.parametrize(
     ("typed", "said"),
-    [("", ""), ("2.5", "Not done: ReductionParams.l_max_cycles is 2.5: it must be a whole number."),
+    [("", ""), ("2.5", "Not done: reduction.l_max_cycles is '2.5': write a whole number."),
      ("many", "Not done: l_max is 'many': give a number such as 200.")],
 )  # fmt: skip
 def test_what_is_no_value_goes_back_to_the_one_that_holds(clock: Clock, typed: str, said: str) -> None:
