@@ -17,8 +17,8 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.skin_monitor import only_here
-from pretouch.hardware.address import EVERYWHERE
 from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
+from pretouch.hardware.udp import EVERYWHERE
 from pretouch.recording.skin_reader import read_skin
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import RangeStatus
@@ -187,7 +187,7 @@ def test_a_port_that_is_taken_is_said(keys, port, tmp_path, capsys):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
         one.bind(("127.0.0.1", port))
         assert monitor(tmp_path, port, "--once") == 2
-    assert f"Port {port} of 127.0.0.1 is taken" in capsys.readouterr().err
+    assert f"Port {port} of 127.0.0.1 is in use" in capsys.readouterr().err
 
 
 def started(*args):
@@ -277,4 +277,4 @@ def test_simulated_units_are_heard_by_the_monitor_with_the_keys_that_were_made(t
     said = capsys.readouterr().out
     assert "6 of 7 units live" in said
     assert "fault: hand_left has not been heard" in said
-    assert "of its samples on their way (limit 15%)" in said
+    assert "of its samples in transmission (limit 15%)" in said

@@ -109,7 +109,7 @@ def test_a_port_that_is_taken_is_said_before_anything_is_planned(tmp_path, capsy
         files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml")
         assert calibrate("--robot", "simulated", *files, "--units-port", port) == 2
     told = capsys.readouterr()
-    assert f"Port {port} of 127.0.0.1 is taken" in told.err
+    assert f"Port {port} of 127.0.0.1 is in use" in told.err
     assert "planned" not in told.out
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 from pretouch.cli.ending import ended
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.extras import VIEWER
-from pretouch.hardware.address import EVERYWHERE, HOST
+from pretouch.hardware.udp import EVERYWHERE, HOST
 from pretouch.params import profile as find_profile
 from pretouch.viewer.server import ServeOptions, check_port
 from pretouch.viewer.settings import LiveSettings, PathName

@@ -7,7 +7,7 @@ import tyro
 
 from pretouch.cli.calibrate.options import Calibrate
 from pretouch.cli.skin_coverage_options import Coverage
-from pretouch.hardware.address import HOST, PORT
+from pretouch.hardware.udp import HOST, PORT
 
 
 @dataclass(frozen=True)

@@ -23,12 +23,12 @@ from pretouch.cli.skin_table import line, thrown_away, view
 from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import HardwareError
-from pretouch.hardware.address import EVERYWHERE, HOST
-from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.health import HealthParams
 from pretouch.hardware.keys import load_keys
 from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
-from pretouch.hardware.monitor import Posture, Turn, watch
+from pretouch.hardware.monitor import MonitorUpdate, Posture, watch
 from pretouch.hardware.receiver import SkinReceiver
+from pretouch.hardware.udp import EVERYWHERE, HOST
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
@@ -56,9 +56,9 @@ def monitor(command: "Monitor") -> int:
     with ExitStack() as stack:
         receiver = stack.enter_context(SkinReceiver(ids, keys, command.host, command.port))
         recording = stack.enter_context(SkinRecording(Path(command.record))) if command.record else None
-        turns = watch(receiver, HealthParams(), duration, posture)
+        updates = watch(receiver, HealthParams(), duration, posture)
         try:
-            last, code = _shown(turns, receiver, recording, command.once)
+            last, code = _shown(updates, receiver, recording, command.once)
         except Terminated:
             if recording:
                 with suppress(OSError):  # the terminal may be gone
@@ -124,39 +124,39 @@ def _posture(text: str, model: RobotModel) -> FloatArray:
 
 
 def _shown(
-    turns: Iterator[Turn], receiver: SkinReceiver, recording: SkinRecording | None, quiet: bool
-) -> tuple[Turn | None, int]:
-    """Show and record the turns until the last; return it and the exit code so far."""
+    updates: Iterator[MonitorUpdate], receiver: SkinReceiver, recording: SkinRecording | None, quiet: bool
+) -> tuple[MonitorUpdate | None, int]:
+    """Show and record the updates until the last; return it and the exit code so far."""
     console, last, second = Console(highlight=False, soft_wrap=True), None, 0.0
     live = None if quiet or not console.is_terminal else Live(console=console, auto_refresh=False, transient=True)
     lines = None if quiet or live else _Lines(console)
     try:
         with live or nullcontext():
-            for turn in turns:
-                last, full = turn, turn.elapsed >= second
+            for update in updates:
+                last, full = update, update.elapsed >= second
                 second += _SECOND_S * full
                 if recording:
-                    record(recording, turn, receiver, full)
+                    record(recording, update, receiver, full)
                 if live:
-                    live.update(view(turn, receiver.rejected, _notes(receiver, recording)), refresh=True)
+                    live.update(view(update, receiver.rejected, _notes(receiver, recording)), refresh=True)
                 elif lines and full:
-                    lines.show(turn)
+                    lines.show(update)
     except KeyboardInterrupt:
         return last, _INTERRUPTED
     return last, 0
 
 
 class _Lines:
-    """Says a turn in a line, and each finding when it comes and when it goes."""
+    """Prints a line for each update, and each finding when it appears and when it is over."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
         self._known: dict[tuple[str, str], str] = {}
 
-    def show(self, turn: Turn) -> None:
+    def show(self, update: MonitorUpdate) -> None:
         """Say it."""
-        self._console.print(line(turn), markup=False)
-        known = {(f.unit, f.what): f"{f.level}: {f.sentence}" for f in turn.findings}
+        self._console.print(line(update), markup=False)
+        known = {(f.unit, f.what): f"{f.level}: {f.sentence}" for f in update.findings}
         for sentence in (known[key] for key in known if key not in self._known):
             self._console.print(f"  {sentence}", markup=False)
         for unit, what in (key for key in self._known if key not in known):
@@ -190,11 +190,11 @@ def only_here(host: str) -> bool:
     return ip_address(str(found).partition("%")[0]).is_loopback
 
 
-def _numbers(turn: Turn, receiver: SkinReceiver, notes: list[str]) -> dict[str, Any]:
+def _numbers(update: MonitorUpdate, receiver: SkinReceiver, notes: list[str]) -> dict[str, Any]:
     return {
-        "elapsed_s": turn.elapsed,
-        "units": [_plain(asdict(unit)) for unit in turn.units],
-        "findings": [asdict(finding) for finding in turn.findings],
+        "elapsed_s": update.elapsed,
+        "units": [_plain(asdict(unit)) for unit in update.units],
+        "findings": [asdict(finding) for finding in update.findings],
         "rejected": dict(receiver.rejected),
         "notes": [*notes, *filter(None, [thrown_away(receiver.rejected)])],
     }

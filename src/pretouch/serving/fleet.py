@@ -87,13 +87,13 @@ class Fleet:
 
         `clock` gives the time [s]. It is asked once, after the sockets: no beacon is heard before it was sent.
         """
-        before, heard = self.sent, [_heard(one) for one in self._sockets]
+        before, arrived = self.sent, [_heard(one) for one in self._sockets]
         now = clock()
-        for unit, came, down, up, one in zip(self.units, heard, self._down, self._up, self._sockets, strict=True):
+        for unit, came, down, up, one in zip(self.units, arrived, self._down, self._up, self._sockets, strict=True):
             for datagram in came:
                 down.put(datagram, now)
             for datagram in down.take(now):
-                unit.heard(datagram, now)
+                unit.receive_beacon(datagram, now)
             for datagram in unit.tick(now):
                 up.put(datagram, now)
             for datagram in up.take(now):
@@ -133,11 +133,11 @@ def _resolved(address: tuple[str, int]) -> tuple[int, tuple[object, ...]]:
 
 def _heard(one: socket.socket) -> list[bytes]:
     """All datagrams that wait at a socket."""
-    heard = []
+    arrived = []
     while True:
         try:
-            heard.append(one.recv(_LARGEST))
+            arrived.append(one.recv(_LARGEST))
         except BlockingIOError:
-            return heard
+            return arrived
         except ConnectionError:  # nobody listens at the receiver's port; it may begin to
             continue

@@ -5,7 +5,7 @@ from importlib.metadata import version
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.client import Kind
-from pretouch.hardware.franka.sentences import check_ready
+from pretouch.hardware.franka.errors import check_ready
 from pretouch.session.remembered import Identity
 from pretouch.types import FloatArray, RobotState
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.findings import findings
-from pretouch.hardware.health import UnitWindow
-from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.health import HealthParams, UnitWindow
 from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
 from pretouch.hardware.receiver_process import Traffic
 from pretouch.hardware.traffic import Received, UnitTraffic

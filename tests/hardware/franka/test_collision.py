@@ -10,8 +10,8 @@ from pretouch.hardware.franka.collision import (
     CollisionParams,
     check,
     collision_behavior,
-    felt_from_n,
     largest_threshold,
+    largest_undetected_n,
     longest_levers,
 )
 from pretouch.params import PROFILES, profile
@@ -57,7 +57,9 @@ def test_a_higher_threshold_of_ours_raises_the_arms(panda_model: RobotModel) -> 
 
 def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel) -> None:
     good = collision_behavior(profile("paper"), panda_model)
-    with pytest.raises(ParameterError, match=r"report a contact from 15 N, but ours is felt from up to 18 N: give"):
+    with pytest.raises(
+        ParameterError, match=r"report a contact from 15 N on, but our detection may need up to 18 N: set"
+    ):
         check(replace(good, lower_force=np.full(6, 15.0)), profile("paper"), panda_model)
     with pytest.raises(ParameterError, match=r"upper_torque\[0\] is 5: it must be greater than the lower"):
         check(replace(good, upper_torque=np.full(7, 5.0)), profile("paper"), panda_model)
@@ -79,7 +81,7 @@ def evidence(model: RobotModel, force: np.ndarray) -> float:
 
 
 def test_what_the_sequential_detector_may_miss_is_what_it_misses(panda_model: RobotModel) -> None:
-    most = felt_from_n(PROFILES["pretouch"], panda_model)
+    most = largest_undetected_n(PROFILES["pretouch"], panda_model)
     assert 30.0 < most < 45.0
     for axis in np.vstack([np.eye(3), -np.eye(3)]):
         assert evidence(panda_model, 1.02 * most * axis) >= 1.0
@@ -89,7 +91,7 @@ def test_what_the_sequential_detector_may_miss_is_what_it_misses(panda_model: Ro
 def test_ours_stops_by_itself_later_than_it_is_felt_and_before_it_hurts(panda_model: RobotModel) -> None:
     ours = PROFILES["pretouch"]
     behavior = collision_behavior(ours, panda_model)
-    felt = felt_from_n(ours, panda_model)
+    felt = largest_undetected_n(ours, panda_model)
     assert np.all(behavior.lower_force[:3] >= felt + 10.0)
     assert np.all(behavior.upper_force[:3] >= felt + 20.0)
     face_n, bias_n = 65.0, CollisionParams().bias_n

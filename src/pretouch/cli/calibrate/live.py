@@ -26,8 +26,8 @@ from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_simulate import keys_for
 from pretouch.cli.writing import check_writable
 from pretouch.errors import CalibrationError, HardwareError
-from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.hardware.network_skin import NetworkSkin
+from pretouch.hardware.udp import EVERYWHERE, HOST
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin

@@ -5,7 +5,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from typing import Any, Literal
 
 from pretouch.errors import CalibrationError
-from pretouch.hardware.address import HOST, PORT
+from pretouch.hardware.udp import HOST, PORT
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,8 @@ from pretouch.cli.skin_keys import keys_file
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.client import connect
 from pretouch.hardware.franka.collision import collision_behavior
-from pretouch.hardware.franka.lockstep import run_in_lockstep
-from pretouch.hardware.franka.lockstep_skin import LockstepSkin
-from pretouch.hardware.franka.sentences import MotionAborted
+from pretouch.hardware.franka.errors import MotionAborted
+from pretouch.hardware.franka.lockstep import LockstepSkin, run_in_lockstep
 from pretouch.hardware.keys import load_keys
 from pretouch.session.finding import refusals
 from pretouch.session.keeping import keeping

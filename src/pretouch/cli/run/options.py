@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import tyro
 
 from pretouch.errors import HardwareError, ParameterError, RobotError
-from pretouch.hardware.address import HOST, PORT
+from pretouch.hardware.udp import HOST, PORT
 
 
 @dataclass(frozen=True)

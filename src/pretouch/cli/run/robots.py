@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from pretouch.cli.run.opened import Opened, network_units
 from pretouch.cli.run.parts import Parts
 from pretouch.extras import ROS2
-from pretouch.hardware.address import HOST
 from pretouch.hardware.franka.client import need_library
+from pretouch.hardware.udp import HOST
 from pretouch.robot.model import RobotModel
 from pretouch.session.session import NoUnits
 

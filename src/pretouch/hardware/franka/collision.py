@@ -11,11 +11,11 @@ largest mean:
   filtered comparison, in which the force of a push still grows. For the paper's parameters that is 48 N, between the
   40 N below which a reaction comes too late and the 60 N that a hand meets at 0.3 m/s.
 
-The sequential detector has no threshold: it feels least while it has learnt nothing. The largest force on one axis that
-it may then miss at the arm's ready posture is `felt_from_n`, 38 N with the profile `pretouch`; once it has learnt, 4 to
-9 N on a simulated Panda. The arm stops by itself `upper_above_n` above that, but from `most_n` on at the latest: with
-an error of `bias_n` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm
-that is pushed yields at 0.27 m/s at least, whatever the direction, of the 0.3 m/s it may.
+The sequential detector has no threshold: it is least sensitive while it has learnt nothing. The largest force on one
+axis that it may then miss at the arm's ready posture is `largest_undetected_n`, 38 N with the profile `pretouch`; once
+it has learnt, 4 to 9 N on a simulated Panda. The arm stops by itself `upper_above_n` above that, but from `most_n` on
+at the latest: with an error of `bias_n` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static
+figures. By then an arm that is pushed yields at 0.27 m/s at least in any direction; its limit is 0.3 m/s.
 
 Joint torques are those of such a force at the end-effector with the longest lever its joint ever has, but at least the
 figures of the vendor's examples, which are above the noise of the estimate (20 20 18 18 16 14 12 Nm; libfranka,
@@ -85,7 +85,7 @@ def largest_threshold(profile: Profile, model: RobotModel, params: CollisionPara
     if profile.detection.method == "fixed":
         return profile.detection.force_n
     if profile.detection.method == "sequential":
-        return felt_from_n(profile, model)
+        return largest_undetected_n(profile, model)
     return profile.threshold.f_base_n + profile.threshold.f_std_n + params.bias_n
 
 
@@ -99,9 +99,9 @@ def collision_behavior(profile: Profile, model: RobotModel, params: CollisionPar
         lower = min(lower, 0.5 * (ours + upper))
         if not ours < upper:
             raise ParameterError(
-                f"The profile {profile.name} may miss {ours:.0f} N before it has learnt anything, and the arm must stop"
-                f" by itself from {given.most_n:g} N on: make its detection feel less, by smaller priors of free motion"
-                " or more detection.false_alarms_per_hour."
+                f"The profile {profile.name} may miss {ours:.0f} N before it has learnt anything, but the arm must stop"
+                f" by itself from {given.most_n:g} N on: make its detection more sensitive, by smaller priors of free"
+                " motion or more detection.false_alarms_per_hour."
             )
     levers, shape = longest_levers(model), np.array([1.0, 1.0, 1.0, _MOMENT_M, _MOMENT_M, _MOMENT_M])
     behavior = CollisionBehavior(
@@ -122,8 +122,9 @@ def check(
     lowest = float(behavior.lower_force[:3].min())
     if not lowest > ours:
         raise ParameterError(
-            f"The arm would report a contact from {lowest:g} N, but ours is felt from up to {ours:g} N: give"
-            f" CollisionBehavior.lower_force more than that, or profile {profile.name!r} a smaller threshold.f_base_n."
+            f"The arm would report a contact from {lowest:g} N on, but our detection may need up to {ours:g} N: set"
+            f" CollisionBehavior.lower_force higher than that, or give profile {profile.name!r} a smaller"
+            " threshold.f_base_n."
         )
     for what, lower, upper in (
         ("force", behavior.lower_force, behavior.upper_force),
@@ -137,7 +138,7 @@ def check(
             )
 
 
-def felt_from_n(profile: Profile, model: RobotModel) -> float:
+def largest_undetected_n(profile: Profile, model: RobotModel) -> float:
     """Force on one axis [N] from which one sample is a contact to a moving arm at its ready posture that knows nothing.
 
     Of the sequential detector itself, by bisection; infinite where it would miss any force up to `_LARGEST_N`.
@@ -149,18 +150,18 @@ def felt_from_n(profile: Profile, model: RobotModel) -> float:
     state = replace(fresh, model=replace(fresh.model, speed=speed))
     nothing, quiet = Obstacles(whole, rows, none, rows, whole, rows, none, none), no_cues(len(model.links))
 
-    def is_felt(force: FloatArray) -> bool:
+    def detected(force: FloatArray) -> bool:
         robot = RobotState(0.0, q, speed, q, speed, J.T @ force, None)
         return take_sample(state, model, kin, robot, nothing, False, False, period, p, quiet)[0].evidence >= 1.0
 
     latest = 0.0
     for axis in np.eye(3):
-        if not is_felt(_LARGEST_N * axis):
+        if not detected(_LARGEST_N * axis):
             return np.inf
         low, high = 0.0, _LARGEST_N
         while high - low > _TO_N:
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if is_felt(middle * axis) else (middle, high)
+            low, high = (low, middle) if detected(middle * axis) else (middle, high)
         latest = max(latest, high)
     return latest
 
