@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from pretouch.hardware import udp
-from pretouch.hardware.udp import PORT
+from pretouch.hardware.address import PORT
 from tests.hardware.fake_unit import Bench
 from tests.ports import PORTS, free_port
 

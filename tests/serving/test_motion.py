@@ -80,5 +80,5 @@ def test_a_machine_that_is_late_leaves_time_out_or_makes_up_for_it(panda_model, 
 
 
 def test_a_receiver_that_cannot_be_found_is_said(panda_model, options):
-    with pytest.raises(HardwareError, match="No receiver is given"):
+    with pytest.raises(HardwareError, match="The receiver's address is empty"):
         run_motion(options(("", 9)), swinging(panda_model), print, lambda: True, print)

@@ -153,7 +153,7 @@ def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_ar
 
 def test_real_units_cannot_be_made_to_fail_but_can_be_reset(room: Room, real: RealUnits) -> None:
     simulation = LiveSimulation(real=real)
-    with pytest.raises(ParameterError, match="units are real ones: unplug or cover one"):
+    with pytest.raises(ParameterError, match="units are real: unplug or cover one"):
         simulation.set_faults(frozenset({"hand_left"}))
     simulation.advance(0.5)
     room.hear()

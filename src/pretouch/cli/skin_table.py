@@ -21,10 +21,10 @@ _TARGET = (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeS
 """Statuses of readings that have a distance."""
 _STYLES = {"fault": "bold red", "warning": "yellow"}
 _MEANINGS = {
-    "size": "no size of ours",
-    "format": "no magic, version or kind of ours",
-    "unit": "a number that none of these units has",
-    "tag": "a wrong tag: another key, or a forgery",
+    "size": "a size that no message has",
+    "format": "an unknown magic, version or kind",
+    "unit": "the number of an unknown unit",
+    "tag": "a wrong tag (another key, or a forgery)",
     "replayed": "a sequence number seen already",
     "no session": "a sample outside a session",
     "too many hellos": "more hellos than are answered",

@@ -1,4 +1,4 @@
-"""A UDP socket that withstands a flood (a long queue, and a kernel filter where there is one), and its addresses."""
+"""A UDP socket that withstands a flood: a long queue, and a kernel filter where there is one."""
 
 import ctypes
 import errno
@@ -8,15 +8,6 @@ import sys
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.wire import HELLO_SIZE, MAGIC, SAMPLE_LEAST, SAMPLE_MOST, VERSION, Kind
-
-HOST = "127.0.0.1"
-"""Only what runs on this machine is heard there: real units need 0.0.0.0, all addresses of this machine."""
-PORT = 29470
-"""UDP port of the receiver: of those that IANA has assigned to nobody, and below those that a system gives to whoever
-asks for any (of Linux: from 32768), which may be taken when the receiver starts."""
-EVERYWHERE = "0.0.0.0"  # noqa: S104
-"""All addresses of this machine."""
-
 
 _SO_RCVBUFFORCE, _SO_ATTACH_FILTER = 33, 26
 """Of Linux."""

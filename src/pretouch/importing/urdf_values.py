@@ -17,7 +17,7 @@ def required(element: Element | None, key: str) -> str:
     value = element.get(key) if element is not None else None
     if element is None or value is None:
         tag = "element" if element is None else f"<{element.tag}>"
-        raise RobotModelError(f"The URDF file has an {tag} without {key!r}: give it one.")
+        raise RobotModelError(f"The URDF file has an element {tag} without {key!r}: add it.")
     return value
 
 

@@ -23,7 +23,7 @@ def as_json(value: JSON) -> str:
         return plain_text(json.dumps(value, default=_plain))
     except (TypeError, ValueError, RecursionError) as error:
         raise RecordingError(
-            f"What is said about the run cannot be written as JSON ({error}): give plain values."
+            f"The description of the run cannot be written as JSON ({error}): give plain values."
         ) from error
 
 
@@ -43,7 +43,7 @@ def from_json(text: str) -> dict[str, JSON]:
     except (ValueError, RecursionError) as error:
         raise RecordingError(f"The description of the run in the recording is damaged: {error}") from error
     if not isinstance(found, dict):
-        raise RecordingError("The description of the run in the recording is damaged: it is no table of names.")
+        raise RecordingError("The description of the run in the recording is damaged: it is not a table.")
     return found
 
 
@@ -76,7 +76,9 @@ def _same_kinds(group: str, given: dict[str, Any], usual: object) -> None:
     for name, value in given.items():
         for kind in (bool, str):
             if isinstance(value, kind) != isinstance(getattr(usual, name), kind):
-                raise RecordingError(f"The recorded parameter {group}.{name} is {value!r}: that is none of its values.")
+                raise RecordingError(
+                    f"The recorded parameter {group}.{name} is {value!r}, which is not one of its values."
+                )
 
 
 def sound(made: Callable[[], Any]) -> Any:
