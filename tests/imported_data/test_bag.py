@@ -60,8 +60,11 @@ def test_the_sign_is_what_was_said_and_is_said_again(tmp_path):
     on, by = (read_imported(bag, Choice(sign=sign)) for sign in ("on-robot", "by-robot"))
     np.testing.assert_array_equal(on.force.values, FORCE)
     np.testing.assert_array_equal(by.force.values, -FORCE)
-    assert "taken as the force on the robot (else --sign by-robot) in the base frame (else --frame ee)" in on.said
-    assert "taken as the force by the robot (else --sign on-robot)" in by.said
+    assert (
+        "assumed to be the force on the robot (otherwise --sign by-robot) in the base frame (otherwise --frame ee)"
+        in on.said
+    )
+    assert "assumed to be the force by the robot (otherwise --sign on-robot)" in by.said
 
 
 @pytest.mark.parametrize(
@@ -109,7 +112,7 @@ def test_a_force_in_the_end_effectors_frame_is_turned_by_the_arms_posture(tmp_pa
         np.testing.assert_allclose(
             ours, hand_rotation((1 - s) * Q + s * other) @ f, atol=1e-5
         )  # the file of the arm has six digits
-    assert "The arm is taken as fr3" in found.said
+    assert "The arm is assumed to be fr3" in found.said
     (said,) = read_imported(bag, Choice()).notes
     assert "frame_id is 'fr3_K'" in said
     assert "--frame ee" in said
@@ -149,14 +152,14 @@ def test_of_several_topics_of_joints_one_has_to_be_named_only_if_they_are_needed
 def test_a_bag_without_forces_says_what_it_holds(tmp_path):
     bag = write_bag(tmp_path / "bag", [("/joint_states", START, joints(START, Q))])
     with pytest.raises(
-        RecordingError, match=r"no topic of .*WrenchStamped: it holds /joint_states \(sensor_msgs/Joint"
+        RecordingError, match=r"no topic of type .*WrenchStamped; it holds /joint_states \(sensor_msgs/Joint"
     ):
         read_imported(bag, Choice())
 
 
 def test_joints_of_another_arm_are_named(tmp_path):
     messages = [*wrenches(FORCE), ("/j", START, joints(START, [0, 1], ["shoulder_pan_joint", "elbow_joint"]))]
-    with pytest.raises(RecordingError, match="names the joints shoulder_pan_joint, elbow_joint: this needs"):
+    with pytest.raises(RecordingError, match="names the joints shoulder_pan_joint, elbow_joint, but those"):
         read_imported(write_bag(tmp_path / "bag", messages), Choice(frame="ee"))
 
 
@@ -173,7 +176,7 @@ def test_disorder_and_doubles_are_put_right_and_counted(tmp_path):
     np.testing.assert_array_equal(found.force.time, stamps(40))
     assert found.notes == (
         "Force: the time went backwards once; the samples were sorted.",
-        "Force: a stamp came again once; the later sample counts.",
+        "Force: a stamp was repeated once; the later sample counts.",
     )
 
 
@@ -221,13 +224,13 @@ def test_ranges_that_are_not_there_are_said(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("gone.mcap", None, "cannot be read: there is none"),
+        ("gone.mcap", None, "does not exist"),
         ("empty.mcap", b"", "cannot be read as a bag"),
         ("junk.mcap", b"\x89MCAP0\r\n" + bytes(range(256)) * 4, "cannot be read as a bag"),
         ("junk.db3", b"SQLite format 3\0" + bytes(200), "cannot be read as a bag"),
         ("junk.bag", b"#ROSBAG V2.0\n" + bytes(200), "cannot be read as a bag"),
-        ("text.pdf", b"text", "has an ending that is none of .mcap, .db3, .bag, .csv"),
-        ("x" * 300, None, "cannot be read: there is none"),
+        ("text.pdf", b"text", "has an unknown format: give a file that ends in .mcap, .db3, .bag, .csv"),
+        ("x" * 300, None, "does not exist"),
     ],
 )
 def test_files_that_are_no_recording_are_one_sentence(tmp_path, name, content, words):

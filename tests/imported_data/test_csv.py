@@ -74,7 +74,7 @@ def test_empty_cells_are_no_estimate_and_rows_without_time_are_left_out(tmp_path
     found = read_imported(written(tmp_path, text), Choice())
     np.testing.assert_array_equal(np.isnan(found.force.values[:, 0]), [False, False, True, True, True, False])
     assert found.notes[0] == "1 row has no time and was left out."
-    assert "3 samples are not finite numbers" in found.notes[1]
+    assert "3 samples are not finite and count" in found.notes[1]
 
 
 def test_columns_of_no_use_are_named(tmp_path):
@@ -99,9 +99,9 @@ def test_columns_of_no_use_are_named(tmp_path):
         (GOOD.replace(",", ";").replace("4;", "4,5;"), r"line 3: force_x_N is '4,5': use a decimal point"),
         (GOOD.replace("4,5,6", "4,5"), "line 3: 3 cells for 4 columns"),
         (GOOD.replace("0.01", "1e9"), "span 1e[+]09 s: check their unit"),
-        (GOOD.replace("4,5,6", '4,"5,6'), "is no CSV file"),
-        (b"\xff\xfe\x00time", "is no text in UTF-8"),
-        (GOOD.replace("force_z_N", "force_z_N,torque_x_Nm"), "not all of torque_x, torque_y and torque_z"),
+        (GOOD.replace("4,5,6", '4,"5,6'), "is not a CSV file"),
+        (b"\xff\xfe\x00time", "is not UTF-8 text"),
+        (GOOD.replace("force_z_N", "force_z_N,torque_x_Nm"), "only some of torque_x, torque_y and torque_z"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_sentence(tmp_path, text, words):
@@ -115,7 +115,7 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path, text, words):
     ("choice", "words"),
     [
         (Choice(wrench="/w"), "has no topics"),
-        (Choice(ranges=True), "tells no ranges"),
+        (Choice(ranges=True), "has no ranges"),
         (EE, "has no joint positions"),
     ],
 )

@@ -141,7 +141,7 @@ def test_samples_that_are_no_estimate_leave_the_window_as_it_is(of_force, broken
 
 
 def test_data_too_short_or_too_slow_are_one_sentence(of_force):
-    with pytest.raises(RecordingError, match=r"0\.90 s of usable force, and the window of paper takes 1 s to fill"):
+    with pytest.raises(RecordingError, match=r"0\.90 s of usable force, but the window of paper takes 1 s to fill"):
         detect_imported(of_force(pushed(0.9, ())), PAPER)
     with pytest.raises(RecordingError, match=r"comes every 1 s.*unit of the time"):
         detect_imported(of_force(pushed(100.0, (), rate=1.0), 1.0), PAPER)

@@ -62,7 +62,7 @@ def test_what_is_no_number_or_comes_twice_is_left_out_and_said(tmp_path, panda_m
     assert np.all(np.diff(found.trace.stamp) > 0)
     assert [note[:28] for note in found.notes] == [
         "1 row has no time and was le", "Joints: 1 sample is not fini", "Joints: the time went backwa",
-        "Joints: a stamp came again o",
+        "Joints: a stamp was repeated",
     ]  # fmt: skip
 
 
@@ -125,9 +125,9 @@ def short(**changed):
         (short(q4_rad="q4_ms"), "'q4_ms' of .* has the unit 'ms': write q4_rad or q4_deg"),
         (short() | {"q4_deg": np.zeros(50)}, "names joint 4 twice, 'q4' and 'q4'"),
         (short() | {"panda_joint4_rad": np.zeros(50)}, "names joint 4 twice, 'q4' and 'panda_joint4'"),
-        (short(q4_rad=np.degrees(MOVING[:, 3])), r"panda_joint4 in .* is at -131.8 rad, out of its range"),
+        (short(q4_rad=np.degrees(MOVING[:, 3])), r"panda_joint4 in .* is at -131.8 rad, outside its range"),
         (short(q4_rad=np.full(50, np.nan)), "has 0 samples of all joints.* 50 samples are not finite"),
-        (short(time_s=np.full(50, 3.0)), "has 1 sample of all joints.* a stamp came again 49 times"),
+        (short(time_s=np.full(50, 3.0)), "has 1 sample of all joints.* a stamp was repeated 49 times"),
         (short(time_s=np.linspace(0, 1e9, 50)), "span 1e[+]09 s: check their unit"),
         (short(time_s=np.tile(np.arange(25) / 10, 2)), "goes back by 2.4 s at sample 26 of 50: give one recording"),
     ],
@@ -141,12 +141,12 @@ def test_what_is_wrong_with_a_csv_file_is_said_in_one_line(tmp_path, panda_model
 
 def test_what_is_wrong_with_a_bag_is_said_in_one_line(tmp_path, panda_model):
     for name, messages, words in (
-        ("none", wrenches(np.zeros((9, 3))), "has no topic of sensor_msgs/JointState: it holds /wrench"),
-        ("others", states(MOVING[:, :2], ("a", "b")), "names the joints a, b: this needs panda_joint1, panda_joint2"),
+        ("none", wrenches(np.zeros((9, 3))), "has no topic of type sensor_msgs/JointState; it holds /wrench"),
+        ("others", states(MOVING[:, :2], ("a", "b")), "names the joints a, b, but panda_joint1, panda_joint2"),
         ("twice", states(np.hstack([MOVING, MOVING]), tuple(f"{a}_joint{i}" for a in "ab" for i in range(1, 8))),
          "names joint 1 twice, 'a_joint1' and 'b_joint1'"),
         ("nan", states(np.full((9, 7), np.nan)), "9 samples are not finite numbers"),
-        ("far", states(100 * MOVING), "out of its range of .* check the unit and the arm"),
+        ("far", states(100 * MOVING), "outside its range of .* check the unit and the arm"),
     ):  # fmt: skip
         with pytest.raises(RecordingError, match=words) as error:
             read_joints(write_bag(tmp_path / name, messages), panda_model)
@@ -165,8 +165,8 @@ def test_a_message_without_positions_is_passed_over(tmp_path, panda_model):
 @pytest.mark.parametrize(
     ("name", "topic", "words"),
     [
-        ("none.csv", "", "there is none"),
-        ("a.xlsx", "", "has an ending that is none of .mcap, .db3, .bag, .csv"),
+        ("none.csv", "", "does not exist"),
+        ("a.xlsx", "", "has an unknown format: give a file that ends in .mcap, .db3, .bag, .csv"),
         ("folder", "", "has no metadata.yaml"),
         ("a.csv", "/joint_states", "is a CSV file and has no topics: leave out --topic"),
         ("a.csv", "", "is empty"),

@@ -9,7 +9,6 @@ import pytest
 
 from pretouch import realtime
 from pretouch.calibration.motion.plan import Plan
-from pretouch.cli.ending import Terminated, ends_raise
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.loop import MonotonicClock
@@ -18,6 +17,7 @@ from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.session.motion import Ending, follow, go
 from pretouch.session.session import NoUnits
+from pretouch.signals import Terminated, ends_raise
 from pretouch.types import Mode
 from tests.session.arms import FollowingArm
 
@@ -106,11 +106,13 @@ def test_an_arm_that_takes_no_more_commands_is_said_and_its_motion_ended(control
     assert arm.ended == 1
 
 
-@pytest.mark.parametrize(("stands", "unrest"), [(True, ""), (False, "The arm does not answer.")])
-def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, panda_model, stands, unrest):
+@pytest.mark.parametrize(("stands", "rest_unknown"), [(True, ""), (False, "The arm does not answer.")])
+def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, panda_model, stands, rest_unknown):
     arm = FollowingArm(panda_model.description.q_ready)
     arm.end_fails, arm.gone = True, not stands
-    assert followed(controller, arm, Keeper(), 20) == Ending(stopped="The arm does not answer.", unrest=unrest)
+    assert followed(controller, arm, Keeper(), 20) == Ending(
+        stopped="The arm does not answer.", rest_unknown=rest_unknown
+    )
 
 
 def test_an_arm_goes_along_a_plan_and_a_signal_stops_it(controller, panda_model):

@@ -18,9 +18,9 @@ from pretouch.types import Mode
 from pretouch.viewer.controls import toggle_recording
 from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage, serve_live
+from pretouch.viewer.room import Faults, LiveSettings
 from pretouch.viewer.scene import GIZMO_M
 from pretouch.viewer.server import ServeOptions, served
-from pretouch.viewer.settings import Faults, LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -175,7 +175,7 @@ def test_a_folder_for_recordings_that_cannot_be_made_is_said(
     Path("runs").write_text("in the way")
     clock.page.ask(lambda: toggle_recording(simulation))
     clock.turn(0.1)
-    assert clock.page.notice == "Not done: The folder runs cannot be made: File exists."
+    assert clock.page.notice == "Not done: The folder runs cannot be created: File exists."
     assert simulation.recording is None
 
 

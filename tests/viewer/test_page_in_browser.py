@@ -21,8 +21,8 @@ from pretouch.types import FloatArray, Mode
 from pretouch.viewer.live import serve_live
 from pretouch.viewer.real_units import RealUnits
 from pretouch.viewer.replay import serve_replay
+from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.scene import GIZMO_M
-from pretouch.viewer.settings import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 pytestmark = pytest.mark.slow

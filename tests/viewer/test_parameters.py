@@ -5,7 +5,7 @@ import pytest
 from pretouch.composition import leaves
 from pretouch.errors import ParameterError
 from pretouch.profiles import PROFILES, Profile, profile
-from pretouch.viewer.controls import named
+from pretouch.viewer.controls import with_name
 from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs, groups_of
 
 TABLE_I = {
@@ -74,9 +74,9 @@ def test_the_documentation_of_every_parameter_is_found() -> None:
 def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
     (f_b,) = (entry for entry in TABLE_1 if entry.symbol == "F_b")
     (l_max,) = (entry for entry in TABLE_1 if entry.symbol == "l_max")
-    changed = named(l_max.write_text(f_b.write_text(PROFILES["paper"], "8.5"), "150"), "paper")
+    changed = with_name(l_max.write_text(f_b.write_text(PROFILES["paper"], "8.5"), "150"), "paper")
     assert changed.name == "paper:reduction.l_max_cycles=150:detect.f_base_n=8.5"
     assert profile(changed.name) == changed
-    fine = named(f_b.write_text(PROFILES["paper"], "8.12345678"), "paper")
+    fine = with_name(f_b.write_text(PROFILES["paper"], "8.12345678"), "paper")
     assert profile(fine.name) == fine
-    assert named(PROFILES["blind"], "blind") == PROFILES["blind"]
+    assert with_name(PROFILES["blind"], "blind") == PROFILES["blind"]

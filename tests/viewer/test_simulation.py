@@ -21,7 +21,7 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
 from pretouch.types import ControlStep, Mode
 from pretouch.viewer.mouse import HAND_FORCE_N, HAND_SPEED_M_S, Mouse
-from pretouch.viewer.settings import LiveSettings
+from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 OBJECTS = ("none", "board -y", "board +y")

@@ -8,7 +8,7 @@ from pretouch.errors import RecordingError
 from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
-from pretouch.viewer.settings import LiveSettings
+from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 

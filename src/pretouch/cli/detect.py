@@ -55,7 +55,7 @@ def detect(
     if not used:
         raise ParameterError("No profile is given: name one or more, separated by commas.")
     if out and out.suffix not in _ENDINGS:
-        raise RecordingError(f"The figure {out} has no ending that says its format: use {', '.join(_ENDINGS)}.")
+        raise RecordingError(f"The figure {out} has an unknown format: use one of the endings {', '.join(_ENDINGS)}.")
     if out:
         FIGURES.need("A figure")
     for what, target in (("figure", out), ("file", json_file)):
@@ -97,13 +97,13 @@ def _unheard(skin: Skin | None, imported: ImportedData) -> list[str]:
     if skin is None:
         return []
     silent = [unit for unit, topic in zip(skin.ids, units_topics(skin, imported.ranges), strict=True) if topic is None]
-    return [f"No range topic is of {', '.join(silent)}: taken as silent."] if silent else []
+    return [f"No range topic belongs to {', '.join(silent)}, which count as silent."] if silent else []
 
 
 def _said(imported: ImportedData, columns: list[Column], skin: Skin | None) -> list[str]:
     said = [sentence for p, d, _ in columns for sentence in findings(imported, d, p)]
     if skin is None and any(p.perception.enabled and thresholds_of(p.detect).f_d_n for p, _, _ in columns):
-        said.append("Without ranges (--skin) nothing is near: eq. 11 lowers no threshold.")
+        said.append("Without ranges (--skin) no obstacle is known, so eq. 11 lowers no threshold.")
     return said
 
 
@@ -125,8 +125,8 @@ def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> No
     for _, d, _ in columns[1:]:
         both, only_first, only_other = matched(first.contacts, d.contacts)
         console.print(
-            f"{first.name} and {d.name}: {len(both)} contacts of both, {len(only_first)} of {first.name} only,"
-            f" {len(only_other)} of {d.name} only.",
+            f"{first.name} and {d.name}: {len(both)} contacts in both, {len(only_first)} only in {first.name},"
+            f" {len(only_other)} only in {d.name}.",
             markup=False,
         )
     console.print("\nFree motion [N]", style="bold", markup=False)

@@ -89,8 +89,8 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     def announced(self, period: float) -> str:
         """Say how fast the arm goes with a push, and when it goes on."""
         return (
-            f"Pushed, it yields at up to {self.speed_max_m_s:g} m/s for as long as it is pushed, and goes on"
-            f" {self.quiet_s:g} s later: nothing it could hit may be near it."
+            f"When pushed, it yields at up to {self.speed_max_m_s:g} m/s as long as the push lasts, and continues"
+            f" {self.quiet_s:g} s later: keep everything it could hit away from it."
         )
 
     @property

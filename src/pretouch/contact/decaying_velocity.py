@@ -110,8 +110,8 @@ class DecayingVelocity(Reaction, name="decay"):
         """Say how fast and how far the arm goes with a push."""
         decay = self.decay_cycles * period
         return (
-            f"Pushed, it yields in the direction of the push, at up to {self.speed_max_m_s:g} m/s and for {decay:g} s:"
-            f" nothing it could hit may be within {self.speed_max_m_s * decay / 2:.1f} m of it."
+            f"When pushed, it yields in the direction of the push, at up to {self.speed_max_m_s:g} m/s and for"
+            f" {decay:g} s: keep everything it could hit at least {self.speed_max_m_s * decay / 2:.1f} m away from it."
         )
 
 

@@ -65,8 +65,8 @@ def read_bag(place: Path, choice: Choice) -> Source:
         reader.close()
     if joints and not joints.logged:
         raise RecordingError(
-            f"{joints.name} of {place} names the joints {picker.seen()}: this needs those of a Panda or FR3, joint1 to"
-            " joint7."
+            f"{joints.name} of {place} names the joints {picker.seen()}, but those of a Panda or FR3 are needed,"
+            " joint1 to joint7."
         )
     headers, notes = believed(topics)
     return Source(
@@ -89,10 +89,10 @@ def read_errors_said(place: Path) -> Iterator[None]:
         raise
     except Exception as error:
         what = " ".join(str(error).split())[:200] or type(error).__name__
-        mend = "; `pretouch recover`, or `mcap recover` for others' files, mends one that was cut off"
+        mend = "; `pretouch recover` (or `mcap recover` for files of other programs) repairs a truncated one"
         raise RecordingError(
-            f"{place} cannot be read as a bag or MCAP file ({what}): give a whole one"
-            f"{mend if place.suffix == '.mcap' else ''}."
+            f"{place} cannot be read as a bag or MCAP file ({what}): give a complete"
+            f" file{mend if place.suffix == '.mcap' else ''}."
         ) from error
 
 
@@ -112,10 +112,10 @@ def one_topic(place: Path, there: list[Any], kind: str, option: str, named: str)
     topics = sorted({c.topic for c in there if c.msgtype == kind})
     short = kind.replace("/msg/", "/")
     if not topics and any(c.msgtype == UNIT_SAMPLE for c in there):
-        raise RecordingError(f"{place} holds what sensor units sent, and no {_HELD[kind]}: {READ_WITH}.")
+        raise RecordingError(f"{place} holds samples of sensor units, but no {_HELD[kind]}: {READ_WITH}.")
     if not topics:
         held = ", ".join(sorted({f"{c.topic} ({c.msgtype.replace('/msg/', '/')})" for c in there})) or "nothing"
-        raise RecordingError(f"{place} has no topic of {short}: it holds {held}.")
+        raise RecordingError(f"{place} has no topic of type {short}; it holds {held}.")
     if named and named not in topics:
         raise RecordingError(f"{place} has no topic {named!r} of {short}: choose {option} from {', '.join(topics)}.")
     if not named and len(topics) > 1:
@@ -139,11 +139,12 @@ def believed(topics: list[Topic]) -> tuple[bool, tuple[str, ...]]:
     if not len(logged) or not np.ptp(logged):
         return True, ()
     if any(topic.header.count(0) > 1 for topic in topics):  # a simulation's may begin with one
-        return False, ("Some headers have no stamp: the times of recording are used.",)
+        return False, ("Some headers have no stamp, so the times of recording are used.",)
     drift = float(np.ptp(header - logged)) / 1e9
     if drift > _CLOCKS_APART_S:
         return False, (
-            f"The headers' stamps and the times of recording drift {drift:.3g} s apart: the latter are used.",
+            f"The headers' stamps and the times of recording drift {drift:.3g} s apart, so the times of recording are"
+            " used.",
         )
     return True, ()
 

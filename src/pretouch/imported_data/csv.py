@@ -38,7 +38,7 @@ def read_csv(place: Path, choice: Choice) -> Source:
     if choice.wrench or choice.joints:
         raise RecordingError(f"{place} is a CSV file and has no topics: leave out --wrench and --joints.")
     if choice.ranges:
-        raise RecordingError(f"{place} is a CSV file, which tells no ranges: leave out --skin, or give a bag.")
+        raise RecordingError(f"{place} is a CSV file, which has no ranges: leave out --skin, or give a bag.")
     rows, names = read_header(place, "time_s,force_x_N,force_y_N,force_z_N")
     columns, factors = _columns(place, names)
     table, time, notes = read_table(place, rows, names, {i: factors[key] for key, i in columns.items()})
@@ -69,9 +69,9 @@ def _rows(place: Path) -> Rows:
                 if any(cell.strip() for cell in cells):
                     yield lines.line_num, cells
     except UnicodeDecodeError as error:
-        raise RecordingError(f"{place} is no text in UTF-8 ({error.reason}): give a CSV file.") from error
+        raise RecordingError(f"{place} is not UTF-8 text ({error.reason}): give a CSV file.") from error
     except csv.Error as error:
-        raise RecordingError(f"{place} is no CSV file ({error}): give columns separated by , ; or a tab.") from error
+        raise RecordingError(f"{place} is not a CSV file ({error}): separate columns by , ; or a tab.") from error
     except OSError as error:
         raise RecordingError(f"{place} cannot be read: {error.strerror}.") from error
 
@@ -110,7 +110,7 @@ def _columns(place: Path, names: list[str]) -> tuple[dict[str, int], dict[str, f
             raise RecordingError(f"{place} has no column {needed} (it has {listed(names)}): add one named {shown}.")
     order = [k for k in ("time", *(f"{q}_{a}" for q in ("force", "torque") for a in "xyz")) if k in columns]
     if sum(key.startswith("torque") for key in order) not in (0, 3):
-        raise RecordingError(f"{place} has not all of torque_x, torque_y and torque_z: give all three, or none.")
+        raise RecordingError(f"{place} has only some of torque_x, torque_y and torque_z: give all three, or none.")
     order += sorted((key for key in columns if key.startswith("q")), key=lambda key: int(key[1:]))
     return {key: columns[key] for key in order}, factors
 

@@ -34,13 +34,13 @@ def detect_imported(imported: ImportedData, profile: Profile, skin: Skin | None 
     """
     if profile.detect.by_torques:
         raise RecordingError(
-            f"The profile {profile.name} detects by joint torques, and {imported.place} is read for its force: choose"
-            " one with detect=thresholds."
+            f"The profile {profile.name} detects by joint torques, but {imported.place} gives only a force: choose one"
+            " with detect=thresholds."
         )
     timeout, gap = profile.failure.force_timeout_s, float(np.median(np.diff(imported.force.time))) / 1e9
     if gap > timeout:
         raise RecordingError(
-            f"The force of {imported.place} comes every {gap:.3g} s, and the detector needs it within {timeout:g} s:"
+            f"The force of {imported.place} comes every {gap:.3g} s, but the detector needs it every {timeout:g} s:"
             " check the unit of the time."
         )
     ticks = _ticks(imported.force.time, profile)
@@ -52,7 +52,7 @@ def detect_imported(imported: ImportedData, profile: Profile, skin: Skin | None 
     if not decisions.armed.any():
         period, usable = profile.task.control_period_s, int(np.isfinite(decisions.force[:, 0]).sum())
         raise RecordingError(
-            f"{imported.place} has {usable * period:.2f} s of usable force, and the window of {profile.name} takes"
+            f"{imported.place} has {usable * period:.2f} s of usable force, but the window of {profile.name} takes"
             f" {profile.window.samples * period:g} s to fill: give a longer recording."
         )
     return decisions
@@ -118,7 +118,9 @@ def _whole_controller(
     posture = interpolated(joints, ticks, POSTURE_GAP_S)
     known = np.flatnonzero(np.isfinite(posture).all(axis=1))
     if not len(known):
-        raise RecordingError(f"{imported.place} has no joint positions while it has forces: use those of one run.")
+        raise RecordingError(
+            f"The joint positions and forces of {imported.place} do not overlap in time: use those of one run."
+        )
     x = model.kinematics(posture[known[0]]).position[model.ee]
     anywhere = line(tuple(x.tolist()), (float(x[0]), float(x[1]) + 0.1, float(x[2])))
     controller, decided = Controller(model, skin, no_fixtures(), anywhere, profile), Decided(profile.name)
@@ -151,7 +153,7 @@ def units_topics(skin: Skin, ranges: tuple[RangeTopic, ...]) -> list[RangeTopic 
     if not any(found):
         topics = ", ".join(f"{r.topic} (frame {r.frame!r})" for r in ranges)
         raise RecordingError(
-            f"No unit of the skin ({', '.join(skin.ids)}) is named by a topic of ranges: {topics}: call the units so."
+            f"No unit of the skin ({', '.join(skin.ids)}) matches a topic of ranges ({topics}): rename the units."
         )
     return found
 

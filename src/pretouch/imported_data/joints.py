@@ -47,7 +47,7 @@ def read_joints(place: Path, model: RobotModel, topic: str = "") -> ImportedJoin
     place = Path(place)
     ending = place.suffix.lower()
     if not place.exists():
-        raise RecordingError(f"The recording {place} cannot be read: there is none.")
+        raise RecordingError(f"The recording {place} does not exist: check its name.")
     if place.is_dir() and not (place / "metadata.yaml").is_file():
         raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
     if place.is_dir() or ending in BAGS:
@@ -56,7 +56,8 @@ def read_joints(place: Path, model: RobotModel, topic: str = "") -> ImportedJoin
         said, series, notes = _of_csv(place, model, topic)
     else:
         raise RecordingError(
-            f"{place} has an ending that is none of {', '.join((*BAGS, *TABLES))}: give such a file, or a bag's folder."
+            f"{place} has an unknown format: give a file that ends in {', '.join((*BAGS, *TABLES))}, or the folder of a"
+            " bag."
         )
     series, more = _usable(place, series)
     check_reach(place, series.values, model)
@@ -142,7 +143,7 @@ def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
         reader.close()
     if not states.logged:
         raise RecordingError(
-            f"{states.name} of {place} names the joints {picked.seen()}: this needs {', '.join(model.joints)}."
+            f"{states.name} of {place} names the joints {picked.seen()}, but {', '.join(model.joints)} are needed."
         )
     headers, notes = believed([states])
     return f"the topic {states.name}", states.series(headers), notes
@@ -172,5 +173,5 @@ def _check_overlap(place: Path, series: Series) -> None:
         first = int(np.argmax(back > _LATE_S))
         raise RecordingError(
             f"The time in {place} goes back by {back[first]:.3g} s at sample {first + 1} of {len(series)}: give one"
-            " recording of one arm, cut where its time goes on without a break."
+            " recording of one arm, cut to a part in which time never goes back."
         )

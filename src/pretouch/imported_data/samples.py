@@ -70,7 +70,7 @@ def read_imported(place: Path, choice: Choice) -> ImportedData:
 
 def _read(place: Path, choice: Choice) -> Source:
     if not os.path.exists(place):
-        raise RecordingError(f"The recording {place} cannot be read: there is none.")
+        raise RecordingError(f"The recording {place} does not exist: check its name.")
     ending = place.suffix.lower()
     if place.is_dir() or ending in BAGS:
         if place.is_dir() and not (place / "metadata.yaml").is_file():
@@ -84,7 +84,8 @@ def _read(place: Path, choice: Choice) -> Source:
 
         return read_csv(place, choice)
     raise RecordingError(
-        f"{place} has an ending that is none of {', '.join((*BAGS, *TABLES))}: give such a file or a bag's folder."
+        f"{place} has an unknown format: give a file that ends in {', '.join((*BAGS, *TABLES))}, or the folder of a"
+        " bag."
     )
 
 
@@ -109,11 +110,11 @@ def _ours(force: Series, choice: Choice) -> tuple[FloatArray, tuple[str, ...]]:
     ours = force.values[:, :3] * (-1.0 if choice.sign == "by-robot" else 1.0)
     notes: list[str] = []
     if unusable.any():
-        notes.append(f"Force: {_samples(unusable)} not finite numbers: taken as no estimate.")
+        notes.append(f"Force: {_samples(unusable)} not finite and count as no estimate.")
     if zero.any() and choice.zeros_missing:
-        notes.append(f"Force: {_samples(zero)} all zeros: taken as no estimate (--zeros kept).")
+        notes.append(f"Force: {_samples(zero)} all zeros and count as no estimate (--zeros kept).")
     elif zero.any():
-        notes.append(f"Force: {_samples(zero)} all zeros, which on a Franka means no estimate (--zeros missing).")
+        notes.append(f"Force: {_samples(zero)} all zeros, which on a Franka arm means no estimate (--zeros missing).")
     none = unusable | (zero & choice.zeros_missing)
     return np.where(none[:, None], np.nan, ours), tuple(notes)
 
@@ -135,8 +136,8 @@ def _in_base(model: RobotModel, joints: Series, force: Series) -> FloatArray:
 def _said(source: Source, choice: Choice, model: RobotModel | None) -> str:
     sign, other = ("on the robot", "by-robot") if choice.sign == "on-robot" else ("by the robot", "on-robot")
     frame, another = ("base", "ee") if choice.frame == "base" else ("end-effector's", "base")
-    arm = f" The arm is taken as {model.description.name} (--arm)." if model else ""
+    arm = f" The arm is assumed to be {model.description.name} (--arm)." if model else ""
     return (
-        f"Force from {source.said}, taken as the force {sign} (else --sign {other}) in the {frame} frame (else --frame"
-        f" {another}).{arm}"
+        f"Force from {source.said}, assumed to be the force {sign} (otherwise --sign {other}) in the {frame} frame"
+        f" (otherwise --frame {another}).{arm}"
     )

@@ -34,7 +34,7 @@ class Choice:
     zeros: Zeros = "auto"
     """Whether a wrench of zeros only means that there is no estimate; auto: where the force is by the robot."""
     arm: Arm = "auto"
-    """The arm; auto: what its joints' names say, or else a Panda."""
+    """The arm; auto: by the names of its joints, otherwise a Panda."""
     ranges: bool = False
     """Whether the range finders are wanted."""
 
@@ -106,7 +106,7 @@ def in_order(series: Series, what: str) -> tuple[Series, tuple[str, ...]]:
     doubles = int(np.count_nonzero(~last))
     if doubles:
         series = Series(series.time[last], series.values[last])
-        notes.append(f"{what}: a stamp came again {_times(doubles)}; the later sample counts.")
+        notes.append(f"{what}: a stamp was repeated {_times(doubles)}; the later sample counts.")
     return series, tuple(notes)
 
 

@@ -71,7 +71,7 @@ def guidance(decisions: Decisions, found: Summary, profile: Profile) -> str:
     if not count:
         return (
             f"{decisions.name}: no contact in {minutes:.1f} min; an F_b below {found.f_base_all:.1f} N would have given"
-            f" one (it is {thresholds_of(profile.detect).f_base_n:g} N)."
+            f" one (F_b is {thresholds_of(profile.detect).f_base_n:g} N)."
         )
     contacts = "1 false contact" if count == 1 else f"{count} false contacts"
     return (
@@ -95,9 +95,12 @@ def findings(imported: ImportedData, decisions: Decisions, profile: Profile) -> 
     if len(long):
         many = f"{len(long)} gaps" if len(long) > 1 else "A gap"
         said.append(
-            f"{many} of more than {profile.failure.force_timeout_s:g} s, {long.sum():.2f} s in all: no force there."
+            f"{many} of more than {profile.failure.force_timeout_s:g} s, {long.sum():.2f} s in all, without force."
         )
     without = int(np.count_nonzero(~np.isfinite(decisions.force).all(axis=1)))
     if without:
-        said.append(f"{decisions.name}: {without} of {len(decisions.time)} cycles have no force, and detect nothing.")
+        said.append(
+            f"{decisions.name}: {without} of {len(decisions.time)} cycles have no force, so nothing is detected in"
+            " them."
+        )
     return tuple(said)

@@ -128,11 +128,11 @@ def _ordered(links: dict[str, Element], joints: dict[str, Element]) -> list[tupl
         children[required(joint.find("parent"), "link")].append(child)
     roots = [name for name in links if name not in joints]
     if links and not roots:
-        raise RobotModelError(f"The links {', '.join(links)} hang on each other in a ring: leave one joint out.")
+        raise RobotModelError(f"The links {', '.join(links)} form a loop: leave one joint out.")
     if not links:
         raise RobotModelError("The robot has no links: give it some.")
     if len(roots) != 1:
-        raise RobotModelError(f"The links hang on {len(roots)} roots ({', '.join(roots)}): join them to one tree.")
+        raise RobotModelError(f"The links have {len(roots)} roots ({', '.join(roots)}): connect them to one tree.")
     order: list[tuple[str, int]] = []
     waiting = [(roots[0], -1)]
     while waiting:
@@ -141,7 +141,7 @@ def _ordered(links: dict[str, Element], joints: dict[str, Element]) -> list[tupl
         waiting += [(child, len(order) - 1) for child in reversed(children[name])]
     if len(order) < len(links):
         lost = sorted(set(links) - {name for name, _ in order})
-        raise RobotModelError(f"The links {', '.join(lost)} hang on each other in a ring: join them to the root.")
+        raise RobotModelError(f"The links {', '.join(lost)} form a loop: connect them to the root.")
     return order
 
 
@@ -158,7 +158,7 @@ def _moving(element: Element) -> tuple[SourceJoint, ...]:
     axis = np.array([1.0, 0.0, 0.0]) if axis_element is None else vector(axis_element, "xyz", 3, name)
     length = float(np.linalg.norm(axis))
     if length < 1e-6:
-        raise RobotModelError(f"The joint {name} has an axis of no length: give it a direction.")
+        raise RobotModelError(f"The joint {name} has an axis of length zero: give it a direction.")
     limit = element.find("limit")
     limits = None
     if limit is not None and kind in ("revolute", "prismatic"):
@@ -222,5 +222,5 @@ def _shape(solid: Element, link: str, T: FloatArray, finder: MeshFinder) -> Shap
         case other:
             raise RobotModelError(f"The link {link} has a shape {other!r}: use box, sphere, cylinder, capsule or mesh.")
     if min(sizes) <= 0:
-        raise RobotModelError(f"The link {link} has a {solid.tag} of no size: give it positive measures.")
+        raise RobotModelError(f"The link {link} has a {solid.tag} of size zero: give it positive dimensions.")
     return shape

@@ -112,7 +112,7 @@ class Codec:
     def decoded(self, kind: str, data: bytes) -> Any:
         """Return the message that CDR bytes hold; its arrays are aligned and writable. Raises DecodeError."""
         if data[:2] != _HEADER[:2]:
-            raise DecodeError("its header is not that of little-endian CDR")
+            raise DecodeError("its header is not little-endian CDR")
         try:
             body = np.frombuffer(data, np.uint8, offset=len(_HEADER)).copy()
             message, end = self._reader(kind)(body, 0)

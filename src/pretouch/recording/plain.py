@@ -19,7 +19,7 @@ def as_json(value: JSON) -> str:
         return json.dumps(value, default=_plain)
     except (TypeError, ValueError, RecursionError) as error:
         raise RecordingError(
-            f"What is said about the run cannot be written as JSON ({error}): give plain values."
+            f"The description of the run cannot be written as JSON ({error}): give plain values."
         ) from error
 
 
@@ -39,7 +39,7 @@ def from_json(text: str) -> dict[str, JSON]:
     except (ValueError, RecursionError) as error:
         raise RecordingError(f"The description of the run in the recording is damaged: {error}") from error
     if not isinstance(found, dict):
-        raise RecordingError("The description of the run in the recording is damaged: it is no table of names.")
+        raise RecordingError("The description of the run in the recording is damaged: it is not a table.")
     return found
 
 

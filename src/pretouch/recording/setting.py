@@ -113,8 +113,8 @@ class Run:
         """Make the controller again, on the model, skin, fixtures and path of this run."""
         if self.unlike:
             raise RecordingError(
-                f"The recorded profile differs in {', '.join(self.unlike)} from what this version knows: recompute it"
-                f" with the version that made it, {self.versions.get('pretouch', 'unknown')}."
+                f"The recorded profile differs from this version in {', '.join(self.unlike)}: recompute it with the"
+                f" version that made it, {self.versions.get('pretouch', 'unknown')}."
             )
         return sound(lambda: Controller(self.model, self.skin, self.fixtures, self.path, self.profile))
 
@@ -139,7 +139,8 @@ def decode_run(data: bytes, tangents: Callable[[int], Tangents]) -> Run:
     m = decoded(RUN, data)
     if m.format > FORMAT:
         raise RecordingError(
-            f"The recording has format {m.format}, this version of pretouch knows {FORMAT}: open it with a later one."
+            f"The recording has format {m.format}, but this version of pretouch reads up to {FORMAT}: open it with a"
+            " later version."
         )
     profile, unlike = sound(lambda: profile_from(from_json(m.profile)))
     return Run(
@@ -164,9 +165,7 @@ def _mjcf(arm: RobotDescription) -> str:
     try:
         return arm.mjcf.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(
-            f"The MJCF file {arm.mjcf} cannot be read, to keep it in the recording: {error}"
-        ) from error
+        raise RecordingError(f"The MJCF file {arm.mjcf} cannot be copied into the recording: {error}") from error
 
 
 def _model(m: Any) -> RobotModel:

@@ -214,8 +214,8 @@ def decode_state(data: bytes) -> tuple[bool, ControllerState]:
         return message.anew, _give(_Reading(message), "", ControllerState)
     except (ValueError, KeyError, IndexError, StopIteration) as error:
         raise RecordingError(
-            f"The controller's state in the recording is that of another version ({error}): open it with the version"
-            " that made it."
+            f"The controller's state in the recording is from another version ({error}): open it with the version that"
+            " made it."
         ) from error
 
 

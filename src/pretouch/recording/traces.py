@@ -93,8 +93,8 @@ class JointRows:
         self.names = self.names or names
         if names != self.names:
             raise RecordingError(
-                f"{self._place} has states of the joints {', '.join(names)} beside those of {', '.join(self.names)}:"
-                " record one arm in a file."
+                f"{self._place} has states of the joints {', '.join(names)} and of {', '.join(self.names)}: record one"
+                " arm per file."
             )
         at = message.header.stamp
         self.add(at.sec + at.nanosec / 1e9, message.position)

@@ -220,7 +220,7 @@ def _verdict(recorded: Recorded, count: _Count, exact: bool) -> Verdict:
 
 
 def _all(checked: int) -> str:
-    return "The one step was" if checked == 1 else f"All {checked} steps were"
+    return "The only step was" if checked == 1 else f"All {checked} steps were"
 
 
 def _largest(count: _Count) -> str:

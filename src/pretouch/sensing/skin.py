@@ -101,7 +101,7 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
         raise SkinError(f"The skin file {path} is not valid TOML: {error}.") from error
     entries = data.get("unit")
     if not isinstance(entries, list) or not entries:
-        raise SkinError(f"The skin file {path} names no unit: give at least one [[unit]] with id, link and pose.")
+        raise SkinError(f"The skin file {path} has no unit: give at least one [[unit]] with id, link and pose.")
     try:
         return Skin([_unit_from(entry) for entry in entries], model)
     except SkinError as error:

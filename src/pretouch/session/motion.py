@@ -25,19 +25,19 @@ class Ending:
 
     stopped: str = ""
     """Why it ended early, as a sentence; '' if it did not."""
-    unrest: str = ""
+    rest_unknown: str = ""
     """Why the arm may not be at rest, as a sentence; '' if it is."""
 
     @property
     def early(self) -> bool:
         """Whether it did not end as asked."""
-        return bool(self.stopped or self.unrest)
+        return bool(self.stopped or self.rest_unknown)
 
     def sentences(self) -> tuple[str, ...]:
         """Say it."""
         rest = "The arm is at rest."
-        if self.unrest:
-            rest = f"Whether the arm is at rest is not known: {self.unrest} Look at it, and press the user stop."
+        if self.rest_unknown:
+            rest = f"The arm may not be at rest: {self.rest_unknown} Check it, and press the user stop."
         return (rest, f"The run ended early: {self.stopped}") if self.stopped else (rest,)
 
 
@@ -64,7 +64,7 @@ def go(arm: Arm, controller: Controller, way: Plan, ending: Ending) -> None:
         done = perform(arm, MonotonicClock(period), controller.model, way, params, look)
         return done.stopped or ""
 
-    _moved(arm, move, ending)
+    _run_motion(arm, move, ending)
 
 
 def follow(
@@ -81,26 +81,26 @@ def follow(
         realtime.run(controller, arm, skin, clock, recorder, lambda step: bool(came) or done(step), options)
         return ""
 
-    _moved(arm, move, ending)
+    _run_motion(arm, move, ending)
 
 
-def _moved(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> None:
+def _run_motion(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> None:
     """Let an arm take commands while `move` gives them; it is handed the signals that came, and says why it stopped."""
     with noted_in_motion() as came:
         try:
             arm.begin()
             ending.stopped = move(came)
         except Exception as error:
-            ending.stopped = named(error)
+            ending.stopped = error_text(error)
         finally:
             try:
                 arm.end()
             except Exception as error:
-                ending.stopped = ending.stopped or named(error)
-                ending.unrest = "" if _stands(arm) else named(error)
+                ending.stopped = ending.stopped or error_text(error)
+                ending.rest_unknown = "" if _is_at_rest(arm) else error_text(error)
 
 
-def _stands(arm: Arm) -> bool:
+def _is_at_rest(arm: Arm) -> bool:
     """Whether an arm whose motion could not be ended is seen to stand, as after a stop of its own."""
     begin = time.monotonic()
     while time.monotonic() < begin + _STAND_S:
@@ -112,6 +112,6 @@ def _stands(arm: Arm) -> bool:
     return False
 
 
-def named(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """Say what an error says, and of one that is not ours, what it is."""
     return str(error) if isinstance(error, PretouchError) else f"{type(error).__name__}: {error}"

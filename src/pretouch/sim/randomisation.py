@@ -111,11 +111,11 @@ def world_set(name: str) -> WorldSet:
         table = tomllib.loads(data.decode("utf-8"))
     except OSError as error:
         raise ParameterError(
-            f"The world {name!r} is none of {', '.join(SETS)}, and no file of that name can be read"
+            f"The world {name!r} is not one of {', '.join(SETS)}, and no file of that name can be read"
             f" ({error.strerror}): choose one of these, or give a TOML file (docs/how-to/sim-to-real.md)."
         ) from error
     except ValueError as error:
-        raise ParameterError(f"The world file {place} is no TOML file ({error}): correct it.") from error
+        raise ParameterError(f"The world file {place} is not valid TOML ({error}): correct it.") from error
     found = WorldSet(name, str(table.get("about", "")), tuple(_spreads(place, table)), sha256(data).hexdigest())
     drawn(found, 0)  # what can never be drawn is said before an hour of trials
     return found
@@ -132,12 +132,14 @@ def _spreads(place: Path, table: dict[str, Any]) -> list[Spread]:
         if part == "about":
             continue
         if part not in known or not isinstance(entries, dict):
-            raise ParameterError(f"{place} has {part!r}: its tables are about, {', '.join(known)}.")
+            raise ParameterError(f"{place} has an unknown table {part!r}: use about, {', '.join(known)}.")
         for name, entry in entries.items():
             if f"{part}.{name}" in _RENAMED:
                 raise ParameterError(f"{place} has {part}.{name}: {_RENAMED[f'{part}.{name}']}.")
             if name not in known[part]:
-                raise ParameterError(f"{place} has {part}.{name}: choose from {', '.join(known[part])}.")
+                raise ParameterError(
+                    f"{place} has an unknown field {part}.{name}: choose from {', '.join(known[part])}."
+                )
             found.append(_spread(place, f"{part}.{name}", entry))
     return found
 

@@ -145,7 +145,9 @@ class RangeFinders:
         """Err in another way from the next measurement on; what was settled when they were mounted has to stay."""
         for name in ("mode", "rings", "offset_max_m"):
             if getattr(params, name) != getattr(self._params, name):
-                raise ParameterError(f"RangeFinderParams.{name} cannot change while the sensors run: mount them anew.")
+                raise ParameterError(
+                    f"RangeFinderParams.{name} cannot change while the sensors run: create them again."
+                )
         self._params, self._errors = params, _errors(params)
 
     def read(self) -> RangeReadings:

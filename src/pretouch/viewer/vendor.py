@@ -25,10 +25,10 @@ _FINGER_HEIGHT_M = 0.0584
 def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
     """Surfaces by link index, link frame, and a sentence: none and why, or all and ''."""
     if model.description.name != "panda":
-        return {}, f"The arm is drawn by its capsules: there are no surfaces for {model.description.name}."
+        return {}, f"The arm is drawn by its capsules, because there are no surfaces for {model.description.name}."
     folder = _folder()
     if folder is None or MESHES.missing():
-        return {}, f"The arm is drawn by its capsules: for the vendor's surfaces, run {MESHES.command}"
+        return {}, f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
 
     return {i: _surface(folder, link) for i, link in enumerate(model.links) if _has_one(link)}, ""
 

@@ -58,7 +58,9 @@ def test_a_higher_threshold_of_ours_raises_the_arms(panda_model: RobotModel) -> 
 
 def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel) -> None:
     good = collision_behavior(profile("paper"), panda_model)
-    with pytest.raises(ParameterError, match=r"report a contact from 15 N, but ours is felt from up to 18 N: give"):
+    with pytest.raises(
+        ParameterError, match=r"report a contact from 15 N on, but our detection may need up to 18 N: set"
+    ):
         check(replace(good, lower_force=np.full(6, 15.0)), profile("paper"), panda_model)
     with pytest.raises(ParameterError, match=r"upper_torque\[0\] is 5: it must be greater than the lower"):
         check(replace(good, upper_torque=np.full(7, 5.0)), profile("paper"), panda_model)

@@ -13,8 +13,8 @@ import pytest
 
 from pretouch.hardware.ros2.params import ArmParams, NodeParams
 from pretouch.robot.description import panda
+from pretouch.session.confirmations import ConfirmedRobots
 from pretouch.session.push import DIRECTIONS
-from pretouch.session.remembered import Remembered
 from pretouch.session.ros2 import identity
 from tests.hardware.ros2.processes import ArmPeer, arm_peer
 
@@ -52,7 +52,7 @@ def arm(domain: int, tmp_path: Path) -> Iterator[ArmPeer]:
 
 def confirmed(domain: int, folder: Path) -> None:
     known = identity(NodeParams(domain=domain), ArmParams("by-robot", "base"))
-    Remembered(folder / "state" / "pretouch").keep(known)
+    ConfirmedRobots(folder / "state" / "pretouch").keep(known)
 
 
 def lines_until(process: subprocess.Popen[str], sign: str) -> list[str]:

@@ -89,6 +89,6 @@ def test_a_world_has_a_folder_of_its_own_and_is_kept_out_of_the_published_tables
     assert cli.main(["bench", "both", "--world", "stress", "--readme", "README.md"]) == 2
     assert "--readme writes the published tables" in capsys.readouterr().err
     assert cli.main(["bench", "detection", "--world", "strange"]) == 2
-    assert "none of nominal, realistic, stress" in capsys.readouterr().err
+    assert "not one of nominal, realistic, stress" in capsys.readouterr().err
     assert cli.main(["reproduce", "static", "--world", "strange"]) == 2
-    assert "none of nominal, realistic, stress" in capsys.readouterr().err
+    assert "not one of nominal, realistic, stress" in capsys.readouterr().err

@@ -272,7 +272,7 @@ def test_a_damaged_run_is_named(tmp_path):
     (cell,) = CATALOGUE["close-up"].cells("paper")
     open_folder(Request(("static",), seeds=1), tmp_path)
     recording_file(tmp_path, cell, 0).write_bytes(b"no recording")
-    with pytest.raises(RecordingError, match="is no MCAP file"):
+    with pytest.raises(RecordingError, match="is not an MCAP file"):
         draw_figure("close-up", tmp_path, tmp_path / "x.png")
     assert not (tmp_path / "x.png").exists()
 

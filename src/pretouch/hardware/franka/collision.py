@@ -11,11 +11,11 @@ largest mean:
   filtered comparison, in which the force of a push still grows. For the paper's parameters that is 48 N, between the
   40 N below which a reaction comes too late and the 60 N that a hand meets at 0.3 m/s.
 
-The sequential test has no threshold: it feels least while it has learnt nothing. The largest force on one axis that
-it may then miss at the arm's ready posture is 38 N with the profile `pretouch`; once it has learnt, 4 to
-9 N on a simulated Panda. The arm stops by itself `upper_above_n` above that, but from `most_n` on at the latest: with
-an error of `bias_n` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm
-that is pushed yields at 0.27 m/s at least, whatever the direction, of the 0.3 m/s it may.
+The sequential test has no threshold: it is least sensitive while it has learnt nothing. The largest force on one axis
+that it may then miss at the arm's ready posture is 38 N with the profile `pretouch`; once it has learnt, 4 to 9 N on a
+simulated Panda. The arm stops by itself `upper_above_n` above that, but from `most_n` on at the latest: with an error
+of `bias_n` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm that is
+pushed yields at 0.27 m/s at least in any direction; its limit is 0.3 m/s.
 
 Joint torques are those of such a force at the end-effector with the longest lever its joint ever has, but at least the
 figures of the vendor's examples, which are above the noise of the estimate (20 20 18 18 16 14 12 Nm; libfranka,
@@ -97,9 +97,9 @@ def collision_behavior(profile: Profile, model: RobotModel, params: CollisionPar
         lower = min(lower, 0.5 * (ours + upper))
         if not ours < upper:
             raise ParameterError(
-                f"The profile {profile.name} may miss {ours:.0f} N before it has learnt anything, and the arm must stop"
-                f" by itself from {given.most_n:g} N on: make its detection feel less, by smaller priors of free motion"
-                " or more detect.false_alarms_per_hour."
+                f"The profile {profile.name} may miss {ours:.0f} N before it has learnt anything, but the arm must stop"
+                f" by itself from {given.most_n:g} N on: make its detection more sensitive, by smaller priors of free"
+                " motion or more detect.false_alarms_per_hour."
             )
     levers, shape = longest_levers(model), np.array([1.0, 1.0, 1.0, _MOMENT_M, _MOMENT_M, _MOMENT_M])
     behavior = CollisionBehavior(
@@ -120,8 +120,9 @@ def check(
     lowest = float(behavior.lower_force[:3].min())
     if not lowest > ours:
         raise ParameterError(
-            f"The arm would report a contact from {lowest:g} N, but ours is felt from up to {ours:g} N: give"
-            f" CollisionBehavior.lower_force more than that, or profile {profile.name!r} a smaller detect.f_base_n."
+            f"The arm would report a contact from {lowest:g} N on, but our detection may need up to {ours:g} N: set"
+            f" CollisionBehavior.lower_force higher than that, or give profile {profile.name!r} a smaller"
+            " detect.f_base_n."
         )
     for what, lower, upper in (
         ("force", behavior.lower_force, behavior.upper_force),

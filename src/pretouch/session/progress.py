@@ -1,4 +1,4 @@
-"""What a person is told of a run as it goes on, and what is said of it at the end."""
+"""Progress messages of a run, and its summary at the end."""
 
 import re
 from collections.abc import Callable
@@ -19,8 +19,8 @@ _BRIEF_S = 0.05
 
 
 @dataclass
-class Course:
-    """What happened in a run."""
+class RunSummary:
+    """Counts of a run."""
 
     steps: int = 0
     contacts: int = 0
@@ -28,7 +28,7 @@ class Course:
     """Time held [s] by the reason, without its numbers."""
 
     def sentences(self, period: float) -> tuple[str, ...]:
-        """Say it."""
+        """Return the summary in sentences."""
         found = [
             f"{self.steps} control steps, {self.steps * period:.1f} s; {self.contacts}"
             f" {'contact' if self.contacts == 1 else 'contacts'}."
@@ -38,8 +38,8 @@ class Course:
         return tuple(found)
 
 
-class Watcher:
-    """A recorder that tells of each change, and hands on what it is given."""
+class ProgressReporter:
+    """A recorder that reports each change, and passes each cycle on to another recorder."""
 
     def __init__(self, further: Recorder, tell: Callable[[str], None], latched: str, period: float) -> None:
         """Take another recorder, what tells a sentence without waiting, and what to do where a HOLD latches."""
@@ -47,18 +47,18 @@ class Watcher:
         self._kind: tuple[Mode, str, bool] | None = None
         self._line_due = self._said = -np.inf
         self._examples: dict[str, str] = {}
-        self.course = Course()
+        self.summary = RunSummary()
 
     def record(self, cycle: Cycle) -> None:
         """Keep one turn of the loop."""
         self._further.record(cycle)
-        step, course = cycle.step, self.course
-        course.steps += 1
-        course.contacts += step.contact is not None
+        step, summary = cycle.step, self.summary
+        summary.steps += 1
+        summary.contacts += step.contact is not None
         stem = _NUMBERS.sub("#", step.reason)
         if step.mode is Mode.HOLD:
             reason = self._examples.setdefault(stem, step.reason)
-            course.holds[reason] = course.holds.get(reason, 0.0) + self._period
+            summary.holds[reason] = summary.holds.get(reason, 0.0) + self._period
         kind = (step.mode, stem if step.mode is Mode.HOLD else "", cycle.after.mode.latched)
         if kind == self._kind:
             self._line(step)

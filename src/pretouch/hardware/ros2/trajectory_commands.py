@@ -31,7 +31,7 @@ _LARGEST_LAG_S = 0.1
 """Largest lag that is reckoned with [s]."""
 
 
-class Trajectories:
+class TrajectoryCommands:
     """Sends trajectory_msgs/JointTrajectory, each of which ends at rest; at rest it sends nothing.
 
     Each message decides alone where the arm is to be. So nothing must be sent in motion while the controller is
@@ -63,9 +63,11 @@ class Trajectories:
     def begin(self, joints: Measured, now: float) -> float:
         """Begin at rest where the arm is; return how long that takes [s]. A RobotError if that is not known."""
         if not np.isfinite(joints.q).all():
-            raise RobotError(f"The joint states hold {joints.q}: the arm is not moved before they are finite.")
+            raise RobotError(
+                f"The joint states are {joints.q}, not all finite, so the arm is not moved: check the arm's driver."
+            )
         if not now - joints.stamp < _FRESH_S:
-            raise RobotError(f"The joint states are {now - joints.stamp:.2f} s old: see that the arm's driver runs.")
+            raise RobotError(f"The joint states are {now - joints.stamp:.2f} s old: check that the arm's driver runs.")
         self._settle(joints.q, now)
         return self._params.settle_s + self._ahead
 
@@ -78,8 +80,8 @@ class Trajectories:
             return
         self._known = False
         passed = reference.passed(now, _PAST_S) if self._params.shared_clock else ()
-        course = reference.command(qd, now)
-        self._publish((*passed, *course.points()) if passed else course.way_points(), now)
+        trajectory = reference.command(qd, now)
+        self._publish((*passed, *trajectory.points()) if passed else trajectory.way_points(), now)
 
     def at(self, joints: Measured, instant: float) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities (n,) that were commanded by an instant [s]."""
@@ -116,15 +118,15 @@ class Trajectories:
 
     def _elsewhere(self, joint: int, joints: Measured, instant: float) -> str:
         return (
-            f"The arm does not follow: {self._names[joint]} is at {joints.q[joint]:.3f} rad and was sent to"
-            f" {self._reference.motion_at(instant)[0][joint]:.3f} rad: see that its controller runs and its commands"
-            " arrive, then start again from where it stands."
+            f"The arm does not follow: {self._names[joint]} is at {joints.q[joint]:.3f} rad, but was commanded to"
+            f" {self._reference.motion_at(instant)[0][joint]:.3f} rad: check that its controller runs and receives the"
+            " commands, then start again from there."
         )
 
     def _publish(self, points: Iterable[Point], began: float) -> None:
         points, make, nothing = tuple(points), self._messages.make, np.zeros(0)
         if not all(np.isfinite(p.q).all() and np.isfinite(p.qd).all() for p in points):
-            raise RobotError("A trajectory holds what is no finite number: nothing is sent.")
+            raise RobotError("A trajectory is not finite, so it is not sent: check the arm's joint states.")
         # a stamp of zero means at once
         first, begin = 0.0, (0, 0)
         if self._params.shared_clock:

@@ -1,10 +1,10 @@
-"""What the robot does at the request of its one client, and what it answers."""
+"""Requests of the one client: what the robot does, and what it answers."""
 
 from collections.abc import Callable
 
 from pretouch.serving.fci.arm import ServedArm
 from pretouch.serving.fci.commands import Status, set_or_get, wanted_motion
-from pretouch.serving.fci.connections import Connection, Gone, Request
+from pretouch.serving.fci.connections import Connection, Disconnected, Request
 from pretouch.serving.fci.motion import Ending
 from pretouch.serving.fci.state import StateDatagram
 from pretouch.serving.fci.urdf import urdf_of
@@ -14,8 +14,8 @@ _NO_LIBRARY = b"\1"
 """Answer to the request for a binary model library: there is none."""
 
 
-class Desk:
-    """Serves the requests of one client. Raises Gone when it has gone."""
+class RequestHandler:
+    """Serves the requests of one client. Raises Disconnected when the client has disconnected."""
 
     def __init__(
         self, client: Connection, protocol: Protocol, arm: ServedArm, state: StateDatagram,
@@ -53,7 +53,7 @@ class Desk:
         arm, name, identifier = self._arm, request.name, request.identifier
         match name:
             case "Connect":
-                raise Gone("asks to connect once more")
+                raise Disconnected("asks to connect once more")
             case "Move":
                 self._begin(request)
             case "StopMove":

@@ -1,4 +1,4 @@
-"""What people ask for in the page, kept until the loop has time for it between two ticks."""
+"""A queue for the actions of people on a page, which the loop runs between two ticks."""
 
 import math
 import threading
@@ -9,14 +9,14 @@ Action = Callable[[], object]
 
 
 @dataclass(frozen=True)
-class Asked:
-    """Something asked for; calling it does it."""
+class QueuedAction:
+    """An action that waits; calling it runs it."""
 
     action: Action
     settle: float
     """How long it waits for a newer one of its kind [s]."""
     quiet: bool
-    """It leaves standing what a person was told."""
+    """Whether it leaves the notice on the page."""
     due: float | None = None
     """When it is to be done, in the time of the loop [s]; None before the loop has seen it."""
 
@@ -25,12 +25,12 @@ class Asked:
         self.action()
 
 
-class Commands:
+class ActionQueue:
     """Actions in the order they were asked for, from any thread. What is done again and again keeps only the newest."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiting: dict[object, Asked] = {}
+        self._waiting: dict[object, QueuedAction] = {}
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -42,19 +42,19 @@ class Commands:
             action: to be done.
             kind: of the action, or ''.
             settle: how long it waits for a newer one of its kind, as somebody types a number key by key [s].
-            quiet: whether it leaves standing what a person was told.
+            quiet: whether it leaves the notice on the page.
         """
         with self._lock:
             key: object = kind or object()
             self._waiting.pop(key, None)
-            self._waiting[key] = Asked(action, settle, quiet)
+            self._waiting[key] = QueuedAction(action, settle, quiet)
 
-    def waits(self, kind: str) -> bool:
+    def is_waiting(self, kind: str) -> bool:
         """Whether an action of a kind is still to be done."""
         with self._lock:
             return kind in self._waiting
 
-    def take(self, now: float = math.inf) -> list[Asked]:
+    def take(self, now: float = math.inf) -> list[QueuedAction]:
         """Return what is due at a time of the loop [s], in order; without one, all.
 
         An action that has to settle is also due if a person asked for something else afterwards.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RobotError
-from pretouch.session.standing import watch
+from pretouch.session.standstill import watch
 from tests.session.arms import PushedArm
 
 
@@ -17,7 +17,7 @@ def test_force_and_noise_at_rest_are_those_the_arm_was_given(panda_model):
     assert np.allclose(seen.rest_wrench[:3], bias, atol=0.2)
     assert np.allclose(seen.noise, 1.0, atol=0.1)
     assert seen.disturbance < 2.0
-    assert seen.unfelt == 0.0
+    assert seen.missing_share == 0.0
 
 
 def test_a_touch_of_a_moment_shows(panda_model):
@@ -41,14 +41,14 @@ def test_states_without_an_estimate_are_counted(panda_model):
     arm = PushedArm(panda_model)
     read, count = arm.read, iter(range(1000))
     arm.read = lambda: replace(read(), wrench=None) if next(count) % 2 else read()
-    assert watch(arm, arm, panda_model.description.qd_max, 1.0).unfelt == pytest.approx(0.5, abs=0.02)
+    assert watch(arm, arm, panda_model.description.qd_max, 1.0).missing_share == pytest.approx(0.5, abs=0.02)
 
 
 def test_a_robot_whose_state_stands_still_is_an_error(panda_model):
     arm = PushedArm(panda_model)
     state = arm.read()
     arm.read = lambda: state
-    with pytest.raises(RobotError, match="gave 1 states at"):
+    with pytest.raises(RobotError, match="sent 1 states in"):
         watch(arm, arm, panda_model.description.qd_max, 1.0)
 
 

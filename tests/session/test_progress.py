@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.loop import Cycle
-from pretouch.session.watching import Course, Watcher
+from pretouch.session.progress import ProgressReporter, RunSummary
 from pretouch.types import Inputs
 from tests.following_arm import Arm
 
@@ -23,24 +23,24 @@ class Sink:
 def watched(panda_model, paper_skin):
     """An arm under a controller, a watcher of it, what it told, and how to turn both."""
     arm, told, sink = Arm(panda_model, paper_skin), [], Sink()
-    watcher = Watcher(sink, told.append, " Press Enter.", 0.01)
+    reporter = ProgressReporter(sink, told.append, " Press Enter.", 0.01)
 
     def turn(cycles, **given):
         for _ in range(cycles):
             before, robot = arm.state, arm.robot()
             step = arm.step(**given)
             inputs = Inputs(step.stamp, robot, arm.readings())
-            watcher.record(Cycle(inputs, before, step, arm.state))
+            reporter.record(Cycle(inputs, before, step, arm.state))
 
-    return watcher, told, sink, turn
+    return reporter, told, sink, turn
 
 
 def test_each_change_is_told_once_and_all_is_handed_on(watched):
-    watcher, told, sink, turn = watched
+    reporter, told, sink, turn = watched
     turn(150)
     assert [sentence.split()[0] for sentence in told] == ["HOLD", "TRACK"]
-    assert len(sink.cycles) == watcher.course.steps == 150
-    (held,) = watcher.course.holds.items()
+    assert len(sink.cycles) == reporter.summary.steps == 150
+    (held,) = reporter.summary.holds.items()
     assert held[0].startswith("The force window is filling")
     assert held[1] == pytest.approx(1.0, abs=0.02)
 
@@ -61,17 +61,17 @@ def test_silent_units_are_named_although_the_arm_held_before(watched):
 
 
 def test_a_hold_of_a_moment_is_not_counted():
-    course = Course(steps=200, holds={"The window fills.": 1.0, "A unit was late.": 0.01})
-    assert course.sentences(0.01) == ("200 control steps, 2.0 s; 0 contacts.", "Held for 1.0 s: The window fills.")
+    summary = RunSummary(steps=200, holds={"The window fills.": 1.0, "A unit was late.": 0.01})
+    assert summary.sentences(0.01) == ("200 control steps, 2.0 s; 0 contacts.", "Held for 1.0 s: The window fills.")
 
 
 def test_contacts_are_counted_and_a_line_comes_every_five_seconds(watched):
-    watcher, told, _, turn = watched
+    reporter, told, _, turn = watched
     turn(150)
     turn(40, force=(0.0, 25.0, 0.0))
-    assert watcher.course.contacts == 1
+    assert reporter.summary.contacts == 1
     assert any(sentence.startswith("REACT") for sentence in told)
     before = len(told)
     turn(900)
     assert 1 <= sum("m/s" in sentence for sentence in told[before:]) <= 2
-    assert any("1 contact." in sentence for sentence in watcher.course.sentences(0.01))
+    assert any("1 contact." in sentence for sentence in reporter.summary.sentences(0.01))

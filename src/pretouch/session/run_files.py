@@ -1,4 +1,4 @@
-"""What is kept of a run: a recording, if one is asked for, and the last seconds before each HOLD that latches."""
+"""The files of a run: a recording, if one is asked for, and the last seconds before each HOLD that latches."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -17,8 +17,8 @@ from pretouch.types import Inputs, RangeReadings, RobotState
 
 
 @dataclass(frozen=True)
-class Kept:
-    """Where a run goes."""
+class RunFiles:
+    """What records a run."""
 
     recorder: Recorder
     """To be given each cycle."""
@@ -41,7 +41,7 @@ class Kept:
 
 
 @contextmanager
-def keeping(
+def open_run_files(
     controller: Controller,
     robot: str,
     place: Path | None,
@@ -49,8 +49,8 @@ def keeping(
     tell: Callable[[str], None],
     learnt: FreeMotion | None = None,
     further: Recorder | None = None,
-) -> Iterator[Kept]:
-    """Open what a run is kept in.
+) -> Iterator[RunFiles]:
+    """Open the files of a run.
 
     Args:
         controller: that moves the arm.
@@ -65,8 +65,10 @@ def keeping(
     with ExitStack() as stack:
         recording = stack.enter_context(Recording(place, controller, {"robot": robot})) if place else None
         last = stack.enter_context(LastSeconds(controller, folder, recording, about={"robot": robot}))
-        minder = _Minder(recording, tell) if recording else None
-        yield Kept(_All([one for one in (last, learnt, further, minder) if one]), recording, last, learnt)
+        supervisor = _RecordingSupervisor(recording, tell) if recording else None
+        yield RunFiles(
+            _RecorderGroup([one for one in (last, learnt, further, supervisor) if one]), recording, last, learnt
+        )
 
 
 def _warm_up(controller: Controller) -> None:
@@ -77,7 +79,7 @@ def _warm_up(controller: Controller) -> None:
     encode_inputs(0, Inputs(0.0, RobotState(0.0, zero, zero, zero, zero, zero, np.zeros(6)), readings))
 
 
-class _All:
+class _RecorderGroup:
     """Several recorders as one."""
 
     def __init__(self, recorders: Sequence[Recorder]) -> None:
@@ -89,14 +91,14 @@ class _All:
             recorder.record(cycle)
 
 
-class _Minder:
-    """A recorder that tells once that another one fails."""
+class _RecordingSupervisor:
+    """Reports once that the recording fails."""
 
     def __init__(self, recording: Recording, tell: Callable[[str], None]) -> None:
-        self._recording, self._tell, self._told = recording, tell, False
+        self._recording, self._tell, self._notified = recording, tell, False
 
     def record(self, cycle: Cycle) -> None:
-        """Look at the other one."""
-        if not self._told and self._recording.trouble:
-            self._told = True
+        """Check the recording."""
+        if not self._notified and self._recording.trouble:
+            self._notified = True
             self._tell(self._recording.trouble)

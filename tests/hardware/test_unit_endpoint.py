@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from pretouch.hardware.stuck import StuckDetector
+from pretouch.hardware.unit_endpoint import StuckDetector
 from pretouch.hardware.wire import Flag
 from tests.hardware.fake_unit import PLAIN, Bench
 
@@ -19,43 +19,43 @@ def reading(number, **changes):
 @pytest.mark.parametrize("name", REPORTED)
 def test_one_value_that_changes_is_enough_not_to_be_stuck(name):
     detector = StuckDetector(1.0)
-    assert not any(detector.heard(reading(k, **{name: 100 + k}), 0.02 * k) for k in range(200))
+    assert not any(detector.update(reading(k, **{name: 100 + k}), 0.02 * k) for k in range(200))
 
 
 def test_the_same_values_are_stuck_after_a_second_and_one_change_ends_it():
     detector = StuckDetector(1.0)
-    stuck = [detector.heard(reading(k), 0.02 * k) for k in range(60)]
+    stuck = [detector.update(reading(k), 0.02 * k) for k in range(60)]
     assert stuck.index(True) == 50
-    assert not detector.heard(reading(60, range_mm=1), 1.2)
+    assert not detector.update(reading(60, range_mm=1), 1.2)
 
 
 def test_a_stream_that_stands_is_stuck_whatever_the_values():
     detector = StuckDetector(1.0)
-    assert [detector.heard(reading(7, range_mm=k), 0.02 * k) for k in range(60)].index(True) == 50
+    assert [detector.update(reading(7, range_mm=k), 0.02 * k) for k in range(60)].index(True) == 50
 
 
 @pytest.mark.parametrize("streams", [True, False])
 def test_nine_readings_alike_may_be_chance(streams):
     detector = StuckDetector(1.0)
-    stuck = [detector.heard(reading(7 if streams else k, range_mm=k if streams else 5), 1.0 * k) for k in range(12)]
+    stuck = [detector.update(reading(7 if streams else k, range_mm=k if streams else 5), 1.0 * k) for k in range(12)]
     assert stuck.index(True) == 9
 
 
 def test_what_is_no_new_reading_changes_nothing():
     detector = StuckDetector(1.0)
     for k in range(60):
-        detector.heard(reading(k), 0.02 * k)
-    assert detector.heard(reading(60, range_mm=3, flags=int(Flag.RANGE_LATE)), 1.2)
+        detector.update(reading(k), 0.02 * k)
+    assert detector.update(reading(60, range_mm=3, flags=int(Flag.RANGE_LATE)), 1.2)
 
 
 def test_after_the_stream_is_forgotten_values_alike_still_are():
     detector = StuckDetector(1.0)
     for k in range(60):
-        detector.heard(reading(7), 0.02 * k)
+        detector.update(reading(7), 0.02 * k)
     detector.forget_stream()
-    assert detector.heard(reading(7), 1.2)
+    assert detector.update(reading(7), 1.2)
     detector.forget_stream()
-    assert not detector.heard(reading(7, range_mm=1), 1.22)
+    assert not detector.update(reading(7, range_mm=1), 1.22)
 
 
 @pytest.fixture

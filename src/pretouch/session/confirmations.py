@@ -21,7 +21,7 @@ class Identity:
     """As `panda`, `fr3`, `ros2`."""
     address: str
     """Where it is."""
-    through: str
+    connection: str
     """Library, driver settings and versions that lie between."""
 
     @property
@@ -37,39 +37,37 @@ def state_folder(environment: Mapping[str, str] = os.environ) -> Path:
     return base / "pretouch"
 
 
-class Remembered:
+class ConfirmedRobots:
     """The file of confirmed robots in a folder."""
 
     def __init__(self, folder: Path) -> None:
-        self.place = folder / _FILE
+        self.path = folder / _FILE
 
-    def knows(self, robot: Identity) -> bool:
+    def is_confirmed(self, robot: Identity) -> bool:
         """Whether this robot has been confirmed; a file that cannot be read is a RobotError."""
-        return self._read().get(robot.key) == robot.through
+        return self._read().get(robot.key) == robot.connection
 
     def keep(self, robot: Identity) -> None:
         """Note that a robot is confirmed; RobotError where that cannot be written."""
-        entries = self._read() | {robot.key: robot.through}
+        entries = self._read() | {robot.key: robot.connection}
         try:
-            self.place.parent.mkdir(parents=True, exist_ok=True)
-            atomic_write(self.place, json.dumps(entries, indent=1))
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            atomic_write(self.path, json.dumps(entries, indent=1))
         except OSError as error:
             raise RobotError(
-                f"The confirmed push cannot be noted in {self.place} ({error.strerror}): make that folder writable, or"
-                " set XDG_STATE_HOME to another."
+                f"The confirmation cannot be saved in {self.path} ({error.strerror}): make that folder writable, or"
+                " set XDG_STATE_HOME to another one."
             ) from error
 
     def _read(self) -> dict[str, str]:
         try:
-            found: Any = json.loads(self.place.read_text(encoding="utf-8"))
+            found: Any = json.loads(self.path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return {}
         except OSError as error:
-            raise RobotError(f"The file {self.place} cannot be read: {error.strerror}.") from error
+            raise RobotError(f"The file {self.path} cannot be read: {error.strerror}.") from error
         except (ValueError, RecursionError):
             found = None
         if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
-            raise RobotError(
-                f"The file {self.place} is damaged: delete it; the guided pushes are then asked for once more."
-            )
+            raise RobotError(f"The file {self.path} is damaged: delete it, and repeat the guided pushes.")
         return found

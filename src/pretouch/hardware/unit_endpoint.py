@@ -5,11 +5,53 @@ from collections.abc import Callable
 
 from pretouch.hardware.keys import UnitKey
 from pretouch.hardware.link import Link, LinkParams, Session
-from pretouch.hardware.stuck import StuckDetector
 from pretouch.hardware.traffic import Received, UnitTraffic
 from pretouch.hardware.unit_clock import UnitClock
 from pretouch.hardware.wire import NO_FORCE, Flag, Sample, touch_part
 from pretouch.types import FloatArray, RangeStatus, TouchStatus
+
+_LEAST = 10
+"""Readings that must be alike; fewer may be so by chance."""
+_NEW = int(Flag.RANGE_NEW)
+
+
+class StuckDetector:
+    """Watches the readings of one unit: a range finder that repeats itself to the last digit does not measure."""
+
+    def __init__(self, after: float) -> None:
+        """Call a unit stuck whose readings are alike for so long [s]."""
+        self._after = after
+        self.stuck = False
+        self._values: tuple[int, ...] = ()
+        self._alikes, self._values_since = 0, math.inf
+        self.forget_stream()
+
+    def forget_stream(self) -> None:
+        """Let the count of measurements begin anew, as after a reboot; values that were alike still are."""
+        self._stream, self._streams, self._stream_since = -1, 0, math.inf
+
+    def update(self, sample: Sample, now: float) -> bool:
+        """Take in a sample newer than those before, that arrived at this instant [s]; return whether it is stuck."""
+        if not sample.flags & _NEW:
+            return self.stuck
+        if sample.range_stream != self._stream:
+            self._stream, self._streams, self._stream_since = sample.range_stream, 0, now
+        values = (
+            sample.range_mm,
+            sample.range_sigma,
+            sample.range_signal,
+            sample.range_ambient,
+            sample.range_spads,
+        )
+        if values != self._values:
+            self._values, self._alikes, self._values_since = values, 0, now
+        self._streams += 1
+        self._alikes += 1
+        self.stuck = (self._streams >= _LEAST and now - self._stream_since >= self._after) or (
+            self._alikes >= _LEAST and now - self._values_since >= self._after
+        )
+        return self.stuck
+
 
 _RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
 NO_READING = (-math.inf, 0.0, float(RangeStatus.NONE))
@@ -23,7 +65,7 @@ NO_TOUCH = (-math.inf, 0.0, math.nan, float(TouchStatus.NONE))
 Address = tuple[str, int]
 
 
-class Station:
+class UnitEndpoint:
     """What is known of one unit. Times in seconds of the host's clock."""
 
     def __init__(
@@ -130,7 +172,7 @@ class Station:
         sent = None
         if sample.beacon != self._echoed and sample.beacon >= self._trusted_from:
             sent, self._echoed = session.sent.get(sample.beacon), sample.beacon
-        if not clock.heard(made, now, sent, 1e-6 * hold):
+        if not clock.update(made, now, sent, 1e-6 * hold):
             self._distrust_beacons(now)
         traffic.clock_jumps = clock.jumps
         traffic.offset, traffic.bound = clock.offset, clock.bound
@@ -145,7 +187,7 @@ class Station:
         instant = 1e-6 * (sample.time_us - sample.range_age_us)
         newest = instant > clock.last_reading
         if newest:
-            traffic.stuck = self._stuck.heard(sample, now)
+            traffic.stuck = self._stuck.update(sample, now)
         stamp = clock.stamp(instant)
         if not clock.known:
             return math.nan

@@ -1,10 +1,10 @@
 import threading
 
-from pretouch.viewer.commands import Commands
+from pretouch.viewer.action_queue import ActionQueue
 
 
 def test_actions_come_in_the_order_in_which_they_were_asked_for() -> None:
-    commands, done = Commands(), []
+    commands, done = ActionQueue(), []
     for i in range(5):
         commands.put(lambda i=i: done.append(i))
     for action in commands.take():
@@ -14,7 +14,7 @@ def test_actions_come_in_the_order_in_which_they_were_asked_for() -> None:
 
 
 def test_of_one_kind_only_the_newest_waits_and_in_its_own_place() -> None:
-    commands, done = Commands(), []
+    commands, done = ActionQueue(), []
     for i in range(1000):
         commands.put(lambda i=i: done.append(i), "hand")
         if i == 500:
@@ -26,7 +26,7 @@ def test_of_one_kind_only_the_newest_waits_and_in_its_own_place() -> None:
 
 
 def test_what_has_to_settle_waits_until_nothing_newer_came_for_so_long() -> None:
-    commands, done = Commands(), []
+    commands, done = ActionQueue(), []
 
     def tick(now: float) -> None:
         for asked in commands.take(now):
@@ -37,26 +37,26 @@ def test_what_has_to_settle_waits_until_nothing_newer_came_for_so_long() -> None
         tick(now)
     tick(2.1)
     assert done == []
-    assert commands.waits("number")
+    assert commands.is_waiting("number")
     tick(2.2)
     assert done == [2]
-    assert not commands.waits("number")
+    assert not commands.is_waiting("number")
 
 
 def test_something_else_asked_for_ends_the_wait_of_what_came_before_and_quiet_things_do_not() -> None:
-    commands = Commands()
+    commands = ActionQueue()
     commands.put(lambda: "typed", "number", settle=0.8)
     commands.put(lambda: "hand", "hand", quiet=True)
     assert [asked.action() for asked in commands.take(0.0)] == ["hand"]
     commands.put(lambda: "button")
     commands.put(lambda: "typed later", "other number", settle=0.8)
     assert [asked.action() for asked in commands.take(0.1)] == ["typed", "button"]
-    assert commands.waits("other number")
+    assert commands.is_waiting("other number")
     assert [asked.action() for asked in commands.take()] == ["typed later"]
 
 
 def test_nothing_is_lost_between_threads() -> None:
-    commands, done, end = Commands(), [], threading.Event()
+    commands, done, end = ActionQueue(), [], threading.Event()
 
     def ask(start: int) -> None:
         for i in range(start, start + 500):

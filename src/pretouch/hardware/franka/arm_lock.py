@@ -10,7 +10,7 @@ _ASK_S = 1.0
 """Longest wait for the holder's number [s]: it answers nobody, and so many may ask."""
 
 
-class OnlyOne:
+class ArmLock:
     """Holds an arm for this process; the system lets go of it when the process ends, however it does.
 
     An abstract socket of Linux: unlike a file it is nobody's to leave behind, and all users of the machine see it.
@@ -26,7 +26,7 @@ class OnlyOne:
         except OSError:
             self._socket.close()
             raise RobotError(
-                f"The arm at {address} is in use by {_holder(name)} on this machine: end that one first."
+                f"The arm at {address} is in use by {_holder(name)} on this machine: end that program first."
             ) from None
 
     def release(self) -> None:

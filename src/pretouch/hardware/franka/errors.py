@@ -1,4 +1,4 @@
-"""What goes wrong with an arm, in one sentence with the way out."""
+"""Errors of an arm: one sentence each, with the way out."""
 
 import re
 from typing import NoReturn
@@ -6,14 +6,14 @@ from typing import NoReturn
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.state import FrankaState, error_names
 
-_RECOVER = "clear what it touches, then let it recover"
+_RECOVER = "free it from what it touches, then let it recover"
 _WAY_OUT = {
-    "other": "it is not ready, so open the brakes and activate FCI in Desk",
-    "move": "another motion runs, so end the program that moves it",
-    "guiding": "it is being guided by hand, so let go of the buttons at its hand",
+    "other": "it is not ready: open the brakes and activate FCI in Desk",
+    "move": "another motion is running: end the program that moves it",
+    "guiding": "it is being guided by hand: release the buttons at its hand",
     "reflex": _RECOVER,
-    "user stopped": "its stop button is pressed, so release it",
-    "automatic error recovery": "it recovers from an error, so wait a second",
+    "user stopped": "its stop button is pressed: release it",
+    "automatic error recovery": "it is recovering from an error: wait a second",
 }
 
 _OTHER = {"panda": "fr3 for an FR3", "fr3": "panda for a Panda, or update an FR3 to system 5.9 or later"}
@@ -34,32 +34,32 @@ def check_ready(state: FrankaState, address: str) -> None:
     """Raise a RobotError with the way out if the arm is in no mode to begin a motion."""
     if state.mode == "idle":
         return
-    raise RobotError(f"The arm at {address} is in {_mode(state)}: {_WAY_OUT[state.mode]}.")
+    raise RobotError(f"The arm at {address} is in {_mode(state)}; {_WAY_OUT[state.mode]}.")
 
 
-def unrecovered(state: FrankaState, address: str) -> NoReturn:
+def raise_not_recovered(state: FrankaState, address: str) -> NoReturn:
     """Raise a RobotError for an arm that took the order to recover and still is in a mode that says otherwise."""
-    raise RobotError(f"The arm at {address} was told to recover and still is in {_mode(state)}: {_WAY_OUT['reflex']}.")
+    raise RobotError(f"The arm at {address} was told to recover but is still in {_mode(state)}: {_WAY_OUT['reflex']}.")
 
 
-def unconnected(address: str, ours: int, kind: str, error: Exception) -> NoReturn:
+def raise_not_connected(address: str, ours: int, kind: str, error: Exception) -> NoReturn:
     """Raise a RobotError for an arm that could not be connected to with a library that speaks version `ours`."""
-    text = brief(error)
+    text = first_line(error)
     if "incompatible" in f"{type(error).__name__} {text}".lower():
         theirs = _VERSION.search(text)
         raise RobotError(
             f"The arm at {address} speaks version {theirs[1] if theirs else 'unknown'} of the Franka Control Interface,"
-            f" and the library for kind {kind!r} version {ours}: choose {_OTHER[kind]}."
+            f" but the library for kind {kind!r} speaks version {ours}: choose {_OTHER[kind]}."
         ) from None
     raise RobotError(
-        f"The arm at {address} took the connection but did not go on ({text}): end the program that is connected to"
-        " it, if there is one."
+        f"The arm at {address} accepted the connection but did not continue ({text}): end any other program that is"
+        " connected to it."
     ) from None
 
 
-def aborted(address: str, error: Exception) -> NoReturn:
+def raise_aborted(address: str, error: Exception) -> NoReturn:
     """Raise MotionAborted for what ended a motion."""
-    text = brief(error)
+    text = first_line(error)
     names = error_names(text)
     if names:
         sentence = f"The arm at {address} stopped by itself ({', '.join(names)}): {_RECOVER}."
@@ -67,12 +67,12 @@ def aborted(address: str, error: Exception) -> NoReturn:
     raise MotionAborted((), f"The motion of the arm at {address} was ended: {text}.") from None
 
 
-def refused(address: str, what: str, error: Exception) -> NoReturn:
+def raise_refused(address: str, what: str, error: Exception) -> NoReturn:
     """Raise a RobotError for something that the arm was asked and did not do."""
-    raise RobotError(f"The arm at {address} did not {what}: {brief(error)}.") from None
+    raise RobotError(f"The arm at {address} did not {what}: {first_line(error)}.") from None
 
 
-def brief(error: Exception) -> str:
+def first_line(error: Exception) -> str:
     """Return the first line of what a library says, without its name."""
     return str(error).partition("\n")[0].removeprefix("libfranka: ").rstrip(".! ")
 

@@ -29,7 +29,7 @@ _OK, _WARN, _ERROR = 0, 1, 2
 _LEVEL = {Mode.TRACK: _OK, Mode.REACT: _OK, Mode.HOLD: _WARN}
 
 
-class Shown:
+class StepMessages:
     """Makes messages of the steps of one controller."""
 
     def __init__(self, controller: Controller, messages: Messages, base_frame: str) -> None:
@@ -103,7 +103,7 @@ class Shown:
         for name, stamp, code in zip(self._skin.ids, readings.stamp.tolist(), readings.status.tolist(), strict=True):
             age = step.stamp - stamp
             level = _OK if age < slow else _WARN if age < silent else _ERROR
-            said = "never heard" if math.isinf(age) else f"heard {age:.2f} s ago"
+            said = "never heard" if math.isinf(age) else f"received {age:.2f} s ago"
             status = RangeStatus(code).name if code in set(RangeStatus) else str(code)
             made.append(self._status(f"pretouch: unit {name}", level, said, name, {"status": status}))
         return made

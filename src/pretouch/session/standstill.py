@@ -1,4 +1,4 @@
-"""An arm watched while it stands: where it is, how still, and what force it believes to feel."""
+"""An arm watched while it stands still: its posture, its drift, and the force it measures."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _ENOUGH = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class Standstill:
     """S states of an arm of n joints, in order."""
 
     stamp: FloatArray
@@ -49,7 +49,7 @@ class Standing:
         return np.array(felt.std(axis=0)) if len(felt) else np.full(3, np.nan)
 
     @property
-    def unfelt(self) -> float:
+    def missing_share(self) -> float:
         """Share of the states without a force estimate."""
         return float(np.mean(~np.isfinite(self.wrench).all(axis=1)))
 
@@ -75,7 +75,7 @@ def _mean(values: FloatArray) -> FloatArray:
 
 def watch(
     robot: Robot, clock: Clock, qd_max: FloatArray, seconds: float, on_tick: Callable[[float], None] = lambda _: None
-) -> Standing:
+) -> Standstill:
     """Watch an arm for some seconds.
 
     Args:
@@ -93,22 +93,22 @@ def watch(
     while now - begin < seconds:
         state, wrong = sound_robot(robot.read(), qd_max)
         if state is None:
-            raise RobotError(f"The robot's state cannot be used: {wrong}: check the connection to the arm.")
+            raise RobotError(f"The robot's state cannot be used ({wrong}): check the connection to the arm.")
         if not states or state.stamp > states[-1].stamp:
             states.append(state)
         on_tick(now)
         ticks, now = ticks + 1, clock.tick()
     if 2 * len(states) < ticks or not states:
         raise RobotError(
-            f"The robot gave {len(states)} states at {ticks} ticks of the control loop: check the network, and let it"
-            " report at least once a control period."
+            f"The robot sent {len(states)} states in {ticks} ticks of the control loop: check the network, and make it"
+            " report at least once per control period."
         )
-    return _standing(states)
+    return _standstill(states)
 
 
-def _standing(states: list[RobotState]) -> Standing:
+def _standstill(states: list[RobotState]) -> Standstill:
     none = np.full(6, np.nan)
-    return Standing(
+    return Standstill(
         stamp=np.array([s.stamp for s in states]),
         q=np.array([s.q for s in states]),
         qd=np.array([s.qd for s in states]),
