@@ -72,7 +72,7 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
         assert simulation.world.profile.restriction.d_crit_m == 0.1
         visitor.wait_until(lambda: visitor.value("d_crit [m]") == "0.1")
         visitor.type("F_b [N]", 8)
-        visitor.wait_until(lambda: simulation.world.profile.name == "paper:threshold.f_base_n=8")
+        visitor.wait_until(lambda: simulation.world.profile.name == "paper:detect.f_base_n=8")
         visitor.tab("World")
         visitor.tick("hand_left")
         visitor.wait_for("reason", "No usable reading from hand_left")

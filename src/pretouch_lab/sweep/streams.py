@@ -18,7 +18,7 @@ from pretouch_lab.sweep.measures import Measure, Numbers
 from pretouch_lab.sweep.setting import Setting
 
 _HAND_RADIUS_M = 0.05
-_DETECTION = ("window", "detect", "threshold", "detection")
+_DETECTION = ("window", "detect")
 _REPLAY_S = 0.0015
 """Processor time of a replayed second [s]."""
 

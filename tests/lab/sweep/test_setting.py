@@ -74,7 +74,12 @@ def test_a_cell_knows_the_file_its_world_is_of(tmp_path):
         ("static", {"skin.units": "1:65"}, ExperimentError, "holds 65, which is not allowed.*whole number to 64"),
         ("static", {"plant.kind": "nominal,rusty"}, ExperimentError, "plant.kind=rusty is unknown"),
         ("static", {"plant.world": "none,mars"}, ExperimentError, "'mars' is not one of nominal, realistic, stress"),
-        ("contacts", {"reduction.d_max_m": "0.5:1"}, ExperimentError, "changes nothing in contacts: take one of thr"),
+        (
+            "contacts",
+            {"reduction.d_max_m": "0.5:1"},
+            ExperimentError,
+            "nothing in contacts: take one of window, detect",
+        ),
     ],
 )
 def test_what_cannot_be_swept_is_said_with_the_way_out(experiment, vary, error, words):
