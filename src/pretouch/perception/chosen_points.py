@@ -12,10 +12,10 @@ from pretouch.perception.obstacles import HEARD, SEEN, USED
 from pretouch.robot.vectors import dot
 from pretouch.types import FloatArray, IntArray
 
-_FARTHEST = 100.0
-"""A coordinate [m] from here on is none: another unit, or a broken message."""
-_LARGEST_SIGMA = 1.0
-"""A standard deviation [m] above this is none."""
+FARTHEST = 100.0
+"""A coordinate [m] from here on is implausible: another unit, or a broken message."""
+LARGEST_SIGMA = 1.0
+"""A standard deviation [m] above this is implausible."""
 _ONE_INSTANT = 1e-3
 """Stamps that differ by less [s] are taken as one: in that time no arm moves by more than 2 mm."""
 _APART = 0.5
@@ -25,7 +25,7 @@ _UNKNOWN, _OBSTACLE, _EXPLAINED, _HIDDEN = range(4)
 
 @compiled
 def usable(stamp: FloatArray, point: FloatArray, sigma: FloatArray) -> tuple[int, int]:
-    """How many of M points are such as a source can see, and how many show nothing, for they hold a NaN."""
+    """How many of M points are plausible, and how many show nothing, for they hold a NaN."""
     good = nothing = 0
     for m in range(len(stamp)):
         if np.isnan(point[m, 0]) or np.isnan(point[m, 1]) or np.isnan(point[m, 2]):
@@ -38,9 +38,9 @@ def usable(stamp: FloatArray, point: FloatArray, sigma: FloatArray) -> tuple[int
 @compiled
 def _is_point(stamp: float, point: FloatArray, m: int, sigma: float) -> bool:
     for i in range(3):
-        if not abs(point[m, i]) < _FARTHEST:
+        if not abs(point[m, i]) < FARTHEST:
             return False
-    return bool(0.0 <= sigma <= _LARGEST_SIGMA and np.isfinite(stamp))
+    return bool(0.0 <= sigma <= LARGEST_SIGMA and np.isfinite(stamp))
 
 
 class KeptPoints(NamedTuple):

@@ -1,4 +1,4 @@
-"""A limb in the crook of an arm that folds, or on a floor on which the hand comes down: caught between two things."""
+"""A limb in the crook of an arm that folds, or on a floor on which the hand comes down: clamped between two objects."""
 
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -140,7 +140,7 @@ _NAMED = {"crook": _CROOK, "floor": ("hand", "fixture")}
 def results(force: FloatArray, record: Record, named: tuple[str, str]) -> Row:
     """Numbers of one trial, given the force (T,) [N] with which the limb was squeezed at each millisecond."""
     squeezed, last = force > TOUCH_N, record.steps[-1]
-    said = [s.reason for s in record.steps if "aught between two things" in s.reason]
+    said = [s.reason for s in record.steps if "lamped between two objects" in s.reason]
     return {
         "caught": bool(squeezed.any()),
         "peak_20ms_n": rounded(peak(mean_over(force, 20))),
