@@ -4,8 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from pretouch.text_table import TextTable, tabulated
-
-Row = dict[str, Any]
+from pretouch_lab.rows import Row
 
 _STATIC = (
     ("impact_speed_m_s", "impact\n[m/s]", 3),

@@ -55,9 +55,9 @@ def folder_part(name: str) -> str:
     return f"-{safe}-{sha256(name.encode()).hexdigest()[:6]}"
 
 
-def told(name: str) -> dict[str, str | None]:
-    """Return what a run's own file says of its world: the name, and the digest of what it names."""
-    return {"world": name or None, "world_sha256": _set(name).digest if name else None}
+def digest_of(name: str) -> dict[str, str]:
+    """Return the digest of what a name stands for, by the phrase that a run's own file has for it; nothing of none."""
+    return {"the world's file has": world_set(name).digest} if name else {}
 
 
 def sentence(name: str) -> str:

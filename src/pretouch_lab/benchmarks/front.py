@@ -3,7 +3,7 @@
 from pretouch.text_table import TextTable
 from pretouch_lab.benchmarks.bounds import short
 from pretouch_lab.benchmarks.goals import find
-from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.rows import Row
 
 _SHOWN = {"blind": "blind", "paper": "paper", "paper-off": "paper", "pretouch": "pretouch"}
 """Contenders of the closed loop, and the detector of each."""

@@ -2,7 +2,6 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -13,8 +12,7 @@ from pretouch.realtime import check_wishes
 from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.cycle import CycleRequest, about, measure
 from pretouch_lab.benchmarks.workload import LARGEST_SKIN
-
-Row = dict[str, Any]
+from pretouch_lab.rows import Row
 
 _SPREAD = {"median": "median_us", "99 %": "p99_us", "99.9 %": "p999_us", "largest": "max_us"}
 

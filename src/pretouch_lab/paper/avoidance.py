@@ -14,7 +14,7 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import rounded
 from pretouch_lab.summary import avoidance_summary
 from pretouch_lab.tables import avoidance_tables
 from pretouch_lab.trial import Record, Setup, play

@@ -13,7 +13,7 @@ from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import angle_deg, peak, rounded
+from pretouch_lab.rows import angle_deg, peak, rounded
 from pretouch_lab.summary import dynamic_summary
 from pretouch_lab.tables import dynamic_tables
 from pretouch_lab.trial import Record, Setup, play

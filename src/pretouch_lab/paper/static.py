@@ -13,7 +13,7 @@ from pretouch.traces import mean_over
 from pretouch.types import ControlStep
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import peak, rounded
+from pretouch_lab.rows import peak, rounded
 from pretouch_lab.summary import static_summary
 from pretouch_lab.tables import shown_controllers, static_tables
 from pretouch_lab.trial import Record, Setup, play

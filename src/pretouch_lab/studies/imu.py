@@ -2,7 +2,8 @@
 
 from pretouch.params import profile
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.rows import Row
 from pretouch_lab.studies.impacts.judged import judged
 from pretouch_lab.studies.impacts.tables import summarise, tables
 

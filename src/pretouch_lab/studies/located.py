@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 
 SIDES = ("without", "with")
 """The two ways in which each contact is felt."""

@@ -14,9 +14,9 @@ from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.metrics import rounded
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper import static
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.mounting_tables import NAME, ROOM, summarise, tables
 from pretouch_lab.trial import Record, Setup, play
 from pretouch_lab.weaknesses import views

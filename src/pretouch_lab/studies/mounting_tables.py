@@ -1,9 +1,7 @@
 """What misplaced units change, as a summary and as tables."""
 
 from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Row
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, cells_of, grouped, rounded
 from pretouch_lab.tables import number, with_spread
 
 NAME = "mounting"

@@ -18,9 +18,8 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import peak, rounded
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.rows import Row, cells_of, peak, rounded
 from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, Setup, play
 

@@ -5,10 +5,8 @@ from typing import Any
 import numpy as np
 
 from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Row
-from pretouch_lab.groups import grouped
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.claims.detectors import rate_bounds
+from pretouch_lab.rows import Row, grouped, rounded
 from pretouch_lab.studies.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
 from pretouch_lab.studies.tactile_kinds import INNER
 

@@ -24,8 +24,7 @@ from pretouch_lab.benchmarks.detection.replay import Said, replay
 from pretouch_lab.benchmarks.detection.stream import Stream
 from pretouch_lab.benchmarks.localization.judge import said_of
 from pretouch_lab.cell import Cell, Context
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.calibration.random_skin import random_skin
 from pretouch_lab.studies.located import SIDES
 from pretouch_lab.studies.tactile_kinds import (

@@ -19,10 +19,9 @@ from pretouch_lab.benchmarks.avoidance.measures import contact
 from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape, nearest
 from pretouch_lab.benchmarks.avoidance.truth import Truth
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import rounded
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper.avoidance import visits
+from pretouch_lab.rows import Row, cells_of, rounded
 from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, Setup, play
 

@@ -10,10 +10,9 @@ from pretouch.serving.network import network
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.text_table import TextTable
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import rounded
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import static
+from pretouch_lab.rows import Row, cells_of, rounded
 from pretouch_lab.tables import number
 from pretouch_lab.trial import Record, Setup, play
 

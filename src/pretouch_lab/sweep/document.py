@@ -6,16 +6,13 @@ from typing import Any
 from pretouch import __version__
 from pretouch.text_table import TextTable, markdown
 from pretouch.whole_file import write_json
-from pretouch_lab.benchmarks.documents import put, shown
+from pretouch_lab.documents import SENSITIVITY, draw, put, shown
+from pretouch_lab.engine import failure_said
 from pretouch_lab.experiment import Picture
 from pretouch_lab.sweep.indices import indices
 from pretouch_lab.sweep.results import write_table
 from pretouch_lab.sweep.run import Run
-from pretouch_lab.sweep.store import unwritable
 from pretouch_lab.sweep.work import code
-
-DOCUMENT = "results/sensitivity.md"
-"""In a folder of documents."""
 
 
 def written(run: Run) -> dict[str, Any]:
@@ -28,10 +25,8 @@ def written(run: Run) -> dict[str, Any]:
         "processor_s": round(sum(r.seconds for r in played), 1), "metrics": found,
     }  # fmt: skip
     write_table(run, run.folder / "results.parquet")
-    try:
+    with failure_said(run.folder):
         write_json(about, run.folder / "indices.json")
-    except OSError as error:
-        raise unwritable(run.folder, error) from error
     return about
 
 
@@ -133,13 +128,10 @@ def publish(runs: list[tuple[Run, dict[str, Any]]], out: Path, docs: Path | None
     for run, about in runs:
         drawn = picture(run, about)
         folder = docs / "images" if docs else run.folder
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            drawn.figure.savefig(folder / f"{drawn.name}.png", dpi=120)
-        except OSError as error:
-            raise unwritable(folder, error) from error
+        with failure_said(folder):
+            draw([drawn], folder)
         places.append(folder / f"{drawn.name}.png")
         if docs:
-            put(docs / DOCUMENT, run.sweep.name, "\n\n".join([shown(drawn), *map(markdown, tables(run, about))]))
-            places.append(docs / DOCUMENT)
+            put(docs / SENSITIVITY, run.sweep.name, "\n\n".join([shown(drawn), *map(markdown, tables(run, about))]))
+            places.append(docs / SENSITIVITY)
     return list(dict.fromkeys(places))

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pretouch.errors import ExperimentError
 from pretouch.whole_file import write_json
 from pretouch_lab.sweep.measures import Measure
 from pretouch_lab.sweep.work import Cell, Job
@@ -123,11 +122,3 @@ def _object(text: str) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise Damaged("it holds no object")
     return found
-
-
-def unwritable(folder: Path, error: OSError) -> ExperimentError:
-    """Return the sentence for results that could not be written."""
-    return ExperimentError(
-        f"Results could not be written to {folder} ({error.strerror or error}): remove the cause, and the same command"
-        " goes on."
-    )

@@ -16,9 +16,8 @@ from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import peak, rounded
 from pretouch_lab.paper.avoidance import gaps
+from pretouch_lab.rows import cells_of, grouped, peak, rounded
 from pretouch_lab.tables import number
 from pretouch_lab.trial import Record, Setup, play
 

@@ -22,10 +22,9 @@ from pretouch.sim.range_finder import MODES, RangeFinders
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray, Mode, QpOutcome
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import peak, rounded, spread
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper import static
+from pretouch_lab.rows import Row, cells_of, grouped, peak, rounded, spread
 from pretouch_lab.tables import number
 from pretouch_lab.trial import Record, Setup, play
 

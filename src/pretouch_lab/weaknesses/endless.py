@@ -12,10 +12,9 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import peak, rounded
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper import static
+from pretouch_lab.rows import Row, cells_of, peak, rounded
 from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trace import Trace
 from pretouch_lab.trial import Record, Setup, play

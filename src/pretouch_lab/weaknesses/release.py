@@ -13,9 +13,8 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.groups import grouped
-from pretouch_lab.metrics import peak, rounded, spread
+from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.rows import Row, grouped, peak, rounded, spread
 from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, Setup, play
 

@@ -10,9 +10,8 @@ from pretouch.sim.scene import Box, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.static import least_sensed
+from pretouch_lab.rows import cells_of, rounded
 from pretouch_lab.tables import median, plain
 from pretouch_lab.trial import Record, Setup, play
 

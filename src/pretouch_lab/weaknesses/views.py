@@ -18,8 +18,7 @@ from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import cells_of, grouped, rounded
 from pretouch_lab.tables import number
 from pretouch_lab.trial import Record, Setup, play
 

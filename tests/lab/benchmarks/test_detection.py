@@ -23,18 +23,16 @@ from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import Contact, RobotState, Thresholds
 from pretouch_lab.benchmarks.detection import campaign, contacts, free, judge
 from pretouch_lab.benchmarks.detection.arm import AWAY, model
-from pretouch_lab.benchmarks.detection.campaign import Bench, Rows
+from pretouch_lab.benchmarks.detection.campaign import DetectionBench
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, Toucher, Touching, contact_cells, plan
 from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells
 from pretouch_lab.benchmarks.detection.judge import BUSY, matched
-from pretouch_lab.benchmarks.detection.published import document_part, pictures, summary_of
 from pretouch_lab.benchmarks.detection.replay import REST, begun, replay
 from pretouch_lab.benchmarks.detection.results import delays, rate, resolution
 from pretouch_lab.benchmarks.detection.stream import StreamRecorder, load_stream, save_stream
 from pretouch_lab.benchmarks.detection.tables import reached
-from pretouch_lab.benchmarks.store import read_rows, run_tasks
 
 HAND = 10
 PAPER = Contender("paper", "paper", "f_base_n")
@@ -299,25 +297,24 @@ def test_a_run_leaves_rows_for_every_contender_and_goes_on_after_a_kill(tmp_path
     cell = ContactCell("nominal", "seven", 0.3, 1000, 1)
     monkeypatch.setattr(campaign, "contact_cells", lambda *_: [cell])
     monkeypatch.setattr(contacts, "plan", lambda *_: [touching(1.8)])
-    bench, costs = Bench(tmp_path, quick=True, seeds="development"), []
-    for tasks in (bench.streams(), [*bench.free(), *bench.contacts()]):
-        run_tasks(tasks, tmp_path, costs.append, processes=1)
+    bench, costs = DetectionBench(tmp_path, quick=True, seeds="development"), []
+    bench.run(costs.append, processes=1)
     replays = 2 * len(CONTENDERS) + len(ablated())  # the contacts are not those that ablations are given
     assert len(costs) == 2 + replays
     bench.free()[1].file.unlink()
-    for tasks in (bench.streams(), [*bench.free(), *bench.contacts()]):
-        run_tasks(tasks, tmp_path, costs.append, processes=1)
+    bench.run(costs.append, processes=1)
     assert len(costs) == 3 + replays
-    rows = Rows(read_rows(bench.free()), read_rows(bench.contacts()), [])
+    rows = bench.rows()
     contact = rows.contacts[0]["contacts"][0]
     assert contact["delay_s"] < 0.2
     assert contact["towards"] is False
     assert contact["feelable"]
-    results = json.loads(json.dumps(summary_of(bench, rows), allow_nan=False))
+    found = bench.found()
+    results = json.loads(json.dumps(found.json, allow_nan=False))
     keys = {"contender", "scenario", "seen", "false_alarms_per_hour", "median_delay_s", "p95_delay_s", "missed",
             "contacts", "peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_time_s"}  # fmt: skip
     assert all(keys <= set(row) for row in results["rows"])
-    assert "Contact detection: the goals" in document_part(results, pictures(results, rows))
+    assert "Contact detection: the goals" in found.section()
     assert resolution(rows).startswith(
         "0.00028 h of free motion. No false alarm in the 0.00028 h at the goal's speed means fewer than"
     )

@@ -64,7 +64,7 @@ def _row(request, out):
     from pretouch.whole_file import write_json
     from pretouch_lab.campaign import trial_file
 
-    cell, seed = request.tasks()[0]
+    cell, seed = request.trials()[0]
     row = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
     write_json(row, trial_file(out, cell, seed))
 

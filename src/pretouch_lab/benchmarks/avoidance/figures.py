@@ -6,9 +6,8 @@ from matplotlib.figure import Figure
 
 from pretouch_lab.benchmarks import style
 from pretouch_lab.benchmarks.avoidance.trade import TRADE, trade, trade_points
-from pretouch_lab.benchmarks.store import Row
 from pretouch_lab.experiment import Picture
-from pretouch_lab.groups import grouped
+from pretouch_lab.rows import Row, grouped
 
 _HELD_M = 0.01
 """Way below which the hand was held [m]."""

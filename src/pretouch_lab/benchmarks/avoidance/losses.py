@@ -2,8 +2,7 @@
 
 from pretouch.text_table import TextTable
 from pretouch_lab.benchmarks.ablations import BASE
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.groups import grouped
+from pretouch_lab.rows import Row, grouped
 
 _LESS = (
     ("true_peak_20ms_n", "true 20 ms [N]", 1.0, 1),

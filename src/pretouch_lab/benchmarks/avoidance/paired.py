@@ -3,8 +3,7 @@
 import numpy as np
 
 from pretouch_lab.benchmarks.bounds import finite, median_bounds
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.groups import grouped
+from pretouch_lab.rows import Row, grouped
 
 FORCES = ("peak_estimate_n", "true_peak_20ms_n", "clamping_force_n")
 TIMES = ("first_contact_s", "cycle_time_s")

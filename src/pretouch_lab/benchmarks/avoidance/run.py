@@ -1,37 +1,34 @@
-"""All trials of the avoidance benchmark: which, in which files, and what they came to."""
+"""The avoidance benchmark: all its trials, in which files, and what they came to."""
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
+from typing import ClassVar
 
 from pretouch.errors import ExperimentError
 from pretouch.params import profile
 from pretouch_lab.benchmarks.avoidance.contenders import ABLATED, ABLATED_IN, ABLATED_SEEDS, CONTENDERS, profile_text
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial
-from pretouch_lab.benchmarks.scenario_files import SeedRange
-from pretouch_lab.benchmarks.store import Row, Task, open_bench, read_rows, run_tasks
+from pretouch_lab.benchmarks.bench import Bench, Found
+from pretouch_lab.engine import Task, rows_of
 from pretouch_lab.result_key import result_key
-from pretouch_lab.worlds import told
-
-NAME = "avoidance"
+from pretouch_lab.rows import Row
 
 
 @dataclass(frozen=True)
-class Request:
-    """What to run."""
+class AvoidanceBench(Bench):
+    """The avoidance benchmark."""
+
+    name: ClassVar[str] = "avoidance"
+    shown_unfinished: ClassVar[bool] = True
 
     contenders: tuple[str, ...] = ()
     """None: all there are, and `pretouch` with each switch off alone in some scenarios."""
-    quick: bool = False
-    seeds: SeedRange = "published"
     names: tuple[str, ...] = ()
     """Scenarios; none: all."""
-    world: str = ""
-    """Set of worlds of which each trial's seed draws its own, or none: the arms of the published tables."""
 
     def __post_init__(self) -> None:
         if len(set(self.contenders)) < len(self.contenders):
@@ -47,7 +44,11 @@ class Request:
         wanted = self.names or tuple(scenarios())
         return [s for name, s in scenarios().items() if name in wanted and s.seeds(self.seeds, self.quick)]
 
-    def tasks(self, out: Path) -> list[Task]:
+    def choices(self) -> Row:
+        """See `Bench`; a quick run shares its trials with a full one."""
+        return {"seeds": self.seeds, "world": self.world}
+
+    def stages(self) -> list[list[Task]]:
         """Return all trials, by scenario, contender and seed."""
         played = [
             (scene, contender, seed)
@@ -61,7 +62,18 @@ class Request:
             for contender in (() if self.contenders else ABLATED)
             for seed in (scene.seeds(self.seeds, self.quick)[:ABLATED_SEEDS] if scene.name in ABLATED_IN else ())
         ]
-        return [_task(out, *trial, self.world) for trial in (*played, *ablated)]
+        return [[_task(self.out, *trial, self.world) for trial in (*played, *ablated)]]
+
+    def rows(self) -> list[Row]:
+        """Return the rows of all finished trials."""
+        return rows_of(self.every())
+
+    def found(self) -> Found | None:
+        """See `Bench`."""
+        from pretouch_lab.benchmarks.avoidance.page import found
+
+        rows = self.rows()
+        return found(self, rows) if rows else None
 
 
 def _task(out: Path, scene: Scenario, contender: str, seed: int, world: str) -> Task:
@@ -87,19 +99,3 @@ _SOON = ("blind", "pretouch", *ABLATED)
 def _key(text: str) -> str:
     """Return the key of the trials of a profile."""
     return result_key(keep_trial, profile=profile(text))
-
-
-def open_run(request: Request, out: Path) -> None:
-    """Make a folder for the results, or take one up that another run with such seeds began."""
-    open_bench(out, NAME, {"seeds": request.seeds, **told(request.world)})
-
-
-def run(request: Request, out: Path, progress: Callable[[float], None], processes: int | None = None) -> None:
-    """Play what is missing; however it ends, finished trials stay in the folder."""
-    open_run(request, out)
-    run_tasks(request.tasks(out), out, progress, processes)
-
-
-def rows_of(request: Request, out: Path) -> list[Row]:
-    """Return the rows of all finished trials."""
-    return read_rows(task for task in request.tasks(out) if task.file.exists())

@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from pretouch import __version__
 from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
 from pretouch_lab.benchmarks.avoidance.paired import REFERENCES, paired
-from pretouch_lab.benchmarks.store import EMPTY, Row
-from pretouch_lab.groups import grouped
-from pretouch_lab.metrics import rounded
+from pretouch_lab.benchmarks.bench import EMPTY, Bench
+from pretouch_lab.rows import Row, grouped, rounded
 
 SPREAD = (
     "least_distance_m", "true_peak_20ms_n", "true_peak_n", "clamping_force_n", "peak_estimate_n", "impact_speed_m_s",
@@ -113,13 +111,10 @@ _MEDIANS = ("peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_tim
 """Keys all benchmarks share, of which the rows have the median over the seeds."""
 
 
-def results(summary: Row, seeds: str, quick: bool, world: str = "") -> Row:
+def results(summary: Row, bench: Bench) -> Row:
     """Return what the JSON file holds: what was run, a row for each contender and scenario, and ratios to some."""
-    about: Row = {"bench": "avoidance", "version": __version__, "quick": quick, "seeds": seeds}
-    if world:
-        about["world"] = world
     kept = {key: summary[key] for key in ("families", "ablations", "ratios", "paired")}
-    return {"about": about, "rows": json_rows(summary), **kept}
+    return {"about": bench.about(), "rows": json_rows(summary), **kept}
 
 
 def json_rows(summary: Row) -> list[Row]:

@@ -3,8 +3,7 @@
 from pretouch.text_table import TextTable
 from pretouch_lab.benchmarks.avoidance.losses import losses
 from pretouch_lab.benchmarks.avoidance.scenario import scenarios
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.groups import grouped
+from pretouch_lab.rows import Row, grouped
 from pretouch_lab.tables import with_spread
 
 _COLUMNS = (

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 
 from pretouch_lab.benchmarks import style
-from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.rows import Row
 
 TRADE = (
     "Force at a board of 25 N/mm against the time of a turn beside a person 0.4 m away, median and 10-90 %;"

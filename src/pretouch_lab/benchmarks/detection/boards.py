@@ -12,8 +12,8 @@ from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.detection.arm import Sensing, model, sensing_of
 from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper import static
+from pretouch_lab.rows import rounded
 from pretouch_lab.trial import Record, Setup, play
 
 COST_S = 1.0

@@ -4,20 +4,21 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 from pretouch.params import profile
+from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
 from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells, record_free, warm_up_s
 from pretouch_lab.benchmarks.detection.judge import judge_contacts, judge_free
 from pretouch_lab.benchmarks.detection.stream import PROFILE
-from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario
-from pretouch_lab.benchmarks.store import Row, Task, open_bench, read_rows, run_tasks
+from pretouch_lab.benchmarks.scenario_files import scenario
+from pretouch_lab.engine import Task, rows_of
 from pretouch_lab.result_key import result_key
-from pretouch_lab.worlds import told
+from pretouch_lab.rows import Row
 
-NAME = "detection"
 _RECORD: dict[str, Callable[..., None]] = {"free": record_free, "contacts": record_contacts}
 """What records the streams of a family."""
 _CONTACT_S = 3.5
@@ -30,19 +31,33 @@ ABLATED_ARMS = 2
 
 
 @dataclass(frozen=True)
-class Bench:
-    """What of the detection benchmark is run."""
+class Rows:
+    """All rows that are there."""
 
-    out: Path
-    """Folder for everything that is kept."""
-    quick: bool = False
-    seeds: SeedRange = "published"
-    world: str = ""
-    """Set of worlds of which each arm's seed draws its own, or none: the arms of the published tables."""
+    free: list[Row]
+    contacts: list[Row]
+    boards: list[Row]
 
-    def open(self) -> None:
-        """Make the folder or take it up."""
-        open_bench(self.out, NAME, {"quick": self.quick, "seeds": self.seeds, **told(self.world)})
+
+@dataclass(frozen=True)
+class DetectionBench(Bench):
+    """The detection benchmark."""
+
+    name: ClassVar[str] = "detection"
+
+    def stages(self) -> list[list[Task]]:
+        """Return the streams to record, then what is made of them and the trials in the closed loop."""
+        return [self.streams(), [*self.free(), *self.contacts(), *self.boards()]]
+
+    def rows(self) -> Rows:
+        """Return the rows of what is done."""
+        return Rows(rows_of(self.free()), rows_of(self.contacts()), rows_of(self.boards()))
+
+    def found(self) -> Found | None:
+        """See `Bench`."""
+        from pretouch_lab.benchmarks.detection.published import found
+
+        return found(self, self.rows())
 
     def streams(self) -> list[Task]:
         """Return the streams to record."""
@@ -88,10 +103,6 @@ class Bench:
             for contender in CONTENDERS
         ]
 
-    def every(self) -> list[Task]:
-        """Return all work."""
-        return [*self.streams(), *self.free(), *self.contacts(), *self.boards()]
-
     def _replayed(self, cell: FreeCell | ContactCell) -> tuple[Contender, ...]:
         """Return the detectors that are given a cell's stream: ablations only what the goals are about."""
         wanted = cell.kind == "nominal" and cell.speed_m_s == scenario("contacts")["goal"]["speed_m_s"]
@@ -120,24 +131,6 @@ class Bench:
         """Where a row is kept: elsewhere as soon as the detector, or what it is given, is another."""
         name = contender.name.replace(" ", "-")
         return self.out / family / f"{name}-{result_key(*made_by, profile=contender.profile)}" / f"{cell}.json"
-
-
-@dataclass(frozen=True)
-class Rows:
-    """All rows that are there."""
-
-    free: list[Row]
-    contacts: list[Row]
-    boards: list[Row]
-
-
-def run_bench(bench: Bench, progress: Callable[[float], None]) -> Rows:
-    """Do all that is missing, and return the rows; a run that was stopped goes on."""
-    bench.open()
-    free, contacts, boards = bench.free(), bench.contacts(), bench.boards()
-    run_tasks(bench.streams(), bench.out, progress)
-    run_tasks([*free, *contacts, *boards], bench.out, progress)
-    return Rows(read_rows(free), read_rows(contacts), read_rows(boards))
 
 
 def _free_s(cell: FreeCell) -> float:

@@ -11,7 +11,7 @@ from pretouch_lab.benchmarks.detection.campaign import Rows
 from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.detection.judge import BUSY
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.rows import Row
 
 
 def curve_figure(results: Row, contenders: Iterable[Contender]) -> Figure:

@@ -16,8 +16,7 @@ from pretouch_lab.benchmarks.detection.free import FreeCell, warm_up_s
 from pretouch_lab.benchmarks.detection.replay import REST, Replayed, replay
 from pretouch_lab.benchmarks.detection.stream import Stream, load_stream
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 
 PERIOD_S = TaskParams().control_period_s
 BUSY = -1.0

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from pretouch_lab.benchmarks.bench import EMPTY
 from pretouch_lab.benchmarks.bounds import median_bounds
 from pretouch_lab.benchmarks.detection.campaign import Rows
 from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated
 from pretouch_lab.benchmarks.detection.judge import BUSY, sweep_values
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import EMPTY, Row
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.claims.detectors import dispersion_of, rate_bounds
+from pretouch_lab.rows import Row, rounded
 
 GOAL_FREE, GOAL_CONTACTS = "free: goal", "contacts: goal"
 """Scenarios of the goals: the usual arm at the goal's speed, whoever is near; contacts the goals of delay are set for,

@@ -5,7 +5,7 @@ from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
 from pretouch_lab.benchmarks.bounds import short
 from pretouch_lab.benchmarks.detection.results import ABLATED_CONTACTS, ABLATED_FREE, GOAL_CONTACTS, GOAL_FREE
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.rows import Row
 
 
 def detection_tables(results: Row) -> list[TextTable]:

@@ -4,24 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from pretouch import __version__
 from pretouch.text_table import TextTable
-from pretouch_lab.benchmarks.localization.campaign import NAME, Bench
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 
 TWO = "two at once"
 """In place of a link, for two contacts at once."""
 
 
-def summary_of(bench: Bench, replays: list[Row]) -> Row:
-    """Return what the JSON file holds: what was run, and a row for each skin and rigid body."""
-    about = {"bench": NAME, "version": __version__, "quick": bench.quick, "seeds": bench.seeds}
-    return {"about": about, "rows": rows_of(replays)}
-
-
-def rows_of(replays: list[Row]) -> list[Row]:
+def rows_by_body(replays: list[Row]) -> list[Row]:
     """Return a row for each skin and rigid body, and one for two contacts at once."""
     rows = []
     for skin in dict.fromkeys(replay["skin"] for replay in replays):
@@ -72,7 +63,7 @@ def _at(values: list[float], percent: float) -> float | None:
 
 
 def tables_of(results: Row) -> list[TextTable]:
-    """Return the tables of what `summary_of` returned."""
+    """Return the tables of what the JSON file holds."""
     judged = scenario("localization")["judged"]
     singles = [row for row in results["rows"] if row["link"] != TWO]
     pairs = [row for row in results["rows"] if row["link"] == TWO]

@@ -9,9 +9,9 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.claims.anticipation_views import DISTANCES_M, PROFILE, summarise, tables
 from pretouch_lab.paper.claims.approach import DIRECTIONS, PLACE_M, approach
+from pretouch_lab.rows import rounded
 from pretouch_lab.trial import Record, Setup, play
 
 NAME = "anticipation"

@@ -8,8 +8,8 @@ from pretouch.contact.thresholds import obstacle_force
 from pretouch.params import profile
 from pretouch.sim.scene import HandSpec
 from pretouch.text_table import TextTable
-from pretouch_lab.metrics import rounded, spread
 from pretouch_lab.paper.claims.approach import DIRECTIONS
+from pretouch_lab.rows import rounded, spread
 from pretouch_lab.tables import number
 
 PROFILE = "paper"

@@ -12,7 +12,7 @@ from pretouch.text_table import TextTable
 from pretouch.types import ControlStep
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import rounded, spread
+from pretouch_lab.rows import rounded, spread
 from pretouch_lab.tables import controller, number
 from pretouch_lab.trial import Record, Setup, play
 

@@ -15,11 +15,11 @@ from pretouch.sensing.skin import Skin
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.metrics import rounded, spread
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper.claims.detectable_views import detectable_tables, draw_detectable
 from pretouch_lab.paper.claims.detectors import TABLE_I, Detector, Windowed, filtered, fixed, raw, raw_twice, windowed
 from pretouch_lab.paper.claims.forces import Event, Shape, apply
+from pretouch_lab.rows import Row, rounded, spread
 from pretouch_lab.trial import Setup, play
 
 NAME = "detectable"

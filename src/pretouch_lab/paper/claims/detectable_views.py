@@ -3,7 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Picture, Row, Sources
+from pretouch_lab.experiment import Picture, Sources
+from pretouch_lab.rows import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

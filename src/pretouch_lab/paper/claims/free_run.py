@@ -12,9 +12,8 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.cell import Cell, Context
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.claims.detectors import TABLE_I, Windowed, band, dispersion_of, onsets, rate_bounds
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.trial import SETTLE_S, Record, Setup, play
 
 PROFILE = "blind:threshold.f_base_n=1000"

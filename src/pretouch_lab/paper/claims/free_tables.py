@@ -1,9 +1,9 @@
 """Tables of the experiments in which nothing touches the arm."""
 
 from pretouch.text_table import TextTable, tabulated
-from pretouch_lab.experiment import Row
 from pretouch_lab.paper.claims.detectors import TABLE_I
 from pretouch_lab.paper.claims.free_run import rate_text
+from pretouch_lab.rows import Row
 from pretouch_lab.tables import median, number, plain
 
 

@@ -8,8 +8,7 @@ from pretouch.control.path import Circle
 from pretouch.sim.plant_params import Joints, PlantParams
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.metrics import rounded, spread
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper.claims.detectors import TABLE_I, filtered, fixed, raw, steady, windowed
 from pretouch_lab.paper.claims.free_run import (
     DURATION_S,
@@ -22,6 +21,7 @@ from pretouch_lab.paper.claims.free_run import (
     tally,
 )
 from pretouch_lab.paper.claims.free_tables import noise_tables
+from pretouch_lab.rows import Row, rounded, spread
 
 NAME = "noise"
 FACTORS = (1.0, 2.0, 3.0, 4.0, 6.0)

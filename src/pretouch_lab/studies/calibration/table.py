@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pretouch.text_table import TextTable
-from pretouch_lab.studies.calibration.errors import Row
+from pretouch_lab.rows import Row
 from pretouch_lab.studies.calibration.study import OURS, WATANABE, WATANABE_UNBIASED, Study
 
 ALL = "all"

@@ -22,9 +22,8 @@ from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.bounds import share_below
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import grouped
-from pretouch_lab.metrics import rounded
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.rows import Row, grouped, rounded
 from pretouch_lab.studies.coverage.comers import EVERY_S, PARKED, START_S, Comers, Coming
 from pretouch_lab.trial import Record, Setup, play
 

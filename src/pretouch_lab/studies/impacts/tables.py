@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.impacts.kinds import GROUPS, KINDS
 from pretouch_lab.studies.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
 

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -5,7 +7,7 @@ from pretouch.errors import ExperimentError, ParameterError
 from pretouch.params import profile
 from pretouch.sim.plant_params import PlantParams
 from pretouch_lab.benchmarks.avoidance.contenders import ABLATED, CONTENDERS, TUNINGS, profile_text
-from pretouch_lab.benchmarks.avoidance.run import Request
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import plant_of, setting
 
@@ -66,15 +68,15 @@ def test_contenders_and_their_other_tunings_are_profiles():
 
 def test_an_unknown_contender_or_scenario_is_refused_with_those_there_are():
     with pytest.raises(ParameterError, match="Contenders are blind, flacco"):
-        Request(("nobody",))
+        AvoidanceBench(Path(), contenders=("nobody",))
     with pytest.raises(ExperimentError, match="choose from srdo, drdo"):
-        Request(("blind",), names=("nothing",))
+        AvoidanceBench(Path(), names=("nothing",))
     with pytest.raises(ExperimentError, match="name each once"):
-        Request(("blind", "blind"))
+        AvoidanceBench(Path(), contenders=("blind", "blind"))
 
 
 def test_each_trial_has_its_own_file(tmp_path):
-    tasks = Request((), seeds="development").tasks(tmp_path)
+    tasks = AvoidanceBench(tmp_path, seeds="development").every()
     assert len({t.file for t in tasks}) == len(tasks)
     assert all(t.file.parent == tmp_path / "trials" for t in tasks)
-    assert len(Request((), True, "development").tasks(tmp_path)) < len(tasks) / 5
+    assert len(AvoidanceBench(tmp_path, True, "development").every()) < len(tasks) / 5

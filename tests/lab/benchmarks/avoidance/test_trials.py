@@ -9,12 +9,12 @@ import pytest
 from pretouch.control.posture import brought_to
 from pretouch.params import profile
 from pretouch.perception.closest import closest_points
-from pretouch_lab.benchmarks.avoidance.run import Request, rows_of, run
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import setting
 from pretouch_lab.benchmarks.avoidance.trial import play_trial
 from pretouch_lab.benchmarks.avoidance.truth import truth_of
-from pretouch_lab.benchmarks.store import missing
+from pretouch_lab.engine import missing
 from pretouch_lab.trial import Record
 
 QUICK = [next(s for s in scenarios().values() if s.family == f and s.quick) for f in FAMILIES]
@@ -55,16 +55,16 @@ def test_the_published_methods_move_out_of_the_way(contender):
 
 @pytest.mark.slow
 def test_a_run_that_was_stopped_goes_on(tmp_path):
-    request = Request(("blind",), True, "development", ("srdo", "drdo"))
-    run(request, tmp_path, lambda _: None, processes=1)
-    assert not missing(request.tasks(tmp_path))
-    lost = request.tasks(tmp_path)[0].file
-    kept = request.tasks(tmp_path)[1].file.stat().st_mtime_ns
+    bench = AvoidanceBench(tmp_path, True, "development", contenders=("blind",), names=("srdo", "drdo"))
+    bench.run(lambda _: None, processes=1)
+    assert not missing(bench.every())
+    lost = bench.every()[0].file
+    kept = bench.every()[1].file.stat().st_mtime_ns
     before = json.loads(lost.read_text())
     lost.unlink()
-    assert [row["scenario"] for row in rows_of(request, tmp_path)] == ["drdo"]
+    assert [row["scenario"] for row in bench.rows()] == ["drdo"]
     costs = []
-    run(request, tmp_path, costs.append, processes=1)
+    bench.run(costs.append, processes=1)
     assert len(costs) == 1
     assert json.loads(lost.read_text()) == before
-    assert request.tasks(tmp_path)[1].file.stat().st_mtime_ns == kept
+    assert bench.every()[1].file.stat().st_mtime_ns == kept
