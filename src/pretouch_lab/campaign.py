@@ -115,7 +115,7 @@ class Request:
             Task(
                 trial_file(out, cell, seed), partial(play_trial, self, out, cell, seed),
                 EXPERIMENTS[cell.experiment].cost(cell), seed,
-                {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed},
+                cell.row(seed),
             )
             for cell, seed in self.trials()
         ]  # fmt: skip

@@ -27,7 +27,7 @@ def cells(grid: Grid) -> list[Cell]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
     """Run one trial; return its row of results. Its course is of no use to a figure."""
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row = cell.row(seed)
     return row | judged(context.profile(cell), seed, WAYS[str(cell.where["way"])], FREE_S), None
 
 

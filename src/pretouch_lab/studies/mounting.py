@@ -81,23 +81,12 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     believed, refused = misplaced(context.skin, context.model, error, seed)
     empty = side == ROOM
     scene = SceneSpec() if empty else static_scene(trajectory, side, _STIFFNESS_N_PER_M, seed)
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        believed=believed,
-        profile=context.profile(cell),
-        scene=scene,
-        path=views.path(trajectory) if empty else static_path(trajectory, side),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
+    setup = context.setup(
+        cell, seed, scene, views.path(trajectory) if empty else static_path(trajectory, side), believed=believed
     )
     record = play(setup, (lambda step, _: step.stamp >= _ROOM_S) if empty else static.done_after_contact())
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **static.results(record, -1.0 if side == "+y" else 1.0, context.model.links),
         "touch_s": record.first_contact(),
         "missed_fraction": None if empty else missed(record, setup),

@@ -37,7 +37,6 @@ from pretouch_lab.studies.tactile_kinds import (
     INNER_LINKS,
     INNER_N,
     KINDS,
-    NAME,
     NOWHERE,
     PROFILE,
     WARM_UP_S,
@@ -183,7 +182,7 @@ def played(cell: Cell, seed: int, context: Context, free_s: float = FREE_S) -> t
         name: replay(course.stream, Contender(name, text, "scale"), model(), cues_of(course, skin, text))
         for name, text in DETECTORS.items()
     }
-    row: Row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row: Row = cell.row(seed)
     if not course.touches:
         counted = course.stream.stamp >= WARM_UP_S
         row["free"] = {

@@ -23,7 +23,7 @@ from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper.avoidance import visits
 from pretouch_lab.rows import Row, cells_of, rounded
 from pretouch_lab.tables import median, plain, share
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 NAME = "vision"
 DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
@@ -96,19 +96,17 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     name, sensing, view = (str(cell.where[key]) for key in ("scene", "sensing", "view"))
     scene, model = scene_of(name, seed), context.model
-    setup = Setup(
-        model=model,
+    setup = context.setup(
+        cell,
+        seed,
+        scene.spec,
+        scene.path,
         skin=Skin([], model) if sensing == "camera" else context.skin,
-        profile=context.profile(cell),
-        scene=scene.spec,
-        path=scene.path,
-        seed=seed,
         hand=Visitor(model, visits("inside", seed)[:1]) if name == "hand" else None,
         camera=None if view == NO_VIEW else looking(np.array(VIEWS[view]), np.array(_LOOKS_AT_M)),
-        recording=context.recording,
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row = cell.row(seed)
     return row | results(record, scene, model, setup.profile.reduction.d_max_m), record
 
 

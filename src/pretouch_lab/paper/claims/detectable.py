@@ -123,10 +123,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
     record = play(setup, lambda step, _: step.stamp >= events[-1].end + 2 * _LATE_S)
     course = windowed(record.forces())
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         "answers": answers(course, record.times()[-len(course.force) :], events),
         "held": record.held(),
     }

@@ -70,10 +70,7 @@ def trial(cell: Cell, seed: int, context: Context, duration_s: float = DURATION_
     off = np.array([s.ee_position - s.path_position for s in record.steps if s.armed])
     force = estimates(record)
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **estimate_results(windowed(force)),
         "path_rms_m": rounded(float(np.sqrt((off**2).sum(axis=1).mean())), 5),
         "detections": detections(force),

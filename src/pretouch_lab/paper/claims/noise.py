@@ -53,10 +53,7 @@ def trial(cell: Cell, seed: int, context: Context, duration_s: float = DURATION_
     what = Solitude(Circle(), plant=noisy(float(cell.where["noise_factor"])), duration_s=duration_s)
     force = estimates(leave_alone(what, cell, seed, context))
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **estimate_results(windowed(force)),
         "detections": detections(force),
     }
