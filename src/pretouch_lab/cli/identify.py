@@ -91,20 +91,18 @@ def _model(arm: str) -> "RobotModel | None":
 
 def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     from rich.console import Console
-    from rich.table import Table
+
+    from pretouch.cli.tables import grid
 
     console = Console(highlight=False, soft_wrap=True, width=20 * (model.n + 2))
     console.print(f"{said}. {found.seconds:.0f} s of free motion are used.", markup=False)
     for note in found.notes:
         console.print(note, markup=False)
-    rows = joint_rows(found, model)
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("")
-    for joint in model.joints:
-        table.add_column(joint, justify="right", no_wrap=True)
-    for name, values, errors, told in rows:
-        table.add_row(name, *(_shown(*each) for each in zip(values, errors, told, strict=True)))
-    console.print(table)
+    rows = [
+        (name, *(_shown(*each) for each in zip(values, errors, told, strict=True)))
+        for name, values, errors, told in joint_rows(found, model)
+    ]
+    console.print(grid(("", *model.joints), rows, whole=1))
     payload, error = float(found.fit.numbers[-2]), float(found.fit.errors[-2])
     console.print(f"Payload {payload:.3f} +- {error:.3f} kg.", markup=False)
     noise = found.noise

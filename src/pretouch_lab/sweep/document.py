@@ -1,10 +1,11 @@
 """What a sweep leaves for readers: numbers, a figure, tables, and its part of docs/results/sensitivity.md."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from pretouch import __version__
-from pretouch.text_table import TextTable, markdown
+from pretouch.text_table import Column, TextTable, markdown, tabulated
 from pretouch.whole_file import write_json
 from pretouch_lab.documents import SENSITIVITY, draw, put, shown
 from pretouch_lab.engine import failure_said
@@ -45,39 +46,45 @@ def tables(run: Run, about: dict[str, Any]) -> list[TextTable]:
     """Return a sweep's tables: one of all metrics for indices and correlations, one for each parameter of a grid."""
     if run.sweep.design == "grid":
         return _grid_tables(run, about)
-    sobol, found = run.sweep.design == "sobol", about["metrics"]
     ranges = {one.name: one.written for one in run.sweep.vary}
-    header = ["parameter", "range"]
-    for metric in run.sweep.metrics:
-        header += [f"{metric}:\nfirst", "total"] if sobol else [metric]
     names = [*ranges, *(["seed"] if run.sweep.arms > 1 else [])]
-    lines = []
-    for name in names:
-        line = [name, ranges.get(name, f"{run.sweep.arms} arms")]
-        for metric in run.sweep.metrics:
-            row = next((r for r in found[metric]["rows"] if r["parameter"] == name), None)
-            line += _numbers(row, sobol)
-        lines.append(tuple(line))
-    return [TextTable(_title(run), tuple(header), tuple(lines), _note(run, about))]
+    columns: list[Column] = [
+        ("parameter", str), ("range", lambda name: ranges.get(name, f"{run.sweep.arms} arms")),
+    ]  # fmt: skip
+    for metric in run.sweep.metrics:
+        of = {row["parameter"]: row for row in about["metrics"][metric]["rows"]}
+        if run.sweep.design == "sobol":
+            columns += [(f"{metric}:\nfirst", _index(of, "first")), ("total", _index(of, "total"))]
+        else:
+            columns.append((metric, _correlation(of)))
+    return [tabulated(_title(run), columns, names, _note(run, about))]
 
 
-def _numbers(row: dict[str, Any] | None, sobol: bool) -> list[str]:
-    if row is None:
-        return ["-", "-"] if sobol else ["-"]
-    if sobol:
-        return [f"{row[k]:.2f} ± {row[f'{k}_95']:.2f}" for k in ("first", "total")]
-    return [f"{row['correlation']:.2f} ({row['low']:.2f} to {row['high']:.2f})"]
+def _index(rows: dict[str, Any], key: str) -> Callable[[str], str]:
+    return lambda name: f"{rows[name][key]:.2f} ± {rows[name][f'{key}_95']:.2f}" if name in rows else "-"
+
+
+def _correlation(rows: dict[str, Any]) -> Callable[[str], str]:
+    def write(name: str) -> str:
+        row = rows.get(name)
+        return "-" if row is None else f"{row['correlation']:.2f} ({row['low']:.2f} to {row['high']:.2f})"
+
+    return write
 
 
 def _grid_tables(run: Run, about: dict[str, Any]) -> list[TextTable]:
+    def band(k: int) -> Callable[[tuple[dict[str, Any], ...]], str]:
+        return lambda rows: _band(rows[k])
+
     found, made = about["metrics"], []
     for one in run.sweep.vary:
         by_metric = [[r for r in found[m]["rows"] if r["parameter"] == one.name] for m in run.sweep.metrics]
-        lines = tuple(
-            (_level(rows[0]["level"]), str(max(r["n"] for r in rows)), *map(_band, rows))
-            for rows in zip(*by_metric, strict=True)
+        columns = (
+            (one.name, lambda rows: _level(rows[0]["level"])),
+            ("n", lambda rows: str(max(r["n"] for r in rows))),
+            *((metric, band(k)) for k, metric in enumerate(run.sweep.metrics)),
         )
-        made.append(TextTable(_title(run), (one.name, "n", *run.sweep.metrics), lines, _note(run, about)))
+        made.append(tabulated(_title(run), columns, zip(*by_metric, strict=True), _note(run, about)))
     return made
 
 
