@@ -17,10 +17,10 @@ from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
 from pretouch.sim.randomisation import world_set
 from pretouch.whole_file import write_json
 from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.domain_randomisation import digest_of
 from pretouch_lab.engine import Task, open_folder
 from pretouch_lab.registry import EXPERIMENTS
 from pretouch_lab.result_key import parameters_digest, result_key
-from pretouch_lab.worlds import digest_of
 
 Recorded = Literal["first", "all"]
 """Trials to record: those of the first seed of which figures are drawn, or all."""
@@ -50,7 +50,8 @@ class Request:
     """Folder of an imported arm, or its robot.toml; None for the Panda."""
     first_seed: int = 0
     world: str | None = None
-    """Set of worlds of which each trial's seed draws its own (`sim.randomisation`), or None for the usual one."""
+    """Set of the domain randomisation (`sim.randomisation`) of which each trial's seed draws its own, or None for the
+    usual arm."""
 
     def __post_init__(self) -> None:
         for name in self.experiments:

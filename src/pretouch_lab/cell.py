@@ -83,7 +83,7 @@ class Context:
     placement: Placement = field(default_factory=Placement)
     """Where the paper's paths are for this arm: the static experiment's."""
     world: str = ""
-    """Set of worlds of which each trial's seed draws its own, or none."""
+    """Set of the domain randomisation of which each trial's seed draws its own, or none."""
     recording: Path | None = None
     """File to record the trial in, if it is to be recorded."""
     plant: PlantParams | None = None

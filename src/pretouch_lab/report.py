@@ -9,11 +9,11 @@ from pretouch.reporting.html import Html, document, element, joined, titled_tabl
 from pretouch.text_table import markdown
 from pretouch_lab.campaign import Request, recording_file
 from pretouch_lab.cell import Cell
+from pretouch_lab.domain_randomisation import sentence
 from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.registry import GROUPS
 from pretouch_lab.rows import Row
 from pretouch_lab.trace import Trace, read_trace
-from pretouch_lab.worlds import sentence
 
 _TITLE = "Contact anticipation in simulation"
 _NOTE = (

@@ -10,10 +10,10 @@ from pretouch import __version__
 from pretouch.text_table import TextTable, markdown
 from pretouch_lab.benchmarks.scenario_files import SeedRange, checksums
 from pretouch_lab.documents import BENCHMARKS, shown
+from pretouch_lab.domain_randomisation import digest_of
 from pretouch_lab.engine import Progress, Task, open_folder, run_tasks
 from pretouch_lab.experiment import Picture
 from pretouch_lab.rows import Row
-from pretouch_lab.worlds import digest_of
 
 EMPTY: Row = dict.fromkeys(
     (
@@ -59,7 +59,7 @@ class Bench(ABC):
     quick: bool = False
     seeds: SeedRange = "published"
     world: str = ""
-    """Set of domain randomisation of which each seed draws its own, or none: the arms of the published tables."""
+    """Set of the domain randomisation of which each seed draws its own, or none: the arms of the published tables."""
 
     @abstractmethod
     def stages(self) -> list[list[Task]]:

@@ -8,7 +8,7 @@ from pretouch_lab.benchmarks.goals import find
 from pretouch_lab.rows import Row
 
 _SHOWN = {"blind": "blind", "paper": "paper", "paper-off": "paper", "pretouch": "pretouch"}
-"""Contenders of the closed loop, and the detector of each."""
+"""Baselines of the closed loop, and the detector of each."""
 
 
 def front_table(detection: Row, avoidance: Row) -> TextTable:

@@ -3,7 +3,9 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
 
 from pretouch.cli.words import words
 from pretouch.errors import ExperimentError, PretouchError
@@ -30,7 +32,7 @@ class BenchOptions:
 
     def folder(self, name: str) -> Path:
         """Where the results go; `name` is that under runs/."""
-        from pretouch_lab.worlds import folder_part
+        from pretouch_lab.domain_randomisation import folder_part
 
         return Path(self.out or f"runs/{name}{folder_part(self.world)}{'-quick' if self.quick else ''}")
 
@@ -42,11 +44,11 @@ class BenchOptions:
         return Path(self.docs) if self.docs else None
 
     def check_published(self, option: str) -> None:
-        """Refuse to write numbers of another world where the published ones stand."""
+        """Refuse to write numbers of other arms where the published ones stand."""
         if self.world:
             raise ExperimentError(
-                f"The world is {self.world!r}, and {option} writes the published tables, which are of the usual one:"
-                f" leave out {option}; tables and figures are in the run's folder."
+                f"The domain randomisation is {self.world!r}, and {option} writes the published tables, which are of"
+                f" the usual arms: leave out {option}; tables and figures are in the run's folder."
             )
 
 
@@ -76,9 +78,9 @@ class Avoidance(BenchOptions):
     """
 
     json: str = ""
-    """File for the numbers, with a row for each contender and scenario; by default results.json in the folder."""
-    contenders: str = ""
-    """Contenders, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
+    """File for the numbers, with a row for each baseline and scenario; by default results.json in the folder."""
+    baselines: Annotated[str, tyro.conf.arg(aliases=["--contenders"])] = ""
+    """Baselines, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
     profile; by default all, and pretouch with each switch off alone."""
     scenarios: str = ""
     """Scenarios, separated by commas; by default all."""
@@ -87,7 +89,7 @@ class Avoidance(BenchOptions):
         """Run it, with tables, figures and numbers."""
         from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 
-        out, some = self.folder("bench-avoidance"), (words(self.contenders), words(self.scenarios))
+        out, some = self.folder("bench-avoidance"), (words(self.baselines), words(self.scenarios))
         run_bench(AvoidanceBench(out, self.quick, self.seeds, self.world, *some), self, self.json)
 
 
@@ -132,8 +134,8 @@ def run_bench(bench: "Bench", options: BenchOptions, json: str) -> None:
     from pretouch.cli.writing import check_writable
     from pretouch_lab.cli.progress import worked
     from pretouch_lab.documents import around
+    from pretouch_lab.domain_randomisation import sentence
     from pretouch_lab.engine import missing
-    from pretouch_lab.worlds import sentence
 
     docs, json_file = options.documents, Path(json) if json else bench.out / "results.json"
     if docs:

@@ -17,8 +17,8 @@ from pretouch.sim.touch_sensor import TouchSensorParams, TouchSensors
 from pretouch.types import BoolArray, FloatArray, TouchReadings
 from pretouch_lab.benchmarks.dense_skin import gap
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, model, path_of, plant_of, record, sensing_of
+from pretouch_lab.benchmarks.detection.baselines import Baseline
 from pretouch_lab.benchmarks.detection.contacts import Toucher, Touching, place_on, start_posture
-from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.detection.judge import matched
 from pretouch_lab.benchmarks.detection.replay import Said, replay
 from pretouch_lab.benchmarks.detection.stream import Stream
@@ -179,7 +179,7 @@ def played(cell: Cell, seed: int, context: Context, free_s: float = FREE_S) -> t
     skin = inner_skin(context.skin) if place == INNER else feeling(context.skin)
     course = recorded(skin, place, cell.where["hand"] == "seen", seed, free_s)
     made = {
-        name: replay(course.stream, Contender(name, text, "scale"), model(), cues_of(course, skin, text))
+        name: replay(course.stream, Baseline(name, text, "scale"), model(), cues_of(course, skin, text))
         for name, text in DETECTORS.items()
     }
     row: Row = cell.row(seed)

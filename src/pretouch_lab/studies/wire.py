@@ -66,11 +66,11 @@ def coming_in(record: Record) -> Row:
     ages = np.zeros(0) if record.reading_age is None else record.reading_age[record.times() >= _BEGIN_S].ravel()
     # sequence numbers begin anew with each session: those of units that kept theirs tell what is missing
     steady = [unit for unit in record.traffic if unit.sessions == 1 and unit.sample is not None]
-    told = sum(unit.sample.sequence for unit in steady if unit.sample)
+    sent = sum(unit.sample.sequence for unit in steady if unit.sample)
     return {
         "age_median_s": rounded(float(np.median(ages)), 4) if ages.size else None,
         "age_p99_s": rounded(float(np.percentile(ages, 99)), 4) if ages.size else None,
-        "lost": rounded(1 - sum(unit.accepted for unit in steady) / told, 4) if told else None,
+        "lost": rounded(1 - sum(unit.accepted for unit in steady) / sent, 4) if sent else None,
         "sessions_left": sum(max(0, unit.sessions - 1) for unit in record.traffic),
     }
 

@@ -98,10 +98,10 @@ class _Watch:
 
     def _ask(self) -> None:
         try:
-            told = self._client.sync(self._client.scheduler.identity, callback_timeout=GONE_S)
+            identity = self._client.sync(self._client.scheduler.identity, callback_timeout=GONE_S)
         except (OSError, TimeoutError, AttributeError, RuntimeError):
             self.gone()
-        self.threads = sum(int(worker["nthreads"]) for worker in told["workers"].values())
+        self.threads = sum(int(worker["nthreads"]) for worker in identity["workers"].values())
 
     def gone(self) -> None:
         """Say that it is."""

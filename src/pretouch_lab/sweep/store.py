@@ -76,11 +76,13 @@ class Store:
                 raise Damaged("it is no list of results")
         except Damaged as error:
             return [(cell, _failed(f"The worker's answer cannot be read: {error}")) for cell in job.cells]
-        told = {row.get("key"): row for row in rows if isinstance(row.get("key"), str)}
+        by_key = {row.get("key"): row for row in rows if isinstance(row.get("key"), str)}
         found = []
         for cell in job.cells:
             try:
-                result = self._checked(told.get(cell.key, {"reason": "The worker did not tell of it.", "seconds": 0.0}))
+                result = self._checked(
+                    by_key.get(cell.key, {"reason": "The worker did not tell of it.", "seconds": 0.0})
+                )
             except Damaged as error:
                 result = _failed(f"The worker's answer cannot be read: {error}")
             found.append((cell, result))

@@ -6,7 +6,7 @@ from pretouch.errors import ParameterError
 from pretouch.params import profile
 from pretouch_lab.benchmarks.ablations import OFF, Ablation, ablations
 from pretouch_lab.benchmarks.avoidance.run import Request
-from pretouch_lab.benchmarks.detection.contenders import Contender
+from pretouch_lab.benchmarks.detection.baselines import Baseline
 
 
 def differing(a, b):
@@ -32,6 +32,6 @@ def test_no_switch_is_in_both_benchmarks():
 
 def test_an_unknown_switch_is_an_error_and_not_left_out():
     with pytest.raises(ParameterError, match=r"'detection\.lern' is unknown"):
-        Contender("own", "pretouch:detection.lern=no", "scale").profile  # noqa: B018  # it reads the text
-    with pytest.raises(ParameterError, match=r"'reaction\.clamp' is unknown.* Contenders are blind"):
+        Baseline("own", "pretouch:detection.lern=no", "scale").profile  # noqa: B018  # it reads the text
+    with pytest.raises(ParameterError, match=r"'reaction\.clamp' is unknown.* Baselines are blind"):
         Request(("pretouch:reaction.clamp=no",))

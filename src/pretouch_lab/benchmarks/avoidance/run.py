@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from pretouch.errors import ExperimentError
 from pretouch.params import profile
-from pretouch_lab.benchmarks.avoidance.contenders import ABLATED, ABLATED_IN, ABLATED_SEEDS, CONTENDERS, profile_text
+from pretouch_lab.benchmarks.avoidance.baselines import ABLATED, ABLATED_IN, ABLATED_SEEDS, BASELINES, profile_text
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial
 from pretouch_lab.benchmarks.bench import Bench, Found
@@ -25,16 +25,16 @@ class AvoidanceBench(Bench):
     name: ClassVar[str] = "avoidance"
     shown_unfinished: ClassVar[bool] = True
 
-    contenders: tuple[str, ...] = ()
+    baselines: tuple[str, ...] = ()
     """None: all there are, and `pretouch` with each switch off alone in some scenarios."""
     names: tuple[str, ...] = ()
     """Scenarios; none: all."""
 
     def __post_init__(self) -> None:
-        if len(set(self.contenders)) < len(self.contenders):
-            raise ExperimentError(f"The contenders are {', '.join(self.contenders)}: name each once.")
-        for contender in self.contenders:
-            profile_text(contender)
+        if len(set(self.baselines)) < len(self.baselines):
+            raise ExperimentError(f"The baselines are {', '.join(self.baselines)}: name each once.")
+        for baseline in self.baselines:
+            profile_text(baseline)
         for name in self.names:
             if name not in scenarios():
                 raise ExperimentError(f"The scenario {name!r} is unknown: choose from {', '.join(scenarios())}.")
@@ -49,17 +49,17 @@ class AvoidanceBench(Bench):
         return {"seeds": self.seeds, "world": self.world}
 
     def stages(self) -> list[list[Task]]:
-        """Return all trials, by scenario, contender and seed."""
+        """Return all trials, by scenario, baseline and seed."""
         played = [
-            (scene, contender, seed)
+            (scene, baseline, seed)
             for scene in self.scenes()
-            for contender in self.contenders or CONTENDERS
+            for baseline in self.baselines or BASELINES
             for seed in scene.seeds(self.seeds, self.quick)
         ]
         ablated = [
-            (scene, contender, seed)
+            (scene, baseline, seed)
             for scene in self.scenes()
-            for contender in (() if self.contenders else ABLATED)
+            for baseline in (() if self.baselines else ABLATED)
             for seed in (scene.seeds(self.seeds, self.quick)[:ABLATED_SEEDS] if scene.name in ABLATED_IN else ())
         ]
         return [[_task(self.out, *trial, self.world) for trial in (*played, *ablated)]]
@@ -76,18 +76,18 @@ class AvoidanceBench(Bench):
         return found(self, rows) if rows else None
 
 
-def _task(out: Path, scene: Scenario, contender: str, seed: int, world: str) -> Task:
-    text = profile_text(contender)
-    digest = sha256(f"{contender} {scene.name}".encode()).hexdigest()[:6]
-    plain = re.sub(r"[^A-Za-z0-9.-]+", "-", f"{scene.name}_{contender}")[:60]
+def _task(out: Path, scene: Scenario, baseline: str, seed: int, world: str) -> Task:
+    text = profile_text(baseline)
+    digest = sha256(f"{baseline} {scene.name}".encode()).hexdigest()[:6]
+    plain = re.sub(r"[^A-Za-z0-9.-]+", "-", f"{scene.name}_{baseline}")[:60]
     file = out / "trials" / f"{plain}_{digest}_{_key(text)}_{seed:04d}.json"
-    return Task(file, partial(keep_trial, scene.name, contender, seed, world), _cost(scene, contender))
+    return Task(file, partial(keep_trial, scene.name, baseline, seed, world), _cost(scene, baseline))
 
 
-def _cost(scene: Scenario, contender: str) -> float:
+def _cost(scene: Scenario, baseline: str) -> float:
     """Processor time, about [s]; the board is met soon, and a turn is quick, where little is done before a contact."""
-    soon = contender in _SOON and ("after_contact_s" in scene.says or "turns" in scene.says)
-    return _COST * float(scene.says["duration_s"]) * (0.4 if soon else 1.0)
+    soon = baseline in _SOON and ("after_contact_s" in scene.params or "turns" in scene.params)
+    return _COST * float(scene.params["duration_s"]) * (0.4 if soon else 1.0)
 
 
 _COST = 0.15

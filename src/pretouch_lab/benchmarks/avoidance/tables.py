@@ -26,7 +26,7 @@ _MOTION_NOTE = (
 
 
 def tables(summary: Row) -> list[TextTable]:
-    """Return what is lost, each contender in each scenario, a table a family, the motion, ablations, and ratios."""
+    """Return what is lost, each baseline in each scenario, a table a family, the motion, ablations, and ratios."""
     cells, made = summary["cells"], [losses(summary["cells"])]
     made += [_results(family["family"], group) for family, group in grouped(cells, ("family",))]
     made += [_motion(family["family"], group) for family, group in grouped(cells, ("family",))]

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 from pretouch.params import profile
 from pretouch_lab.benchmarks.bench import Bench, Found
+from pretouch_lab.benchmarks.detection.baselines import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
-from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells, record_free, warm_up_s
 from pretouch_lab.benchmarks.detection.judge import judge_contacts, judge_free
 from pretouch_lab.benchmarks.detection.stream import PROFILE
@@ -75,35 +75,35 @@ class DetectionBench(Bench):
         """Return the replays on streams of free motion."""
         return [
             Task(
-                self._row("free", cell.name, contender, record_free, judge_free),
-                partial(judge_free, cell, contender, self._stream(cell)),
-                _replay_cost(contender) * _free_s(cell),
+                self._row("free", cell.name, baseline, record_free, judge_free),
+                partial(judge_free, cell, baseline, self._stream(cell)),
+                _replay_cost(baseline) * _free_s(cell),
             )
             for cell in self._free()
-            for contender in self._replayed(cell)
+            for baseline in self._replayed(cell)
         ]
 
     def contacts(self) -> list[Task]:
         """Return the replays on streams with contacts."""
         return [
             Task(
-                self._row("contacts", cell.name, contender, record_contacts, judge_contacts),
-                partial(judge_contacts, cell, contender, self._stream(cell)),
-                _replay_cost(contender) * _contacts_s(cell),
+                self._row("contacts", cell.name, baseline, record_contacts, judge_contacts),
+                partial(judge_contacts, cell, baseline, self._stream(cell)),
+                _replay_cost(baseline) * _contacts_s(cell),
             )
             for cell in self._contacts()
-            for contender in self._replayed(cell)
+            for baseline in self._replayed(cell)
         ]
 
     def boards(self) -> list[Task]:
         """Return the trials in the closed loop."""
         return [
-            Task(self._row("boards", cell.name, contender, meet_board), partial(meet_board, cell, contender), COST_S)
+            Task(self._row("boards", cell.name, baseline, meet_board), partial(meet_board, cell, baseline), COST_S)
             for cell in self._boards()
-            for contender in CONTENDERS
+            for baseline in BASELINES
         ]
 
-    def _replayed(self, cell: FreeCell | ContactCell) -> tuple[Contender, ...]:
+    def _replayed(self, cell: FreeCell | ContactCell) -> tuple[Baseline, ...]:
         """Return the detectors that are given a cell's stream: ablations only what the goals are about."""
         wanted = cell.kind == "nominal" and cell.speed_m_s == scenario("contacts")["goal"]["speed_m_s"]
         if isinstance(cell, FreeCell):
@@ -111,7 +111,7 @@ class DetectionBench(Bench):
             wanted = wanted and cell in same[:ABLATED_ARMS]
         else:
             wanted = wanted and cell.sensing == "nominal"
-        return (*CONTENDERS, *ablated()) if wanted else CONTENDERS
+        return (*BASELINES, *ablated()) if wanted else BASELINES
 
     def _free(self) -> list[FreeCell]:
         return [replace(cell, world=self.world) for cell in free_cells(self.seeds, self.quick)]
@@ -127,10 +127,10 @@ class DetectionBench(Bench):
         made_by = result_key(_RECORD[family], profile=profile(PROFILE))
         return self.out / f"streams-{made_by}" / f"{family}_{cell.name}.npz"
 
-    def _row(self, family: str, cell: str, contender: Contender, *made_by: Callable[..., None]) -> Path:
+    def _row(self, family: str, cell: str, baseline: Baseline, *made_by: Callable[..., None]) -> Path:
         """Where a row is kept: elsewhere as soon as the detector, or what it is given, is another."""
-        name = contender.name.replace(" ", "-")
-        return self.out / family / f"{name}-{result_key(*made_by, profile=contender.profile)}" / f"{cell}.json"
+        name = baseline.name.replace(" ", "-")
+        return self.out / family / f"{name}-{result_key(*made_by, profile=baseline.profile)}" / f"{cell}.json"
 
 
 def _free_s(cell: FreeCell) -> float:
@@ -141,8 +141,8 @@ def _contacts_s(cell: ContactCell) -> float:
     return warm_up_s() + _CONTACT_S * cell.count
 
 
-def _replay_cost(contender: Contender) -> float:
-    return _REPLAY_COST[contender.profile.detection.method]
+def _replay_cost(baseline: Baseline) -> float:
+    return _REPLAY_COST[baseline.profile.detection.method]
 
 
 def _where(cell: FreeCell) -> tuple[str, str, float, str]:

@@ -78,7 +78,7 @@ class ContactCell:
     count: int
     """Contacts."""
     world: str = ""
-    """Set of worlds of which the seed draws one, or none."""
+    """Set of the domain randomisation of which the seed draws one, or none."""
 
     @property
     def name(self) -> str:

@@ -46,7 +46,7 @@ class FreeCell:
     counted_s: float
     """Time that counts [s], after the warm-up."""
     world: str = ""
-    """Set of worlds of which the seed draws one, or none."""
+    """Set of the domain randomisation of which the seed draws one, or none."""
 
     @property
     def name(self) -> str:

@@ -1,8 +1,8 @@
 """What a run of the detection benchmark leaves for readers: numbers, figures, and a part of a document."""
 
 from pretouch_lab.benchmarks.bench import Bench, Found, said
+from pretouch_lab.benchmarks.detection.baselines import BASELINES
 from pretouch_lab.benchmarks.detection.campaign import Rows
-from pretouch_lab.benchmarks.detection.contenders import CONTENDERS
 from pretouch_lab.benchmarks.detection.results import (
     ablation_rows,
     board_rows,
@@ -26,7 +26,7 @@ def found(bench: Bench, rows: Rows) -> Found:
     from pretouch_lab.benchmarks.detection.figures import curve_figure, missed_figure
 
     results = summary_of(bench, rows)
-    figures = (curve_figure(results, CONTENDERS), missed_figure(rows, CONTENDERS))
+    figures = (curve_figure(results, BASELINES), missed_figure(rows, BASELINES))
     pictures = [Picture(name, text, figure) for (name, text), figure in zip(_PICTURES.items(), figures, strict=True)]
     text = f"{said(results['about'])} {results['resolution']}"
     return Found(results, detection_tables(results), results["resolution"], pictures, text)
@@ -34,7 +34,7 @@ def found(bench: Bench, rows: Rows) -> Found:
 
 def summary_of(bench: Bench, rows: Rows) -> Row:
     """Return what the JSON file holds: what was run, a row for each detector and scenario, and the curves."""
-    known = CONTENDERS
+    known = BASELINES
     return {
         "about": bench.about(),
         "resolution": resolution(rows),

@@ -11,7 +11,7 @@ from pretouch.params import ReactionParams
 from pretouch.perception.closest import no_obstacles
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched
-from pretouch_lab.benchmarks.detection.contenders import Contender
+from pretouch_lab.benchmarks.detection.baselines import Baseline
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.stream import Stream
 
@@ -38,7 +38,7 @@ class Replayed:
     motion: FloatArray
     """(S, n) joint velocities with which the arm would begin to move in answer to an alarm [rad/s], else NaN."""
     statistic: FloatArray
-    """(S,) see `Contender.statistic`."""
+    """(S,) see `Baseline.statistic`."""
     touched: list[Touched]
     """Where the arm was said to be touched in each of these steps."""
 
@@ -56,9 +56,9 @@ def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
     return found
 
 
-def replay(stream: Stream, contender: Contender, model: RobotModel, said: Said = lambda step, kin: None) -> Replayed:
+def replay(stream: Stream, baseline: Baseline, model: RobotModel, said: Said = lambda step, kin: None) -> Replayed:
     """Give a detector each step of a stream, from its beginning, and what units said of a touch."""
-    params = contender.profile
+    params = baseline.profile
     sees = params.perception.enabled
     state, steps = feel_init(model, params), len(stream.count)
     alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
@@ -69,7 +69,7 @@ def replay(stream: Stream, contender: Contender, model: RobotModel, said: Said =
         kin = model.kinematics(robot.q)
         found, state = feel(state, model, kin, robot, near, reacting, params, sees and watched, said(i, kin))
         touched[i] = found.touched
-        statistic[i] = contender.statistic(found, state, robot.wrench, params.threshold)
+        statistic[i] = baseline.statistic(found, state, robot.wrench, params.threshold)
         if found.contact is not None:
             alarm[i], force[i] = True, found.contact.force
         begins = first.step(kin, robot, found, near)

@@ -25,7 +25,13 @@ from pretouch_lab.benchmarks.bounds import share_below
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
 from pretouch_lab.rows import Row, grouped, rounded
-from pretouch_lab.studies.coverage.comers import EVERY_S, PARKED, START_S, Comers, Coming
+from pretouch_lab.studies.coverage.approaching import (
+    EVERY_S,
+    PARKED,
+    START_S,
+    ApproachingObstacle,
+    ApproachingObstacles,
+)
 from pretouch_lab.tables import plain
 from pretouch_lab.trial import Record, play
 
@@ -78,7 +84,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     model, params = context.model, CoverageParams()
     skin = skin_of(str(cell.where["skin"]), model, context.skin, seed)
     surface = surface_of(model, POINTS, float(np.random.default_rng([seed, 54]).uniform()))
-    comers = Comers(model, skin, surface, params, COUNT, seed)
+    approaching = ApproachingObstacles(model, skin, surface, params, COUNT, seed)
     found, speed = context.profile(cell), ARMS[str(cell.where["arm"])]
     if speed is not None:
         found = replace(found, task=replace(found.task, speed_m_s=speed))
@@ -90,11 +96,13 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         Circle(start_angle=float(np.random.default_rng([seed, 55]).uniform(0, 2 * np.pi))),
         skin=skin,
         profile=found,
-        prepare=comers.attach,
+        prepare=approaching.attach,
     )
-    record = play(setup, lambda step, _: step.stamp >= comers.end)
+    record = play(setup, lambda step, _: step.stamp >= approaching.end)
     row = cell.row(seed)
-    return row | results(comers.came, record, params) | {"predicted": _predicted(model, context.skin, skin)}, record
+    return row | results(approaching.came, record, params) | {
+        "predicted": _predicted(model, context.skin, skin)
+    }, record
 
 
 def _predicted(model: RobotModel, own: Skin, skin: Skin) -> float | None:
@@ -104,12 +112,12 @@ def _predicted(model: RobotModel, own: Skin, skin: Skin) -> float | None:
     return rounded(1.0 - covered(ways, seen).arm.ways.value)
 
 
-def results(came: list[Coming], record: Record, params: CoverageParams) -> Row:
+def results(came: list[ApproachingObstacle], record: Record, params: CoverageParams) -> Row:
     """Numbers of one trial."""
     points = {round(step.stamp / 0.001): step.obstacles.point for step in record.steps}
-    blind = [not seen_in_time(coming, points, params) for coming in came]
-    towards = [coming.touch_m_s for coming in came if coming.touch_m_s is not None]
-    foreseen = [coming.foreseen for coming in came]
+    blind = [not seen_in_time(obstacle, points, params) for obstacle in came]
+    towards = [obstacle.touch_m_s for obstacle in came if obstacle.touch_m_s is not None]
+    foreseen = [obstacle.foreseen for obstacle in came]
     return {
         "came": len(came),
         "blind": sum(blind),
@@ -120,13 +128,13 @@ def results(came: list[Coming], record: Record, params: CoverageParams) -> Row:
     }
 
 
-def seen_in_time(coming: Coming, points: dict[int, FloatArray], params: CoverageParams) -> bool:
+def seen_in_time(obstacle: ApproachingObstacle, points: dict[int, FloatArray], params: CoverageParams) -> bool:
     """Whether the controller had a sensed point on the ball while there was still way left to brake.
 
     `points` (M, 3) [m] are those of each control step, by its number in milliseconds.
     """
     needed = params.braking_m + _DRIVES_S * params.closing_m_s
-    for number, (left, center) in coming.track.items():
+    for number, (left, center) in obstacle.track.items():
         sensed = points.get(number)
         if left >= needed and sensed is not None and len(sensed):
             gap = np.linalg.norm(sensed - center, axis=1) - params.object_radius_m

@@ -13,7 +13,7 @@ KEYS = {
 """Keys of the rows that all benchmarks write."""
 
 
-def row(contender, seed, scenario="drdo", family="drdo", **measures):
+def row(baseline, seed, scenario="drdo", family="drdo", **measures):
     """A trial without a contact."""
     numbers = dict.fromkeys(
         (
@@ -32,7 +32,7 @@ def row(contender, seed, scenario="drdo", family="drdo", **measures):
         "hold_reasons": {}, "duration_s": 14.0,
         "course": {"time_s": [0.0, 1.0], "distance_m": [0.4, 0.1], "force_n": [0.0, 0.0], "way_m": [0.0, 0.3]},
     }  # fmt: skip
-    names = {"contender": contender, "scenario": scenario, "family": family, "seed": seed}
+    names = {"contender": baseline, "scenario": scenario, "family": family, "seed": seed}
     return {**names, **numbers, **counts, **absent, **usual, **measures}
 
 

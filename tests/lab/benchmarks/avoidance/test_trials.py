@@ -42,20 +42,20 @@ def test_a_trial_of_every_family_can_be_played(scene):
     row = play_trial(scene, "paper", 1000)
     json.dumps(row, allow_nan=False)
     assert row["solver_failures"] == 0
-    assert row["duration_s"] <= scene.says["duration_s"] + 0.02
+    assert row["duration_s"] <= scene.params["duration_s"] + 0.02
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("contender", ["flacco", "ding"])
-def test_the_published_methods_move_out_of_the_way(contender):
-    row = play_trial(scenarios()["drdo"], contender, 1000)
+def test_the_published_methods_move_out_of_the_way(baseline):
+    row = play_trial(scenarios()["drdo"], baseline, 1000)
     assert row["off_path_max_m"] > 0.05
     assert row["solver_failures"] == row["infeasible"] == 0
 
 
 @pytest.mark.slow
 def test_a_run_that_was_stopped_goes_on(tmp_path):
-    bench = AvoidanceBench(tmp_path, True, "development", contenders=("blind",), names=("srdo", "drdo"))
+    bench = AvoidanceBench(tmp_path, True, "development", baselines=("blind",), names=("srdo", "drdo"))
     bench.run(lambda _: None, processes=1)
     assert not missing(bench.every())
     lost = bench.every()[0].file

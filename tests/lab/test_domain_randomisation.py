@@ -12,35 +12,35 @@ from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.detection.campaign import DetectionBench
 from pretouch_lab.campaign import Request
 from pretouch_lab.cli.benchmarks import BenchOptions
+from pretouch_lab.domain_randomisation import Parts, digest_of, folder_part, randomised, sentence
 from pretouch_lab.paper import static
 from pretouch_lab.report import _about
 from pretouch_lab.studies.mounting import EXACT
-from pretouch_lab.worlds import Parts, digest_of, folder_part, in_world, sentence
 
 MODEL = RobotModel(panda())
 PARTS = Parts(PlantParams(), RangeFinderParams(), paper_skin(MODEL), None)
 
 
 def test_without_a_world_nothing_changes():
-    assert in_world("", 1001, MODEL, PARTS) is PARTS
+    assert randomised("", 1001, MODEL, PARTS) is PARTS
     assert folder_part("") == sentence("") == ""
     assert digest_of("") == {}
 
 
 def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin():
-    parts = in_world("realistic", 1001, MODEL, PARTS)
+    parts = randomised("realistic", 1001, MODEL, PARTS)
     assert parts.plant != PARTS.plant
     assert parts.ranging != PARTS.ranging
     assert parts.skin is PARTS.skin
     assert (parts.believed.T_link_sensor != PARTS.skin.T_link_sensor).any()
-    again = in_world("realistic", 1001, MODEL, PARTS)
+    again = randomised("realistic", 1001, MODEL, PARTS)
     assert again.plant == parts.plant
     assert (again.believed.T_link_sensor == parts.believed.T_link_sensor).all()
 
 
 def test_what_an_experiment_says_of_its_skin_stays():
     believed = paper_skin(MODEL)
-    assert in_world("stress", 1001, MODEL, replace(PARTS, believed=believed)).believed is believed
+    assert randomised("stress", 1001, MODEL, replace(PARTS, believed=believed)).believed is believed
     assert EXACT.position_mm == 0.0
 
 
@@ -61,8 +61,8 @@ def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
         kind(tmp_path / kind.name, world="stress").open()
         with pytest.raises(ExperimentError, match="holds a run with world = 'stress', not ''"):
             kind(tmp_path / kind.name).open()
-    assert "World stress" in _about(other)
-    assert "World" not in _about(usual)
+    assert "Domain randomisation stress" in _about(other)
+    assert "Domain" not in _about(usual)
 
 
 def test_a_world_file_that_changed_is_another_world(tmp_path):
