@@ -16,8 +16,8 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.avoidance.measures import contact
-from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape, nearest
-from pretouch_lab.benchmarks.avoidance.truth import Truth
+from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape
+from pretouch_lab.benchmarks.avoidance.truth import truth_of
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper.avoidance import visits
@@ -123,7 +123,7 @@ def results(record: Record, scene: Scene, model: RobotModel, d_max: float) -> Ro
     )
     if scene.object is None:
         return row
-    truth = _truth(record, shapes, model)
+    truth = truth_of(record, model, [shape for shape in shapes if shape is not None])
     row |= {key: value for key, value in contact(record, truth, d_max).items() if key in ("contact", *_MEASURES)}
     shown, times = np.array([bool(true.any()) for true in of_it]), record.times()
     within = truth.distance < _NEAR_M
@@ -141,17 +141,6 @@ def results(record: Record, scene: Scene, model: RobotModel, d_max: float) -> Ro
 def _distances(points: FloatArray, shape: Shape | None) -> FloatArray:
     """Distance (K,) [m] of points (K, 3) from an object's surface; infinite where there is none."""
     return np.full(len(points), np.inf) if shape is None else np.abs(shape.closest(points)[0])
-
-
-def _truth(record: Record, shapes: list[Shape | None], model: RobotModel) -> Truth:
-    """Work out from true joint positions and the object's true place how near they were."""
-    found, of_ee = [], []
-    for step, shape in zip(record.steps, shapes, strict=True):
-        if shape is not None:
-            kin = model.kinematics(step.q)
-            found.append(nearest(kin, model.body, shape))
-            of_ee.append(float(shape.closest(kin.position[model.ee])[0]))
-    return Truth(found, np.array([n.distance for n in found]), np.array(of_ee))
 
 
 _MEASURES = (

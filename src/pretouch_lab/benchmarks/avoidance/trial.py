@@ -23,7 +23,8 @@ _COURSE_EVERY = 5
 
 def measured(record: Record, made: Setting, params: Row) -> Row:
     """Return all measures of a trial, without its names."""
-    setup, truth = made.setup, truth_of(record, made)
+    setup = made.setup
+    truth = truth_of(record, setup.model, map(made.shape, record.hand_position))
     held = params["path"]["kind"] == "held"
     return {
         **measures.contact(record, truth, params["obstacle"].get("d_max_m", _D_MAX_M)),

@@ -92,6 +92,10 @@ class Alone:
     """When it ends [s]."""
     world: str = ""
     """Set of the domain randomisation of which the seed draws one, or none."""
+    start: FloatArray | None = None
+    """Joint positions (n,) in which it begins [rad]; None: those in which its path does."""
+    controller: Callable[..., Controller] = Controller
+    """Makes its controller, as `Controller` is made."""
 
 
 Prepare = Callable[[Plant], Callable[[float], FloatArray]]
@@ -108,10 +112,11 @@ def record(
     task = replace(found.task, speed_m_s=what.speed_m_s or _RETURN_M_S)
     start = (float(AWAY[0]), float(AWAY[1]), float(AWAY[2]))
     scene = SceneSpec(ghost=GhostSpec(what.ghost_radius, start))
-    plant = Plant(model(), scene, parts.plant, brought_to(model(), what.path.point(0.0)), what.seed)
+    begin = brought_to(model(), what.path.point(0.0)) if what.start is None else what.start
+    plant = Plant(model(), scene, parts.plant, begin, what.seed)
     finders = RangeFinders(plant, parts.skin, parts.ranging, what.seed)
     ghost = Ghost(plant, prepare(plant))
-    controller = Controller(
+    controller = what.controller(
         model(), parts.skin if parts.believed is None else parts.believed, fixtures(scene), what.path,
         replace(found, task=task),
     )  # fmt: skip

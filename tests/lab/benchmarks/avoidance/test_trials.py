@@ -28,7 +28,8 @@ def test_an_arm_that_does_not_move_in_srdo_has_the_distance_of_its_geometry():
     hands = np.array([walker.goal(t, np.zeros(3), None).position for t in times])
     kin = setup.model.kinematics(q)
     still = SimpleNamespace(q=q)
-    found = truth_of(Record([still] * len(times), np.zeros(0), np.zeros((0, 3)), [], hands), made)
+    record = Record([still] * len(times), np.zeros(0), np.zeros((0, 3)), [], hands)
+    found = truth_of(record, setup.model, map(made.shape, hands))
     aside = np.array([[0.0, 0.0, 1.0]] * len(times))
     exact = closest_points(kin, setup.model.body, np.zeros(3), np.arange(len(times)), hands, aside).body_distance - 0.05
     np.testing.assert_allclose(found.distance, exact, atol=1e-3)
