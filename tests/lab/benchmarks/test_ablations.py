@@ -1,11 +1,12 @@
 from dataclasses import asdict
+from pathlib import Path
 
 import pytest
 
 from pretouch.errors import ParameterError
 from pretouch.params import profile
 from pretouch_lab.benchmarks.ablations import OFF, Ablation, ablations
-from pretouch_lab.benchmarks.avoidance.run import Request
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.detection.baselines import Baseline
 
 
@@ -34,4 +35,4 @@ def test_an_unknown_switch_is_an_error_and_not_left_out():
     with pytest.raises(ParameterError, match=r"'detection\.lern' is unknown"):
         Baseline("own", "pretouch:detection.lern=no", "scale").profile  # noqa: B018  # it reads the text
     with pytest.raises(ParameterError, match=r"'reaction\.clamp' is unknown.* Baselines are blind"):
-        Request(("pretouch:reaction.clamp=no",))
+        AvoidanceBench(Path(), baselines=("pretouch:reaction.clamp=no",))

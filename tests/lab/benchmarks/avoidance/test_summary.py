@@ -1,8 +1,11 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from pretouch_lab.benchmarks.avoidance.figures import figures
-from pretouch_lab.benchmarks.avoidance.page import section
+from pretouch_lab.benchmarks.avoidance.page import found
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.summary import json_rows, spread, summarise
 from pretouch_lab.benchmarks.avoidance.tables import tables
 
@@ -84,7 +87,7 @@ def test_tables_figures_and_page_say_who_loses():
     assert [line[:3] for line in shown.rows] == [("drdo", "paper", "0/2"), ("drdo", "ding", "2/2")]
     pictures = figures(summary, rows)
     assert [p.name for p in pictures] == ["bench-avoidance-outcome", "bench-avoidance-drdo"]
-    text = section(summary, pictures, "development")
+    text = found(AvoidanceBench(Path("run"), seeds="development"), rows).section()
     assert "4 trials with development seeds" in text
     assert "images/bench-avoidance-drdo.png" in text
     assert "| drdo | ding | 2/2 |" in text

@@ -47,7 +47,7 @@ def test_a_trial_of_every_family_can_be_played(scene):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("contender", ["flacco", "ding"])
+@pytest.mark.parametrize("baseline", ["flacco", "ding"])
 def test_the_published_methods_move_out_of_the_way(baseline):
     row = play_trial(scenarios()["drdo"], baseline, 1000)
     assert row["off_path_max_m"] > 0.05
