@@ -124,7 +124,7 @@ class Request:
     def open(self, out: Path) -> None:
         """Make a folder for the results, or take up one that a run with the same parameters began."""
         self.context()  # a bad skin is refused here, before any process starts
-        open_folder(out, asdict(self), _fingerprints(self))
+        open_folder(out, asdict(self), _fingerprints(self), ("trials", "recordings"))
 
 
 def _arm_folder(arm: str) -> Path:
@@ -178,7 +178,6 @@ def play_trial(request: Request, out: Path, cell: Cell, seed: int, file: Path) -
     """Run one trial in a worker process; write its row to a file, and its recording beside if it is wanted."""
     experiment, context = EXPERIMENTS[cell.experiment], _context(request)
     place = recording_file(out, cell, seed)
-    place.parent.mkdir(parents=True, exist_ok=True)
     place.unlink(missing_ok=True)  # of another program, or of a trial whose row was damaged
     unfinished = place.with_suffix(".unfinished")
     if request.record == "all" or (seed == 0 and experiment.recorded):

@@ -104,13 +104,14 @@ def failure_said(out: Path) -> Iterator[None]:
         ) from error
 
 
-def open_folder(out: Path, about: Mapping[str, Any], digests: Mapping[str, str]) -> None:
+def open_folder(out: Path, about: Mapping[str, Any], digests: Mapping[str, str], parts: Iterable[str] = ()) -> None:
     """Make a folder for results, or take one up that a run with the same choices began.
 
     Args:
         out: the folder; `run.json` in it says what it holds.
         about: choices by their names, as JSON can hold them.
         digests: of files and parameters that the choices only name, by a phrase such as "the skin file has".
+        parts: names of folders to make in it.
 
     Raises:
         ExperimentError: for a folder that cannot be used, or that another version or other choices filled.
@@ -118,7 +119,8 @@ def open_folder(out: Path, about: Mapping[str, Any], digests: Mapping[str, str])
     wanted = json.loads(json.dumps({"version": __version__, **about, "sha256": dict(digests)}))
     place = out / "run.json"
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        for folder in (out, *(out / part for part in parts)):
+            folder.mkdir(parents=True, exist_ok=True)
         if place.exists():
             _check_same(_object(place), wanted, out)
         else:

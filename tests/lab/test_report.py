@@ -39,6 +39,8 @@ class Links(HTMLParser):
 def request_and_folder(context, tmp_path_factory):
     request, out = Request(("static", "dynamic"), seeds=1), tmp_path_factory.mktemp("run")
     request.open(out)
+    for task in request.tasks(out):
+        task.file.parent.mkdir(exist_ok=True)
     cells = [c for c in static.cells(Grid(("blind", "paper"))) if (c.where["trajectory"], c.where["side"]) == LINE]
     for cell in [*cells, Cell(dynamic.NAME, "paper", {"restrictions": "slack"})]:
         recorded = replace(context, recording=recording_file(out, cell, 0))
