@@ -101,7 +101,8 @@ def test_names_in_the_notation_exist():
         if owner[0].isupper() and owner != "RobotModel":
             modules = (
                 "pretouch.types", "pretouch.params", "pretouch.control.reduction", "pretouch.contact.window",
-                "pretouch.contact.residual_model",
+                "pretouch.contact.residual_model", "pretouch.contact.moving_thresholds",
+                "pretouch.contact.sequential_test", "pretouch.contact.decaying_velocity",
             )  # fmt: skip
             owners = [vars(importlib.import_module(m)).get(owner) for m in modules]
             assert any(name in o.__annotations__ or hasattr(o, name) for o in owners if o), f"{owner}.{name}"

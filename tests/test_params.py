@@ -6,23 +6,27 @@ from dataclasses import fields, replace
 
 import pytest
 
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
-    PROFILES,
+    ClampParams,
     FailureParams,
+    GiveUpParams,
     PerceptionParams,
-    Profile,
-    ReactionParams,
+    PinchParams,
     ReductionParams,
     RestrictionParams,
     TaskParams,
     ThresholdParams,
-    profile,
+    WindowParams,
 )
+from pretouch.profiles import PROFILES, Profile, profile
 
 SETS = [
-    PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), ReactionParams(),
-    FailureParams(),
+    PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), FailureParams(),
+    DecayingVelocity(), Admittance(), ClampParams(), PinchParams(), GiveUpParams(),
 ]  # fmt: skip
 NUMBERS = [
     (s, f.name)
@@ -41,21 +45,21 @@ def name_of(value: object) -> str:
 def test_the_paper_profile_is_table_i():
     p = profile("paper")
     # d_max appears in eqs. 3, 4 and in eq. 11
-    assert (p.reduction.d_max_m, p.threshold.d_max_m) == (0.8, 0.8)
-    assert p.threshold.d_min_m == 0.05
+    assert (p.reduction.d_max_m, p.detect.d_max_m) == (0.8, 0.8)
+    assert p.detect.d_min_m == 0.05
     # 200 cycles at 100 Hz
     assert (p.reduction.l_max_cycles, p.task.control_period_s) == (200, 0.01)
     assert p.restriction.v_max_m_s == 0.04
     assert p.restriction.d_repulse_m == 0.1
     assert p.restriction.d_crit_m == 0.1
     assert p.restriction.d_notice_m == 0.6
-    assert p.threshold.alpha == 0.1
+    assert p.window.alpha == 0.1
     assert p.restriction.beta == -10
-    assert p.threshold.lambda_ == 0.75
-    assert p.threshold.f_std_n == 3
-    assert p.threshold.f_d_n == 4
-    assert p.threshold.f_base_n == 10
-    assert p.threshold.sigma_max_n == 3
+    assert p.window.lambda_ == 0.75
+    assert p.detect.f_std_n == 3
+    assert p.detect.f_d_n == 4
+    assert p.detect.f_base_n == 10
+    assert p.detect.sigma_max_n == 3
     # IV-A: trajectories at 0.3 m/s
     assert p.task.speed_m_s == 0.3
 
@@ -120,9 +124,9 @@ def test_values_that_contradict_each_other_are_refused(params: object, change: d
 
 
 def test_fractions_end_at_one():
-    assert ThresholdParams(alpha=1.0).alpha == 1.0
+    assert WindowParams(alpha=1.0).alpha == 1.0
     with pytest.raises(ParameterError, match=r"alpha is 1\.1: it must be at most 1"):
-        ThresholdParams(alpha=1.1)
+        WindowParams(alpha=1.1)
 
 
 def test_parameters_are_frozen():
@@ -139,26 +143,27 @@ def test_a_bad_value_is_a_value_error_and_one_of_ours():
 def test_ablations_take_one_use_of_proximity_away():
     paper = profile("paper")
     slowing, moving = profile("slowing-only"), profile("thresholds-only")
-    assert slowing.threshold.f_d_n == 0.0
-    assert replace(slowing, name="paper", threshold=paper.threshold) == paper
+    assert slowing.detect.f_d_n == 0.0
+    assert replace(slowing, name="paper", detect=paper.detect) == paper
     assert moving.reduction.enabled is False
     assert replace(moving, name="paper", reduction=paper.reduction) == paper
 
 
 def test_a_profile_is_varied_by_its_name():
-    name = "paper:threshold.window_samples=500:reduction.enabled=no:threshold.compare=raw:restriction.beta=-20"
+    name = "paper:window.samples=500:reduction.enabled=no:detect.compare=raw:restriction.beta=-20"
     varied = profile(name)
     assert varied.name == name
-    assert varied.threshold == ThresholdParams(window_samples=500, compare="raw")
+    assert varied.window == WindowParams(samples=500)
+    assert varied.detect == MovingThresholds(compare="raw")
     assert varied.reduction == ReductionParams(enabled=False)
     assert varied.restriction == RestrictionParams(beta=-20.0)
     assert varied.task == profile("paper").task
 
 
 def test_the_order_of_changes_does_not_matter():
-    one = profile("paper:threshold.f_base_n=3:threshold.f_d_n=2")
+    one = profile("paper:detect.f_base_n=3:detect.f_d_n=2")
     other = profile("paper:threshold.f_d_n=2:threshold.f_base_n=3")
-    assert one.threshold == other.threshold == ThresholdParams(f_base_n=3.0, f_d_n=2.0)
+    assert one.detect == other.detect == MovingThresholds(f_base_n=3.0, f_d_n=2.0)
 
 
 @pytest.mark.parametrize(
@@ -168,15 +173,20 @@ def test_the_order_of_changes_does_not_matter():
         ("paper:speed=0.1", "The group 'speed' of 'speed=0.1' is unknown: choose from perception, task, reduction,"),
         ("paper:task.sped=0.1", "The parameter 'task.sped' is unknown: choose from speed_m_s,"),
         ("pretouch:anticipation.detour=yes", "The parameter 'anticipation.detour' is gone: the arm no longer goes"),
-        ("paper:task.speed_m_s", "has no value: write GROUP.FIELD=VALUE"),
+        ("paper:task.speed_m_s", "has no value: write PATH=VALUE"),
         ("paper:", "has no value"),
         ("paper:name=x", "The group 'name' of 'name=x' is unknown"),
         ("paper:task.speed_m_s=fast", "task.speed_m_s is 'fast': write a number"),
         ("paper:task.speed_m_s=-1", "TaskParams.speed_m_s is -1.0: it must be greater than 0"),
-        ("paper:threshold.window_samples=10.5", "threshold.window_samples is '10.5': write a whole number"),
+        ("paper:threshold.window_samples=10.5", "window.samples is '10.5': write a whole number"),
         ("paper:reduction.enabled=0", "reduction.enabled is '0': write yes or no"),
         ("paper:restriction.mode=firm", "RestrictionParams.mode is 'firm': choose one of off, hard, slack, floor"),
-        ("paper:threshold.d_max_m=nan", "ThresholdParams.d_max_m is nan: it must be finite"),
+        ("paper:detect.d_max_m=nan", "MovingThresholds.d_max_m is nan: it must be finite"),
+        ("paper:detect=magic", "There is no Detector called 'magic': choose from thresholds, sequential, fixed"),
+        ("paper:detect.cues=touch", "The parameter 'detect.cues' is unknown: choose from f_base_n"),
+        ("paper:detection.use_touch=maybe", "detection.use_touch is 'maybe': choose from yes, no"),
+        ("pretouch:detect.localise=none:detect.localise.force_n=3", "detect.localise is none: choose it first"),
+        ("pretouch:detect.cues=smell", "There is no Cue called 'smell': choose from touch, imu"),
     ],
 )
 def test_a_variation_that_cannot_be_is_refused(name, words):

@@ -7,15 +7,16 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal, cast, get_args
 
+from pretouch.atomic_write import write_json
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
-from pretouch.params import Orientation, RestrictionMode, profile
+from pretouch.params import Orientation, RestrictionMode
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
 from pretouch.sim.randomisation import world_set
-from pretouch.whole_file import write_json
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.domain_randomisation import digest_of
 from pretouch_lab.engine import Task, open_folder

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from pretouch.control.path import Path as TaskPath
-from pretouch.params import Orientation, Profile, RestrictionMode, profile
+from pretouch.params import Orientation, RestrictionMode
+from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import Placement

@@ -19,9 +19,9 @@ from threading import Thread
 from typing import Any, TypeVar
 
 from pretouch import __version__
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
 from pretouch.signals import kept_from_children, leave_to_parent, noted
-from pretouch.whole_file import write_json
 
 Row = dict[str, Any]
 """What one task found, as its JSON file holds it."""

@@ -16,8 +16,9 @@ from pretouch.control.baselines import (
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.setup import MotionRequest, motion_setup
 from pretouch.errors import ParameterError
-from pretouch.params import BaselineParams, profile
+from pretouch.params import BaselineParams
 from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.profiles import profile
 from pretouch.types import Obstacles, QpOutcome, RobotState
 
 P = BaselineParams()

@@ -12,8 +12,8 @@ from pretouch.control.joint_box import joint_limits
 from pretouch.control.motion import joint_motion
 from pretouch.control.near import near_init, near_motion
 from pretouch.control.setup import MotionRequest, anticipates, motion_setup
-from pretouch.params import PROFILES, Profile, profile
 from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RobotState

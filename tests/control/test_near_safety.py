@@ -11,8 +11,8 @@ from pretouch.control.braking import braking_cap
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.near import near_init, near_motion
 from pretouch.control.setup import MotionRequest, motion_setup
-from pretouch.params import profile
 from pretouch.perception.closest import closest_points
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import QpOutcome, RobotState

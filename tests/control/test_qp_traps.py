@@ -13,8 +13,9 @@ from pretouch.control.path import Circle
 from pretouch.control.qp import Cost, solve
 from pretouch.control.restriction import ApproachRows
 from pretouch.controller import Controller
-from pretouch.params import PROFILES, RestrictionMode
+from pretouch.params import RestrictionMode
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, Mode, QpOutcome, QpSolution, RangeReadings, RangeStatus, RobotState
@@ -306,7 +307,7 @@ def test_beyond_its_budget_the_controller_brakes_holds_and_says_so(
 ):
     paper = PROFILES["paper"]
     profile = replace(
-        paper, threshold=replace(paper.threshold, window_samples=5), restriction=replace(paper.restriction, mode=mode),
+        paper, window=replace(paper.window, samples=5), restriction=replace(paper.restriction, mode=mode),
         task=replace(paper.task, acceleration_m_s2=100.0),
     )  # fmt: skip
     hurried = replace(profile, failure=replace(profile.failure, solver_iterations=1))

@@ -14,10 +14,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError, ParameterError, SkinError
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import PAPER_SKIN
-from pretouch.whole_file import write_json
 from pretouch_lab import campaign, engine
 from pretouch_lab.campaign import Request, play_trial, recording_file, trial_file
 from pretouch_lab.engine import missing, rows_of, run_tasks

@@ -3,9 +3,9 @@ from functools import partial
 
 import pytest
 
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
 from pretouch.text_table import TextTable, markdown
-from pretouch.whole_file import write_json
 from pretouch_lab.documents import begin_mark, end_mark, put
 from pretouch_lab.engine import Task, missing, open_folder, rows_of, run_tasks
 

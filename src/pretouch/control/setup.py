@@ -1,6 +1,6 @@
 """What the arm's motion is made with, set up once, and what is asked of it in a step."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from pretouch.control.null_space import NullSpaceLimits
 from pretouch.control.qp import CostParams, cost_params
 from pretouch.control.restriction import ApproachParams, approach_params
 from pretouch.control.touch_speed import TouchLimits, touch_limits
-from pretouch.params import Profile
+from pretouch.params import AnticipationParams, BaselineParams, FailureParams, RestrictionParams, TaskParams
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 from pretouch.values import value
@@ -49,13 +49,37 @@ class NearSettings(NamedTuple):
     """Whether the mid-joint term is in the null space."""
 
 
+class MotionProfile(Protocol):
+    """What motion takes of a profile."""
+
+    @property
+    def task(self) -> TaskParams:
+        """Following the path, and the cost of eq. 2."""
+
+    @property
+    def restriction(self) -> RestrictionParams:
+        """Restricting the approach."""
+
+    @property
+    def anticipation(self) -> AnticipationParams:
+        """What is done before a contact."""
+
+    @property
+    def baselines(self) -> BaselineParams:
+        """Published ways to compare with."""
+
+    @property
+    def failure(self) -> FailureParams:
+        """When to give up."""
+
+
 @value
 class MotionSetup:
     """An arm, its limits and a profile."""
 
     model: RobotModel
     limits: JointLimits
-    profile: Profile
+    profile: MotionProfile
     numbers: MotionNumbers
     near: NearSettings | None
     """None for a profile without anticipation."""
@@ -103,7 +127,7 @@ class Asked(NamedTuple):
     """(n,) these [rad/s]; without meaning if not."""
 
 
-def motion_setup(model: RobotModel, limits: JointLimits, profile: Profile) -> MotionSetup:
+def motion_setup(model: RobotModel, limits: JointLimits, profile: MotionProfile) -> MotionSetup:
     """Return what `near_motion` and `joint_motion` are made with."""
     r, t = profile.restriction, profile.task
     numbers = MotionNumbers(
@@ -115,13 +139,13 @@ def motion_setup(model: RobotModel, limits: JointLimits, profile: Profile) -> Mo
     return MotionSetup(model, limits, profile, numbers, near, rotors, fields, flattened(arm, numbers, near))
 
 
-def anticipates(profile: Profile) -> bool:
+def anticipates(profile: MotionProfile) -> bool:
     """Whether a profile asks for anything that `joint_motion` alone does not do."""
     p = profile.anticipation
     return profile.restriction.mode == "braking" or profile.task.mid_joint_projected or p.null_space
 
 
-def near_settings(profile: Profile) -> NearSettings | None:
+def near_settings(profile: MotionProfile) -> NearSettings | None:
     """Return what anticipation takes of a profile; None for one without."""
     if not anticipates(profile):
         return None

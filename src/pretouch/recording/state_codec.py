@@ -1,32 +1,28 @@
 """All the controller remembers, to a message and back, to the bit.
 
-Both ways follow the annotations of `ControllerState`, so a field added there is kept without a change here.
+Both ways follow the annotations of `ControllerState`, so a field added there is kept without a change here. What a part
+of the profile remembers is annotated with `object`, and kept with the name of the part whose `State` it is.
 """
 
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
 from functools import cache
-from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_origin
 
 import numpy as np
 
+from pretouch.composition import Part
 from pretouch.controller import ControllerState
-from pretouch.errors import RecordingError
-from pretouch.recording.messages import PACKAGE, decoded, encoded, make, plain_text
+from pretouch.errors import PretouchError, RecordingError
+from pretouch.recording.codec import hints_of, optional
+from pretouch.recording.messages import PACKAGE, decoded, encoded, make
 from pretouch.types import IntArray
 
 STATE = f"{PACKAGE}/msg/State"
 
 _UNREAD = "watch.robot.tau_ext"
 """Made an array of numbers by each step; what a caller puts there may be anything, and is kept only if it is one."""
-
-
-@cache
-def _hints(kind: type) -> tuple[tuple[str, Any], ...]:
-    hints = get_type_hints(kind)
-    return tuple((name, hints[name]) for name in (getattr(kind, "_fields", None) or [f.name for f in fields(kind)]))
 
 
 def _is_made_of_fields(hint: Any) -> bool:
@@ -51,7 +47,7 @@ class _Parts:
         self.shape: list[str] = []
         self.numbers: list[Any] = []
         self.wholes: list[int] = []
-        self.texts: list[str] = []
+        self.texts: list[str | Enum] = []
 
     def add(self, name: str, kind: str, shape: str = "") -> None:
         self.name.append(name)
@@ -74,8 +70,10 @@ def _take(parts: _Parts, name: str, hint: Any, value: Any) -> None:
     if name == _UNREAD:
         value = _readable(value)
     hint, kind = _kind(hint, value)
-    if kind == "parts":
-        for field, inner in _hints(hint):
+    if kind == "state":
+        parts.add(name, kind, _owner(hint))
+    if kind in ("parts", "state"):
+        for field, inner in hints_of(hint):
             _take(parts, f"{name}.{field}" if name else field, inner, getattr(value, field))
     elif kind == "tuple":
         parts.add(name, kind, str(len(value)))
@@ -91,7 +89,7 @@ def _take(parts: _Parts, name: str, hint: Any, value: Any) -> None:
         elif kind in ("int", "bool"):
             parts.wholes.append(int(value))
         elif kind == "text":
-            parts.texts.append(plain_text(value.value if isinstance(value, Enum) else value))
+            parts.texts.append(value)
 
 
 def _readable(value: Any) -> Any:
@@ -102,24 +100,52 @@ def _readable(value: Any) -> Any:
 
 def _kind(hint: Any, value: Any) -> tuple[Any, str]:
     """Return the type a value is annotated with, without None, and how it is kept."""
-    if get_origin(hint) in (Union, UnionType):
+    if hint is object:
+        if value is None or _is_made_of_fields(type(value)):
+            return type(value), "none" if value is None else "state"
+        hint = np.ndarray if isinstance(value, np.ndarray) else type(value)
+    if (left := optional(hint)) is not None:
         if value is None:
             return hint, "none"
-        hint = _without_none(hint)
+        hint = left
     if _is_made_of_fields(hint):
         return hint, "parts"
     if get_origin(hint) is tuple:
         return hint, "tuple"
-    if get_origin(hint) is np.ndarray:
+    if np.ndarray in (hint, get_origin(hint)):
         return hint, "array"
     if isinstance(hint, type) and issubclass(hint, Enum):
         return hint, "text"
-    return hint, {float: "float", int: "int", bool: "bool", str: "text"}[hint]
+    if hint not in _PLAIN.values():
+        raise RecordingError(
+            f"A part of the profile remembers a {hint.__name__}, which a recording cannot hold: let it remember a"
+            " number, an array of numbers, or a class of such fields, named as `State` of the part."
+        )
+    return hint, next(kind for kind, plain in _PLAIN.items() if plain is hint)
 
 
-def _without_none(hint: Any) -> Any:
-    (left,) = (inner for inner in get_args(hint) if inner is not NoneType)
-    return left
+_PLAIN: dict[str, Any] = {"float": float, "int": int, "bool": bool, "text": str}
+
+
+def _owner(state: type) -> str:
+    """Name the part whose state a class is: its group and its name."""
+    for group, interface in Part.interfaces.items():
+        for name, part in interface.known.items():
+            if part.State is state:
+                return f"{group} {name}"
+    raise RecordingError(
+        f"No named part of a profile has {state.__name__} as its `State`: name the class there, and give the part a"
+        ' name, as class MyDetector(Detector, name="mine").'
+    )
+
+
+def _state_of(owner: str) -> type:
+    """Return the class of the state of a part."""
+    group, _, name = owner.partition(" ")
+    try:
+        return Part.interfaces[group].called(name).State
+    except (KeyError, PretouchError) as error:
+        raise RecordingError(f"The part {owner} of the recorded profile is not installed: {error}") from error
 
 
 def _inner(hint: Any, count: int) -> Iterator[Any]:
@@ -143,6 +169,14 @@ class _Reading:
         found = self._at < len(self._parts) and self._parts[self._at][:2] == (name, "none")
         self._at += int(found)
         return found
+
+    def of_part(self, name: str) -> Any:
+        """Return the type of what a part remembered, kept under a name."""
+        _, kind, shape = self._parts[self._at]
+        if kind != "state":
+            return _PLAIN.get(kind, np.ndarray)
+        self.next(name)
+        return _state_of(shape)
 
     def next(self, name: str) -> tuple[str, str]:
         if self._at == len(self._parts):
@@ -180,22 +214,21 @@ def decode_state(data: bytes) -> tuple[bool, ControllerState]:
         return message.anew, _give(_Reading(message), "", ControllerState)
     except (ValueError, KeyError, IndexError, StopIteration) as error:
         raise RecordingError(
-            f"The controller's state in the recording is that of another version ({error}): open it with the version"
-            " that made it."
+            f"The controller's state in the recording is from another version ({error}): open it with the version that"
+            " made it."
         ) from error
 
 
 def _give(parts: _Reading, name: str, hint: Any) -> Any:
     """Return the next value, annotated with a type."""
-    optional = get_origin(hint) in (Union, UnionType)
-    if optional:
+    if hint is object or (left := optional(hint)) is not None:
         if parts.none(name):
             return None
-        hint = _without_none(hint)
+        hint = parts.of_part(name) if hint is object else left
     if _is_made_of_fields(hint):
         kind = hint if isinstance(hint, type) else type(hint)
         given, may_lack = {}, _with_default(kind)
-        for field, inner in _hints(kind):
+        for field, inner in hints_of(kind):
             whole = f"{name}.{field}" if name else field
             if field not in may_lack or parts.holds(whole):  # what an older version did not know is as it began
                 given[field] = _give(parts, whole, inner)

@@ -6,11 +6,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from pretouch.atomic_write import write_json
 from pretouch.cli.tables import grid
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError
 from pretouch.realtime import check_wishes
-from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.cycle import CycleRequest, about, measure
 from pretouch_lab.benchmarks.workload import LARGEST_SKIN
 from pretouch_lab.rows import Row

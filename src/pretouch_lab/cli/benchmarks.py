@@ -160,9 +160,9 @@ def run_bench(bench: "Bench", options: BenchOptions, json: str) -> None:
 def _report(bench: "Bench", json_file: Path, docs: Path | None) -> None:
     from rich.console import Console
 
+    from pretouch.atomic_write import write_json
     from pretouch.cli.tables import show
     from pretouch.cli.writing import unwritable_said
-    from pretouch.whole_file import write_json
     from pretouch_lab.documents import draw, put
 
     found = bench.found()

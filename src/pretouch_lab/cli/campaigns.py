@@ -8,11 +8,13 @@ from typing import Any
 
 from rich.console import Console
 
+from pretouch.atomic_write import write_json
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.whole_file import write_json
-from pretouch_lab.campaign import Request
+from pretouch_lab.campaign import (
+    Request,
+)
 from pretouch_lab.cli.progress import bar
 from pretouch_lab.engine import missing, rows_of, run_tasks
 from pretouch_lab.registry import summarise, tables

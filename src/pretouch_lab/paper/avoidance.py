@@ -5,8 +5,9 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import RestrictionMode
 from pretouch.perception.closest import closest_points
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec

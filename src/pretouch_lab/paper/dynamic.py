@@ -3,7 +3,8 @@
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import RestrictionMode
+from pretouch.profiles import profile
 from pretouch.sim.paper_scenes import dynamic_pushes
 from pretouch.sim.pushes import Push, Pusher
 from pretouch.sim.scene import HandSpec, SceneSpec

@@ -4,9 +4,10 @@ from itertools import product
 
 import numpy as np
 
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import RestrictionMode
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import expected_range
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.paper_scenes import static_path, static_scene

@@ -6,10 +6,10 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle, Path
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import RestrictionMode
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sim.depth_camera import looking
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.pushes import Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -19,6 +19,7 @@ from pretouch_lab.benchmarks.avoidance.measures import contact
 from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape
 from pretouch_lab.benchmarks.avoidance.truth import truth_of
 from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.depth_camera import looking
 from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper.avoidance import visits
 from pretouch_lab.rows import Row, cells_of, rounded

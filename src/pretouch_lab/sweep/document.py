@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from pretouch import __version__
+from pretouch.atomic_write import write_json
 from pretouch.text_table import Column, TextTable, markdown, tabulated
-from pretouch.whole_file import write_json
 from pretouch_lab.documents import SENSITIVITY, draw, put, shown
 from pretouch_lab.engine import failure_said
 from pretouch_lab.experiment import Picture

@@ -6,7 +6,7 @@ from typing import Any, Literal, cast
 
 from pretouch.checks import Checked, Positive
 from pretouch.errors import ExperimentError
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import avoidance, dynamic, static

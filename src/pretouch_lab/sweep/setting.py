@@ -12,9 +12,8 @@ from numbers import Real
 from typing import Any
 
 from pretouch.checks import Checked
-from pretouch.errors import ExperimentError
-from pretouch.params import Profile, profile
-from pretouch.params.profile import REMOVED
+from pretouch.errors import ExperimentError, ParameterError
+from pretouch.profiles import Profile, profile, value_of
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import WorldSet, drawn, world_set
@@ -38,7 +37,7 @@ class Setting:
     """One cell's parameters."""
 
     profile_text: str
-    """As `pretouch.params.profile` reads it."""
+    """As `pretouch.profiles.profile` reads it."""
     plant: PlantParams
     sensing: RangeFinderParams
     units: int
@@ -76,7 +75,7 @@ def plants() -> tuple[str, ...]:
 
 def current(name: str, base: Profile, scene: Checked) -> Value:
     """Return a parameter's value where nothing changes it; an ExperimentError for a parameter there is not."""
-    group, dot, field = name.partition(".")
+    group, _, field = name.partition(".")
     if name == UNITS:
         return 0
     if name == KIND:
@@ -84,20 +83,25 @@ def current(name: str, base: Profile, scene: Checked) -> Value:
     if name == WORLD:
         return USUAL_WORLD
     groups: dict[str, Any] = {"plant": PlantParams(), "sensing": RangeFinderParams(), "scene": scene}
-    groups |= {f.name: getattr(base, f.name) for f in fields(Profile) if f.name != "name"}
-    if not dot or group not in groups:
-        listed = ", ".join([*groups, "skin"])
-        raise ExperimentError(f"The parameter {name!r} is unknown: write GROUP.FIELD with a group of {listed}.")
-    known = [f.name for f in fields(groups[group])]
-    if field not in known:
-        also = ["kind", "world"] if group == "plant" else []
-        if name in REMOVED:
-            raise ExperimentError(f"The parameter {name!r} is gone: {REMOVED[name]}")
-        raise ExperimentError(f"The parameter {name!r} is unknown: {group} has {', '.join([*known, *also])}.")
-    value = getattr(groups[group], field)
+    if group not in groups:
+        value = _of_profile(name, base, (*groups, "skin"))
+    elif not hasattr(groups[group], field):
+        known = [f.name for f in fields(groups[group])] + (["kind", "world"] if group == "plant" else [])
+        raise ExperimentError(f"The parameter {name!r} is unknown: {group} has {', '.join(known)}.")
+    else:
+        value = getattr(groups[group], field)
     if not isinstance(value, Real | str):
-        raise ExperimentError(f"The parameter {name} holds one value a joint: sweep one that holds a single value.")
+        held = "no usual value" if value is None else "one value a joint"
+        raise ExperimentError(f"The parameter {name} holds {held}: sweep one that holds a single value.")
     return value  # type: ignore[return-value]  # a bool is a Real
+
+
+def _of_profile(name: str, base: Profile, others: tuple[str, ...]) -> object:
+    try:
+        return value_of(base, name)
+    except ParameterError as error:
+        also = f"Beside those of the profile there are parameters of {', '.join(others)}."
+        raise ExperimentError(f"{error} {also}") from error
 
 
 def built(profile_text: str, scene: Checked, values: Values, seed: int) -> Setting:

@@ -8,7 +8,8 @@ from textwrap import fill
 import numpy as np
 
 from pretouch.control.path import Path, line
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import RestrictionMode
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import HandGoal, HandScript, point_on_arm
 from pretouch.sim.paper_scenes import static_path, static_scene

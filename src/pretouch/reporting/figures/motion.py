@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.reporting.course import MODES, Course
+from pretouch.recording.run_record import MODES
+from pretouch.reporting.course import Course
 from pretouch.reporting.figures.marks import BLUE, GREEN, GREY, INK, LINES, RED, draw, legend, panels, plain
 from pretouch.types import BoolArray, FloatArray, Mode
 

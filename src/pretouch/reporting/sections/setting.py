@@ -1,11 +1,12 @@
 """Sections about what ran, with which parameters, and how well units, robot and loop did."""
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from pretouch.params import PROFILES, Profile
+from pretouch.composition import leaves
+from pretouch.profiles import PROFILES
 from pretouch.reporting.course import Course
 from pretouch.reporting.health import UnitHealth
 from pretouch.reporting.html import (
@@ -120,12 +121,12 @@ def parameter_section(m: Measures) -> Html:
         return element("p", "No profile is known.")
     shown = profiles[:_PROFILE_COLUMNS]
     head = ("parameter", "unit", "paper", *(profile.name for profile in shown))
+    paper, *others = [dict(leaves(replace(profile, name=""))) for profile in (PROFILES["paper"], *shown)]
     rows: list[list[Text]] = []
-    for group, name in _parameters():
-        usual = _get(PROFILES["paper"], group, name)
-        values = [_get(profile, group, name) for profile in shown]
+    for path in dict.fromkeys(path for values in (paper, *others) for path in values if path != "name"):
+        usual, values = paper.get(path, _ABSENT), [known.get(path, _ABSENT) for known in others]
         marked: list[Text] = [_value(v) if v == usual else element("b", _value(v), "other") for v in values]
-        rows.append([f"{group}.{name}", unit_of(name), _value(usual), *marked])
+        rows.append([path, unit_of(path.rpartition(".")[2]), _value(usual), *marked])
     left_out = len(profiles) - len(shown)
     return joined([
         table(head, rows, words=2),
@@ -134,15 +135,8 @@ def parameter_section(m: Measures) -> Html:
     ])  # fmt: skip
 
 
-def _parameters() -> list[tuple[str, str]]:
-    """Group and name of each parameter of a profile."""
-    paper = PROFILES["paper"]
-    groups = [f.name for f in fields(Profile) if f.name != "name"]
-    return [(group, f.name) for group in groups for f in fields(getattr(paper, group))]
-
-
-def _get(profile: Profile, group: str, name: str) -> object:
-    return getattr(getattr(profile, group), name)
+_ABSENT = "–"
+"""Stands for a parameter of a part that a profile does not have."""
 
 
 def unit_of(name: str) -> str:

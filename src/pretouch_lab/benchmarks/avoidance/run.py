@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from pretouch.errors import ExperimentError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.avoidance.baselines import ABLATED, ABLATED_IN, ABLATED_SEEDS, BASELINES, profile_text
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.benchmarks.detection.baselines import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
@@ -142,7 +142,7 @@ def _contacts_s(cell: ContactCell) -> float:
 
 
 def _replay_cost(baseline: Baseline) -> float:
-    return _REPLAY_COST[baseline.profile.detection.method]
+    return _REPLAY_COST[baseline.profile.detect.name]
 
 
 def _where(cell: FreeCell) -> tuple[str, str, float, str]:

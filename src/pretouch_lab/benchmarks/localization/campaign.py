@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from pretouch.errors import ExperimentError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.bench import Bench, Found, said
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell, duration_s, record_touched, touched_cells
 from pretouch_lab.benchmarks.localization.judge import PROFILE, WITHOUT, judge_touched

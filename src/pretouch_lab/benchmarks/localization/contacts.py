@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.arm import Alone, model, path_of, plant_of, record, sensing_of

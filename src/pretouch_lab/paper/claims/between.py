@@ -3,7 +3,8 @@
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import RestrictionMode
+from pretouch.profiles import profile
 from pretouch.sim.pushes import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import ExperimentError, ParameterError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.plant_params import PlantParams
 from pretouch_lab.benchmarks.avoidance.baselines import ABLATED, BASELINES, TUNINGS, profile_text
 from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench

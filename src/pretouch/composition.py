@@ -1,0 +1,242 @@
+"""Frozen sets of parameters that hold others: nested, optional, or a choice of parts. As text and as plain tables.
+
+A part is a set of parameters with behaviour, chosen by name: `class MyDetector(Detector, name="mine")`. A subclass with
+a name is known from its definition on; parts of other distributions are found through the entry points of their group.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from functools import cache
+from numbers import Real
+from types import NoneType, UnionType
+from typing import Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
+
+from pretouch.checks import Checked
+from pretouch.errors import ParameterError
+from pretouch.plugins import load, names
+
+NONE = ("none", "off")
+"""What stands for a part or group that is left out."""
+_PART = "part"
+"""Key of a part's name in a table."""
+_BOOLEANS = {"yes": True, "true": True, "no": False, "false": False}
+
+
+class Part(Checked):
+    """Base of the interfaces that parts of a profile implement. A direct subclass names its group of entry points."""
+
+    group: ClassVar[str] = ""
+    name: ClassVar[str] = ""
+    """What the part is called in texts and recordings."""
+    known: ClassVar[dict[str, "type[Part]"]]
+    """Parts of the interface that have been defined, by name."""
+    State: ClassVar[type] = NoneType
+    """What the part remembers from one step to the next, if that is more than one value: a class made of fields."""
+    interfaces: ClassVar[dict[str, "type[Part]"]] = {}
+    """Interfaces by group."""
+
+    def __init_subclass__(cls, name: str = "", group: str = "") -> None:
+        super().__init_subclass__()
+        if group:
+            cls.group, cls.known, cls.interfaces[group] = group, {}, cls
+        if name:
+            other = cls.known.setdefault(name, cls)
+            if (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
+                both = f"{other.__qualname__} and {cls.__qualname__}"
+                raise ParameterError(f"{both} have the name {name!r}: rename one.")
+            cls.name, cls.known[name] = name, cls
+
+    @classmethod
+    def choices(cls) -> tuple[str, ...]:
+        """Names of all parts that implement this interface."""
+        return tuple(dict.fromkeys((*cls.known, *names(cls.group))))
+
+    @classmethod
+    def called(cls, name: str) -> "type[Part]":
+        """Return the part of a name; a ParameterError names those there are."""
+        if name not in cls.known and name in names(cls.group):
+            load(cls.group, name)
+        if name not in cls.known:
+            raise ParameterError(f"There is no {cls.__name__} called {name!r}: choose from {', '.join(cls.choices())}.")
+        return cls.known[name]
+
+
+def as_table(value: object) -> Any:
+    """Return parameters as dicts, lists and plain values."""
+    if is_dataclass(value) and not isinstance(value, type):
+        part = {_PART: value.name} if isinstance(value, Part) else {}
+        return part | {f.name: as_table(getattr(value, f.name)) for f in fields(value)}
+    return [as_table(item) for item in value] if isinstance(value, tuple) else value
+
+
+def from_table(hint: Any, table: Any, where: str, unlike: list[str]) -> Any:
+    """Make the parameters of a type from what `as_table` returned.
+
+    Names that only one of this version and the table knows are added to `unlike`: what is missing gets this version's
+    default, what is unknown is left out. Raises ParameterError for a value that does not belong there.
+    """
+    kind, optional = _without_none(hint)
+    if table is None and optional:
+        return None
+    if get_origin(kind) is tuple and isinstance(table, list):
+        inner = get_args(kind)[0]
+        return tuple(from_table(inner, item, f"{where}.{i}", unlike) for i, item in enumerate(table))
+    if not is_dataclass(kind) and not _is_part(kind):
+        return _plain(kind, table, where)
+    if not isinstance(table, dict):
+        raise ParameterError(f"{where} is {table!r}: it must be a table.")
+    made = kind.called(str(table.get(_PART))) if _is_part(kind) else kind
+    hints, given = _hints(made), {key: item for key, item in table.items() if key != _PART}
+    unlike += [f"{where}.{name}".lstrip(".") for name in sorted(set(given) ^ {f.name for f in fields(made)})]
+    chosen = {name: item for name, item in given.items() if name in hints}
+    return made(**{name: from_table(hints[name], item, f"{where}.{name}", unlike) for name, item in chosen.items()})
+
+
+def _plain(kind: Any, value: Any, where: str) -> Any:
+    """Refuse a number where there is a text or a yes or no, and the other way round."""
+    kind = str if get_origin(kind) is Literal else kind
+    for other in (bool, str):
+        if isinstance(value, other) != (kind is other):
+            raise ParameterError(f"{where.lstrip('.')} is {value!r}: that is none of its values.")
+    return value
+
+
+def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
+    """Return parameters with some changed: path -> text, as `detect.window_s` -> `0.5` or `detect` -> `thresholds`.
+
+    A choice of a part comes before the changes of its own parameters, and all changes of a set are made at once, for
+    some are only allowed together. Raises ParameterError for a parameter there is not, or a value it does not allow.
+    """
+    trees: dict[str, dict[str, str]] = {}
+    for path, text in changes.items():
+        first, _, rest = path.partition(".")
+        trees.setdefault(first, {})[rest] = text
+    hints, new = _hints(value.__class__), {}
+    for name, tree in trees.items():
+        path = f"{where}.{name}" if where else name
+        if name not in hints:
+            raise ParameterError(f"The parameter {path!r} is unknown: choose from {', '.join(hints)}.")
+        now, (kind, _) = getattr(value, name), _without_none(hints[name])
+        if "" in tree:
+            now = read(hints[name], tree.pop(""), path, now)
+        if tree and isinstance(now, tuple):
+            now = tuple(changed(item, _of(tree, item), f"{path}.{item.name}") for item in now)
+        elif tree:
+            if not is_dataclass(now):
+                first = next(iter(kind.choices())) if _is_part(kind) else "on"
+                why = f"{path} is none: choose it first, as {path}={first}" if now is None else f"{path} is one value"
+                raise ParameterError(f"{path}.{next(iter(tree))} cannot be set, for {why}.")
+            now = changed(now, tree, path)
+        new[name] = now
+    return replace(value, **new) if new else value
+
+
+def leaves(params: Any, where: str = "") -> Iterator[tuple[str, object]]:
+    """Yield each parameter by its path; a part by its name, before its own parameters."""
+    for f in fields(params):
+        path, value = (f"{where}.{f.name}" if where else f.name), getattr(params, f.name)
+        if isinstance(value, tuple) and value and all(isinstance(item, Part) for item in value):
+            yield path, _written(value)
+            for item in value:
+                yield from leaves(item, f"{path}.{item.name}")
+        elif is_dataclass(value):
+            if isinstance(value, Part):
+                yield path, value.name
+            yield from leaves(value, path)
+        else:
+            yield path, value
+
+
+def at(value: Any, path: str, where: str = "") -> Any:
+    """Return what stands at a path; a ParameterError where nothing does."""
+    first, _, rest = path.partition(".")
+    here, kind = (f"{where}.{first}" if where else first), type(value)
+    if isinstance(value, tuple):
+        found = next((item for item in value if isinstance(item, Part) and item.name == first), None)
+    else:
+        found = getattr(value, first) if is_dataclass(kind) and first in _hints(kind) else None
+    if found is None and (rest or not is_dataclass(kind) or first not in _hints(kind)):
+        known = ", ".join(_hints(kind)) if is_dataclass(kind) else "no parameters"
+        raise ParameterError(f"The parameter {here!r} is unknown: there is {known}.")
+    return at(found, rest, here) if rest else found
+
+
+def _of(tree: dict[str, str], item: Part) -> dict[str, str]:
+    """Return the changes of one part of several."""
+    return {rest: text for path, text in tree.items() for first, _, rest in [path.partition(".")] if first == item.name}
+
+
+def read(hint: Any, text: str, where: str, now: object = None) -> Any:
+    """Read a value of a type. A part or group that is chosen again keeps its parameters."""
+    kind, optional = _without_none(hint)
+    if optional and text in NONE:
+        return None
+    if _is_part(kind):
+        made = kind.called(text)
+        return now if type(now) is made else made()
+    if is_dataclass(kind):
+        if text not in ("on", "yes"):
+            raise ParameterError(f"{where} is {text!r}: write on or none, or change one of its parameters.")
+        return now if now is not None else kind()  # type: ignore[operator]
+    if get_origin(kind) is tuple:
+        inner = get_args(kind)[0]
+        held = {item.name: item for item in now if isinstance(item, Part)} if isinstance(now, tuple) else {}
+        return () if text in NONE else tuple(read(inner, one, where, held.get(one)) for one in text.split(","))
+    return _read(kind, text, where)
+
+
+def _read(kind: Any, text: str, where: str) -> object:
+    if kind is bool:
+        if text not in _BOOLEANS:
+            raise ParameterError(f"{where} is {text!r}: write yes or no.")
+        return _BOOLEANS[text]
+    if kind not in (int, float):
+        return text
+    try:
+        return kind(text)
+    except ValueError:
+        raise ParameterError(f"{where} is {text!r}: write a {'whole ' if kind is int else ''}number.") from None
+
+
+def differences(mine: Any, other: Any, where: str = "") -> Iterator[str]:
+    """Write what `changed` needs to make one set of parameters out of another, as PATH=VALUE."""
+    for f in fields(mine):
+        path, a, b = f"{where}.{f.name}" if where else f.name, getattr(mine, f.name), getattr(other, f.name)
+        if a == b:
+            continue
+        if is_dataclass(a) and not isinstance(a, type):
+            if type(a) is not type(b):
+                yield f"{path}={a.name if isinstance(a, Part) else 'on'}"
+                b = type(a)()
+            yield from differences(a, b, path)
+        else:
+            yield f"{path}={_written(a)}"
+
+
+def _written(value: object) -> str:
+    if value is None or value == ():
+        return NONE[0]
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, tuple):
+        return ",".join(item.name if isinstance(item, Part) else _written(item) for item in value)
+    return f"{value:.12g}" if isinstance(value, Real) and not isinstance(value, int) else str(value)
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    """Types of the fields of a dataclass."""
+    hints = get_type_hints(kind)
+    return {f.name: hints[f.name] for f in fields(kind)}
+
+
+def _without_none(hint: Any) -> tuple[Any, bool]:
+    """Return a type without None, and whether None was allowed."""
+    if get_origin(hint) in (Union, UnionType):
+        (left,) = (inner for inner in get_args(hint) if inner is not NoneType)
+        return left, True
+    return hint, False
+
+
+def _is_part(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Part)

@@ -1,0 +1,206 @@
+"""A profile is the choice of parts and parameters of a whole controller; the named ones, and how to make variants.
+
+`replace(profile, ...)` of the standard library makes a variant in a program, `profile("NAME:CHANGE:...")` from a text.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from pretouch.checks import Checked
+from pretouch.composition import at, changed, from_table
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.detector import Detector
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.reaction import Reaction
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.contact.tactile import TouchSensors
+from pretouch.errors import ParameterError
+from pretouch.params import (
+    AnticipationParams,
+    BaselineParams,
+    ClampParams,
+    FailureParams,
+    GiveUpParams,
+    LocalisationParams,
+    PerceptionParams,
+    PinchParams,
+    ReductionParams,
+    RestrictionMode,
+    RestrictionParams,
+    TaskParams,
+    WindowParams,
+)
+from pretouch.plugins import load, names
+from pretouch.renamed import REMOVED, SWITCHES, of_today
+
+GROUP = "pretouch.profiles"
+"""Group of entry points under which other distributions name profiles of theirs."""
+
+
+@dataclass(frozen=True)
+class Profile(Checked):
+    """A named set of parameters for the whole controller."""
+
+    name: str = "paper"
+    """Name shown in tables and files."""
+    perception: PerceptionParams = field(default_factory=PerceptionParams)
+    task: TaskParams = field(default_factory=TaskParams)
+    reduction: ReductionParams = field(default_factory=ReductionParams)
+    restriction: RestrictionParams = field(default_factory=RestrictionParams)
+    anticipation: AnticipationParams = field(default_factory=AnticipationParams)
+    window: WindowParams = field(default_factory=WindowParams)
+    """The window of the external force: contacts are told once it is full (eq. 8)."""
+    detect: Detector = field(default_factory=MovingThresholds)
+    """How a contact is told from free motion (eqs. 9-11)."""
+    react: Reaction = field(default_factory=DecayingVelocity)
+    """How the arm answers a contact (eq. 12)."""
+    failure: FailureParams = field(default_factory=FailureParams)
+    baselines: BaselineParams = field(default_factory=BaselineParams)
+
+
+_PAPER = Profile()
+_BLIND = Profile(name="blind", perception=PerceptionParams(enabled=False), restriction=RestrictionParams(mode="off"))
+
+
+def _avoiding(name: RestrictionMode) -> Profile:
+    """Return a published way to avoid obstacles: contacts are felt as without proximity, nothing else slows the arm."""
+    return replace(
+        _PAPER,
+        name=name,
+        reduction=ReductionParams(enabled=False),
+        restriction=RestrictionParams(mode=name),
+        detect=MovingThresholds(f_d_n=0.0),
+    )
+
+
+PROFILES: dict[str, Profile] = {
+    "paper": _PAPER,
+    "blind": _BLIND,
+    "slowing-only": replace(_PAPER, name="slowing-only", detect=MovingThresholds(f_d_n=0.0)),
+    "thresholds-only": replace(_PAPER, name="thresholds-only", reduction=ReductionParams(enabled=False)),
+    "paper-0.5m": replace(
+        _PAPER,
+        name="paper-0.5m",
+        reduction=ReductionParams(d_max_m=0.5),
+        restriction=RestrictionParams(d_notice_m=0.5),
+        detect=MovingThresholds(d_max_m=0.5),
+    ),
+    "pretouch": Profile(
+        name="pretouch",
+        perception=PerceptionParams(
+            closing_speed=True,
+            reckon_below_minimum=True,
+            place_at_stamp=True,
+            keep_while_silent=True,
+            outside_points=2,
+        ),
+        task=TaskParams(mid_joint_projected=True),
+        reduction=ReductionParams(enabled=False),
+        restriction=RestrictionParams(mode="braking"),
+        anticipation=AnticipationParams(effective_mass=True, closing_speed=True, tangential=True, null_space=True),
+        window=WindowParams(freeze_while_reacting=True),
+        detect=SequentialTest(cues=(TouchSensors(),), localise=LocalisationParams()),
+        react=Admittance(
+            soft_hold=True, static_friction_nm=3.0, clamp=ClampParams(), pinch=PinchParams(), give_up=GiveUpParams()
+        ),
+    ),
+    "flacco": _avoiding("flacco"),
+    "ding": _avoiding("ding"),
+}
+"""`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0.
+`slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity each (restrictions are apart from
+both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
+text (section V-C). `pretouch`: ours, each departure from the
+paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md).
+`flacco` and `ding`: published ways to avoid obstacles, to compare with (docs/explanation/baselines.md)."""
+
+
+def profile_names() -> tuple[str, ...]:
+    """Return the names of all profiles, those of other distributions last."""
+    return tuple(dict.fromkeys((*PROFILES, *names(GROUP))))
+
+
+def profile(text: str) -> Profile:
+    """Look a profile up: by its name, or as `NAME:CHANGE:...`, that profile with some parts or parameters changed.
+
+    A change is a part by its name or a parameter by its value, as `paper:detect=sequential:task.speed_m_s=0.2`, and
+    `none` leaves a part out. Names of earlier versions are read as well. Raises ParameterError for a profile, part or
+    parameter there is not, naming those there are, and for a value that is not allowed.
+    """
+    base, *changes = text.split(":")
+    found = _named(base)
+    return replace(changed(found, _paths(changes)), name=text) if changes else found
+
+
+def _named(name: str) -> Profile:
+    if name in PROFILES:
+        return PROFILES[name]
+    if name not in names(GROUP):
+        raise ParameterError(f"The profile {name!r} is unknown: choose from {', '.join(profile_names())}.")
+    found = load(GROUP, name)
+    if not isinstance(found, Profile):
+        raise ParameterError(f"The profile {name!r} is {found!r} in its distribution: it must be a Profile.")
+    return found
+
+
+def _paths(changes: list[str]) -> dict[str, str]:
+    """Read changes, of this version's names or an earlier one's: path -> text."""
+    found: dict[str, str] = {}
+    groups = [f.name for f in fields(Profile) if f.name != "name"]
+    for change in changes:
+        path, given, text = change.partition("=")
+        if not given:
+            raise ParameterError(f"The change {change!r} has no value: write PATH=VALUE.")
+        if path in REMOVED:
+            raise ParameterError(f"The parameter {path!r} is gone: {REMOVED[path]}")
+        found |= of_today(path, text)
+        group = next(iter(found)).partition(".")[0]
+        if group not in groups:
+            raise ParameterError(f"The group {group!r} of {change!r} is unknown: choose from {', '.join(groups)}.")
+    return found
+
+
+def value_of(found: Profile, path: str) -> object:
+    """Return a part's or parameter's value, by its name of today or of an earlier version.
+
+    A switch of an earlier version is True or False, or its text. Raises ParameterError for a parameter there is not.
+    """
+    if path in SWITCHES:
+        for text, (today, chosen) in SWITCHES[path].items():
+            if changed(found, {today: chosen}) == found:
+                return {"yes": True, "no": False}.get(text, text)
+    (today,) = _paths([f"{path}=" if path not in SWITCHES else f"{path}={next(iter(SWITCHES[path]))}"])
+    return at(found, today)
+
+
+def profile_from(table: Mapping[str, Any]) -> tuple[Profile, tuple[str, ...]]:
+    """Make a profile from the table that `composition.as_table` makes of one.
+
+    Names what another version knew that this one does not. Raises ParameterError where a value does not belong.
+    """
+    unlike: list[str] = []
+    made = from_table(Profile, dict(table), "", unlike)
+    return made, tuple(unlike)
+
+
+def at_rate(profile: Profile, rate: float) -> Profile:
+    """Return a profile for a controller at another rate [Hz]: what it counts in cycles lasts as long as before.
+
+    That is the fading of eq. 4, the force window, and the decay of a reaction; alpha of eq. 8, the weight of one
+    sample, changes so that a lasting push enters the window as fast as before.
+    """
+    p, more = profile, rate * profile.task.control_period_s
+    if not (math.isfinite(rate) and rate * p.failure.overrun_s > 1):
+        least = 1 / p.failure.overrun_s
+        raise ParameterError(f"The rate is {rate:g} Hz: it must be more than {least:g} Hz, or each step would be late.")
+    samples, alpha = max(2, round(p.window.samples * more)), 1 - (1 - p.window.alpha) ** (1 / more)
+    return p if more == 1 else replace(
+        p,
+        task=replace(p.task, control_period_s=1 / rate),
+        reduction=replace(p.reduction, l_max_cycles=max(1, round(p.reduction.l_max_cycles * more))),
+        window=replace(p.window, samples=samples, alpha=alpha),
+        react=p.react.stretched(more),
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Detectors and cues that Pretouch is compared with: parts by entry points, as anybody else's."""
