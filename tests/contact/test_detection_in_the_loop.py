@@ -12,8 +12,8 @@ from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec, fixtures
 from pretouch.types import Inputs, Mode, RangeReadings, RobotState
+from pretouch_lab.baselines.detection import BASELINES
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, path_of, record, sensing_of
-from pretouch_lab.benchmarks.detection.baselines import BASELINES
 from pretouch_lab.benchmarks.detection.replay import replay
 from pretouch_lab.paper.claims.forces import Event, apply
 from pretouch_lab.trial import Setup, play

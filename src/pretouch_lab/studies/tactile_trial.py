@@ -12,9 +12,9 @@ from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.sim.plant import Plant
 from pretouch.sim.touch_sensor import TouchSensorParams, TouchSensors
 from pretouch.types import BoolArray, FloatArray, TouchReadings
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.dense_skin import gap
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, model, path_of, plant_of, record, sensing_of
-from pretouch_lab.benchmarks.detection.baselines import Baseline
 from pretouch_lab.benchmarks.detection.contacts import Toucher, Touching, place_on, start_posture
 from pretouch_lab.benchmarks.detection.judge import matched
 from pretouch_lab.benchmarks.detection.replay import replay

@@ -7,8 +7,8 @@ import numpy as np
 
 from pretouch.checks import Check, Checked, NonNegative
 from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import Sensing, model
-from pretouch_lab.benchmarks.detection.baselines import Baseline
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_stream, touches_of
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_stream
 from pretouch_lab.benchmarks.detection.judge import BUSY, PERIOD_S, matched

@@ -5,9 +5,9 @@ import pytest
 from pretouch.composition import differences
 from pretouch.errors import ParameterError
 from pretouch.profiles import profile
+from pretouch_lab.baselines.detection import Baseline, ablated
 from pretouch_lab.benchmarks.ablations import OFF, Ablation, ablations
 from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
-from pretouch_lab.benchmarks.detection.baselines import Baseline
 
 
 def differing(a, b):
@@ -29,6 +29,10 @@ def test_no_switch_is_in_both_benchmarks():
     of_detection, others = (ablations(of_detection=of) for of in (True, False))
     assert {a.switch for a in of_detection} == {s for s in OFF if s.startswith(("detect", "window."))}
     assert not {a.name for a in of_detection} & {a.name for a in others}
+
+
+def test_only_the_thresholds_are_swept_by_their_base_force():
+    assert [baseline.name for baseline in ablated() if baseline.sweep == "f_base_n"] == ["without detect"]
 
 
 def test_an_unknown_switch_is_an_error_and_not_left_out():

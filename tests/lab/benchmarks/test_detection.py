@@ -20,9 +20,9 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import Contact, RobotState, Thresholds
+from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.detection import campaign, contacts, free, judge
 from pretouch_lab.benchmarks.detection.arm import AWAY, model
-from pretouch_lab.benchmarks.detection.baselines import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.detection.campaign import DetectionBench
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, Toucher, Touching, contact_cells, plan
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from pretouch.errors import ExperimentError
 from pretouch.profiles import profile
-from pretouch_lab.benchmarks.avoidance.baselines import ABLATED, ABLATED_IN, ABLATED_SEEDS, BASELINES, profile_text
+from pretouch_lab.baselines.avoidance import ABLATED, ABLATED_IN, ABLATED_SEEDS, BASELINES, profile_text
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial
 from pretouch_lab.benchmarks.bench import Bench, Found

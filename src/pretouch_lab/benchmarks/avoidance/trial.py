@@ -8,8 +8,8 @@ import numpy as np
 
 from pretouch.atomic_write import write_json
 from pretouch.profiles import profile
+from pretouch_lab.baselines.avoidance import profile_text
 from pretouch_lab.benchmarks.avoidance import measures
-from pretouch_lab.benchmarks.avoidance.baselines import profile_text
 from pretouch_lab.benchmarks.avoidance.livelock import livelocks
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import Setting, setting

@@ -9,8 +9,8 @@ import numpy as np
 from pretouch.atomic_write import write_json
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import Sensing, model, sensing_of
-from pretouch_lab.benchmarks.detection.baselines import Baseline
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
 from pretouch_lab.paper import static
 from pretouch_lab.rows import rounded

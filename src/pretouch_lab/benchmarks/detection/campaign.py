@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from pretouch.profiles import profile
+from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.bench import Bench, Found
-from pretouch_lab.benchmarks.detection.baselines import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells, record_free, warm_up_s

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks import style
-from pretouch_lab.benchmarks.detection.baselines import Baseline
 from pretouch_lab.benchmarks.detection.campaign import Rows
 from pretouch_lab.benchmarks.detection.judge import BUSY
 from pretouch_lab.benchmarks.scenario_files import scenario

@@ -9,8 +9,8 @@ import numpy as np
 from pretouch.atomic_write import write_json
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import model
-from pretouch_lab.benchmarks.detection.baselines import Baseline
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, Touching, touches_of
 from pretouch_lab.benchmarks.detection.free import FreeCell, warm_up_s
 from pretouch_lab.benchmarks.detection.replay import REST, Replayed, replay

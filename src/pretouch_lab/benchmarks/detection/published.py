@@ -1,7 +1,7 @@
 """What a run of the detection benchmark leaves for readers: numbers, figures, and a part of a document."""
 
+from pretouch_lab.baselines.detection import BASELINES
 from pretouch_lab.benchmarks.bench import Bench, Found, said
-from pretouch_lab.benchmarks.detection.baselines import BASELINES
 from pretouch_lab.benchmarks.detection.campaign import Rows
 from pretouch_lab.benchmarks.detection.results import (
     ablation_rows,

@@ -10,7 +10,7 @@ from pretouch.perception.closest import no_obstacles
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched, TouchReadings
-from pretouch_lab.benchmarks.detection.baselines import Baseline
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.stream import Stream
 from pretouch_lab.detector_alone import DetectorAlone

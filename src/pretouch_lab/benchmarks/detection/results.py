@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.bench import EMPTY
 from pretouch_lab.benchmarks.bounds import median_bounds
-from pretouch_lab.benchmarks.detection.baselines import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.detection.campaign import Rows
 from pretouch_lab.benchmarks.detection.judge import BUSY, sweep_values
 from pretouch_lab.benchmarks.scenario_files import scenario

@@ -6,7 +6,7 @@ import pytest
 from pretouch.errors import ExperimentError, ParameterError
 from pretouch.profiles import profile
 from pretouch.sim.plant_params import PlantParams
-from pretouch_lab.benchmarks.avoidance.baselines import ABLATED, BASELINES, TUNINGS, profile_text
+from pretouch_lab.baselines.avoidance import ABLATED, BASELINES, TUNINGS, profile_text
 from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import plant_of, setting

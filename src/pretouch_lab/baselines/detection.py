@@ -1,4 +1,4 @@
-"""The detectors that are held against each other: each a profile, so that all go through the same `feel`."""
+"""The detectors that the benchmark of detection compares: each is a profile, so all run through the same code."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -67,6 +67,6 @@ BASELINES = (
 def ablated() -> tuple[Baseline, ...]:
     """Return `pretouch` with each switch of its detection off alone; the paper's thresholds are swept by F_b."""
     return tuple(
-        Baseline(a.name, a.profile_text, "f_base_n" if a.switch == "detection.method" else "scale")
+        Baseline(a.name, a.profile_text, "f_base_n" if a.switch == "detect" else "scale")
         for a in ablations(of_detection=True)
     )

@@ -1,4 +1,4 @@
-"""Who takes part: short names for profiles."""
+"""The methods that the benchmark of avoidance compares: short names for profiles."""
 
 from pretouch.errors import ParameterError
 from pretouch.profiles import profile
