@@ -13,11 +13,11 @@ from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_ce
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells, record_free, warm_up_s
 from pretouch_lab.benchmarks.detection.judge import judge_contacts, judge_free
+from pretouch_lab.benchmarks.detection.results import Rows
 from pretouch_lab.benchmarks.detection.stream import PROFILE
 from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.engine import Task, rows_of
 from pretouch_lab.result_key import result_key
-from pretouch_lab.rows import Row
 
 _RECORD: dict[str, Callable[..., None]] = {"free": record_free, "contacts": record_contacts}
 """What records the streams of a family."""
@@ -28,15 +28,6 @@ _REPLAY_COST = {"thresholds": 0.003, "fixed": 0.007, "sequential": 0.012}
 """Processor time of a second of simulation, and of one replayed by a detector's method [s]."""
 ABLATED_ARMS = 2
 """Arms of each path and neighbour in free motion that ablations are given."""
-
-
-@dataclass(frozen=True)
-class Rows:
-    """All rows that are there."""
-
-    free: list[Row]
-    contacts: list[Row]
-    boards: list[Row]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks import style
-from pretouch_lab.benchmarks.detection.campaign import Rows
 from pretouch_lab.benchmarks.detection.judge import BUSY
+from pretouch_lab.benchmarks.detection.results import Rows
 from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.rows import Row
 

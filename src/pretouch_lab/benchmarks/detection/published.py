@@ -2,8 +2,8 @@
 
 from pretouch_lab.baselines.detection import BASELINES
 from pretouch_lab.benchmarks.bench import Bench, Found, said
-from pretouch_lab.benchmarks.detection.campaign import Rows
 from pretouch_lab.benchmarks.detection.results import (
+    Rows,
     ablation_rows,
     board_rows,
     contact_rows,

@@ -1,6 +1,7 @@
 """What all rows of the detection benchmark say together: rates with their bounds, delays, what was missed."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,6 @@ import numpy as np
 from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.bench import EMPTY
 from pretouch_lab.benchmarks.bounds import median_bounds
-from pretouch_lab.benchmarks.detection.campaign import Rows
 from pretouch_lab.benchmarks.detection.judge import BUSY, sweep_values
 from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.paper.claims.detectors import dispersion_of, rate_bounds
@@ -19,6 +19,15 @@ GOAL_FREE, GOAL_CONTACTS = "free: goal", "contacts: goal"
 on the usual arm with the usual skin."""
 ABLATED_FREE, ABLATED_CONTACTS = "free: ablations", "contacts: ablations"
 """Of those, what ablations were given."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """All rows that are there."""
+
+    free: list[Row]
+    contacts: list[Row]
+    boards: list[Row]
 
 
 def free_scenarios() -> dict[str, Callable[[Row], bool]]:
