@@ -26,8 +26,11 @@ def run(capsys, *args):
         (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("reproduce", "static", "--out", "/dev/null/x"), "/dev/null/x cannot be used"),
         (("reproduce", "static", "--out", "OUT", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
-        (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "cannot be written (Is a directory): give"),
-        (("reproduce", "static", "--out", "OUT", "--json", "x" * 256), "cannot be written (File name too long): give"),
+        (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "written (Is a directory): give another file"),
+        (
+            ("reproduce", "static", "--out", "OUT", "--json", "x" * 256),
+            "written (File name too long): give another file",
+        ),
         (("demo", "--seeds", "0"), "The number of seeds is 0"),
         (("bench", "cycle", "--points", "7,x"), "The numbers of points are '7,x': give whole numbers"),
         (("bench", "cycle", "--points", ""), "The numbers of points are '': give whole numbers"),
