@@ -7,11 +7,10 @@ from rich.console import Console
 
 from pretouch.cli.tables import show
 from pretouch.errors import RobotModelError
-from pretouch.importing.folder import SKIN
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
 from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import load_skin
+from pretouch.sensing.skin import OWN_SKIN, load_skin
 from pretouch.text_table import TextTable, tabulated
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ def check_arm(command: "Check") -> None:
         raise RobotModelError(f"{error} (in {file}, or its {description.mjcf.name})") from error
     check_posture(description.q_ready, model.q_min, model.q_max, f"{file}: q_ready")
     ready = rated(model, description.q_ready)
-    own = file.parent / SKIN
+    own = file.parent / OWN_SKIN
     skin = load_skin(command.skin or own, model) if command.skin or own.exists() else None
     together = ", ".join(f"{a} and {b}" for a, b in never_apart(model)) or "none"
     note = (

@@ -19,12 +19,10 @@ from pretouch.coverage.suggest import Suggestions, suggest
 from pretouch.coverage.ways import Ways
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.extras import FIGURES
-from pretouch.importing.folder import SKIN
 from pretouch.perception.scene_filter import floor_and_pedestal
-from pretouch.robot.description import fr3, panda
-from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import OWN_SKIN, Skin, save_skin, skin_for
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Coverage as Asked
@@ -69,17 +67,10 @@ def skin_coverage(command: "Asked") -> None:
 
 def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path | None]:
     """Return the arm, its skin, and the skin's file if one was named."""
-    folder = None if command.arm in ("panda", "fr3") else Path(command.arm)
-    if folder is None:
-        model = RobotModel(panda() if command.arm == "panda" else fr3())
-    else:
-        model = RobotModel(load_description(folder))
-    if command.skin:
-        return model, load_skin(command.skin, model), Path(command.skin)
-    if folder is None:
-        return model, paper_skin(model), None
-    own = (folder if folder.is_dir() else folder.parent) / SKIN
-    return model, load_skin(own, model), own
+    model = RobotModel(robot_named(command.arm))
+    own = model.description.mjcf.with_name(OWN_SKIN)
+    source = Path(command.skin) if command.skin else own if own.is_file() else None
+    return model, skin_for(model, command.skin), source
 
 
 def _params(command: "Asked") -> CoverageParams:

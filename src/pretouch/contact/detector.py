@@ -139,12 +139,13 @@ class Detector(Part, group="pretouch.detectors"):
 
 def no_torques(body: Body, sample: Sample) -> Detection | None:
     """Return what a detector by torques says where there are none, or None where there are."""
-    if not math.isnan(sample.robot.tau_ext.sum()):
+    if not math.isnan(sample.robot.tau_ext.sum()):  # NaN if one of them is
         return None
     return Detection(Thresholds(np.full((6, 3), np.nan)), None, False, np.full(body.model.n, np.nan), 0.0)
 
 
 def strongest(force: FloatArray, bands: Thresholds) -> Contact:
     """Return a contact with the axes whose equivalent band is passed, or else the one with the largest part."""
+    # the bands are of one sample: where the test decided by a longer mean it may be that no axis passes its own
     share = np.abs(force) / (bands.upper - bands.mean)
     return Contact(force, share >= min(1.0, float(share.max())))

@@ -134,6 +134,21 @@ def paper_skin(model: RobotModel) -> Skin:
     return load_skin(path, model)
 
 
+OWN_SKIN = "skin.toml"
+"""A skin beside the model of an imported arm."""
+
+
+def skin_for(model: RobotModel, file: Path | str = "") -> Skin:
+    """Return the skin of a file, or without one the skin that the arm comes with.
+
+    That is `paper_skin` for Panda and FR3, and for another arm the file skin.toml beside its model.
+    """
+    if file:
+        return load_skin(file, model)
+    own = model.description.mjcf.with_name(OWN_SKIN)
+    return load_skin(own, model) if own.is_file() else paper_skin(model)
+
+
 _KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad", "touch")
 _TOUCH_KEYS = {"radius_m": "radius", "force_min_n": "force_min", "measures_force": "measures_force"}
 

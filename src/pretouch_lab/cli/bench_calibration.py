@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 from pretouch.cli.calibrate.options import MotionOptions
 from pretouch.errors import CalibrationError
@@ -19,8 +18,8 @@ class Calibration:
     find_links: bool = False
     """Do not tell the calibration which links the units sit on."""
     motion: MotionOptions = field(default_factory=MotionOptions)
-    arm: Literal["panda", "fr3"] = "panda"
-    """The arm."""
+    arm: str = "panda"
+    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
     json: str = ""
     """File for all numbers."""
     seed: int = 0
@@ -37,10 +36,11 @@ def bench_calibration(command: Calibration) -> None:
 
     from pretouch.atomic_write import write_json
     from pretouch.calibration.motion.planner import plan_motion
-    from pretouch.cli.arms import arm_model
     from pretouch.cli.calibrate.motion import plan_params
     from pretouch.cli.tables import show
     from pretouch.cli.writing import check_writable, unwritable_said
+    from pretouch.robot.model import RobotModel
+    from pretouch.robot.named import robot_named
     from pretouch_lab.cli.progress import bar
     from pretouch_lab.studies.calibration.study import study
     from pretouch_lab.studies.calibration.table import tables
@@ -52,7 +52,7 @@ def bench_calibration(command: Calibration) -> None:
         raise CalibrationError(f"The seed is {command.seed}: it must be at least 0.")
     if json_file:
         check_writable("file", json_file)
-    model = arm_model(command.arm)
+    model = RobotModel(robot_named(command.arm))
     plan = None if command.motion == MotionOptions() else plan_motion(model, plan_params(command.motion))
     name = "simulations"
     with bar(Console(stderr=True), name, command.skins * (1 + command.compared)) as advance:

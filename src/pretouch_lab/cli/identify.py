@@ -79,14 +79,10 @@ def identify_arm(command: Identify) -> None:
 
 
 def _model(arm: str) -> "RobotModel | None":
-    from pretouch.robot.description import fr3, panda
-    from pretouch.robot.description_file import load_description
     from pretouch.robot.model import RobotModel
+    from pretouch.robot.named import robot_named
 
-    if not arm:
-        return None
-    known = {"panda": panda, "fr3": fr3}
-    return RobotModel(known[arm]() if arm in known else load_description(arm))
+    return RobotModel(robot_named(arm)) if arm else None
 
 
 def _show(found: "Identified", model: "RobotModel", said: str) -> None:
