@@ -4,8 +4,9 @@ import re
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
+from pretouch.control.path import Path as TaskPath
 from pretouch.params import Orientation, RestrictionMode
 from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
@@ -13,6 +14,9 @@ from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams
+from pretouch.sim.scene import SceneSpec
+from pretouch_lab.rows import Row
+from pretouch_lab.trial import Setup
 
 _ITS_OWN = ("braking", "flacco", "ding")
 """Restriction modes that make a profile what it is."""
@@ -64,6 +68,10 @@ class Cell:
         plain = safe == re.sub(r"[:=]", "-", exact)
         return safe if plain else f"{safe}-{sha256(exact.encode()).hexdigest()[:8]}"
 
+    def row(self, seed: int) -> Row:
+        """Begin the row of results of a trial: what tells it from all others."""
+        return {"experiment": self.experiment, **self.where, "profile": self.profile, "seed": seed}
+
 
 @dataclass(frozen=True)
 class Context:
@@ -76,7 +84,7 @@ class Context:
     placement: Placement = field(default_factory=Placement)
     """Where the paper's paths are for this arm: the static experiment's."""
     world: str = ""
-    """Set of worlds of which each trial's seed draws its own, or none."""
+    """Set of the domain randomisation of which each trial's seed draws its own, or none."""
     recording: Path | None = None
     """File to record the trial in, if it is to be recorded."""
     plant: PlantParams | None = None
@@ -96,3 +104,11 @@ class Context:
             mode = cast(RestrictionMode, cell.where["restrictions"])
             found = replace(found, restriction=replace(found.restriction, mode=mode))
         return replace(found, task=replace(found.task, orientation=self.orientation or found.task.orientation))
+
+    def setup(self, cell: Cell, seed: int, scene: SceneSpec, path: TaskPath, **other: Any) -> Setup:
+        """Return what a trial of a cell is made of; `other` are further fields of `Setup`, or other values of them."""
+        usual = Setup(
+            self.model, self.skin, self.profile(cell), scene, path, seed, plant=self.arm, ranging=self.ranging,
+            recording=self.recording, world=self.world,
+        )  # fmt: skip
+        return replace(usual, **other)

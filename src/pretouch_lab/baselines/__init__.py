@@ -1,1 +1,1 @@
-"""Detectors and cues that Pretouch is compared with: parts by entry points, as anybody else's."""
+"""What Pretouch is compared with: detectors and cues as parts by entry points, and the profiles of each benchmark."""

@@ -33,14 +33,6 @@ class Calibration:
 def bench_calibration(command: Calibration) -> None:
     """Calibrate random skins, show how far the answers are off, and write them down."""
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
 
     from pretouch.atomic_write import write_json
     from pretouch.calibration.motion.planner import plan_motion
@@ -49,6 +41,7 @@ def bench_calibration(command: Calibration) -> None:
     from pretouch.cli.writing import check_writable, unwritable_said
     from pretouch.robot.model import RobotModel
     from pretouch.robot.named import robot_named
+    from pretouch_lab.cli.progress import bar
     from pretouch_lab.studies.calibration.study import study
     from pretouch_lab.studies.calibration.table import tables
 
@@ -61,12 +54,11 @@ def bench_calibration(command: Calibration) -> None:
         check_writable("file", json_file)
     model = RobotModel(robot_named(command.arm))
     plan = None if command.motion == MotionOptions() else plan_motion(model, plan_params(command.motion))
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        task = bar.add_task("simulations", total=command.skins * (1 + command.compared))
+    name = "simulations"
+    with bar(Console(stderr=True), name, command.skins * (1 + command.compared)) as advance:
         found = study(
             model, command.skins, command.seed, command.compared, not command.find_links, plan,
-            progress=lambda done, _total: bar.update(task, completed=done),
+            progress=lambda: advance(1, name),
         )  # fmt: skip
     console = Console(highlight=False)
     show(console, tables(found))

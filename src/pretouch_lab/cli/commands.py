@@ -72,9 +72,9 @@ class Reproduce:
         """Run the experiments, with results, recordings, figures and page."""
         from pretouch_lab.campaign import Request
         from pretouch_lab.cli.campaigns import run_all
+        from pretouch_lab.domain_randomisation import folder_part
         from pretouch_lab.paper.whole import whole_paper
         from pretouch_lab.registry import EXPERIMENTS
-        from pretouch_lab.worlds import folder_part
 
         everything = self.experiment == "all"
         request = Request(

@@ -11,7 +11,7 @@ from pretouch_lab.benchmarks.localization.contacts import TouchedCell, planned, 
 from pretouch_lab.benchmarks.localization.judge import Said, _one, _two, name_of
 from pretouch_lab.benchmarks.localization.limit import LINK_M, position_limit
 from pretouch_lab.benchmarks.localization.motion import wandering
-from pretouch_lab.benchmarks.localization.results import TWO, rows_of, tables_of
+from pretouch_lab.benchmarks.localization.results import TWO, rows_by_body, tables_of
 
 LEARNT = np.stack([np.stack([np.full(7, 0.25), np.full(7, 0.01)])] * 2)
 
@@ -127,7 +127,7 @@ def test_rows_say_what_was_found():
     pair = _two(touch, touching("link4"), said_of(NOT_TOUCHED))
     one = {"contacts": 1, "skin": "none", "found": found, "median_s": 0.0004, "p99_s": 0.001}
     two = {"contacts": 2, "skin": "none", "found": [pair], "median_s": 0.0004, "p99_s": 0.002}
-    rows = rows_of([one, two])
+    rows = rows_by_body([one, two])
     assert [row["link"] for row in rows] == ["hand", TWO]
     first = rows[0]
     assert (first["skin"], first["contacts"], first["felt"], first["right_link"]) == ("none", 2, 1, 0.5)

@@ -3,6 +3,7 @@ import json
 import pytest
 
 from pretouch import cli
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
 from pretouch_lab.cli.commands import new_folder
 
@@ -63,22 +64,14 @@ def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
     assert not out.exists()
 
 
-def _row(request, out):
-    from pretouch.atomic_write import write_json
-    from pretouch_lab.campaign import trial_file
-
-    cell, seed = request.tasks()[0]
-    row = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
-    write_json(row, trial_file(out, cell, seed))
-
-
 @pytest.mark.parametrize("error", [RuntimeError("crash"), ExperimentError("full"), KeyboardInterrupt()])
 def test_finished_trials_are_kept_whatever_ends_a_run(capsys, tmp_path, monkeypatch, error):
-    def play(request, out, _progress):
-        _row(request, out)
+    def play(tasks, _out, _progress):
+        tasks[0].file.parent.mkdir(parents=True)
+        write_json(tasks[0].about, tasks[0].file)
         raise error
 
-    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_campaign", play)
+    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_tasks", play)
     monkeypatch.setattr("pretouch_lab.cli.campaigns.summarise", len)
     args = ("reproduce", "static", "--out", str(tmp_path))
     if isinstance(error, RuntimeError):
@@ -95,10 +88,10 @@ def test_results_that_cannot_be_written_at_the_end_are_said(capsys, tmp_path, mo
     def full(_value, _path):
         raise OSError(28, "No space left on device")
 
-    def play(request, out, _progress):
+    def play(_tasks, _out, _progress):
         monkeypatch.setattr("pretouch_lab.cli.campaigns.write_json", full)
 
-    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_campaign", play)
+    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_tasks", play)
     code, said = run(capsys, "reproduce", "static", "--out", str(tmp_path))
     assert code == 2
     assert "results.json cannot be written (No space left on device)" in said.err
