@@ -12,10 +12,10 @@ from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.params import Orientation, RestrictionMode
 from pretouch.profiles import profile
-from pretouch.robot.description import panda
-from pretouch.robot.description_file import FILE, load_description
+from pretouch.robot.description_file import description_text
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import skin_file, skin_for
 from pretouch.sim.randomisation import world_set
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.domain_randomisation import digest_of
@@ -48,7 +48,7 @@ class Request:
     record: str = "first"
     """Trials to record, `Recorded`."""
     arm: str | None = None
-    """Folder of an imported arm, or its robot.toml; None for the Panda."""
+    """Name of an arm, or the folder of an imported one; None for the Panda."""
     first_seed: int = 0
     world: str | None = None
     """Set of the domain randomisation (`sim.randomisation`) of which each trial's seed draws its own, or None for the
@@ -93,16 +93,9 @@ class Request:
 
     def context(self) -> Context:
         """Load what all trials share."""
-        model = RobotModel(load_description(self.arm) if self.arm else panda())
-        skin = load_skin(self.skin_file, model) if self.skin or self.arm else paper_skin(model)
+        model = RobotModel(robot_named(self.arm or "panda"))
+        skin = skin_for(model, self.skin or "")
         return Context(model, skin, cast(Orientation | None, self.orientation), placement_for(model), self.world or "")
-
-    @property
-    def skin_file(self) -> Path:
-        """The skin's file: the one asked for, or else the arm's own."""
-        if self.skin:
-            return Path(self.skin)
-        return _arm_folder(self.arm) / "skin.toml" if self.arm else PAPER_SKIN
 
     def trials(self) -> list[tuple[Cell, int]]:
         """Every trial once, seed by seed, so that a stopped run has some of each cell."""
@@ -128,10 +121,6 @@ class Request:
         open_folder(out, asdict(self), _fingerprints(self), ("trials", "recordings"))
 
 
-def _arm_folder(arm: str) -> Path:
-    return Path(arm) if Path(arm).is_dir() else Path(arm).parent
-
-
 def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:
     if choice not in allowed:
         raise ExperimentError(f"The {what} {choice!r} is unknown: choose from {', '.join(allowed)}.")
@@ -139,24 +128,18 @@ def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:
 
 def _fingerprints(request: Request) -> dict[str, str]:
     """Digests of what a request only names: the skin file, and the parameters of each profile."""
-    path = request.skin_file
+    arm = robot_named(request.arm or "panda")
+    path = Path(request.skin or skin_file(arm))
     try:
         digests = {"the skin file has": sha256(path.read_bytes()).hexdigest()}
     except OSError as error:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
     digests |= digest_of(request.world or "")
     if request.arm:
-        digests["the arm's files have"] = sha256(_arm_files(request.arm)).hexdigest()
+        digests["the arm's files have"] = sha256(description_text(arm).encode() + arm.mjcf.read_bytes()).hexdigest()
     for name in dict.fromkeys(cell.profile for cell, _ in request.trials()):
         digests[f"the parameters of profile {name} have"] = parameters_digest(profile(name))
     return digests
-
-
-def _arm_files(arm: str) -> bytes:
-    """Content of an arm's files."""
-    mjcf = load_description(arm).mjcf
-    file = Path(arm) / FILE if Path(arm).is_dir() else Path(arm)
-    return file.read_bytes() + mjcf.read_bytes()
 
 
 def trial_file(out: Path, cell: Cell, seed: int) -> Path:

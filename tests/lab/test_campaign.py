@@ -129,7 +129,7 @@ def test_a_changed_skin_file_is_noticed(tmp_path):
 def test_a_changed_built_in_skin_is_noticed(tmp_path, monkeypatch):
     open_folder(SMALL, tmp_path / "out")
     (tmp_path / "skin.toml").write_text("")
-    monkeypatch.setattr(campaign, "PAPER_SKIN", tmp_path / "skin.toml")
+    monkeypatch.setattr(campaign, "skin_file", lambda arm: tmp_path / "skin.toml")
     with pytest.raises(ExperimentError, match="but the skin file has changed since"):
         open_folder(SMALL, tmp_path / "out")
 

@@ -22,7 +22,7 @@ from pretouch.extras import FIGURES
 from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
-from pretouch.sensing.skin import OWN_SKIN, Skin, save_skin, skin_for
+from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Coverage as Asked
@@ -65,12 +65,11 @@ def skin_coverage(command: "Asked") -> None:
         console.print(f"Numbers: {command.json}", markup=False, soft_wrap=True)
 
 
-def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path | None]:
-    """Return the arm, its skin, and the skin's file if one was named."""
+def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path]:
+    """Return the arm, its skin, and the skin's file."""
     model = RobotModel(robot_named(command.arm))
-    own = model.description.mjcf.with_name(OWN_SKIN)
-    source = Path(command.skin) if command.skin else own if own.is_file() else None
-    return model, skin_for(model, command.skin), source
+    source = Path(command.skin or skin_file(model.description))
+    return model, load_skin(source, model), source
 
 
 def _params(command: "Asked") -> CoverageParams:
@@ -81,7 +80,7 @@ def _params(command: "Asked") -> CoverageParams:
     )  # fmt: skip
 
 
-def _check_outputs(command: "Asked", source: Path | None) -> None:
+def _check_outputs(command: "Asked", source: Path) -> None:
     """Refuse, before anything is computed, what could not be done or would be lost."""
     if command.suggest < 0:
         raise SkinError(f"--suggest is {command.suggest}: give 1 or more, or leave it out.")
@@ -100,7 +99,7 @@ def _check_outputs(command: "Asked", source: Path | None) -> None:
     places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
     given = [(what, Path(text)) for what, text in places if text]
     for i, (what, place) in enumerate(given):
-        others = [other for _, other in given[:i]] + ([source] if source else [])
+        others = [other for _, other in given[:i]] + [source]
         if any(same_file(other, place) or same_file(place, other) for other in others):
             raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
     for what, place in given:
