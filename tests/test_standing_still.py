@@ -97,7 +97,7 @@ def test_under_a_bias_that_is_not_learnt_a_reacting_arm_holds_and_says_why(going
     stood = steps[300:]
     assert not any(s.command.any() for s in stood)
     assert stood[-1].mode is Mode.HOLD
-    assert "felt that does not move the arm" in stood[-1].reason
+    assert "force that does not move the arm" in stood[-1].reason
     assert f"joint {joint + 1}" in stood[-1].reason
     arm.bias = np.zeros(7)
     assert any(s.mode is Mode.TRACK for s in arm.feel(300, seen=seen)), "gone, the arm goes on"
