@@ -9,13 +9,14 @@ from pretouch.control.path import Circle, Path, line
 from pretouch.controller import Controller
 from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import with_restriction
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, RangeStatus, RobotState
 
 DT = 0.01
 SHORT = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=5))
-HARD = replace(SHORT, restriction=replace(SHORT.restriction, mode="hard"))
+HARD = with_restriction(SHORT, "hard")
 FAULTS = [
     "q", "qd", "q_commanded", "qd_commanded", "wrench", "no wrench", "robot stamp", "step stamp", "stale", "backwards",
     "jump", "distance", "range stamp", "dead",

@@ -100,7 +100,8 @@ def test_names_in_the_notation_exist():
     for owner, name in re.findall(r"`(\w+)\.(\w+)(?:\.min\(\))?`", text):
         if owner[0].isupper() and owner != "RobotModel":
             modules = (
-                "pretouch.types", "pretouch.params", "pretouch.control.reduction", "pretouch.contact.window",
+                "pretouch.types", "pretouch.params", "pretouch.control.restriction",
+                "pretouch.control.reduction", "pretouch.contact.window",
                 "pretouch.contact.residual_model",
             )  # fmt: skip
             owners = [vars(importlib.import_module(m)).get(owner) for m in modules]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pretouch.control.path import Circle as Circle
     from pretouch.control.path import WayPoints as WayPoints
     from pretouch.control.path import line as line
+    from pretouch.control.restriction import ApproachRestriction as ApproachRestriction
     from pretouch.control.restriction import approach_rows as approach_rows
     from pretouch.controller import Controller as Controller
     from pretouch.controller import ControllerState as ControllerState
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from pretouch.loop import Recorder as Recorder
     from pretouch.params import Profile as Profile
     from pretouch.params import ReactionParams as ReactionParams
-    from pretouch.params import RestrictionParams as RestrictionParams
     from pretouch.params import ThresholdParams as ThresholdParams
     from pretouch.params import at_rate as at_rate
     from pretouch.params import profile as profile
@@ -62,11 +62,11 @@ _PLACES = {
     "contact.window": ("window_init",),
     "control.joint_box": ("joint_box", "joint_limits"),
     "control.path": ("Circle", "WayPoints", "line"),
-    "control.restriction": ("approach_rows",),
+    "control.restriction": ("ApproachRestriction", "approach_rows"),
     "controller": ("Controller", "ControllerState"),
     "errors": ("PretouchError", "RecordingError"),
     "loop": ("Cycle", "MonotonicClock", "Recorder"),
-    "params": ("Profile", "ReactionParams", "RestrictionParams", "ThresholdParams", "at_rate", "profile"),
+    "params": ("Profile", "ReactionParams", "ThresholdParams", "at_rate", "profile"),
     "perception.closest": ("closest_points", "no_obstacles"),
     "perception.scene_filter": ("Fixtures", "no_fixtures"),
     "recording.last_seconds": ("LastSeconds",),

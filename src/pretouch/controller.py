@@ -15,10 +15,11 @@ from pretouch.contact.impact import ImpactState, impact_init, listen
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.tactile import TouchState, feel_touch, touch_init, touch_settings
 from pretouch.control import path as paths
+from pretouch.control.interface import Body, MotionRequest, restriction_on
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.near import NearState, near_init, near_motion, widened
+from pretouch.control.motion import MotionState, joint_motion
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
-from pretouch.control.setup import MotionRequest, motion_setup
+from pretouch.control.setup import motion_setup
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import doing, events_of
 from pretouch.faults import (
@@ -53,7 +54,9 @@ class ControllerState:
     reduction: ReductionState
     reaction: response.ResponseState
     path: paths.PathState
-    near: NearState
+    approach: object
+    """What the profile's restriction remembers."""
+    motion: MotionState
     mode: ModeState
     command: FloatArray
     """(n,) last joint velocity command [rad/s]."""
@@ -87,7 +90,9 @@ class Controller:
                 raise SkinError(f"The skin was made for another arm than {model.description.name}: make one for it.")
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
         self._sight = perception_setup(model, skin, fixtures, profile.perception)
-        self._setup = motion_setup(model, self.limits, profile)
+        self._body = Body(model, len(skin), self.limits, profile.task)
+        self._approach = restriction_on(profile.approach, self._body)
+        self._setup = motion_setup(self._body, profile.null_space, profile.failure.solver_iterations)
         self._touching = touch_settings(model, skin, profile.detection)
         self._mark = mark
 
@@ -106,7 +111,8 @@ class Controller:
             reduction=ReductionState(),
             reaction=response.response_init(sound.q_commanded, self.profile.reaction),
             path=paths.PathState(),
-            near=near_init(self.model, len(self.skin)),
+            approach=self._approach_init(),
+            motion=MotionState(np.zeros(self.model.n)),
             mode=mode_init(),
             command=sound.qd_commanded,
             rotation_goal=self.model.kinematics(sound.q).rotation[self.model.ee],
@@ -133,10 +139,15 @@ class Controller:
             feel=state.feel if same_window else feel_init(self.model, mine),
             reaction=response.adopted(state.reaction, mine.reaction, theirs.reaction),
             path=way,
-            near=near_init(self.model, len(self.skin)) if mine.anticipation != theirs.anticipation else state.near,
+            approach=state.approach if mine.approach == theirs.approach else self._approach_init(),
+            motion=state.motion if mine.null_space == theirs.null_space else MotionState(np.zeros(self.model.n)),
             touch=state.touch if mine.detection == theirs.detection else touch_init(self._touching),
             outside=state.outside if same_points else None,
         )
+
+    def _approach_init(self) -> object:
+        """Return what the restriction remembers at first; a part says so itself, whatever works in its place."""
+        return None if self.profile.approach is None else self.profile.approach.init(self._body)
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         """Run one control cycle; to be called once a period, with the state that the step before returned."""
@@ -186,7 +197,7 @@ class Controller:
         push = response.Felt(model, kin, robot, felt, close, state.command, p, fixed.planes, fixed.capsules)
         react = response.noticed(state.reaction, before, push, state.path.phase, inputs.resume)
         events |= events_of(
-            unfit, silent, lost, felt, feeling.window.count, react, close, before, state.near.blocked, p
+            unfit, silent, lost, felt, feeling.window.count, react, close, before, state.motion.blocked, p
         )  # fmt: skip
         mode = next_mode(state.mode, events, inputs.resume)
         contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
@@ -195,8 +206,8 @@ class Controller:
         mark("mode")
 
         # how fast: eqs. 3-4 on the path, or eq. 12
-        slowed = speed_scale(seen.nearest, p.reduction.d_max_m) if p.reduction.enabled else 1.0
-        scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.reduction)
+        slowed = 1.0 if p.slow is None else speed_scale(seen.nearest, p.slow.d_max_m)
+        scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.task.restore_cycles)
         way = paths.follow(self.path, state.path, x, p.task)
         answer, react = response.answered(react, doing(mode, felt.armed, p), push)
         desired, qd = (way.scaled(scale), None) if answer is None else (answer.velocity, answer.qd)
@@ -205,10 +216,10 @@ class Controller:
         # how near: eqs. 5-7, and the joint velocities: eq. 2
         touch = None if answer is None else answer.touch
         room = len(self.skin) + (0 if outside is None else len(outside.sigma))
-        request = MotionRequest(
-            desired, state.rotation_goal, mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch
-        )
-        motion, near = near_motion(widened(state.near, room), self._setup, kin, robot, seen.obstacles, request)
+        hold = mode.mode is Mode.HOLD and qd is None
+        request = MotionRequest(desired, state.rotation_goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
+        allowed, approach = self._approach.step(state.approach, self._body, kin, robot, seen.obstacles, request)
+        motion, moving = joint_motion(state.motion, self._setup, kin, robot, seen.obstacles, request, allowed)
         qp = motion.qp
         if qp.outcome in _TROUBLE and (qp.outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)
@@ -230,8 +241,8 @@ class Controller:
             watch=watch, tracks=tracks, feel=feeling, reduction=reduction, reaction=react,
             path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
-            near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal, touch=touched,
-            impact=impact, outside=outside,
+            approach=approach, motion=moving, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal,
+            touch=touched, impact=impact, outside=outside,
         )  # fmt: skip
         mark("record")
         return step, after

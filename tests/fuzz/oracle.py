@@ -180,8 +180,8 @@ class Oracle:
             return self._told(e, step)
         filling = self.samples < self.p.threshold.window_samples
         seen = {"silent": bool(e.silent), "no force": e.no_force, "overrun": e.overrun, "filling": filling}
-        # how long the path has been blocked is remembered by the arm's anticipation, and said only while it tracks
-        blocked = self.mode is Mode.TRACK and self.p.restriction.mode == "braking"
+        # how long the path has been blocked is remembered by the arm's motion, and said only while it tracks
+        blocked = self.mode is Mode.TRACK and self.p.task.blocked_after_s is not None
         clear = "path blocked" if blocked and WORDS["path blocked"] in step.reason else "clear"
         return next((cause for cause, here in seen.items() if here), clear)
 

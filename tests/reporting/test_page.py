@@ -256,12 +256,13 @@ def test_units_of_all_parameters_are_those_that_their_documentation_gives():
     for group in fields(Profile):
         params = getattr(Profile(), group.name)
         for item in fields(params) if is_dataclass(params) else ():
-            told = re.findall(r"\[([^\]]*)\]", field_docs().get((type(params).__name__, item.name), ""))
+            owners = [(owner.__name__, item.name) for owner in type(params).__mro__]
+            told = re.findall(r"\[([^\]]*)\]", " ".join(field_docs().get(owner, "") for owner in owners))
             if told and told[0] != "1":
                 found += 1
                 if unit_of(item.name) not in told[0].replace("^2", "²").split(", "):
                     wrong[item.name] = told[0], unit_of(item.name)
-    assert found > 70
+    assert found > 60
     assert wrong == {}
 
 

@@ -13,12 +13,12 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.types import RobotState
 
-_PROFILES = ("paper", "paper:restriction.mode=hard", "paper:restriction.mode=off")
+_PROFILES = ("paper", "paper:approach.rows=hard", "paper:approach=none")
 _RATE_HZ = 1000.0
 
 
 def compile_step() -> str:
-    """Compile a control step, in each restriction mode, and say where that is kept; '' for nowhere."""
+    """Compile a control step, with each kind of rows, and say where that is kept; '' for nowhere."""
     model = RobotModel(panda())
     q, rest = model.description.q_ready, np.zeros(model.n)
     robot = RobotState(0.0, q, rest, q, rest, rest, np.zeros(6))

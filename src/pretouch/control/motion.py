@@ -1,25 +1,38 @@
-"""From what is near and what is asked to joint velocities: eqs. 5-7, the joint limits and eq. 2, in one compiled call.
+"""From what is asked and what is allowed to joint velocities: the joint limits and eq. 2, in one compiled call.
 
-The same as `approach_rows`, `box_and_brake`, `task`, `task_cost` and `solve` one after the other, and made of the same
-functions: five calls from Python cost more time than what they do.
+The same as `box_and_brake`, `task`, `task_cost` and `solve` one after the other, and made of the same functions: four
+calls from Python cost more time than what they do.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import entry
-from pretouch.control.baselines import MODES, baseline_motion
+from pretouch.compiled import compiled, entry, inlined
+from pretouch.control.blocked import time_blocked
+from pretouch.control.interface import MotionRequest, Restricted
 from pretouch.control.joint_box import box_and_brake
+from pretouch.control.null_space import Near, away, cost_with_null_space
 from pretouch.control.penalty import SOLVED, Minimum, Problem, excesses, minimise
-from pretouch.control.qp import ENDING, Cost, cost_into, solve, task_cost
-from pretouch.control.restriction import Rows, approach_rows, rows_into
-from pretouch.control.setup import NO_JOINTS, Asked, MotionNumbers, MotionRequest, MotionSetup
-from pretouch.control.task import task, twist
-from pretouch.groups import NOTHING_NEAR, Arm, JointArrays, ObstacleArrays
+from pretouch.control.qp import ENDING, Cost, cost_into, solve
+from pretouch.control.restriction import ApproachRows
+from pretouch.control.setup import MotionNumbers, MotionSetup
+from pretouch.control.task import twist
+from pretouch.errors import ParameterError
+from pretouch.groups import Arm, JointArrays
 from pretouch.robot.model import Kinematics, jacobian_into
-from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, QpOutcome, QpSolution, RobotState
+from pretouch.types import FloatArray, IntArray, Obstacles, QpOutcome, QpSolution, RobotState
 from pretouch.values import value
+
+
+@value
+class MotionState:
+    """What the motion remembers from one step to the next."""
+
+    null_velocity: FloatArray
+    """(n,) joint velocity asked for in the null space [rad/s]."""
+    blocked: float = 0.0
+    """How long the arm has been kept from its path [s]; 0 where that is not counted."""
 
 
 @value
@@ -30,46 +43,60 @@ class Motion:
     restricted: IntArray
     """(K',) which of the obstacles restrict the arm."""
     approach_limit: FloatArray
-    """(K',) approach limit for each of them, of eq. 7 or the braking curve [m/s]."""
+    """(K',) approach limit for each of them [m/s]."""
     ee_velocity: FloatArray
     """(3,) measured velocity of the end-effector origin [m/s]."""
     ee_velocity_commanded: FloatArray
     """(3,) velocity of the end-effector origin with the joint velocities of the answer [m/s]."""
 
 
+_NONE = np.zeros(0)
+"""What stands for joint velocities that are not given."""
+_ANY = _NONE, _NONE
+
+
 def joint_motion(
-    setup: MotionSetup, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
-) -> Motion:
-    """Joint velocities that track the task (eq. 2) within joint limits and approach limits (eqs. 5-7).
+    state: MotionState, setup: MotionSetup, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
+    request: MotionRequest, allowed: Restricted,
+) -> tuple[Motion, MotionState]:  # fmt: skip
+    """Joint velocities that track the task (eq. 2) within the joint limits and what is allowed, and what to remember.
 
     Args:
-        setup: arm, limits and parameters.
+        state: what is remembered.
+        setup: body and parameters.
         kin: posture.
         robot: state of the arm.
         obstacles: what is near.
         request: what is asked.
+        allowed: what a restriction allows.
     """
-    model, restriction = setup.model, setup.profile.restriction
-    if restriction.mode in MODES:
-        return Motion(*baseline_motion(setup, kin, robot, obstacles, request))
-    n, count = model.n, 0 if restriction.mode == "off" else len(obstacles.unit)
-    qd, multipliers, velocities = np.empty(n), np.empty(n + count), np.empty((2, 3))
-    restricted, rows = np.empty(count, WHOLE), np.empty((2, count))
-    o = obstacles if count else NOTHING_NEAR
-    found, ending, violated = _motion.flat(
-        robot.q, robot.qd, robot.q_commanded, robot.qd_commanded,
-        o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
-        request.velocity, request.rotation_goal, request.hold, request.tracks,
-        request.qd is not None, NO_JOINTS if request.qd is None else request.qd,
-        qd, multipliers, velocities, restricted, rows, *kin, *setup.fields,
+    numbers, a, o = setup.numbers, allowed, obstacles
+    n, count, seen = len(robot.q), len(a.h), len(a.which)
+    if a.G.shape != (count, n) or seen > count:
+        shapes = f"G {a.G.shape}, h {a.h.shape}, which {a.which.shape}"
+        raise ParameterError(f"A restriction's rows are {shapes}: G is (R, {n}), h is (R,), which is at most (R,).")
+    slowest, fastest = a.speeds or _ANY
+    null_velocity = state.null_velocity.copy() if numbers.moves_away else state.null_velocity
+    velocity = request.velocity if a.velocity is None else request.velocity + a.velocity
+    H, f = cost = np.empty((n, n)), np.empty(n)
+    qd, slack, multipliers, velocities = np.empty(n), np.empty(count), np.empty(n + count), np.empty((2, 3))
+    ending, violated, blocked = _motion.flat(
+        robot.q, robot.qd, robot.q_commanded, robot.qd_commanded, o.link, o.direction, o.body_distance,
+        a.G, a.h, a.which, a.weight, slowest, fastest,
+        velocity, request.rotation_goal, request.hold, request.tracks,
+        request.qd is not None, _NONE if request.qd is None else request.qd,
+        null_velocity, state.blocked, H, f, qd, slack, multipliers, velocities, *kin, *setup.fields,
     )  # fmt: skip
-    if violated and restriction.mode == "hard" and not request.hold:
-        return _motion_with_hard_rows(setup, kin, robot, obstacles, request)
-    qp = QpSolution(qd, rows[1, :found], multipliers[: n + found], *how_it_ended(request.hold, ending, violated))
-    return Motion(qp, restricted[:found], rows[0, :found], velocities[0], velocities[1])
+    after = MotionState(null_velocity, blocked) if numbers.moves_away or numbers.times_blocked else state
+    if violated and a.weight == 0.0 and not request.hold:
+        return _motion_with_hard_rows(setup, kin, robot, a, Cost(*cost)), after
+    if seen < count:
+        slack, multipliers = slack[:seen], multipliers[: n + seen]
+    qp = QpSolution(qd, slack, multipliers, *_how_it_ended(request.hold, ending, violated))
+    return Motion(qp, a.which, a.h[:seen], velocities[0], velocities[1]), after
 
 
-def how_it_ended(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, str]:
+def _how_it_ended(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, str]:
     """Return outcome and sentence for how `minimise` ended, and for whether a row is violated."""
     if hold:
         return QpOutcome.SKIPPED, "not posed: the arm holds"
@@ -78,78 +105,151 @@ def how_it_ended(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, st
     return QpOutcome.SOLVED, "solved, an approach row is violated" if violated else "solved"
 
 
+class _Asked(NamedTuple):
+    """What compiled code takes of a `MotionRequest`."""
+
+    velocity: FloatArray
+    rotation_goal: FloatArray
+    hold: bool
+    tracks: bool
+    by_joint: bool
+    """Whether joint velocities are asked for."""
+    joints: FloatArray
+    """(n,) these [rad/s]; without meaning if not."""
+
+
+class _Allowed(NamedTuple):
+    """What compiled code takes of `Restricted`."""
+
+    G: FloatArray
+    h: FloatArray
+    which: IntArray
+    weight: float
+    slowest: FloatArray
+    """(n,) or none."""
+    fastest: FloatArray
+    """(n,) or none."""
+
+
+class _Memory(NamedTuple):
+    """What is remembered."""
+
+    null_velocity: FloatArray
+    """Written to."""
+    blocked: float
+
+
 class _Answer(NamedTuple):
     """Room for the answer."""
 
+    H: FloatArray
+    """(n, n) of the cost."""
+    f: FloatArray
+    """(n,) of the cost."""
     qd: FloatArray
     """(n,) joint velocities [rad/s]."""
+    slack: FloatArray
+    """(R,) violation of each row [m/s]."""
     multipliers: FloatArray
-    """(n + K,) of box and rows."""
+    """(n + R,) of box and rows."""
     velocities: FloatArray
     """(2, 3) of the end-effector origin, measured and answered [m/s]."""
-    restricted: IntArray
-    """(K,) which obstacles restrict the arm."""
-    rows: FloatArray
-    """(2, K) limit and violation of each row [m/s]."""
 
 
 @entry
 def _motion(
-    robot: JointArrays, obstacles: ObstacleArrays, asked: Asked, answer: _Answer, kin: Kinematics, arm: Arm,
-    numbers: MotionNumbers,
-) -> tuple[int, int, bool]:  # fmt: skip
-    """Write the answer; return how many rows, how the solver ended, and whether any is violated."""
-    n, limit, slack, multipliers = len(robot.q), answer.rows[0], answer.rows[1], answer.multipliers
+    robot: JointArrays, near: Near, allowed: _Allowed, asked: _Asked, memory: _Memory, answer: _Answer,
+    kin: Kinematics, arm: Arm, p: MotionNumbers,
+) -> tuple[int, bool, float]:  # fmt: skip
+    """Write the answer, and change what is remembered.
+
+    Returns how the solver ended, whether any row is violated, and for how long the path has been blocked [s].
+    """
+    G, h, which, slack, qd = allowed.G, allowed.h, allowed.which, answer.slack, answer.qd
+    n, seen = len(robot.q), len(which)
+    if p.moves_away:
+        memory.null_velocity[:] = away(memory.null_velocity, G[:seen], which, near, arm.moved_by, p.away)
     J = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J)
-
-    # eqs. 5-7
-    G = np.empty((len(obstacles.link), n))
-    found = rows_into(kin, arm.moved_by, obstacles, numbers.approach, Rows(G, limit, answer.restricted))
-    G, h = G[:found], limit[:found]
-    lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, numbers.limits)
-
-    # eq. 2
+    lower, upper, stop = _box(robot, allowed, p)
     ending = SOLVED
     if not asked.hold:
-        m = 6 if numbers.holds_orientation else 3
-        x_d = twist(asked.velocity, kin.rotation[arm.ee], asked.rotation_goal, numbers.orientation_gain_1_s)
-        H, f = np.empty((n, n)), np.empty(n)
-        if asked.by_joint:
-            H[:], f[:] = np.eye(n), -asked.joints
-        else:
-            cost_into(J[:m], x_d[:m], robot.q, numbers.q_mid, numbers.cost, H, f)
-        minimum = Minimum(answer.qd, slack[:found], multipliers[: n + found])
-        ending = minimise(Problem(H, f, lower, upper, G, h, numbers.row_weight), numbers.budget, minimum)
+        _pose(J, robot.q, asked, kin.rotation[arm.ee], memory.null_velocity, p, answer)
+        minimum = Minimum(qd, slack, answer.multipliers)
+        ending = minimise(Problem(answer.H, answer.f, lower, upper, G, h, allowed.weight), p.budget, minimum)
     if asked.hold or ending != SOLVED:
-        for j in range(n):
-            answer.qd[j] = stop[j]
-        for j in range(len(multipliers)):
-            multipliers[j] = 0.0
-        excesses(G, h, answer.qd, slack)
+        qd[:], answer.multipliers[:] = stop, 0.0
+        excesses(G, h, qd, slack)
+    _hand_velocities(J, robot.qd, qd, p.in_null_space, answer.velocities)
+    violated, blocked = False, memory.blocked
+    for k in range(len(h)):
+        violated = violated or slack[k] > 0.0
+    if p.times_blocked and asked.tracks and not asked.hold:
+        hand, towards = np.empty(seen, np.bool_), np.empty((seen, 3))
+        for k in range(seen):
+            hand[k] = arm.moved_by[near.link[which[k]]].all()
+            towards[k] = near.direction[which[k]]
+        moving = answer.velocities[1]
+        blocked = time_blocked(blocked, asked.velocity, moving, towards, h[:seen], hand, p.period_s)
+    return ending, violated, blocked
 
+
+@inlined
+def _box(robot: JointArrays, allowed: _Allowed, p: MotionNumbers) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the joint box, what is allowed of it, and how to brake in it (n,) [rad/s]."""
+    lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, p.limits)
+    slowest, fastest = allowed.slowest, allowed.fastest
+    # what the acceleration does not allow comes later: the box is never empty
+    for i in range(len(slowest)):
+        least, most = lower[i], upper[i]
+        lower[i], upper[i] = min(max(slowest[i], least), most), min(max(fastest[i], least), most)
+    return lower, upper, stop
+
+
+@inlined
+def _pose(
+    J: FloatArray, q: FloatArray, asked: _Asked, rotation: FloatArray, null_velocity: FloatArray, p: MotionNumbers,
+    answer: _Answer,
+) -> None:  # fmt: skip
+    """Write the cost of eq. 2, or of how far the joint velocities are from those asked for."""
+    H, f = answer.H, answer.f
+    if asked.by_joint:
+        H[:], f[:] = np.eye(len(q)), -asked.joints
+        return
+    m = 6 if p.holds_orientation else 3
+    x_d = twist(asked.velocity, rotation, asked.rotation_goal, p.orientation_gain_1_s)
+    if p.in_null_space:
+        H[:], f[:] = cost_with_null_space(J[:m], x_d[:m], q, p.q_mid, p.cost, p.projected, null_velocity)
+    else:
+        cost_into(J[:m], x_d[:m], q, p.q_mid, p.cost, H, f)
+
+
+@compiled
+def _hand_velocities(
+    J: FloatArray, measured: FloatArray, answered: FloatArray, in_null_space: bool, velocities: FloatArray
+) -> None:
+    """Write the end-effector's velocities (2, 3) [m/s], those measured and those answered."""
+    if in_null_space:
+        # what was published of such profiles has the last digit of this product, which is not that of the sum below
+        velocities[0], velocities[1] = J[:3] @ measured, J[:3] @ answered
+        return
     for i in range(3):
-        answer.velocities[0, i], answer.velocities[1, i] = 0.0, 0.0
-        for j in range(n):
-            answer.velocities[0, i] += J[i, j] * robot.qd[j]
-            answer.velocities[1, i] += J[i, j] * answer.qd[j]
-    violated = False
-    for k in range(found):
-        violated = violated or slack[k] > 0
-    return found, ending, violated
+        velocities[0, i], velocities[1, i] = 0.0, 0.0
+        for j in range(len(measured)):
+            velocities[0, i] += J[i, j] * measured[j]
+            velocities[1, i] += J[i, j] * answered[j]
 
 
 def _motion_with_hard_rows(
-    setup: MotionSetup, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
+    setup: MotionSetup, kin: Kinematics, robot: RobotState, allowed: Restricted, cost: Cost
 ) -> Motion:
     """Answer of `joint_motion` where a hard row is in the way, which takes another solver."""
-    model, profile = setup.model, setup.profile
-    rows, restricted = approach_rows(kin, model.moved_by, obstacles, profile.restriction)
-    J = model.ee_jacobian(kin)
-    goal = task(J, request.velocity, kin.rotation[model.ee], request.rotation_goal, profile.task)
-    cost = task_cost(*goal, robot.q, model.q_mid, profile.task)
-    if request.qd is not None:
-        cost = Cost(np.eye(model.n), -request.qd)
-    lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, setup.limits.table)
-    qp = solve(cost, lower, upper, rows, profile.restriction.slack_weight, stop, profile.failure.solver_iterations)
-    return Motion(qp, restricted, rows.h, J[:3] @ robot.qd, J[:3] @ qp.qd)
+    a, J = allowed, setup.body.model.ee_jacobian(kin)[:3]
+    lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, setup.numbers.limits)
+    if a.speeds is not None:
+        slowest, fastest = a.speeds
+        lower, upper = np.clip(slowest, lower, upper), np.clip(fastest, lower, upper)
+    qp = solve(cost, lower, upper, ApproachRows(a.G, a.h, soft=False), 0.0, stop, setup.numbers.budget)
+    seen = len(a.which)
+    of_obstacles = QpSolution(qp.qd, qp.slack[:seen], qp.multipliers[: len(qp.qd) + seen], qp.outcome, qp.status)
+    return Motion(of_obstacles, a.which, a.h[:seen], J @ robot.qd, J @ qp.qd)

@@ -1,14 +1,16 @@
 """Restricting the body's approach to obstacles: eqs. 5-7, as rows G qd <= h of the QP."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import ByName, compiled, entry, inlined
+from pretouch.control.interface import Body, MotionRequest, Restricted, Restriction
 from pretouch.groups import ObstacleArrays
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
-from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles
+from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Number, Obstacles, RobotState
 from pretouch.values import value
 
 
@@ -46,7 +48,7 @@ def approach_limit(d: FloatArray, params: RestrictionParams) -> FloatArray:
     """Largest approach velocity of the closest point (K,) [m/s], eq. 7 of the paper; infinite: no restriction.
 
     V_a - V_max below d_repulse, V_b from there to d_notice. `d` (K,) [m] is from the body's surface and may be
-    negative. In mode floor the limit never lies below `floor_m_s`.
+    negative. With rows=floor the limit never lies below `floor_m_s`.
     """
     return _limits(d, approach_params(params))
 
@@ -66,7 +68,7 @@ class ApproachParams(NamedTuple):
 def approach_params(params: RestrictionParams) -> ApproachParams:
     """Return what eqs. 5-7 take of the parameters."""
     p = params
-    least = p.floor_m_s if p.mode == "floor" else -np.inf
+    least = p.floor_m_s if p.rows == "floor" else -np.inf
     return ApproachParams(p.v_max_m_s, p.beta, p.d_crit_m, p.d_repulse_m, p.d_notice_m, least)
 
 
@@ -96,11 +98,11 @@ def approach_rows(
     which joint moves which link.
     """
     p, n, count = params, len(kin.anchor), len(obstacles.unit)
-    if p.mode == "off" or count == 0:
+    if count == 0:
         return ApproachRows(np.zeros((0, n)), np.zeros(0), soft=False), np.zeros(0, np.int64)
     G, h, which = np.empty((count, n)), np.empty(count), np.empty(count, np.int64)
-    found = _rows(kin, moved_by, obstacles, approach_params(p), Rows(G, h, which))
-    return ApproachRows(G[:found], h[:found], p.mode in ("slack", "floor")), which[:found]
+    found = _rows(kin, moved_by, obstacles, Rows(G, h, which), approach_params(p))
+    return ApproachRows(G[:found], h[:found], p.rows != "hard"), which[:found]
 
 
 class Rows(NamedTuple):
@@ -116,7 +118,7 @@ class Rows(NamedTuple):
 
 @entry
 def _rows(
-    kin: Kinematics, moved_by: BoolArray, obstacles: ByName[ObstacleArrays], p: ApproachParams, rows: Rows
+    kin: Kinematics, moved_by: BoolArray, obstacles: ByName[ObstacleArrays], rows: Rows, p: ApproachParams
 ) -> int:
     return rows_into(kin, moved_by, obstacles, p, rows)
 
@@ -145,3 +147,52 @@ def rows_into(kin: Kinematics, moved_by: BoolArray, obstacles: ObstacleArrays, p
                 )
         found += 1
     return found
+
+
+@dataclass(frozen=True)
+class ApproachRestriction(RestrictionParams, Restriction, name="paper"):
+    """Restricting the body's approach to obstacles, as in the paper (eqs. 5-7)."""
+
+    def on(self, body: Body) -> Restriction:
+        """Return the same with what compiled code takes of the parameters."""
+        return _OnBody(self, body)
+
+    def step(
+        self, state: Any, body: Body, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
+    ) -> tuple[Restricted, Any]:  # fmt: skip
+        """Return the rows of `approach_rows`; nothing is remembered."""
+        return self.on(body).step(state, body, kin, robot, obstacles, request)
+
+
+class _OnBody(Restriction):
+    """An `ApproachRestriction` that works for one body."""
+
+    def __init__(self, params: RestrictionParams, body: Body) -> None:
+        self._moved_by, self._numbers, n = body.model.moved_by, approach_params(params), body.model.n
+        self._weight = 0.0 if params.rows == "hard" else params.slack_weight
+        self._nothing = Restricted(np.zeros((0, n)), np.zeros(0), np.zeros(0, WHOLE), self._weight)
+
+    def step(
+        self, state: Any, body: Body, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
+    ) -> tuple[Restricted, Any]:  # fmt: skip
+        o, count = obstacles, len(obstacles.unit)
+        if count == 0:
+            return self._nothing, state
+        G, h, which = np.empty((count, len(robot.q))), np.empty(count), np.empty(count, WHOLE)
+        found = _rows.flat(
+            *kin, self._moved_by, o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
+            G, h, which, *self._numbers,
+        )  # fmt: skip
+        if found < count:
+            G, h, which = G[:found], h[:found], which[:found]
+        return Restricted(G, h, which, self._weight), state
+
+
+def of_table_i(part: Restriction | None) -> ApproachRestriction:
+    """Return a profile's restriction if it is of eqs. 5-7, else one with the values of Table I."""
+    return part if isinstance(part, ApproachRestriction) else ApproachRestriction()
+
+
+def notice_m(part: Restriction | None) -> float:
+    """Return from which body distance on a restriction allows everything [m]: its own, or Table I's."""
+    return float(getattr(part, "d_notice_m", ApproachRestriction.d_notice_m))

@@ -10,7 +10,8 @@ import numpy as np
 
 from pretouch.composition import differences
 from pretouch.errors import RecordingError
-from pretouch.params import PROFILES, Profile, RestrictionMode
+from pretouch.params import Profile
+from pretouch.profiles import profile, profile_names, restriction_mode, restriction_modes, with_restriction
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
 from pretouch.viewer.commands import Commands
@@ -40,10 +41,10 @@ class Running:
     """Control cycles that are to pass one by one, paused or not."""
 
 
-def named(profile: Profile, base: str) -> Profile:
+def named(changed: Profile, base: str) -> Profile:
     """Name a profile by the one it was made from and what is different, as `pretouch.profiles.profile` reads it."""
-    mine, theirs = (replace(p, name="") for p in (profile, PROFILES[base]))
-    return replace(profile, name=":".join([base, *differences(mine, theirs)]))
+    mine, theirs = (replace(p, name="") for p in (changed, profile(base)))
+    return replace(changed, name=":".join([base, *differences(mine, theirs)]))
 
 
 class Controls:
@@ -54,7 +55,7 @@ class Controls:
         self.running = Running()
         self._shown: list[tuple[Any, str, Callable[[], object]]] = []
         self._base = simulation.settings.profile.name.partition(":")[0]
-        if self._base not in PROFILES:
+        if self._base not in profile_names():
             self._base = "paper"
         self.on_view: Callable[[str, bool], None] = lambda name, visible: None
         """Told which part of the scene to show or hide."""
@@ -92,12 +93,12 @@ class Controls:
 
     def _controller_tab(self) -> None:
         gui, docs = self._gui, field_docs()
-        profile = gui.add_dropdown("Profile", tuple(PROFILES))
-        self._choice(profile, self._choose_profile, "profile", lambda: self._base)
+        base = gui.add_dropdown("Profile", profile_names())
+        self._choice(base, self._choose_profile, "profile", lambda: self._base)
         speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=docs["TaskParams", "speed_m_s"])
         self._number(speed, self._choose_speed, "path speed", lambda: self._mine.task.speed_m_s)
-        mode = gui.add_dropdown("Restrictions", get_args(RestrictionMode), hint=docs["RestrictionParams", "mode"])
-        self._choice(mode, self._choose_restrictions, "restrictions", lambda: self._mine.restriction.mode)
+        mode = gui.add_dropdown("Restrictions", restriction_modes(), hint=docs["Profile", "approach"])
+        self._choice(mode, self._choose_restrictions, "restrictions", lambda: restriction_mode(self._mine))
         with gui.add_folder("Table I", expand_by_default=False):
             for entry in TABLE_1:
                 # as text: of a field for numbers that is emptied, viser tells nobody
@@ -155,24 +156,24 @@ class Controls:
     def _mine(self) -> Profile:
         return self._simulation.settings.profile
 
-    def _change(self, profile: Profile) -> None:
-        self._simulation.set_profile(named(profile, self._base))
+    def _change(self, changed: Profile) -> None:
+        self._simulation.set_profile(named(changed, self._base))
 
     def _change_entry(self, entry: TableEntry, text: str) -> None:
         if text.strip():  # else what holds comes back
             self._change(entry.write_text(self._mine, text))
 
     def _choose_profile(self, base: str) -> None:
-        chosen = PROFILES[base]
-        profile = replace(chosen, task=replace(chosen.task, speed_m_s=self._mine.task.speed_m_s))
-        self._simulation.set_profile(named(profile, base))
+        chosen = profile(base)
+        chosen = replace(chosen, task=replace(chosen.task, speed_m_s=self._mine.task.speed_m_s))
+        self._simulation.set_profile(named(chosen, base))
         self._base = base
 
     def _choose_speed(self, speed: float) -> None:
         self._change(replace(self._mine, task=replace(self._mine.task, speed_m_s=float(speed))))
 
-    def _choose_restrictions(self, mode: RestrictionMode) -> None:
-        self._change(replace(self._mine, restriction=replace(self._mine.restriction, mode=mode)))
+    def _choose_restrictions(self, mode: str) -> None:
+        self._change(with_restriction(self._mine, mode))
 
     def _text_of(self, entry: TableEntry) -> str:
         return entry.text(self._mine)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import profile
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel
 from pretouch.sim.pushes import Visit, Visitor
@@ -20,7 +20,7 @@ from pretouch_lab.tables import avoidance_tables
 from pretouch_lab.trial import Record, Setup, play
 
 NAME = "avoidance"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 40.0
 _VISITS_S = ((4.0, 14.0), (20.0, 30.0))

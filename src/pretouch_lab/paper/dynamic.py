@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import profile
 from pretouch.sim.paper_scenes import dynamic_pushes
 from pretouch.sim.pushes import Push, Pusher
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -19,7 +19,7 @@ from pretouch_lab.tables import dynamic_tables
 from pretouch_lab.trial import Record, Setup, play
 
 NAME = "dynamic"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 30.0
 _NOTICE_S = 0.3

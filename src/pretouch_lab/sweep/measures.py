@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from pretouch.checks import Checked, Positive
+from pretouch.control.restriction import ApproachRestriction
 from pretouch.errors import ExperimentError
 from pretouch.params import Profile
 from pretouch_lab.benchmarks.detection.arm import model
@@ -123,7 +124,7 @@ _FALSE = {"false_detections": "reactions that nothing caused"}
 
 
 def _static_cost(setting: Setting) -> float:
-    slow = setting.profile.restriction.mode in ("hard", "slack", "floor")
+    slow = isinstance(setting.profile.approach, ApproachRestriction)
     return (1.6 if slow else 0.3) + 0.006 * (setting.units or 7)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from pretouch.checks import Checked
 from pretouch.errors import ExperimentError
 from pretouch.params import Profile, profile
-from pretouch.params.profile import REMOVED
+from pretouch.profiles import REMOVED
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import WorldSet, drawn, world_set

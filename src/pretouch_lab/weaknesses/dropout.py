@@ -1,6 +1,6 @@
 """A few readings in a row are lost while the arm stands before a board: what of thresholds, rows and speed jumps."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from pretouch.control.path import Path, line
 from pretouch.control.qp import solve, task_cost
-from pretouch.control.restriction import approach_rows
+from pretouch.control.restriction import ApproachRestriction, approach_rows, of_table_i
 from pretouch.control.task import task
-from pretouch.params import Profile, RestrictionMode, profile
+from pretouch.params import Profile, profile
+from pretouch.perception.closest import no_obstacles
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "dropout"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 READINGS = (0, 1, 2, 3, 5, 10, 20)
 """How many readings in a row are lost."""
@@ -226,10 +227,14 @@ def free_answer(step: ControlStep, upright: FloatArray, params: Profile, model: 
     if step.qp.outcome is QpOutcome.SKIPPED:
         return None
     kin = model.kinematics(step.q)
-    rows, _ = approach_rows(kin, model.moved_by, step.obstacles, params.restriction)
+    approach = of_table_i(params.approach)
+    if not isinstance(params.approach, ApproachRestriction):  # its rows would be other ones
+        approach = replace(approach, rows="hard")
+    near = no_obstacles() if params.approach is None else step.obstacles
+    rows, _ = approach_rows(kin, model.moved_by, near, approach)
     goal = task(model.ee_jacobian(kin), step.desired_velocity, kin.rotation[model.ee], upright, params.task)
     cost, fastest = task_cost(*goal, step.q, model.q_mid, params.task), model.description.qd_max
-    return solve(cost, -fastest, fastest, rows, params.restriction.slack_weight, np.zeros(model.n)).qd
+    return solve(cost, -fastest, fastest, rows, approach.slack_weight, np.zeros(model.n)).qd
 
 
 _MEASURES = (

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import profile
 from pretouch.sim.plant import TOUCH_N
 from pretouch.sim.pushes import FACES, Holder, Push, Pusher, against
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "release"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 HELD_S = (0.3, 1.0, 2.0, 3.0, 4.0)
 """How long each push lasts [s]."""

@@ -5,7 +5,8 @@ from dataclasses import fields
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from pretouch.params import PROFILES, Profile
+from pretouch.composition import as_table
+from pretouch.params import PROFILES
 from pretouch.reporting.course import Course
 from pretouch.reporting.health import UnitHealth
 from pretouch.reporting.html import (
@@ -34,6 +35,8 @@ _RUNS = 30
 """Stretches of one profile and path that are listed."""
 _PROFILE_COLUMNS = 6
 """Profiles that are shown side by side."""
+_ABSENT = "none"
+"""Stands for a parameter of a part that a profile has not."""
 _UNITS = {
     "_m_s_n": "(m/s)/N", "_kg_m2": "kg m²", "_rad_s2": "rad/s²", "_nm_s": "Nm s/rad", "_m_s2": "m/s²",
     "_nm_rad": "Nm/rad", "_rad_s": "rad/s", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_nm": "Nm", "_kg": "kg",
@@ -121,11 +124,12 @@ def parameter_section(m: Measures) -> Html:
     shown = profiles[:_PROFILE_COLUMNS]
     head = ("parameter", "unit", "paper", *(profile.name for profile in shown))
     rows: list[list[Text]] = []
-    for group, name in _parameters():
-        usual = _get(PROFILES["paper"], group, name)
-        values = [_get(profile, group, name) for profile in shown]
-        marked: list[Text] = [_value(v) if v == usual else element("b", _value(v), "other") for v in values]
-        rows.append([f"{group}.{name}", unit_of(name), _value(usual), *marked])
+    usual, *found = (_parameters(as_table(profile)) for profile in (PROFILES["paper"], *shown))
+    for path in dict.fromkeys(path for values in (usual, *found) for path in values):
+        values = [_value(profile.get(path, _ABSENT)) for profile in found]
+        norm = _value(usual.get(path, _ABSENT))
+        marked: list[Text] = [value if value == norm else element("b", value, "other") for value in values]
+        rows.append([path, unit_of(path), norm, *marked])
     left_out = len(profiles) - len(shown)
     return joined([
         table(head, rows, words=2),
@@ -134,15 +138,16 @@ def parameter_section(m: Measures) -> Html:
     ])  # fmt: skip
 
 
-def _parameters() -> list[tuple[str, str]]:
-    """Group and name of each parameter of a profile."""
-    paper = PROFILES["paper"]
-    groups = [f.name for f in fields(Profile) if f.name != "name"]
-    return [(group, f.name) for group in groups for f in fields(getattr(paper, group))]
-
-
-def _get(profile: Profile, group: str, name: str) -> object:
-    return getattr(getattr(profile, group), name)
+def _parameters(table: dict[str, Any], where: str = "") -> dict[str, object]:
+    """Return each parameter of a profile by its path, and the name of each part."""
+    found: dict[str, object] = {}
+    for name, value in table.items():
+        path = where if name == "part" else f"{where}.{name}".lstrip(".")
+        if isinstance(value, dict):
+            found |= _parameters(value, path)
+        elif path != "name":
+            found[path] = _ABSENT if value is None else value
+    return found
 
 
 def unit_of(name: str) -> str:
@@ -153,7 +158,7 @@ def unit_of(name: str) -> str:
 def _value(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return f"({', '.join(map(_value, value))})"
     return f"{value:.6g}".replace("-", "−") if isinstance(value, float) else str(value)
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode, profile
+from pretouch.params import profile
 from pretouch.sim.pushes import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable
@@ -17,7 +17,7 @@ from pretouch_lab.tables import controller, number
 from pretouch_lab.trial import Record, Setup, play
 
 NAME = "between"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 12.0
 _REACH_M = 0.25

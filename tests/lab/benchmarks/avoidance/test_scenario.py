@@ -61,7 +61,7 @@ def test_friction_of_all_joints_grows_by_one_factor():
 def test_contenders_and_their_other_tunings_are_profiles():
     for name in (*CONTENDERS, *ABLATED, *TUNINGS):
         assert profile(profile_text(name))
-    assert profile(profile_text("paper-off")).restriction.mode == "off"
+    assert profile(profile_text("paper-off")).approach is None
 
 
 def test_an_unknown_contender_or_scenario_is_refused_with_those_there_are():
