@@ -8,6 +8,7 @@ from pretouch.checks import Checked, Positive
 from pretouch.control.restriction import ApproachRestriction
 from pretouch.errors import ExperimentError
 from pretouch.params import Profile
+from pretouch.profiles import RENAMED
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.experiment import Row
@@ -43,7 +44,7 @@ class Measure:
 
     def check(self, name: str) -> None:
         """Refuse a parameter of the profile that cannot change anything here."""
-        group = name.partition(".")[0]
+        group = RENAMED.get(name, name).partition(".")[0]
         of_profile = group in Profile.__dataclass_fields__
         if self.groups is not None and of_profile and not {group, name} & set(self.groups):
             of = f"take one of {', '.join(self.groups)}, or" if self.groups else "take one of scene, or"

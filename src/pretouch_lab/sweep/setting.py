@@ -6,15 +6,17 @@ range finders, `skin.units` for so many units spread over the arm, and `scene.FI
 of what the experiment plays.
 """
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from numbers import Real
 from typing import Any
 
 from pretouch.checks import Checked
+from pretouch.composition import changed
 from pretouch.errors import ExperimentError
 from pretouch.params import Profile, profile
-from pretouch.profiles import REMOVED
+from pretouch.profiles import REMOVED, RENAMED, SWITCHES
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import WorldSet, drawn, world_set
@@ -76,28 +78,39 @@ def plants() -> tuple[str, ...]:
 
 def current(name: str, base: Profile, scene: Checked) -> Value:
     """Return a parameter's value where nothing changes it; an ExperimentError for a parameter there is not."""
-    group, dot, field = name.partition(".")
     if name == UNITS:
         return 0
     if name == KIND:
         return "nominal"
     if name == WORLD:
         return USUAL_WORLD
+    if name in REMOVED:
+        raise ExperimentError(f"The parameter {name!r} is gone: {REMOVED[name]}")
+    if name in SWITCHES:
+        return next(text for text, changes in SWITCHES[name].items() if changed(base, changes) == base)
+    group, dot, field = RENAMED.get(name, name).rpartition(".")
     groups: dict[str, Any] = {"plant": PlantParams(), "sensing": RangeFinderParams(), "scene": scene}
-    groups |= {f.name: getattr(base, f.name) for f in fields(Profile) if f.name != "name"}
+    groups |= dict(_groups(base))
     if not dot or group not in groups:
         listed = ", ".join([*groups, "skin"])
         raise ExperimentError(f"The parameter {name!r} is unknown: write GROUP.FIELD with a group of {listed}.")
     known = [f.name for f in fields(groups[group])]
     if field not in known:
         also = ["kind", "world"] if group == "plant" else []
-        if name in REMOVED:
-            raise ExperimentError(f"The parameter {name!r} is gone: {REMOVED[name]}")
         raise ExperimentError(f"The parameter {name!r} is unknown: {group} has {', '.join([*known, *also])}.")
     value = getattr(groups[group], field)
     if not isinstance(value, Real | str):
         raise ExperimentError(f"The parameter {name} holds one value a joint: sweep one that holds a single value.")
     return value  # type: ignore[return-value]  # a bool is a Real
+
+
+def _groups(params: Any, where: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield each group of parameters of a profile that it has, groups in groups too, with its path."""
+    for f in fields(params):
+        group, path = getattr(params, f.name), f"{where}.{f.name}".lstrip(".")
+        if is_dataclass(group):
+            yield path, group
+            yield from _groups(group, path)
 
 
 def built(profile_text: str, scene: Checked, values: Values, seed: int) -> Setting:
