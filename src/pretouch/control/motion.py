@@ -156,15 +156,23 @@ class _Answer(NamedTuple):
     """(2, 3) of the end-effector origin, measured and answered [m/s]."""
 
 
+class _Fixed(NamedTuple):
+    """What does not change from step to step."""
+
+    arm: Arm
+    numbers: MotionNumbers
+
+
 @entry
 def _motion(
     robot: JointArrays, near: Near, allowed: _Allowed, asked: _Asked, memory: _Memory, answer: _Answer,
-    kin: Kinematics, arm: Arm, p: MotionNumbers,
+    kin: Kinematics, fixed: _Fixed,
 ) -> tuple[int, bool, float]:  # fmt: skip
     """Write the answer, and change what is remembered.
 
     Returns how the solver ended, whether any row is violated, and for how long the path has been blocked [s].
     """
+    arm, p = fixed.arm, fixed.numbers
     G, h, which, slack, qd = allowed.G, allowed.h, allowed.which, answer.slack, answer.qd
     n, seen = len(robot.q), len(which)
     if p.moves_away:
