@@ -1,5 +1,7 @@
 # Everything works from a fresh clone with Python 3.11 and make; each target sets up what it needs.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
+# tests start programs a hundred times: each would compile all of the source anew
+unexport PYTHONDONTWRITEBYTECODE
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
@@ -45,14 +47,14 @@ micropython:
 	npm install --prefix build/micropython --no-package-lock --no-audit --no-fund --silent
 
 test: setup
-	$(BIN)/pytest -n 2 -m "not slow" --list-skipped build/skipped
+	$(BIN)/pytest -n 2 --dist worksteal -m "not slow" --list-skipped build/skipped
 
 # the files in which the last `make test` skipped something, once what they need is installed; nothing may be skipped now
 test-skipped: setup
-	@test ! -s build/skipped || $(BIN)/pytest -n 2 -m "not slow" --none-skipped $$(cat build/skipped)
+	@test ! -s build/skipped || $(BIN)/pytest -n 2 --dist worksteal -m "not slow" --none-skipped $$(cat build/skipped)
 
 test-slow: setup
-	$(BIN)/pytest -n 2 -m "slow and not alone" --none-skipped
+	$(BIN)/pytest -n 2 --dist worksteal -m "slow and not alone" --none-skipped
 	$(BIN)/pytest -n 0 -m alone --none-skipped
 
 # every field of every control step, to the bit, here and in the commit BASE (docs/explanation/design.md, golden steps)

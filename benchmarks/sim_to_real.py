@@ -15,9 +15,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pretouch.contact.feel import feel, feel_init
 from pretouch.control.path import WayPoints
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -26,6 +25,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import Obstacles, RobotState
+from pretouch_lab.detector_alone import DetectorAlone
 from pretouch_lab.identification.arm_file import arm_toml
 from pretouch_lab.identification.free_motion import read_free_motion
 from pretouch_lab.identification.identify import identify
@@ -38,7 +38,7 @@ PATH = WayPoints(
     closed=True,
 )
 _ALONE = "blind:threshold.f_base_n=1000:task.orientation=free"
-_DETECTORS = {"pretouch": "pretouch:detection.learn_unseen=yes", "fixed": "blind:detection.method=fixed"}
+_DETECTORS = {"pretouch": "pretouch:detect.learn=always", "fixed": "fixed"}
 MODEL = RobotModel(panda())
 
 
@@ -95,13 +95,13 @@ def said(samples: ArmSamples) -> dict[str, object]:
     none = Obstacles(unit=np.zeros(0, np.int64), link=np.zeros(0, np.int64), **nothing)
     for name, text in _DETECTORS.items():
         p, evidence, alarms, quiet = profile(text), [], 0, 0
-        state = feel_init(MODEL, p)
-        for i in range(len(samples.time)):
+        detector = DetectorAlone(p, MODEL)
+        for i in range(len(samples.stamp)):
             robot = RobotState(
-                float(samples.time[i]), samples.q[i], samples.qd[i], samples.q[i], samples.qd[i], samples.tau[i], None
+                float(samples.stamp[i]), samples.q[i], samples.qd[i], samples.q[i], samples.qd[i], samples.tau[i], None
             )  # fmt: skip
-            felt, state = feel(state, MODEL, MODEL.kinematics(samples.q[i]), robot, none, False, p)
-            if i > len(samples.time) // 3:
+            felt = detector.step(MODEL.kinematics(samples.q[i]), robot, none)
+            if i > len(samples.stamp) // 3:
                 evidence.append(felt.evidence)
                 # not `contact`: without a wrench the paper's window never fills, and nothing is armed
                 alarms += felt.evidence >= 1.0 and i > quiet
@@ -131,11 +131,11 @@ def study(world: str, seed: int, seconds: float) -> dict[str, object]:
 
 def rough(samples: ArmSamples, seed: int) -> ArmSamples:
     """As a recording may be: noise and steps of encoders, stamps late by up to 2 ms, samples lost, gaps of 60 ms."""
-    rng, count = np.random.default_rng(seed), len(samples.time)
+    rng, count = np.random.default_rng(seed), len(samples.stamp)
     kept = (rng.random(count) > 0.005) & (np.arange(count) % 500 > 5)
     q = 1e-5 * np.round((samples.q + 2e-5 * rng.standard_normal(samples.q.shape)) / 1e-5)
-    late = replace(samples, time=samples.time + rng.uniform(0.0, 0.002, count), q=q)
-    return ArmSamples(late.time[kept], late.q[kept], late.qd[kept], late.tau[kept])
+    late = replace(samples, stamp=samples.stamp + rng.uniform(0.0, 0.002, count), q=q)
+    return late.at(kept)
 
 
 def swung(seed: int, world: str, seconds: float, roughly: bool) -> dict[str, object]:

@@ -22,11 +22,13 @@ hand = pt.closest_points(
 )  # fmt: skip
 
 for name, near in {"nothing near": pt.no_obstacles(), "a hand 0.2 m away at +y": hand}.items():
-    params, state, said = pt.ThresholdParams(), pt.window_init(100), "no contact"
+    detector, params, said = pt.MovingThresholds(), pt.WindowParams(), "no contact"
+    window = pt.window_init(params.samples)
     for i, sample in enumerate(force):
-        found, state = pt.detect(state, sample, ee, near, params)
+        armed, window = window.full, pt.add_force(window, sample, params)
+        found = detector.judged(window, sample, armed, ee, near)
         if found.contact is not None:
-            crossed = f"{state.newest[1]:.1f} N in y, filtered, is beyond {found.thresholds.lower[1]:.1f} N"
+            crossed = f"{window.newest[1]:.1f} N in y, filtered, is beyond {found.thresholds.lower[1]:.1f} N"
             said = f"contact {i - 300} samples after the push began: {crossed}"
             break
     print(f"{name}: {said}")

@@ -53,9 +53,9 @@ arm, path, scene = pt.RobotModel(pt.panda()), pt.Circle(), SceneSpec()
 control = pt.Controller(arm, pt.Skin([], arm), fixtures(scene), path, pt.profile("pretouch"))
 for name, tracked in (("without", False), ("with", True)):
     plant, watcher = Plant(arm, scene, PlantParams(), brought_to(arm, path.point(0.0)), seed=1), Watcher()
-    points = BallTracker(plant) if tracked else None
+    options = pt.loop.Options(points=BallTracker(plant) if tracked else None)
     clock = PlantClock(plant, control.limits.period)
-    pt.loop.run(control, plant, NoSkin(), clock, watcher, lambda step: step.stamp >= 8.0, points=points)
+    pt.loop.run(control, plant, NoSkin(), clock, watcher, lambda step: step.stamp >= 8.0, options)
     nearest = min(float(step.obstacles.body_distance.min(initial=np.inf)) for step in watcher.steps)
     print(f"{name} the ball's points: {watcher.steps[-1].path_phase:.2f} m along the path in 8 s", end="")
     print(f", at {nearest:.2f} m from the ball at the nearest." if tracked else ".")

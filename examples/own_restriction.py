@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import pretouch as pt
-from pretouch.control.interface import Body, MotionRequest, Restricted, Restriction
+from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.loop import run
 from pretouch.profiles import profile
 from pretouch.robot.model import Kinematics
@@ -31,7 +31,7 @@ class Separation(Restriction, name="separation"):
     reach_s: float = 0.5
 
     def step(
-        self, state: Any, body: Body, kin: Kinematics, robot: pt.RobotState, obstacles: pt.Obstacles,
+        self, state: Any, body: MotionBody, kin: Kinematics, robot: pt.RobotState, obstacles: pt.Obstacles,
         request: MotionRequest,
     ) -> tuple[Restricted, Any]:  # fmt: skip
         """Return a row for each obstacle: how fast its closest point of the body approaches, and may."""

@@ -1,5 +1,6 @@
 """What all tests share: the arm, its skin, and how properties are searched."""
 
+import gc
 from collections import Counter
 from pathlib import Path
 
@@ -23,6 +24,12 @@ def panda_model() -> RobotModel:
 @pytest.fixture(scope="session")
 def paper_skin(panda_model: RobotModel) -> skin.Skin:
     return skin.paper_skin(panda_model)
+
+
+def pytest_collection_finish() -> None:
+    """Keep the garbage collector from what lasts: half a million objects, a second each time that a run is prepared."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -6,8 +6,8 @@ import numpy as np
 
 from pretouch.control.path import line
 from pretouch.controller import Controller
-from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, RangeReadings, RangeStatus, RobotState

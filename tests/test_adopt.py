@@ -8,7 +8,7 @@ import pytest
 from pretouch.control.path import Circle, Path
 from pretouch.controller import Controller
 from pretouch.errors import RobotStateError
-from pretouch.params import PROFILES, Profile
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Mode
@@ -60,7 +60,7 @@ def test_units_that_were_not_looked_at_are_not_taken_for_silent(arm: Arm):
 
 
 def test_a_window_of_another_length_is_filled_before_anything_is_felt(arm: Arm):
-    switch(arm, replace(PAPER, threshold=replace(PAPER.threshold, window_samples=50)))
+    switch(arm, replace(PAPER, window=replace(PAPER.window, samples=50)))
     steps = arm.run(52)
     assert {s.mode for s in steps[:50]} == {Mode.HOLD}
     assert "of 50 samples" in steps[10].reason
@@ -82,7 +82,7 @@ def test_a_reaction_under_way_goes_on_and_decays(arm: Arm):
 def test_a_longer_decay_does_not_bring_a_past_reaction_back(arm: Arm):
     arm.run(6, force=PUSH)
     arm.run(250)
-    switch(arm, replace(PAPER, reaction=replace(PAPER.reaction, decay_cycles=2000)))
+    switch(arm, replace(PAPER, react=replace(PAPER.react, decay_cycles=2000)))
     steps = arm.run(20)
     assert {s.mode for s in steps} == {Mode.TRACK}
     assert not any(np.any(s.reaction_velocity) for s in steps)

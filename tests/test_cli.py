@@ -22,11 +22,11 @@ def run(capsys, *args):
     [
         (("live", "--port", "0"), "The port is 0: give one from 1 to 65535"),
         (("live", "--path", "square"), "The path is 'square': choose circle or line"),
-        (("replay", "/nowhere.mcap", "--no-page"), "/nowhere.mcap cannot be read: there is none"),
+        (("replay", "/nowhere.mcap", "--no-page"), "/nowhere.mcap cannot be read: it does not exist"),
         (("replay", "/dev/null", "--no-page"), "/dev/null is empty"),
         (("recover", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
         (("report", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
-        (("detect", "/nowhere.csv"), "/nowhere.csv cannot be read: there is none"),
+        (("detect", "/nowhere.csv"), "/nowhere.csv does not exist"),
     ],
 )
 def test_bad_input_ends_with_one_sentence_and_code_2(capsys, args, words):
@@ -82,8 +82,8 @@ def test_help_names_the_commands(capsys):
 
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
+    from pretouch.atomic_write import write_json
     from pretouch.cli.writing import check_writable
-    from pretouch.whole_file import write_json
 
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -97,7 +97,7 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
 
 
 def test_a_link_is_followed(tmp_path):
-    from pretouch.whole_file import write_json
+    from pretouch.atomic_write import write_json
 
     (tmp_path / "link").symlink_to(tmp_path / "real")
     write_json([1], tmp_path / "link")
@@ -150,7 +150,7 @@ def test_a_command_can_be_added(installed, capsys):
     [
         ("nowhere.at_all:Command", "cannot be loaded from nowhere.at_all:Command (ModuleNotFoundError: No module"),
         ("pretouch.cli:Nothing", "cannot be loaded from pretouch.cli:Nothing (AttributeError: "),
-        ("pretouch.cli:main", "is given by an entry point that names no class with run()"),
+        ("pretouch.cli:main", "is not a class with run()"),
     ],
 )
 def test_a_broken_entry_point_is_a_sentence_and_leaves_the_others(installed, capsys, value, said):

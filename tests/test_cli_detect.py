@@ -9,15 +9,15 @@ from matplotlib.image import imread
 
 from pretouch.cli.detect import detect
 from pretouch.errors import ParameterError, PretouchError, RecordingError
-from pretouch.foreign.source import Choice
+from pretouch.imported_data.source import Choice
 from pretouch.loop import Cycle
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
-from tests.foreign.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 from tests.hardware.traffic import heard
+from tests.imported_data.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 
 
 @pytest.fixture
@@ -29,8 +29,11 @@ def test_what_was_read_assumed_and_found_is_printed(capsys, file):
     detect(file, Choice())
     said = capsys.readouterr().out
     assert "mine.csv: 1400 samples in 14.0 s, 100 Hz, the first at" in said
-    assert "taken as the force on the robot (else --sign by-robot) in the base frame (else --frame ee)" in said
-    assert "Without ranges (--skin) nothing is near" in said
+    assert (
+        "assumed to be the force on the robot (otherwise --sign by-robot) in the base frame (otherwise --frame ee)"
+        in said
+    )
+    assert "Without ranges (--skin) no obstacle is known" in said
     rows = [line.split() for line in said.splitlines() if line.startswith("paper ")]
     assert [row[-1] for row in rows[:3]] == ["y", "x", "z"]
     assert "paper: if nobody touched the arm, 3 false contacts in 0.2 min" in said
@@ -40,7 +43,7 @@ def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
     place = tmp_path / "units.mcap"
     with SkinRecording(place) as recording:
         recording.sample("wrist", heard(0.02)[0], new=True)
-    with pytest.raises(RecordingError, match="holds what sensor units sent, and no force: read it with") as caught:
+    with pytest.raises(RecordingError, match="holds samples of sensor units, but no force: read it with") as caught:
         detect(place, Choice())
     assert len(str(caught.value)) < 300
 
@@ -48,7 +51,7 @@ def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
 def test_profiles_stand_side_by_side(capsys, file):
     detect(file, Choice(), ("paper", "paper:threshold.f_base_n=31"))
     said = capsys.readouterr().out
-    assert "paper and paper:threshold.f_base_n=31: 0 contacts of both, 3 of paper only, 0 of" in said
+    assert "paper and paper:threshold.f_base_n=31: 0 contacts in both, 3 only in paper, 0 only in" in said
     assert "paper:threshold.f_base_n=31: no contact in 0.2 min" in said
     assert "time [s]" in said
 
@@ -85,11 +88,11 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
         ({"profiles": ("brave",)}, ParameterError, "The profile 'brave' is unknown"),
         ({"profiles": ()}, ParameterError, "No profile is given"),
         ({"rate": 10.0}, ParameterError, "The rate is 10 Hz"),
-        ({"out": "a.gif"}, RecordingError, "a.gif has no ending that says its format"),
+        ({"out": "a.gif"}, RecordingError, "a.gif has an unknown format"),
         ({"out": "/dev/null/a.png"}, PretouchError, "/dev/null/a.png cannot be written"),
         ({"json_file": "/dev/null/a.json"}, PretouchError, "/dev/null/a.json cannot be written"),
-        ({"place": "gone.csv"}, RecordingError, "The recording gone.csv cannot be read: there is none"),
-        ({"choice": Choice(ranges=True), "skin_file": PAPER_SKIN}, RecordingError, "tells no ranges"),
+        ({"place": "gone.csv"}, RecordingError, "The recording gone.csv does not exist"),
+        ({"choice": Choice(ranges=True), "skin_file": PAPER_SKIN}, RecordingError, "has no ranges"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_printed(capsys, file, given, error, words):
@@ -111,7 +114,7 @@ def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, 
             arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
             steps.append(step)
     detect(place, Choice(ranges=True), ("paper", "blind"), PAPER_SKIN, json_file=numbers)
-    assert "The arm is taken as panda" in capsys.readouterr().out
+    assert "The arm is assumed to be panda" in capsys.readouterr().out
     paper, _ = json.loads(numbers.read_text())["profiles"]
     contacts = [s for s in steps if s.contact is not None]
     assert len(contacts) == 1

@@ -6,7 +6,7 @@ from contextlib import suppress
 
 import pytest
 
-from pretouch.cli.ending import Terminated, ended, ends_raise, exit_code
+from pretouch.signals import Terminated, ended, ends_raise, exit_code
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
-from tests.foreign.files import pushed
+from tests.imported_data.files import pushed
 
 PUSHES = ((2.0, 0.6, (0.0, 40.0, 0.0)),)
 
@@ -107,7 +107,7 @@ def test_another_profile_is_shown_beside_the_recorded_one(capsys, whole):
     (row,) = [line.split() for line in said.splitlines() if line.strip().startswith("2.1")]
     assert row[2:] == ["y", "-"]
     assert re.search(r"35\.\d / 35\.\d / 35\.\d N \(paper:threshold\.f_base_n=35\)", said)
-    assert "Detector only: the arm's motion is the recorded one in both" in said
+    assert "Detector only: both use the recorded motion of the arm" in said
 
 
 def test_the_same_profile_is_later_by_nothing(capsys, whole):

@@ -39,11 +39,11 @@ def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
     assert "raise approach.d_repulse_m by as much, or import with --cover" in printed
     assert json.loads(numbers.read_text())["whole_arm"]["points"] > 500
     assert main(["robot", "check", str(out)]) == 0
-    assert "In order" in capsys.readouterr().out
+    assert "No problem found" in capsys.readouterr().out
     assert main(told) == 2
-    assert "is there: give another --out, or --force" in capsys.readouterr().err
+    assert "exists already: give another --out, or --force" in capsys.readouterr().err
     assert main([*told, "--force"]) == 0
-    assert f"What was in {out} is in {out}.old-1." in capsys.readouterr().out
+    assert f"The previous contents of {out} are now in {out}.old-1." in capsys.readouterr().out
 
 
 def test_a_folder_of_the_arms_own_name_is_refused_before_anything_is_fitted(tmp_path, capsys, monkeypatch):
@@ -52,7 +52,7 @@ def test_a_folder_of_the_arms_own_name_is_refused_before_anything_is_fitted(tmp_
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("pretouch.cli.robot_import.import_robot", lambda *_: pytest.fail("imported"))
     assert main(["robot", "import", str(file)]) == 2
-    assert "The folder sixer is there" in capsys.readouterr().err
+    assert "The folder sixer exists already" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_a_folder_of_the_arms_own_name_is_refused_before_anything_is_fitted(tmp_
         (["--ee", "hand"], "The link 'hand' is unknown: choose from base"),
         (["--qd-max", "fast"], "--qd-max is 'fast': give numbers"),
         (["--capsules", "0"], "--capsules is 0: give 1 to 10"),
-        (["--package-path", "/nowhere"], "The package path /nowhere is no folder"),
+        (["--package-path", "/nowhere"], "The package path /nowhere is not a folder"),
         (["--ready", "1,2"], "--ready is [1.0, 2.0]: give 6 joint positions"),
     ],
 )
@@ -76,7 +76,7 @@ def test_misuse_is_one_sentence(tmp_path, capsys, more, sentence):
     ("name", "old", "new", "sentence"),
     [
         ("arm.xml", 'name="base_0" type="capsule" size="', 'name="base_0" type="capsule" size="0.7 0.1" user="',
-         "in each other"),
+         "overlap by"),
         ("robot.toml", '"tool0"', '"hand"', "ee_body: The link 'hand' is unknown: choose from base"),
         ("robot.toml", "1.2", "9.2", "q_ready is [0.0, 0.3, 9.2, 0.0, 1.6, 0.0]: give 6 joint positions"),
     ],
@@ -88,13 +88,13 @@ def test_an_arm_that_is_not_in_order_is_refused_with_the_file_and_the_key(
     captured = capsys.readouterr()
     assert sentence in captured.err
     assert "robot.toml" in captured.err
-    assert "In order" not in captured.out
+    assert "No problem found" not in captured.out
 
 
 def test_a_ready_posture_that_is_not_clear_is_said_and_the_import_is_kept(tmp_path, capsys):
     told = ["robot", "import", str(written(tmp_path, six_axis())), "--capsules", "1", "--out", str(tmp_path / "o")]
     assert main([*told, "--ready", "0,0,2.7,0,2.7,0"]) == 0
-    assert "mm in each other: choose another posture" in capsys.readouterr().out
+    assert "mm: choose another posture" in capsys.readouterr().out
     assert main(["robot", "check", str(tmp_path / "o")]) == 2
 
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli.run.opened import Opened
+from pretouch.cli.run.setup import OpenedRobot
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.session import simulated
+from pretouch.session.confirmations import Identity
 from pretouch.session.preflight import PreflightParams
 from pretouch.session.push import GuidedPush, PushParams
-from pretouch.session.remembered import Identity
 from pretouch.types import Mode
 
 BLIND = ("run", "--no-skin", "--profile", "blind", "--path", "hold")
@@ -44,9 +44,9 @@ def at_begin(monkeypatch, seconds, then):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--robot", "franka"), "name it with --ip"),
+        (("--robot", "franka"), "give it with --ip"),
         (("--ip", "127.0.0.1"), "--ip does not go with --robot simulated"),
-        (("--robot", "ros2"), "both --ros-sign and --ros-frame must be given"),
+        (("--robot", "ros2"), "needs both --ros-sign and --ros-frame"),
         (("--robot", "ros2", "--ros-sign", "on-robot", "--ip", "1.2.3.4"), "--ip does not go with --robot ros2"),
         (
             ("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--approach"),
@@ -78,7 +78,7 @@ def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys
 def test_a_recording_that_is_there_is_not_written_over(tmp_path, capsys):
     (tmp_path / "a.mcap").write_text("precious")
     assert cli.main([*BLIND, "--record", "a.mcap"]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "exists already" in capsys.readouterr().err
     assert (tmp_path / "a.mcap").read_text() == "precious"
 
 
@@ -107,7 +107,7 @@ def _no_pushes(monkeypatch):
 @pytest.mark.usefixtures("_no_pushes")
 def test_a_folder_that_is_made_for_a_recording_is_said(tmp_path, capsys):
     assert cli.main([*BLIND, "--seconds", "0.1", "--yes", "--record", "deep/er/a.mcap"]) == 0
-    assert "The folder deep/er was made for the recording." in capsys.readouterr().out
+    assert "The folder deep/er was created for the recording." in capsys.readouterr().out
     assert len(open_recording(tmp_path / "deep" / "er" / "a.mcap"))
 
 
@@ -118,9 +118,9 @@ def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path,
     known = Identity("test", "here", "nothing")
 
     def opened(arm, skin, _, *more, **named):
-        return Opened(arm, skin, known, *more, **named)
+        return OpenedRobot(arm, skin, known, *more, **named)
 
-    monkeypatch.setattr("pretouch.cli.run.robots.Opened", opened)
+    monkeypatch.setattr("pretouch.cli.run.robots.OpenedRobot", opened)
     assert cli.main([*BLIND, "--seconds", "0.1", "--yes"]) == 2
     shown = capsys.readouterr()
     assert "is damaged: delete it" in shown.err
@@ -150,12 +150,14 @@ def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tm
     for name in ("a", "b"):
         assert cli.main([*LEARNING, "--seconds", "2", "--record", f"{name}.mcap"]) == 0
         said = capsys.readouterr().out
-        assert ("Nothing is known yet" if name == "a" else "Free motion of this robot is known since") in said
+        assert (
+            "This robot's free motion is not known yet" if name == "a" else "Free motion of this robot is known since"
+        ) in said
         assert str(place) in said
         assert verify(open_recording(tmp_path / f"{name}.mcap")).agrees
     first, second = (open_recording(tmp_path / f"{name}.mcap")[0].snapshot for name in "ab")
-    assert not first.feel.sequential[0].model.weights.any()
-    assert second.feel.sequential[0].model.seen.sum() > 50
+    assert not first.detector.test.model.weights.any()
+    assert second.detector.test.model.seen.sum() > 50
     kept = place.read_text()
     assert cli.main([*LEARNING, "--seconds", "2", "--no-learnt"]) == 0
     assert place.read_text() == kept
@@ -166,7 +168,7 @@ def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tm
 def test_what_was_learnt_is_kept_after_ctrl_c_in_the_file_that_was_named(tmp_path, capsys, monkeypatch):
     at_begin(monkeypatch, 3.0, lambda _: os.kill(os.getpid(), signal.SIGINT))
     assert cli.main([*LEARNING, "--learnt", "arms/mine.toml"]) == 130
-    assert "Free motion is kept" in capsys.readouterr().out
+    assert "Free motion saved" in capsys.readouterr().out
     assert (tmp_path / "arms" / "mine.toml").exists()
     assert not (tmp_path / "state").exists()
 
@@ -177,7 +179,7 @@ def test_a_named_file_of_free_motion_must_be_one_and_the_profile_must_learn(tmp_
     assert "skin.toml cannot be used as --learnt" in capsys.readouterr().err
     assert (tmp_path / "skin.toml").read_text() == "[[unit]]\n"
     assert cli.main([*BLIND, "--learnt", "new.toml"]) == 2
-    assert "learns no free motion" in capsys.readouterr().err
+    assert "does not learn free motion" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("_no_pushes")
@@ -189,7 +191,7 @@ def test_an_approach_that_is_broken_off_is_reported_and_no_refusal(tmp_path, cap
     words = "--no-skin", "--profile", "blind", "--path", "line", "--approach", "--yes", "--record", "a.mcap"
     assert cli.main(["run", *words]) == 1
     said = capsys.readouterr().out
-    assert "The arm did not get to the start of its path." in said
+    assert "The arm did not reach the start of its path." in said
     assert "its power failed" in said
     assert "a.mcap holds 0 control steps" in said
     assert not list((tmp_path / "runs").glob("**/*"))
@@ -206,11 +208,11 @@ def test_an_arm_that_is_moved_while_a_person_is_asked_is_not_let_go(capsys, monk
         state = read(arm)
         return replace(state, q=state.q + sum(turned))
 
-    monkeypatch.setattr("pretouch.cli.run.command.demand_yes", asked)
+    monkeypatch.setattr("pretouch.cli.run.command.require_yes", asked)
     monkeypatch.setattr(simulated.SimulatedSessionArm, "read", moved)
     monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", pytest.fail)
     assert cli.main([*BLIND, "--seconds", "1"]) == 2
-    assert "The arm was moved since it was checked" in capsys.readouterr().err
+    assert "The arm moved after the checks" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("_no_pushes")
@@ -234,7 +236,7 @@ def test_without_a_terminal_nobody_lets_the_arm_move(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     assert cli.main([*BLIND, "--seconds", "1"]) == 2
     shown = capsys.readouterr()
-    assert "no terminal to ask at" in shown.err
+    assert "no terminal to ask for" in shown.err
     assert "HOLD" not in shown.out
 
 
@@ -303,6 +305,6 @@ def test_an_approach_leads_to_where_the_path_begins(tmp_path, capsys):
     words = "--no-skin", "--profile", "blind", "--path", "line", "--approach", "--seconds", "0.5", "--yes"
     assert cli.main(["run", *words, "--record", "a.mcap"]) == 0
     said = capsys.readouterr().out
-    assert "First the arm goes slowly" in said
+    assert "First the arm moves slowly" in said
     step = open_recording(tmp_path / "a.mcap")[0].step
     assert np.linalg.norm(step.ee_position - step.path_position) < 0.02

@@ -98,9 +98,9 @@ def test_a_stuck_unit_is_named(keys, port, tmp_path, capsys):
 def test_where_nothing_is_heard_the_way_out_is_said(keys, port, tmp_path, capsys):
     assert monitor(tmp_path, port, "--duration", "0.3") == 1
     said = capsys.readouterr().out
-    assert f"Nothing was heard at 127.0.0.1:{port}; only what runs on this machine is heard there" in said
+    assert f"Nothing was received at 127.0.0.1:{port}, which only programs on this machine can reach" in said
     assert "--host 0.0.0.0" in said
-    assert "wrist has not been heard" in said
+    assert "wrist has sent nothing so far" in said
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_units_with_other_keys_are_told_from_silent_ones(keys, port, tmp_path, c
     others = Keys([UnitKey("wrist", 1, new_key()), UnitKey("hand-1", 2, new_key())])
     with Desk(others, port):
         assert monitor(tmp_path, port, "--duration", "1") == 1
-    assert "with a wrong tag: another key, or a forgery" in capsys.readouterr().out
+    assert "with a wrong tag (another key, or a forgery)" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -128,7 +128,9 @@ def test_a_posture_tells_whether_units_agree_with_the_model(panda_model, paper_s
     assert code == 1
     said = capsys.readouterr().out
     assert "fault: hand_back reports 0.90 m where the model has the arm" in said
-    assert said.split("Nothing was heard")[0].count("where the model has the arm") == 2  # when it came, and at the end
+    assert (
+        said.split("Nothing was received")[0].count("where the model has the arm") == 2
+    )  # when it came, and at the end
 
 
 def test_a_terminal_shows_a_table_that_changes(keys, port, tmp_path, capsys, monkeypatch):
@@ -153,25 +155,25 @@ def test_a_disk_that_is_full_is_said_and_the_exit_code_tells_of_it(keys, port, t
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, handler)
     assert code == 1
-    assert "make room, then record again" in capsys.readouterr().out
+    assert "free some space, then record again" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (("--duration", "-1"), "The duration is -1 s"),
-        (("--duration", "nan"), "The duration is nan s"),
+        (("--duration", "-1"), "--duration is -1 s"),
+        (("--duration", "nan"), "--duration is nan s"),
         (("--units", "elbow"), "There is no key for elbow"),
         (("--units", "wrist", "--skin", "x.toml"), "Both --skin and --units are given"),
-        (("--posture", "0,0"), "A --posture needs --skin"),
+        (("--posture", "0,0"), "--posture needs --skin"),
         (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
-        (("--skin", str(PAPER_SKIN), "--posture", "99,0,0,-2,0,2,0"), "joint 1 at 99 rad, out of its range of -2.90"),
-        (("--keys", ""), "No file of keys is given: name one with --keys."),
-        (("--host", ""), "No address to listen at is given"),
+        (("--skin", str(PAPER_SKIN), "--posture", "99,0,0,-2,0,2,0"), "joint 1 at 99 rad, outside its range of -2.90"),
+        (("--keys", ""), "The file of keys is missing: name one with --keys."),
+        (("--host", ""), "The address to listen on is empty"),
         (("--keys", "/nowhere.toml"), "The keys in /nowhere.toml cannot be read"),
         (("--host", "no.such.host.invalid"), "no.such.host.invalid"),
         (("--port", "70000"), "70000"),
-        (("--record", "/nowhere/x.mcap"), "The folder /nowhere for the recording is not there"),
+        (("--record", "/nowhere/x.mcap"), "The folder /nowhere for the recording does not exist"),
         (("--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
     ],
 )
@@ -187,7 +189,7 @@ def test_a_port_that_is_taken_is_said(keys, port, tmp_path, capsys):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
         one.bind(("127.0.0.1", port))
         assert monitor(tmp_path, port, "--once") == 2
-    assert f"Port {port} of 127.0.0.1 is taken" in capsys.readouterr().err
+    assert f"Port {port} of 127.0.0.1 is in use" in capsys.readouterr().err
 
 
 def started(*args):
@@ -232,7 +234,7 @@ def test_keys_are_made_and_listed_without_being_shown(tmp_path, capsys):
     assert "c: number 3, key " in said
     assert not any(unit.key.hex() in said for unit in made.values())
     assert cli.main(["skin", "keys", "--keys", str(place), "--new", "b"]) == 2
-    assert "There is a key for b already" in capsys.readouterr().err
+    assert "b already has a key" in capsys.readouterr().err
     assert cli.main(["skin", "keys", "--keys", str(tmp_path / "none.toml")]) == 2
     assert "cannot be read" in capsys.readouterr().err
 
@@ -240,15 +242,15 @@ def test_keys_are_made_and_listed_without_being_shown(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (("--loss", "1.5"), "WayParams.loss is 1.5"),
+        (("--loss", "1.5"), "ChannelParams.loss is 1.5"),
         (("--port", "0"), "The receiver's port is 0"),
         (("--profile", "brave"), "The profile 'brave' is unknown"),
-        (("--stuck", "elbow"), "There is no unit elbow"),
+        (("--stuck", "elbow"), "Unknown unit elbow"),
         (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--duration", "-2"), "-2"),
         (("--seed", "-1"), "SimulateOptions.seed is -1: it must be at least 0."),
-        (("--host", ""), "No receiver is given"),
-        (("--keys", ""), "No file of keys is given: name one with --keys."),
+        (("--host", ""), "The receiver's address is empty"),
+        (("--keys", ""), "The file of keys is missing: name one with --keys."),
     ],
 )
 def test_a_simulation_that_makes_no_sense_is_refused(tmp_path, capsys, more, words):
@@ -276,5 +278,5 @@ def test_simulated_units_are_heard_by_the_monitor_with_the_keys_that_were_made(t
     assert "Traceback" not in err
     said = capsys.readouterr().out
     assert "6 of 7 units live" in said
-    assert "fault: hand_left has not been heard" in said
-    assert "of its samples on their way (limit 15%)" in said
+    assert "fault: hand_left has sent nothing so far" in said
+    assert "of its samples in transmission (limit 15%)" in said

@@ -11,7 +11,7 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.calibrate import live
-from pretouch.foreign.joints import read_joints
+from pretouch.imported_data.joints import read_joints
 from pretouch.robot.self_distance import capsule_ends, kinematics_of
 from pretouch.serving.simulated_arm import SimulatedArm
 
@@ -26,23 +26,23 @@ def calibrate(*words):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "Nothing says what to calibrate from: give --recording FILE, --plan FILE, or --robot ARM."),
-        (("--keys", "k.toml"), "Nothing says what to calibrate from"),
+        ((), "The source of the calibration is missing: give --recording FILE, --plan FILE, or --robot ARM."),
+        (("--keys", "k.toml"), "The source of the calibration is missing"),
         (("--plan", "m.csv", "--robot", "simulated"), "--plan and --robot are given: choose one of them."),
         (("--recording", "x.mcap", "--keys", "k"), "--keys does not go with --recording: leave it out."),
         (("--recording", "x.mcap", "--duration", "30"), "--duration does not go with --recording"),
         (("--recording", "x.mcap", "--seed", "1"), "--seed does not go with --recording"),
         (("--plan", "m.csv", "--units-port", "1"), "--units-port does not go with --plan"),
         (("--robot", "simulated", "--joints", "x"), "--joints does not go with --robot"),
-        (("--recording", "/nowhere.mcap"), "The recording /nowhere.mcap cannot be read: there is none."),
+        (("--recording", "/nowhere.mcap"), "The recording /nowhere.mcap cannot be read: it does not exist."),
         (("--recording", "x.mcap", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--recording", "x.mcap", "--out", "/dev/null/x.toml"), "/dev/null/x.toml cannot be written"),
         (("--recording", "x.mcap", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
         (("--plan", "m.csv", "--duration", "100"), "PlanParams.duration_s is 100.0: it must be at most 90"),
         (("--plan", "/dev/null/m.csv"), "/dev/null/m.csv cannot be written"),
-        (("--robot", "fr3", "--out", "s.toml"), "The arm 'fr3' cannot be moved from here: choose simulated"),
-        (("--robot", "simulated"), "No skin file to write is given: name one with --out."),
-        (("--robot", "simulated", "--out", "s.toml"), "No file of keys is given: name one with --keys."),
+        (("--robot", "fr3", "--out", "s.toml"), "--robot 'fr3' is not supported: choose simulated"),
+        (("--robot", "simulated"), "--out is missing: name the skin file to write."),
+        (("--robot", "simulated", "--out", "s.toml"), "The file of keys is missing: name one with --keys."),
         (("--robot", "simulated", "--out", "s.toml", "--keys", "k.toml", "--units-host", ""), "--units-host is empty"),
         (("--robot", "simulated", "--out", "s.toml", "--record", "/dev/null/x.mcap"), "x.mcap cannot be written"),
     ],
@@ -68,7 +68,7 @@ def test_files_that_are_there_are_not_written_over_unasked(tmp_path, capsys):
         ("--robot", "simulated", "--keys", "k.toml", "--out", tmp_path / "s.toml", "--record", there),
     ):
         assert calibrate(*words) == 2
-        assert f"{there} is there already: give another name, or --replace." in capsys.readouterr().err
+        assert f"{there} exists already: give another name, or --replace." in capsys.readouterr().err
     assert there.read_text() == "mine"
 
 
@@ -99,7 +99,7 @@ def test_no_file_is_written_over_another_one_of_the_same_command(tmp_path, monke
 
 def test_a_table_is_no_recording_of_units(tmp_path, capsys):
     assert calibrate("--recording", tmp_path / "joints.csv") == 2
-    assert "give that with --recording, and joint states with --joints." in capsys.readouterr().err
+    assert "give the recording with --recording, and joint states with --joints." in capsys.readouterr().err
 
 
 def test_a_port_that_is_taken_is_said_before_anything_is_planned(tmp_path, capsys):
@@ -109,7 +109,7 @@ def test_a_port_that_is_taken_is_said_before_anything_is_planned(tmp_path, capsy
         files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml")
         assert calibrate("--robot", "simulated", *files, "--units-port", port) == 2
     told = capsys.readouterr()
-    assert f"Port {port} of 127.0.0.1 is taken" in told.err
+    assert f"Port {port} of 127.0.0.1 is in use" in told.err
     assert "planned" not in told.out
 
 
@@ -120,16 +120,16 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
         monkeypatch.setattr("builtins.input", lambda question, answer=answer: answer)
         assert calibrate("--robot", "simulated", *files) == 2
         told = capsys.readouterr()
-        assert "The arm needs the room x" in told.out
-        assert "Nobody may be within the arm's reach" in told.out
-        assert "The arm was not moved: answer y to let it." in told.err
+        assert "The arm needs the space x" in told.out
+        assert "While the arm moves, nobody may be within its reach" in told.out
+        assert "The arm was not moved: answer y to allow it." in told.err
 
     def nobody(_question):
         raise EOFError
 
     monkeypatch.setattr("builtins.input", nobody)
     assert calibrate("--robot", "simulated", *files) == 2
-    assert "There is no terminal to ask at whether the arm may move: give --yes." in capsys.readouterr().err
+    assert "There is no terminal to ask for permission to move the arm: give --yes." in capsys.readouterr().err
     assert [place.name for place in tmp_path.iterdir()] == ["k.toml"]
 
 
@@ -140,13 +140,13 @@ def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_pa
     files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml", "--units-port", 0)
     assert calibrate("--robot", "simulated", *files, "--duration", 45) == 2
     said = capsys.readouterr().out
-    told = re.search(r"the way to its start takes (\d+) s and needs the room x (\S+) to .*, y (\S+) to", said)
+    told = re.search(r"moving to its start takes (\d+) s and needs the space x (\S+) to .*, y (\S+) to", said)
     assert told
     assert abs(int(re.findall(r"\d+", questions[0])[0]) - 45 - int(told[1])) <= 1
     body = panda_model.capsules
     ends = capsule_ends(panda_model, kinematics_of(panda_model, (panda_model.description.q_ready + ASIDE)[None]))
     assert float(told[3]) < (ends - body.radius[:, None, None])[..., 1].min() + 0.01
-    assert float(told[3]) < float(re.search(r"The arm needs the room .*, y (\S+) to", said)[1])
+    assert float(told[3]) < float(re.search(r"The arm needs the space .*, y (\S+) to", said)[1])
 
 
 def elsewhere(options, q, *words, **more):
@@ -171,7 +171,7 @@ def test_the_motion_is_written_for_another_driver_with_what_it_is_good_for(panda
     place = tmp_path / "motion.csv"
     assert calibrate("--plan", place, "--duration", 45) == 0
     said = capsys.readouterr().out
-    assert said.index("45 s, ") < said.index("The arm needs the room") < said.index("Let nobody be within")
+    assert said.index("45 s, ") < said.index("The arm needs the space") < said.index("Keep everybody out of")
     assert "panda_link1       not where along the axis" in said
     with place.open() as file:
         rows = list(csv.reader(file))
@@ -187,7 +187,7 @@ def test_the_motion_is_written_for_another_driver_with_what_it_is_good_for(panda
 def test_a_rehearsal_ends_with_its_motion_and_takes_no_duration(tmp_path, capsys):
     words = ("--keys", tmp_path / "k.toml", "--calibration-joints", tmp_path / "j.mcap", "--duration", 5)
     assert cli.main(["skin", "simulate", *map(str, words)]) == 2
-    assert "--duration does not go with --calibration-joints" in capsys.readouterr().err
+    assert "--duration cannot be combined with --calibration-joints" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

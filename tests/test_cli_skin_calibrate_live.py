@@ -15,12 +15,11 @@ from scipy.spatial.transform import Rotation
 from pretouch import cli
 from pretouch.cli.calibrate import live
 from pretouch.cli.calibrate.session import Session
-from pretouch.cli.ending import Terminated, ends_raise, exit_code
 from pretouch.errors import HardwareError, RecordingError
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.sensing.skin import load_skin
-from pretouch.signals import noted_in_motion
+from pretouch.signals import Terminated, ends_raise, exit_code, noted_in_motion
 from pretouch.types import RobotState
 from tests.calibrated_arm import swinging
 from tests.ports import free_port
@@ -87,7 +86,7 @@ def session(panda_model):
 
 
 def test_units_that_are_not_heard_are_named_before_the_arm_moves(session):
-    with pytest.raises(HardwareError, match=r"^b is not heard at 127\.0\.0\.1:5: see `pretouch skin monitor`"):
+    with pytest.raises(HardwareError, match=r"^No data from b at 127\.0\.0\.1:5: check with `pretouch skin monitor`"):
         session.wait_for_units()
 
 
@@ -186,8 +185,8 @@ def test_how_to_calibrate_from_the_recording_is_said_before_the_motion_and_after
         f" --json {taken} --replace\n"
     )
     before, after = capsys.readouterr().out.split("It moves.\n")
-    assert before.endswith(f"All that is measured is kept in skin-calibration-2.mcap. To calibrate from it: {command}")
-    assert after.endswith(f"What was measured is in skin-calibration-2.mcap. To calibrate from it: {command}")
+    assert before.endswith(f"All measurements are recorded in skin-calibration-2.mcap. To calibrate from it: {command}")
+    assert after.endswith(f"The measurements are in skin-calibration-2.mcap. To calibrate from it: {command}")
 
 
 @pytest.mark.slow

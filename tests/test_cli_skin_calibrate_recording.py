@@ -94,8 +94,8 @@ def test_an_offset_of_clocks_that_one_unit_alone_tells_is_said_to_be_so(recorded
     monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, units=alone, complete=False))
     assert calibrate("--recording", "units.mcap", "--joints", recorded / "joints.csv") == 0
     said = capsys.readouterr().out
-    assert "Only hand_left tells that: no other unit agrees with it" in said
-    assert "units.mcap was not ended in order, or is damaged: what can be read of it is used." in said
+    assert "Only hand_left shows this: no other unit agrees with it" in said
+    assert "units.mcap is incomplete or damaged: the readable part is used." in said
 
 
 def test_a_skin_that_is_wrong_about_a_link_keeps_that_unit_as_it_was(panda_model, skin, recorded, tmp_path, capsys):
@@ -109,7 +109,7 @@ def test_a_skin_that_is_wrong_about_a_link_keeps_that_unit_as_it_was(panda_model
     assert f"{old} does not name forearm_left: their links are found." in said
     assert "hand_left is refused: It is said to sit on panda_link6" in said
     assert "lost is refused: It sent no IMU samples" in said
-    assert "As they were before, and not calibrated: lost, hand_left." in said
+    assert "Kept as before, without calibration: lost, hand_left." in said
     made = load_skin(out, panda_model)
     assert made.ids == ("lost", "hand_left", "hand_front", "forearm_left")
     np.testing.assert_allclose(made.T_link_sensor[:2], believed.T_link_sensor[:2], atol=1e-9)
@@ -162,6 +162,6 @@ def test_nothing_is_written_where_no_unit_is_good(recorded, tmp_path, capsys, mo
 
 def test_joint_states_of_another_arm_are_refused(recorded, capsys):
     assert calibrate("--recording", recorded / "units.mcap", "--topic", "/joint_states") == 2
-    assert "A --topic needs --joints" in capsys.readouterr().err
+    assert "--topic needs --joints" in capsys.readouterr().err
     assert calibrate("--recording", recorded / "units.mcap", "--arm", "fr3") == 2
     assert "has no states of fr3_joint1" in capsys.readouterr().err

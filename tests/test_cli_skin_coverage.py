@@ -14,8 +14,9 @@ def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model
     told += ["--suggest", "2", "--out", str(skin), "--figure", str(figure), "--json", str(numbers)]
     assert main(told) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    for part in ("Seen in time: panda, 4 postures of circle", "whole arm", "into view 0.37 m", "forearm_left",
-                 "Blind spots, less than 10 % of the ways seen:", "panda_link2, its back, ", " cm^2", "2 more units:",
+    for part in ("Seen in time: panda, 4 postures of circle", "whole arm", "be seen 0.37 m", "forearm_left",
+                 "Blind spots, with less than 10 % of the paths seen:", "panda_link2, its back, ", " cm^2",
+                 "2 more units:",
                  "suggested_2", f"Skin: {skin}", f"Figure: {figure}"):  # fmt: skip
         assert part in printed
     assert load_skin(skin, panda_model).ids[-2:] == ("suggested_1", "suggested_2")
@@ -28,7 +29,7 @@ def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model
     areas = [spot["area_m2"] for spot in found["blind_spots"]]
     assert areas == sorted(areas, reverse=True)
     assert main(told) == 2
-    assert "is there already: give another name, or --replace" in capsys.readouterr().err
+    assert "exists already: give another name, or --replace" in capsys.readouterr().err
 
 
 def test_an_imported_arm_has_its_own_skin(tmp_path, capsys):
@@ -44,16 +45,16 @@ def test_an_imported_arm_has_its_own_skin(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--out", "x.toml"], "say how many with --suggest"),
-        (["--suggest", "-1"], "-1 more units are asked for: give 1 or more"),
-        (["--figure", "arm.gif"], "ends in none of .png, .pdf, .svg"),
-        (["--speed", "3"], "before it touches, but ways are 0.8 m long: give slower speeds"),
+        (["--out", "x.toml"], "give their number with --suggest"),
+        (["--suggest", "-1"], "--suggest is -1: give 1 or more"),
+        (["--figure", "arm.gif"], "has an unknown format: use one of the endings .png, .pdf, .svg"),
+        (["--speed", "3"], "before contact, but the paths are only 0.8 m long: give lower speeds"),
         (["--seed", "-1"], "The seed is -1: give 0 or more"),
         (["--workspace", "moon"], "The workspace is 'moon': give circle"),
-        (["--suggest", "400", "--postures", "2"], "400 more units are asked for, and"),
+        (["--suggest", "400", "--postures", "2"], "400 more units were requested, but only"),
         (["no-such.toml"], "The skin file no-such.toml cannot be read"),
         (["--arm", "no-such-arm"], "no-such-arm"),
-        (["--json", "a.json", "--figure", "a.json/b.png"], "would take the place of another file"),
+        (["--json", "a.json", "--figure", "a.json/b.png"], "is also another input or output file"),
     ],
 )
 def test_what_cannot_be_done_is_said(more, said, tmp_path, capsys, monkeypatch):
@@ -66,5 +67,5 @@ def test_the_skin_file_that_is_read_is_never_written(tmp_path, capsys):
     mine = tmp_path / "mine.toml"
     mine.write_text(PAPER_SKIN.read_text())
     assert main(["skin", "coverage", str(mine), "--suggest", "1", "--out", str(mine), "--replace"]) == 2
-    assert "would take the place of another file" in capsys.readouterr().err
+    assert "is also another input or output file" in capsys.readouterr().err
     assert mine.read_text() == PAPER_SKIN.read_text()

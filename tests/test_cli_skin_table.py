@@ -7,14 +7,14 @@ import pytest
 from rich.console import Console
 
 from pretouch.cli.skin_table import table
-from pretouch.hardware.health import Counts, Standing, unit_health
+from pretouch.hardware.health import Counts, UnitStatus, unit_health
 from pretouch.types import RangeStatus
 from tests.hardware.traffic import NOW, heard, traffic
 
 
 def unit(state="live", **changes):
     """A unit with the widest numbers there are."""
-    made = unit_health("hand_right", heard(), NOW, Standing.of(traffic()), Counts(500))
+    made = unit_health("hand_right", heard(), NOW, UnitStatus.of(traffic()), Counts(500))
     standing = replace(made.standing, state=state, bound=0.01234)
     return replace(made, latency_s=0.1042, loss=1.0, temperature_c=-20.1, standing=standing, **changes)
 

@@ -6,8 +6,8 @@ import pytest
 from pretouch import loop
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 

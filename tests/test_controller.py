@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.controller import Controller
-from pretouch.params import PROFILES, Profile
-from pretouch.profiles import with_restriction
+from pretouch.profiles import PROFILES, Profile, with_restriction
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, QpOutcome
@@ -129,7 +128,7 @@ def test_the_arm_moves_the_way_it_is_pushed(arm: Arm, axis: int, sign: float):
 
 @pytest.mark.parametrize(("compare", "cycle"), [("raw", 0), ("filtered", 2)])
 def test_when_a_push_is_felt(panda_model: RobotModel, paper_skin: Skin, compare: str, cycle: int):
-    arm = Arm(panda_model, paper_skin, replace(PAPER, threshold=replace(PAPER.threshold, compare=compare)))
+    arm = Arm(panda_model, paper_skin, replace(PAPER, detect=replace(PAPER.detect, compare=compare)))
     arm.run(110)
     steps = arm.run(4, force=(0.0, -50.0, 0.0))
     # filtered: eq. 8 lets -5, -9.5, -13.55 N in; the lower threshold is then at -11.99 N (see test_detect)

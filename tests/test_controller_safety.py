@@ -7,15 +7,14 @@ import pytest
 
 from pretouch.control.path import Circle, Path, line
 from pretouch.controller import Controller
-from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import with_restriction
+from pretouch.profiles import PROFILES, Profile, with_restriction
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, RangeStatus, RobotState
 
 DT = 0.01
-SHORT = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=5))
+SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
 HARD = with_restriction(SHORT, "hard")
 FAULTS = [
     "q", "qd", "q_commanded", "qd_commanded", "wrench", "no wrench", "robot stamp", "step stamp", "stale", "backwards",
@@ -255,7 +254,7 @@ def test_a_blocked_arm_brakes_and_tries_again_at_each_step(panda_model: RobotMod
 
 
 def test_a_blocked_reaction_stays_one(panda_model: RobotModel, paper_skin: Skin):
-    arm = Arm(panda_model, paper_skin, replace(HARD, threshold=replace(HARD.threshold, compare="raw")))
+    arm = Arm(panda_model, paper_skin, replace(HARD, detect=replace(HARD.detect, compare="raw")))
     for _ in range(20):
         arm.step(arm.inputs())
     for _ in range(30):

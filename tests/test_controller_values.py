@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.controller import Controller
 from pretouch.errors import RobotStateError
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, Mode, RangeReadings

@@ -11,15 +11,15 @@ from pretouch import loop
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import RobotStateError
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
 
 DT = 0.01
 PAPER = PROFILES["paper"]
-PROFILE = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=2))
+PROFILE = replace(PAPER, window=replace(PAPER.window, samples=2))
 
 
 class World:
@@ -250,10 +250,8 @@ def test_a_latched_hold_goes_on_when_resume_says_so(controller: Controller, worl
         world.broken = count == 30
 
     recorder = FakeRecorder(on_step=break_down)
-    loop.run(
-        controller, world, world.skin(), world, recorder, lambda step: step.stamp >= 0.8,
-        resume=lambda: asked and len(recorder.steps) == 60,
-    )  # fmt: skip
+    options = loop.Options(resume=lambda: asked and len(recorder.steps) == 60)
+    loop.run(controller, world, world.skin(), world, recorder, lambda step: step.stamp >= 0.8, options)
     modes = [step.mode for step in recorder.steps]
     assert set(modes[30:60]) == {Mode.HOLD}
     assert set(modes[60:]) == {Mode.TRACK if asked else Mode.HOLD}

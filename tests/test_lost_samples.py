@@ -10,8 +10,8 @@ from pretouch import loop
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
@@ -22,7 +22,7 @@ PAPER = PROFILES["paper"]
 BRISK = replace(
     PAPER,
     task=replace(PAPER.task, acceleration_m_s2=50.0, speed_m_s=0.8),
-    threshold=replace(PAPER.threshold, window_samples=20),
+    window=replace(PAPER.window, samples=20),
 )
 
 

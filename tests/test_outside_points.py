@@ -7,8 +7,8 @@ import pytest
 
 from pretouch.control.braking import slots_init, widened
 from pretouch.faults import MOST_POINTS, sound_points
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.realtime import warm_up
 from pretouch.recording.codec import decode_points, encode_points
 from pretouch.recording.messages import decoded, encoded

@@ -6,26 +6,29 @@ from dataclasses import fields, replace
 
 import pytest
 
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.braking_curve import BrakingCurve
-from pretouch.control.restriction import ApproachRestriction
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
-    PROFILES,
+    ClampParams,
     FailureParams,
+    GiveUpParams,
     PerceptionParams,
-    Profile,
-    ReactionParams,
+    PinchParams,
     RestrictionParams,
     SpeedReduction,
     TaskParams,
     ThresholdParams,
-    profile,
+    WindowParams,
 )
-from pretouch.profiles import restriction_mode, restriction_modes, with_restriction
+from pretouch.profiles import PROFILES, Profile, profile, restriction_mode, restriction_modes, with_restriction
 
 SETS = [
-    PerceptionParams(), TaskParams(), SpeedReduction(), RestrictionParams(), ThresholdParams(), ReactionParams(),
-    FailureParams(),
+    PerceptionParams(), TaskParams(), SpeedReduction(), RestrictionParams(), ThresholdParams(), FailureParams(),
+    DecayingVelocity(), Admittance(), ClampParams(), PinchParams(), GiveUpParams(),
 ]  # fmt: skip
 NUMBERS = [
     (s, f.name)
@@ -44,21 +47,21 @@ def name_of(value: object) -> str:
 def test_the_paper_profile_is_table_i():
     p = profile("paper")
     # d_max appears in eqs. 3, 4 and in eq. 11
-    assert (p.slow.d_max_m, p.threshold.d_max_m) == (0.8, 0.8)
-    assert p.threshold.d_min_m == 0.05
+    assert (p.slow.d_max_m, p.detect.d_max_m) == (0.8, 0.8)
+    assert p.detect.d_min_m == 0.05
     # 200 cycles at 100 Hz
     assert (p.task.restore_cycles, p.task.control_period_s) == (200, 0.01)
     assert p.approach.v_max_m_s == 0.04
     assert p.approach.d_repulse_m == 0.1
     assert p.approach.d_crit_m == 0.1
     assert p.approach.d_notice_m == 0.6
-    assert p.threshold.alpha == 0.1
+    assert p.window.alpha == 0.1
     assert p.approach.beta == -10
-    assert p.threshold.lambda_ == 0.75
-    assert p.threshold.f_std_n == 3
-    assert p.threshold.f_d_n == 4
-    assert p.threshold.f_base_n == 10
-    assert p.threshold.sigma_max_n == 3
+    assert p.window.lambda_ == 0.75
+    assert p.detect.f_std_n == 3
+    assert p.detect.f_d_n == 4
+    assert p.detect.f_base_n == 10
+    assert p.detect.sigma_max_n == 3
     # IV-A: trajectories at 0.3 m/s
     assert p.task.speed_m_s == 0.3
 
@@ -123,9 +126,9 @@ def test_values_that_contradict_each_other_are_refused(params: object, change: d
 
 
 def test_fractions_end_at_one():
-    assert ThresholdParams(alpha=1.0).alpha == 1.0
+    assert WindowParams(alpha=1.0).alpha == 1.0
     with pytest.raises(ParameterError, match=r"alpha is 1\.1: it must be at most 1"):
-        ThresholdParams(alpha=1.1)
+        WindowParams(alpha=1.1)
 
 
 def test_parameters_are_frozen():
@@ -142,17 +145,18 @@ def test_a_bad_value_is_a_value_error_and_one_of_ours():
 def test_ablations_take_one_use_of_proximity_away():
     paper = profile("paper")
     slowing, moving = profile("slowing-only"), profile("thresholds-only")
-    assert slowing.threshold.f_d_n == 0.0
-    assert replace(slowing, name="paper", threshold=paper.threshold) == paper
+    assert slowing.detect.f_d_n == 0.0
+    assert replace(slowing, name="paper", detect=paper.detect) == paper
     assert moving.slow is None
     assert replace(moving, name="paper", slow=paper.slow) == paper
 
 
 def test_a_profile_is_varied_by_its_name():
-    name = "paper:threshold.window_samples=500:reduction.enabled=no:threshold.compare=raw:restriction.beta=-20"
+    name = "paper:window.samples=500:reduction.enabled=no:detect.compare=raw:restriction.beta=-20"
     varied = profile(name)
     assert varied.name == name
-    assert varied.threshold == ThresholdParams(window_samples=500, compare="raw")
+    assert varied.window == WindowParams(samples=500)
+    assert varied.detect == MovingThresholds(compare="raw")
     assert varied.slow is None
     assert varied.approach == ApproachRestriction(beta=-20.0)
     assert varied.task == profile("paper").task
@@ -201,9 +205,9 @@ def test_a_value_that_may_be_none_is_checked_if_it_is_not(value: object, problem
 
 
 def test_the_order_of_changes_does_not_matter():
-    one = profile("paper:threshold.f_base_n=3:threshold.f_d_n=2")
+    one = profile("paper:detect.f_base_n=3:detect.f_d_n=2")
     other = profile("paper:threshold.f_d_n=2:threshold.f_base_n=3")
-    assert one.threshold == other.threshold == ThresholdParams(f_base_n=3.0, f_d_n=2.0)
+    assert one.detect == other.detect == MovingThresholds(f_base_n=3.0, f_d_n=2.0)
 
 
 @pytest.mark.parametrize(
@@ -218,10 +222,15 @@ def test_the_order_of_changes_does_not_matter():
         ("paper:name=x", "The group 'name' of 'name=x' is unknown"),
         ("paper:task.speed_m_s=fast", "task.speed_m_s is 'fast': write a number"),
         ("paper:task.speed_m_s=-1", "TaskParams.speed_m_s is -1.0: it must be greater than 0"),
-        ("paper:threshold.window_samples=10.5", "threshold.window_samples is '10.5': write a whole number"),
+        ("paper:threshold.window_samples=10.5", "window.samples is '10.5': write a whole number"),
         ("paper:reduction.enabled=0", "reduction.enabled is '0': choose from yes, no"),
         ("paper:restriction.mode=firm", "restriction.mode is 'firm': choose from off, hard, slack, floor, braking"),
-        ("paper:threshold.d_max_m=nan", "ThresholdParams.d_max_m is nan: it must be finite"),
+        ("paper:detect.d_max_m=nan", "MovingThresholds.d_max_m is nan: it must be finite"),
+        ("paper:detect=magic", "There is no Detector called 'magic': choose from thresholds, sequential, fixed"),
+        ("paper:detect.cues=touch", "The parameter 'detect.cues' is unknown: choose from f_base_n"),
+        ("paper:detection.use_touch=maybe", "detection.use_touch is 'maybe': choose from yes, no"),
+        ("pretouch:detect.localise=none:detect.localise.force_n=3", "detect.localise is none: choose it first"),
+        ("pretouch:detect.cues=smell", "There is no Cue called 'smell': choose from touch, imu"),
     ],
 )
 def test_a_variation_that_cannot_be_is_refused(name, words):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.window import WindowState, add, window_init
+from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.errors import ParameterError
-from pretouch.params import PROFILES, Profile, ThresholdParams, at_rate
+from pretouch.profiles import PROFILES, Profile, at_rate
 
 PAPER = PROFILES["paper"]
 
@@ -17,7 +17,7 @@ def test_what_is_counted_in_cycles_lasts_as_long(rate: float):
     fast = at_rate(PAPER, rate)
     assert fast.task.control_period_s == pytest.approx(1 / rate)
     for counted in (
-        lambda p: p.task.restore_cycles, lambda p: p.threshold.window_samples, lambda p: p.reaction.decay_cycles,
+        lambda p: p.task.restore_cycles, lambda p: p.window.samples, lambda p: p.react.decay_cycles,
     ):  # fmt: skip
         assert counted(fast) * fast.task.control_period_s == pytest.approx(counted(PAPER) * 0.01)
 
@@ -27,8 +27,8 @@ def test_all_else_stays():
     back = replace(
         fast,
         task=replace(fast.task, control_period_s=0.01, restore_cycles=200),
-        threshold=replace(fast.threshold, window_samples=100, alpha=0.1),
-        reaction=replace(fast.reaction, decay_cycles=200),
+        window=replace(fast.window, samples=100, alpha=0.1),
+        react=replace(fast.react, decay_cycles=200),
     )
     assert back == PAPER
     assert at_rate(PAPER, 100.0) == PAPER
@@ -36,12 +36,12 @@ def test_all_else_stays():
 
 def pushed(profile: Profile, seconds: float, force: float = 100.0) -> float:
     """The newest value in a window that was filled with no force, after a push of `seconds` [N]."""
-    t: ThresholdParams = profile.threshold
-    window: WindowState = window_init(t.window_samples)
-    for _ in range(t.window_samples):
-        window = add(window, np.zeros(3), t.alpha, t.lambda_)
+    p = profile.window
+    window: WindowState = window_init(p.samples)
+    for _ in range(p.samples):
+        window = add_force(window, np.zeros(3), p)
     for _ in range(round(seconds / profile.task.control_period_s)):
-        window = add(window, np.full(3, force), t.alpha, t.lambda_)
+        window = add_force(window, np.full(3, force), p)
     return float(window.newest[0])
 
 
@@ -52,19 +52,19 @@ def test_a_push_enters_the_window_as_fast():
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0])
 def test_weights_at_the_ends_of_their_range_stay(alpha: float):
-    profile = replace(PAPER, threshold=replace(PAPER.threshold, alpha=alpha))
-    assert at_rate(profile, 1000.0).threshold.alpha == alpha
+    profile = replace(PAPER, window=replace(PAPER.window, alpha=alpha))
+    assert at_rate(profile, 1000.0).window.alpha == alpha
 
 
 def test_counts_stay_whole_and_large_enough():
     few = replace(
         PAPER,
         task=replace(PAPER.task, restore_cycles=1),
-        threshold=replace(PAPER.threshold, window_samples=2),
-        reaction=replace(PAPER.reaction, decay_cycles=1),
+        window=replace(PAPER.window, samples=2),
+        react=replace(PAPER.react, decay_cycles=1),
     )
     slow = at_rate(few, 25.0)
-    assert (slow.task.restore_cycles, slow.threshold.window_samples, slow.reaction.decay_cycles) == (1, 2, 1)
+    assert (slow.task.restore_cycles, slow.window.samples, slow.react.decay_cycles) == (1, 2, 1)
 
 
 @pytest.mark.parametrize("rate", [20.0, 0.0, -1000.0, float("nan"), float("inf")])

@@ -19,8 +19,8 @@ from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, MonotonicClock
-from pretouch.params import PROFILES, at_rate
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, RangeReadings, RobotState
@@ -31,11 +31,17 @@ FAST = at_rate(PROFILES["paper"], 1000.0)
 
 @pytest.fixture(autouse=True)
 def collector() -> Iterator[None]:
-    gc.unfreeze()
     gc.enable()
     yield
     assert gc.isenabled()
+
+
+@pytest.fixture
+def nothing_frozen() -> Iterator[None]:
+    """Undo what `tests.conftest` freezes for as long as a test looks at that."""
     gc.unfreeze()
+    yield
+    gc.freeze()
 
 
 @pytest.fixture
@@ -48,6 +54,7 @@ def at_rest(model: RobotModel, stamp: float = 0.0) -> RobotState:
     return RobotState(stamp, q, zero, q, zero, zero, np.zeros(6))
 
 
+@pytest.mark.usefixtures("nothing_frozen")
 def test_nothing_is_collected_meanwhile():
     with realtime.real_time() as missing:
         assert not gc.isenabled()
@@ -57,6 +64,7 @@ def test_nothing_is_collected_meanwhile():
     assert missing == () or sys.platform != "linux"
 
 
+@pytest.mark.usefixtures("nothing_frozen")
 def test_the_collector_comes_back_after_an_error():
     with pytest.raises(RuntimeError, match="lost"), realtime.real_time():
         raise RuntimeError("lost")
@@ -64,6 +72,7 @@ def test_the_collector_comes_back_after_an_error():
     assert gc.get_freeze_count() == 0
 
 
+@pytest.mark.usefixtures("nothing_frozen")
 def test_a_collector_somebody_switched_off_and_froze_stays_so():
     gc.disable()
     gc.freeze()
@@ -211,10 +220,9 @@ def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypat
         monkeypatch.setattr(os, "sched_setaffinity", refuse)
     clock, told = MonotonicClock(0.001), []
     arm = Arm(controller)
-    realtime.run(
-        controller, arm, NoReadings(arm.units), clock, arm, lambda step: len(arm.steps) == 20,
-        cpu=0 if sys.platform != "linux" else min(os.sched_getaffinity(0)), tell=told.append,
-    )  # fmt: skip
+    cpu = 0 if sys.platform != "linux" else min(os.sched_getaffinity(0))
+    options = realtime.Options(cpu=cpu, tell=told.append)
+    realtime.run(controller, arm, NoReadings(arm.units), clock, arm, lambda step: len(arm.steps) == 20, options)
     assert len(told) == 1
     assert arm.collecting == [False] * 20
     assert clock.timing().cycles == 20

@@ -8,11 +8,10 @@ import pytest
 from pretouch.controller import Controller
 from pretouch.faults import sound_touch
 from pretouch.loop import turn
-from pretouch.params import PROFILES, profile
 from pretouch.ports import touch_of
+from pretouch.profiles import PROFILES, profile
 from pretouch.recording.messages import own_definition
 from pretouch.recording.reader import open_recording
-from pretouch.recording.state_codec import STATE, decode_state, encode_state
 from pretouch.recording.verify import verify
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
@@ -125,7 +124,7 @@ def test_without_sensors_in_the_skin_or_without_the_switch_no_bit_changes(panda_
         assert all(
             same(replace(a, reason=""), replace(b, reason="")) for a, b in zip(plain.steps, found.steps, strict=True)
         )
-    assert not PROFILES["paper"].detection.use_touch
+    assert not PROFILES["paper"].detect.reads
 
 
 def test_touch_readings_that_do_not_fit_hold_the_arm_and_say_so(panda_model, feeling):
@@ -195,7 +194,7 @@ def test_a_recording_with_touch_is_recomputed_to_the_bit(panda_model, feeling, t
     found = verify(kept)
     assert found.exact
     assert found.agrees
-    assert run.cycles[-1].after.touch[0].account.any()
+    assert run.cycles[-1].after.detector.cues[0].account.any()
 
 
 def test_touch_that_fits_no_message_is_said_to_be_missing(panda_model, feeling, tmp_path):
@@ -216,24 +215,6 @@ def test_without_touch_nothing_of_it_is_written(panda_model, paper_skin, tmp_pat
     assert own_definition("Touch").encode() not in data
 
 
-def test_a_state_that_an_older_version_recorded_is_read(panda_model, feeling):
-    """It has no account of touches: the controller begins with an empty one where it needs one."""
-    from pretouch.recording.messages import decoded, encoded
-
-    run = Run(controller_of(panda_model, feeling, OURS))
-    message = decoded(STATE, encode_state(0, run.state, True))
-    (at,) = [i for i, name in enumerate(message.name) if name == "touch"]
-    older = [i for i, name in enumerate(message.name) if not name.startswith(("touch", "impact", "outside"))]
-    assert at == len(older)
-    for part in ("name", "kind", "shape"):
-        setattr(message, part, [getattr(message, part)[i] for i in older])
-    message.numbers = message.numbers[:-7]
-    _, state = decode_state(encoded(STATE, message))
-    assert state.touch == ()
-    _, after = run.controller.step(state, replace(run.inputs(), touch=readings(7, 0.0, (0,))))
-    assert after.touch[0].account.tolist() == [0.01, *[0.0] * 6]
-
-
 def test_another_arm_feels_as_well(tmp_path):
     from pretouch.robot.model import RobotModel
     from pretouch.sensing.unit import SensorUnit
@@ -242,4 +223,4 @@ def test_another_arm_feels_as_well(tmp_path):
     T = np.eye(4)
     T[:3, 3] = [0.05, 0.0, 0.0]
     skin = Skin([SensorUnit("u", "b", T, touch=TouchPatch())], model)
-    assert controller_of(model, skin, OURS).init(Run(controller_of(model, skin, OURS)).inputs().robot).touch
+    assert len(Run(controller_of(model, skin, OURS)).state.detector.cues[0].account) == 1

@@ -10,8 +10,8 @@ import pytest
 from pretouch import realtime
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.params import at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import at_rate, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, RobotState
@@ -70,7 +70,7 @@ from pretouch import realtime
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.params import at_rate, profile
+from pretouch.profiles import at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel

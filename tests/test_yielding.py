@@ -5,8 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.errors import ParameterError
 from pretouch.modes import ModeState
-from pretouch.params import PROFILES, Profile, ReactionParams, ThresholdParams, profile
+from pretouch.params import ClampParams, GiveUpParams
+from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.recording.state_codec import decode_state, encode_state
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -15,8 +19,8 @@ from tests.following_arm import DT, Arm
 from tests.fuzz.invariants import same
 
 RIGHT = 1  # unit of the paper's skin that looks along -y in the ready posture
-OURS = replace(PROFILES["pretouch"], threshold=ThresholdParams(compare="raw"))
-NO_LAG = replace(OURS, reaction=replace(OURS.reaction, lag_s=0.0))
+OURS = PROFILES["pretouch"]
+NO_LAG = replace(OURS, react=replace(OURS.react, lag_s=0.0))
 
 
 class Pushed(Arm):
@@ -152,8 +156,8 @@ def test_a_person_who_pushes_thrice_at_one_place_does_not_make_it_give_up(arm: P
 
 
 def test_after_three_contacts_at_one_place_it_gives_up_says_so_and_tries_again(panda_model, paper_skin):
-    quick = replace(NO_LAG.reaction, retry_s=1.0, quiet_s=0.3, pushed_j=100.0)
-    arm = arm_of(panda_model, paper_skin, replace(NO_LAG, reaction=quick))
+    quick = replace(NO_LAG.react, quiet_s=0.3, give_up=GiveUpParams(push_j=100.0, retry_s=1.0))
+    arm = arm_of(panda_model, paper_skin, replace(NO_LAG, react=quick))
     for _ in range(3):
         arm.wait()
         arm.run(5)
@@ -225,14 +229,29 @@ def test_the_paper_does_not_look_at_joint_torques(panda_model, paper_skin, name:
 
 
 @pytest.mark.parametrize(
-    "change", ["clamps=no", "gives_up=no", "soft_hold=no", "method=decay", "lag_s=0", "static_friction_nm=0"]
-)
-def test_each_switch_can_be_turned_off_alone(change: str):
+    ("change", "old"),
+    [
+        ("clamp=none", "clamps=no"), ("pinch=none", "pinches=no"), ("give_up=none", "gives_up=no"),
+        ("soft_hold=no", "soft_hold=no"), ("lag_s=0", "lag_s=0"), ("static_friction_nm=0", "static_friction_nm=0"),
+    ],
+)  # fmt: skip
+def test_each_of_its_parts_can_be_left_out_alone(change: str, old: str):
     name, _, text = change.partition("=")
-    varied = profile(f"pretouch:reaction.{change}").reaction
-    off = {"no": False, "decay": "decay", "0": 0.0}[text]
-    assert varied == replace(PROFILES["pretouch"].reaction, **{name: off})
-    assert ReactionParams() == PROFILES["paper"].reaction
+    ours, varied = PROFILES["pretouch"].react, profile(f"pretouch:react.{change}").react
+    assert varied == replace(ours, **{name: {"none": None, "no": False, "0": 0.0}[text]}) != ours
+    assert profile(f"pretouch:reaction.{old}").react == varied
+
+
+def test_the_reaction_of_the_paper_can_be_chosen_by_its_name_of_today_and_before():
+    for text in ("pretouch:react=decay", "pretouch:reaction.method=decay"):
+        assert profile(text).react == PROFILES["paper"].react == DecayingVelocity()
+    assert profile("paper:reaction.method=admittance:reaction.clamp_nm=5:reaction.clamps=yes").react == Admittance(
+        clamp=ClampParams(torque_nm=5.0)
+    )
+    with pytest.raises(
+        ParameterError, match=r"reaction\.clamp_turns' is gone: it is a constant of pretouch\.contact now"
+    ):
+        profile("pretouch:reaction.clamp_turns=3")
 
 
 def test_the_state_of_a_clamp_is_recorded_to_the_bit(arm: Pushed):

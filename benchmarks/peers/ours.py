@@ -12,9 +12,10 @@ from pretouch.control.path import line
 from pretouch.control.qp import solve, task_cost
 from pretouch.control.restriction import approach_rows
 from pretouch.controller import Controller, ControllerState
-from pretouch.params import RestrictionParams, TaskParams, profile
+from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
@@ -129,7 +130,7 @@ class Step:
     def _armed(self) -> ControllerState:
         """Return the state after the force window has filled, from where on the arm tracks."""
         state = self.controller.init(self._inputs(0.0, 0).robot)
-        for cycle in range(self.controller.profile.threshold.window_samples + 10):
+        for cycle in range(self.controller.profile.window.samples + 10):
             _, state = self.controller.step(state, self._inputs(TERMS.period * cycle, 0))
         self.time = TERMS.period * (cycle + 1)
         return state

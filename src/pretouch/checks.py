@@ -25,7 +25,7 @@ class Check:
         if not math.isfinite(value):
             return "must be finite"
         if value != 0 and not _SMALLEST <= abs(value) <= _LARGEST:
-            return f"must be between {_SMALLEST:g} and {_LARGEST:g} in size, or else a unit is wrong"
+            return f"must be between {_SMALLEST:g} and {_LARGEST:g} in size; check its unit"
         if value < self.low or (self.open_low and value == self.low):
             return f"must be {'greater than' if self.open_low else 'at least'} {self.low:g}"
         if value > self.high or (self.open_high and value == self.high):

@@ -9,7 +9,7 @@ from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from numbers import Real
 from types import NoneType, UnionType
-from typing import Any, ClassVar, Literal, Self, Union, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
 from pretouch.checks import Checked
 from pretouch.errors import ParameterError
@@ -28,7 +28,7 @@ class Part(Checked):
     group: ClassVar[str] = ""
     name: ClassVar[str] = ""
     """What the part is called in texts and recordings."""
-    known: ClassVar[dict[str, type[Self]]]
+    known: ClassVar[dict[str, "type[Part]"]]
     """Parts of the interface that have been defined, by name."""
     State: ClassVar[type] = NoneType
     """What the part remembers from one step to the next, if that is more than one value: a class made of fields."""
@@ -111,7 +111,7 @@ def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
     for path, text in changes.items():
         first, _, rest = path.partition(".")
         trees.setdefault(first, {})[rest] = text
-    hints, new = _hints(type(value)), {}
+    hints, new = _hints(value.__class__), {}
     for name, tree in trees.items():
         path = f"{where}.{name}" if where else name
         if name not in hints:
@@ -129,6 +129,36 @@ def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
             now = changed(now, tree, path)
         new[name] = now
     return replace(value, **new) if new else value
+
+
+def leaves(params: Any, where: str = "") -> Iterator[tuple[str, object]]:
+    """Yield each parameter by its path; a part by its name, before its own parameters."""
+    for f in fields(params):
+        path, value = (f"{where}.{f.name}" if where else f.name), getattr(params, f.name)
+        if isinstance(value, tuple) and value and all(isinstance(item, Part) for item in value):
+            yield path, _written(value)
+            for item in value:
+                yield from leaves(item, f"{path}.{item.name}")
+        elif is_dataclass(value):
+            if isinstance(value, Part):
+                yield path, value.name
+            yield from leaves(value, path)
+        else:
+            yield path, value
+
+
+def at(value: Any, path: str, where: str = "") -> Any:
+    """Return what stands at a path; a ParameterError where nothing does."""
+    first, _, rest = path.partition(".")
+    here, kind = (f"{where}.{first}" if where else first), type(value)
+    if isinstance(value, tuple):
+        found = next((item for item in value if isinstance(item, Part) and item.name == first), None)
+    else:
+        found = getattr(value, first) if is_dataclass(kind) and first in _hints(kind) else None
+    if found is None and (rest or not is_dataclass(kind) or first not in _hints(kind)):
+        known = ", ".join(_hints(kind)) if is_dataclass(kind) else "no parameters"
+        raise ParameterError(f"The parameter {here!r} is unknown: there is {known}.")
+    return at(found, rest, here) if rest else found
 
 
 def _of(tree: dict[str, str], item: Part) -> dict[str, str]:

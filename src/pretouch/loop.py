@@ -169,28 +169,33 @@ class Recorder(Protocol):
         ...
 
 
-def run(
-    controller: Controller,
-    robot: Robot,
-    skin: Skin,
-    clock: Clock,
-    recorder: Recorder,
-    done: Callable[[ControlStep], bool],
-    resume: Callable[[], bool] = lambda: False,
-    learnt: ResidualModel | None = None,
-    points: Points | None = None,
-) -> None:
-    """Turn the controller until `done` says so of a step. However it ends, the arm is first brought to rest.
+@dataclass(frozen=True)
+class Options:
+    """What a loop can do without."""
 
-    `resume` says whether a person now asks to leave a latched HOLD; `learnt` is free motion as an earlier session left
-    it. `points` is an outside source of points; once there is one, its silence stops the arm.
-    """
-    state = controller.init(robot.read(), learnt)
+    resume: Callable[[], bool] = lambda: False
+    """Whether a person now asks to leave a latched HOLD."""
+    learnt: ResidualModel | None = None
+    """Free motion as an earlier session left it."""
+    points: Points | None = None
+    """An outside source of points, read in the loop, so it must not wait; once there is one, its silence stops the
+    arm."""
+
+
+NO_OPTIONS = Options()
+
+
+def run(
+    controller: Controller, robot: Robot, skin: Skin, clock: Clock, recorder: Recorder,
+    done: Callable[[ControlStep], bool], options: Options = NO_OPTIONS,
+) -> None:  # fmt: skip
+    """Turn the controller until `done` says so of a step. However it ends, the arm is first brought to rest."""
+    state = controller.init(robot.read(), options.learnt)
     sent = state.command
     try:
         while True:
             tick = clock.tick()
-            cycle = turn(controller, state, robot, skin, tick, resume(), points)
+            cycle = turn(controller, state, robot, skin, tick, options.resume(), options.points)
             state, sent = cycle.after, cycle.step.command
             recorder.record(cycle)
             if done(cycle.step):
@@ -206,7 +211,7 @@ def turn(
 ) -> Cycle:  # fmt: skip
     """Turn the controller once, at a tick [s]: read, step, command."""
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
-    imu = imu_of(skin) if controller.profile.detection.use_imu else None
+    imu = imu_of(skin) if "imu" in controller.profile.detect.reads else None
     seen = None if points is None else points.read()
     stamp = _instant(tick, controller.limits.period, report, readings, touch)
     inputs = Inputs(stamp, report, readings, resume, touch, imu, seen)

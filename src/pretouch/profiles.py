@@ -1,61 +1,91 @@
-"""The named profiles, and how to make variants of them.
+"""A profile is the choice of parts and parameters of a whole controller; the named ones, and how to make variants.
 
 `replace(profile, ...)` of the standard library makes a variant in a program, `profile("NAME:CHANGE:...")` from a text.
 """
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, get_args
 
-from pretouch.composition import changed, from_table
+from pretouch.checks import Checked
+from pretouch.composition import at, changed, from_table
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.detector import Detector
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.reaction import Reaction
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.contact.tactile import TouchSensors
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.braking_curve import BrakingCurve
 from pretouch.control.interface import Restriction
-from pretouch.control.restriction import ApproachRestriction
 from pretouch.errors import ParameterError
 from pretouch.params import (
-    DetectionParams,
+    ClampParams,
     EffectiveMass,
+    FailureParams,
+    GiveUpParams,
+    LocalisationParams,
     NullSpaceMotion,
     PerceptionParams,
-    ReactionParams,
+    PinchParams,
     RowKind,
     SpeedReduction,
     Tangential,
     TaskParams,
-    ThresholdParams,
+    WindowParams,
 )
 from pretouch.plugins import load, names
-from pretouch.profile import Profile
+from pretouch.renamed import REMOVED, SWITCHES, of_today
 
 GROUP = "pretouch.profiles"
 """Group of entry points under which other distributions name profiles of theirs."""
 
+
+@dataclass(frozen=True)
+class Profile(Checked):
+    """A named set of parameters for the whole controller."""
+
+    name: str = "paper"
+    """Name shown in tables and files."""
+    perception: PerceptionParams = field(default_factory=PerceptionParams)
+    task: TaskParams = field(default_factory=TaskParams)
+    slow: SpeedReduction | None = field(default_factory=SpeedReduction)
+    """What slows the arm near obstacles (eq. 3); none: nothing but silent units does."""
+    approach: Restriction | None = field(default_factory=ApproachRestriction)
+    """What keeps the body from what is near (eqs. 5-7, or other rows of the QP); none: nothing does."""
+    null_space: NullSpaceMotion | None = None
+    """Whether links before the hand move away from what is near in the null space of the task."""
+    window: WindowParams = field(default_factory=WindowParams)
+    """The window of the external force: contacts are told once it is full (eq. 8)."""
+    detect: Detector = field(default_factory=MovingThresholds)
+    """How a contact is told from free motion (eqs. 9-11)."""
+    react: Reaction = field(default_factory=DecayingVelocity)
+    """How the arm answers a contact (eq. 12)."""
+    failure: FailureParams = field(default_factory=FailureParams)
+
+    @property
+    def d_max_m(self) -> float:
+        """Distance from the end-effector origin within which something is near it [m]: of eq. 3, or Table I's."""
+        return (self.slow or SpeedReduction()).d_max_m
+
+
 _PAPER = Profile()
 _BLIND = Profile(name="blind", perception=PerceptionParams(enabled=False), approach=None)
-
-OBSERVER_NM = (3.2, 5.2, 3.2, 4.0, 1.8, 1.1, 1.4)
-"""Bounds of the profile `observer` [Nm]: five times what a real Panda's model leaves of its torques in free motion,
-0.64 1.03 0.64 0.79 0.35 0.22 0.28 Nm rms."""
 
 
 PROFILES: dict[str, Profile] = {
     "paper": _PAPER,
     "blind": _BLIND,
-    "slowing-only": replace(_PAPER, name="slowing-only", threshold=ThresholdParams(f_d_n=0.0)),
+    "slowing-only": replace(_PAPER, name="slowing-only", detect=MovingThresholds(f_d_n=0.0)),
     "thresholds-only": replace(_PAPER, name="thresholds-only", slow=None),
     "paper-0.5m": replace(
         _PAPER,
         name="paper-0.5m",
         slow=SpeedReduction(d_max_m=0.5),
         approach=ApproachRestriction(d_notice_m=0.5),
-        threshold=ThresholdParams(d_max_m=0.5),
-    ),
-    "fixed": replace(_BLIND, name="fixed", detection=DetectionParams(method="fixed")),
-    "observer": replace(
-        _BLIND,
-        name="observer",
-        detection=DetectionParams(method="fixed", joint_torques_nm=OBSERVER_NM, force_n=1000.0),
+        detect=MovingThresholds(d_max_m=0.5),
     ),
     "pretouch": Profile(
         name="pretouch",
@@ -70,17 +100,17 @@ PROFILES: dict[str, Profile] = {
         slow=None,
         approach=BrakingCurve(effective_mass=EffectiveMass(), closing_deadband_m_s=0.05, tangential=Tangential()),
         null_space=NullSpaceMotion(),
-        detection=DetectionParams(method="sequential", freeze_while_reacting=True, localise=True, use_touch=True),
-        reaction=ReactionParams(
-            method="admittance", clamps=True, gives_up=True, soft_hold=True, static_friction_nm=3.0, pinches=True
+        window=WindowParams(freeze_while_reacting=True),
+        detect=SequentialTest(cues=(TouchSensors(),), localise=LocalisationParams()),
+        react=Admittance(
+            soft_hold=True, static_friction_nm=3.0, clamp=ClampParams(), pinch=PinchParams(), give_up=GiveUpParams()
         ),
     ),
 }
 """`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0.
 `slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity each (restrictions are apart from
 both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
-text (section V-C). `fixed`: as `blind`, with the bounds of the vendor's examples on torques and force. `observer`: as
-that, with tighter constant bounds on the torques of the momentum observer. `pretouch`: ours, each departure from the
+text (section V-C). `pretouch`: ours, each departure from the
 paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
 
 
@@ -129,64 +159,17 @@ def _paths(changes: list[str]) -> dict[str, str]:
     return found
 
 
-def of_today(path: str, text: str) -> dict[str, str]:
-    """Return what a change by a name of an earlier version is today: path -> text."""
+def value_of(found: Profile, path: str) -> object:
+    """Return a part's or parameter's value, by its name of today or of an earlier version.
+
+    A switch of an earlier version is True or False, or its text. Raises ParameterError for a parameter there is not.
+    """
     if path in SWITCHES:
-        if text not in SWITCHES[path]:
-            raise ParameterError(f"{path} is {text!r}: choose from {', '.join(SWITCHES[path])}.")
-        return dict(SWITCHES[path][text])
-    return {RENAMED.get(path, path): text}
-
-
-_APPROACH = (
-    "v_max_m_s", "beta", "d_repulse_m", "d_crit_m", "d_notice_m", "floor_m_s", "slack_weight", "deceleration_m_s2",
-    "latency_s", "margin_m", "touch_speed_max_m_s", "retreat_max_m_s", "tighten_m_s2", "loosen_m_s2",
-    "closing_deadband_m_s",
-)  # fmt: skip
-_BASELINES = (
-    "flacco_v_max_m_s", "flacco_alpha", "flacco_rho_m", "flacco_size_m", "ding_repulse_m", "ding_zero_low_m",
-    "ding_zero_high_m", "ding_notice_m", "ding_approach_m_s", "ding_retreat_m_s", "ding_weighted_m",
-)  # fmt: skip
-_MASS = ("body_region", "region_force_n", "force_fraction", "rotor_inertia_kg_m2")
-RENAMED: dict[str, str] = {
-    "reduction.d_max_m": "slow.d_max_m",
-    "reduction.l_max_cycles": "task.restore_cycles",
-    "anticipation.blocked_after_s": "task.blocked_after_s",
-    **{f"{group}.{name}": f"approach.{name}" for group in ("restriction", "anticipation") for name in _APPROACH},
-    **{f"anticipation.{name}": f"approach.effective_mass.{name}" for name in _MASS},
-    **{f"anticipation.tangential_{name}": f"approach.tangential.{name}" for name in ("distance_m", "speed_m_s")},
-    **{f"anticipation.null_{name}": f"null_space.{name}" for name in ("distance_m", "speed_m_s")},
-    **{f"anticipation.null_{name}": f"null_space.{name}" for name in ("joint_rad_s", "rate_rad_s2")},
-    **{f"baselines.{name}": f"approach.{name.partition('_')[2]}" for name in _BASELINES},
-}
-"""Names of earlier versions, and what each is today."""
-
-
-def _switch(path: str, on: str) -> dict[str, dict[str, str]]:
-    return {"yes": {path: on}, "no": {path: "none"}}
-
-
-SWITCHES: dict[str, dict[str, dict[str, str]]] = {
-    "reduction.enabled": _switch("slow", "on"),
-    "restriction.mode": {
-        "off": {"approach": "none"},
-        **{rows: {"approach": "paper", "approach.rows": rows} for rows in get_args(RowKind)},
-        "braking": {"approach": "braking", "task.blocked_after_s": "2"},
-        **{name: {"approach": name} for name in ("flacco", "ding")},
-    },
-    "anticipation.null_space": _switch("null_space", "on"),
-    "anticipation.effective_mass": _switch("approach.effective_mass", "on"),
-    "anticipation.tangential": _switch("approach.tangential", "on"),
-    "anticipation.closing_speed": _switch("approach.closing_deadband_m_s", "0.05"),
-}
-"""Switches of earlier versions: for each value the changes that it is today."""
-
-
-_NO_DETOUR = "the arm no longer goes round what blocks its path, which kept it from none of 8 boards. Leave it out."
-REMOVED = {
-    f"anticipation.{name}": _NO_DETOUR for name in ("detour", "detour_distance_m", "detour_speed_m_s", "detour_hold_s")
-}
-"""Parameters that earlier versions had, and what to do without each."""
+        for text, changes in SWITCHES[path].items():
+            if changed(found, changes) == found:
+                return {"yes": True, "no": False}.get(text, text)
+    today, *_ = _paths([f"{path}=" if path not in SWITCHES else f"{path}={next(iter(SWITCHES[path]))}"])
+    return at(found, today)
 
 
 def restriction_modes() -> tuple[str, ...]:
@@ -229,12 +212,12 @@ def at_rate(profile: Profile, rate: float) -> Profile:
     if not (math.isfinite(rate) and rate * p.failure.overrun_s > 1):
         least = 1 / p.failure.overrun_s
         raise ParameterError(f"The rate is {rate:g} Hz: it must be more than {least:g} Hz, or each step would be late.")
-    samples, alpha = max(2, round(p.threshold.window_samples * more)), 1 - (1 - p.threshold.alpha) ** (1 / more)
+    samples, alpha = max(2, round(p.window.samples * more)), 1 - (1 - p.window.alpha) ** (1 / more)
     return p if more == 1 else replace(
         p,
         task=replace(
             p.task, control_period_s=1 / rate, restore_cycles=max(1, round(p.task.restore_cycles * more))
         ),
-        threshold=replace(p.threshold, window_samples=samples, alpha=alpha),
-        reaction=replace(p.reaction, decay_cycles=max(1, round(p.reaction.decay_cycles * more))),
+        window=replace(p.window, samples=samples, alpha=alpha),
+        react=p.react.stretched(more),
     )  # fmt: skip

@@ -7,15 +7,14 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pretouch import loop
-from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
-from pretouch.ports import Points, Robot, Skin
+from pretouch.ports import Robot, Skin
 from pretouch.signals import ended_in_order
 from pretouch.types import (
     ControlStep,
@@ -39,21 +38,25 @@ _LOOK_S = 0.001
 """Between two looks at whether a state has come [s]."""
 
 
+@dataclass(frozen=True)
+class Options(loop.Options):
+    """What a loop in real time can do without."""
+
+    priority: int | None = None
+    """See `real_time`."""
+    cpu: int | None = None
+    """See `real_time`."""
+    tell: Callable[[str], None] = print
+    """Is given each sentence on what could not be had, before the loop begins."""
+
+
+NO_OPTIONS = Options()
+
+
 def run(
-    controller: Controller,
-    robot: Robot,
-    skin: Skin,
-    clock: loop.MonotonicClock,
-    recorder: loop.Recorder,
-    done: Callable[[ControlStep], bool],
-    resume: Callable[[], bool] = lambda: False,
-    *,
-    priority: int | None = None,
-    cpu: int | None = None,
-    tell: Callable[[str], None] = print,
-    learnt: ResidualModel | None = None,
-    points: Points | None = None,
-) -> None:
+    controller: Controller, robot: Robot, skin: Skin, clock: loop.MonotonicClock, recorder: loop.Recorder,
+    done: Callable[[ControlStep], bool], options: Options = NO_OPTIONS,
+) -> None:  # fmt: skip
     """`loop.run`, warmed up and in a process prepared for real time. However it ends, `clock.timing()` is the report.
 
     SIGTERM and SIGHUP, where nobody else handles them, end it like Ctrl-C: the arm comes to rest first.
@@ -65,24 +68,19 @@ def run(
         clock: gives the ticks and measures how they are kept.
         recorder: keeps the steps; it runs in the loop, so it must not wait for a disk.
         done: whether a step was the last.
-        resume: whether a person now asks to leave a latched HOLD.
-        priority: see `real_time`.
-        cpu: see `real_time`.
-        tell: is given each sentence on what could not be had, before the loop begins.
-        learnt: free motion as an earlier session left it.
-        points: an outside source of points; it is read in the loop, so it must not wait.
+        options: what it can do without.
     """
     if not math.isclose(clock.period, controller.limits.period, rel_tol=1e-9):
         raise ParameterError(
             f"The clock has a period of {clock.period!r} s, the controller {controller.limits.period!r} s:"
             " make them the same (params.at_rate makes a profile for another rate)."
         )
-    warm_up(controller, robot.read(), points is not None)
-    with ended_in_order(), real_time(priority, cpu) as missing:
+    warm_up(controller, robot.read(), options.points is not None)
+    with ended_in_order(), real_time(options.priority, options.cpu) as missing:
         for sentence in missing:
-            tell(sentence)
+            options.tell(sentence)
         _await_news(robot)
-        loop.run(controller, robot, skin, clock, recorder, done, resume, learnt, points)
+        loop.run(controller, robot, skin, clock, recorder, done, options)
 
 
 def _await_news(robot: Robot) -> None:
@@ -209,7 +207,7 @@ def warm_up(controller: Controller, robot: RobotState, points: bool = False) -> 
     lost = np.full(len(robot.q), np.nan)
     for seen in (RangeStatus.SIGNAL, RangeStatus.OK):
         rehearsal = _Rehearsal(controller, robot, points)
-        for _ in range(controller.profile.threshold.window_samples):
+        for _ in range(controller.profile.window.samples):
             rehearsal.step(None, quiet)
         for wrench in (robot.wrench, None, quiet, push):
             for _ in range(_WARM_UP_STEPS):

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from multiprocessing import resource_tracker
+from signal import SIGINT
 from types import FrameType
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -87,3 +88,33 @@ def leave_to_parent(numbers: Iterable[int]) -> None:
     for number in numbers:
         signal.signal(number, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)
+
+
+_received: list[int] = []
+
+
+class Terminated(BaseException):
+    """SIGTERM, or SIGHUP of a terminal that closed."""
+
+
+@contextmanager
+def ends_raise() -> Iterator[None]:
+    """Raise KeyboardInterrupt for Ctrl-C, and `Terminated` for the others, as long as the context lasts."""
+
+    def handle(number: int, _frame: FrameType | None) -> None:
+        _received.append(number)
+        raise KeyboardInterrupt if number == SIGINT else Terminated
+
+    _received.clear()
+    with handled(ENDING, handle):
+        yield
+
+
+def ended() -> bool:
+    """Whether a signal has come that ends the command."""
+    return bool(_received)
+
+
+def exit_code() -> int:
+    """Exit code after the first signal that came, as shells have it; 0 if none did."""
+    return 128 + _received[0] if _received else 0

@@ -1,8 +1,11 @@
 """What was measured over some time: arrays by instant."""
 
+from dataclasses import fields, replace
+from typing import Self
+
 import numpy as np
 
-from pretouch.types import BoolArray, FloatArray
+from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value
 
 
@@ -26,6 +29,19 @@ class JointTrace:
     """(T,) [s]."""
     q: FloatArray
     """(T, n) [rad]."""
+
+    def at(self, which: BoolArray | IntArray) -> Self:
+        """Return some of the samples, by flags (T,) or indices."""
+        columns = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(self, **{name: column[which] for name, column in columns.items() if column is not None})
+
+
+def on_grid(time: FloatArray, begin: float, spacing: float, values: FloatArray) -> FloatArray:
+    """Values (N, ...) at instants (N,) [s] of what is known (G, ...) from `begin` on at a spacing [s], linearly."""
+    place = np.clip((time - begin) / spacing, 0.0, len(values) - 1.000001)
+    left = place.astype(np.int64)
+    share = (place - left).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray((1.0 - share) * values[left] + share * values[np.minimum(left + 1, len(values) - 1)])
 
 
 def spans(flags: BoolArray) -> list[tuple[int, int]]:

@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from pretouch import __version__
+from pretouch.atomic_write import write_json
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
-from pretouch.params import Orientation, profile
-from pretouch.profiles import restriction_modes
+from pretouch.params import Orientation
+from pretouch.profiles import profile, restriction_modes
 from pretouch.robot.description import panda
 from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
 from pretouch.sim.randomisation import world_set
-from pretouch.whole_file import write_json
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.registry import EXPERIMENTS
 from pretouch_lab.result_key import parameters_digest, result_key

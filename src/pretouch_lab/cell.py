@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 
-from pretouch.params import Orientation, Profile, profile
-from pretouch.profiles import restriction_mode, with_restriction
+from pretouch.params import Orientation
+from pretouch.profiles import Profile, profile, restriction_mode, with_restriction
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import Placement

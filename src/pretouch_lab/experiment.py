@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from pretouch.recording.run_record import RunRecord
 from pretouch.text_table import TextTable
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.trace import Trace
 from pretouch_lab.trial import Record
 
 if TYPE_CHECKING:  # workers that only play trials need none of it
@@ -31,7 +31,7 @@ class Sources:
 
     summary: Row
     """The experiment's own."""
-    trace: Callable[[Cell], Trace | None]
+    trace: Callable[[Cell], RunRecord | None]
     """The course of a cell's trial with the first seed, if it was recorded."""
     units: tuple[str, ...]
     """Names of the skin's units."""

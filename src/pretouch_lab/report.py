@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from pretouch.errors import ExperimentError, PretouchError
+from pretouch.recording.run_record import RunRecord
 from pretouch.reporting.html import Html, document, element, joined, titled_table
 from pretouch.text_table import markdown
 from pretouch_lab.campaign import Request, recording_file
 from pretouch_lab.cell import Cell
 from pretouch_lab.experiment import Experiment, Picture, Row, Sources
 from pretouch_lab.registry import GROUPS
-from pretouch_lab.trace import Trace, read_trace
+from pretouch_lab.trace import read_trace
 from pretouch_lab.worlds import sentence
 
 _TITLE = "Contact anticipation in simulation"
@@ -86,7 +87,7 @@ def _pictures(parts: list[tuple[Request, Path]], experiment: Experiment, summary
     return [_picture(picture, folder) for picture in experiment.draw(sources)]
 
 
-def find_trace(folders: list[Path], cell: Cell) -> Trace | None:
+def find_trace(folders: list[Path], cell: Cell) -> RunRecord | None:
     """Read the course of a cell's trial with the first seed from one of some folders, if it is there and whole."""
     for folder in folders:
         try:

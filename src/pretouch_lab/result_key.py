@@ -6,7 +6,7 @@ from dataclasses import asdict
 from functools import cache
 from hashlib import sha256
 
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.versions import libraries
 from pretouch.source_digest import source_digest
 

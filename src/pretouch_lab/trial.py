@@ -14,8 +14,8 @@ from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.hardware.traffic import UnitTraffic
-from pretouch.loop import Cycle, run
-from pretouch.params import Profile
+from pretouch.loop import Cycle, Options, run
+from pretouch.profiles import Profile
 from pretouch.recording.reader import Recorded
 from pretouch.recording.truth import Truth, truth_of
 from pretouch.recording.writer import Recording
@@ -23,7 +23,6 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.wire_skin import WireSkin
-from pretouch.sim.depth_camera import DepthCamera, DepthCameraParams
 from pretouch.sim.hand import Hand, HandScript, PersonArm
 from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
@@ -31,6 +30,7 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, described, fixtures
 from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
+from pretouch_lab.depth_camera import DepthCamera, DepthCameraParams
 from pretouch_lab.worlds import Parts, in_world
 
 SETTLE_S = 0.2
@@ -186,8 +186,7 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
     with _mounted(setup, plant) as units:
         finders, traffic = (units.range_finders, units.receiver.units) if isinstance(units, WireSkin) else (units, ())
-        who = setup.person
-        hand = Hand(plant, setup.hand, who.speed_max, who.stiffness, who.damping) if setup.hand else None
+        hand = Hand(plant, setup.hand, setup.person) if setup.hand else None
         camera = None if setup.camera is None else DepthCamera(plant, setup.camera, setup.seeing, setup.seed)
         if setup.prepare:
             setup.prepare(plant, finders)
@@ -198,7 +197,8 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         plant.advance(SETTLE_S)
         with _recording(setup, controller) as recording:
             recorder = _Recorder(plant, hand, recording)
-            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant), points=camera)
+            options = Options(points=camera)
+            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant), options)
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),

@@ -89,7 +89,7 @@ REFUSED = {
     "shape": (lambda data, unit: changed(data, unit, acceleration=np.zeros((5, 3))), r"\(5, 3\)"),
     "short": (lambda data, unit: silent(data, unit, 3.0, 99.0), "at least 15 s are needed"),
     "slow": (lambda data, unit: thinned(data, unit, 8), "every 38.5 ms"),
-    "clock": (begun_anew, "began anew"),
+    "clock": (begun_anew, "restarted"),
     "not_finite": (lambda data, unit: with_nan(data, unit, 2), "50.0% of its samples are not finite"),
     "stuck": (lambda data, unit: stuck(data, unit, "acceleration", 1, 20.0), "accelerometer y stays at .* for 25.0 s"),
     "gravity": (lambda data, unit: scaled(data, unit, 1 / 9.80665), "look like g: multiply by 9.80665"),
@@ -117,9 +117,9 @@ def test_a_unit_whose_data_cannot_be_trusted_is_refused_with_the_reason(panda_mo
 
 BEARABLE = {
     "lost": (with_losses, "Gaps in its samples"),
-    "unordered": (jittered, "1.0% of its samples are no later"),
+    "unordered": (jittered, "1.0% of its samples are not later"),
     "not_finite": (lambda data, unit: with_nan(data, unit, 20), "5.0% of its samples are not finite"),
-    "outliers": (lambda data, unit: with_knocks(data, unit, 20), "did not move as its link"),
+    "outliers": (lambda data, unit: with_knocks(data, unit, 20), "did not move with its link"),
 }
 
 

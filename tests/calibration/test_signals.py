@@ -4,8 +4,8 @@ import pytest
 from pretouch.calibration.data import UnitData
 from pretouch.calibration.imu_signal import ImuSignal, saturated
 from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.signals import gaps, interpolated, outside, rate_of_change, smooth, times
-from pretouch.traces import ImuTrace
+from pretouch.calibration.signals import FINE_S, gaps, outside, rate_of_change, smooth, times
+from pretouch.traces import ImuTrace, on_grid
 
 PARAMS = CalibrationParams()
 
@@ -39,7 +39,7 @@ def test_between_instants_it_is_linear_and_at_the_ends_it_stays():
     fine = times(10.0, 10.004)
     values = np.array([[1.0, 0.0], [3.0, 0.0], [2.0, 5.0]])
     at = np.array([9.0, 10.0, 10.001, 10.003, 11.0])
-    found = interpolated(at, fine, values)
+    found = on_grid(at, fine[0], FINE_S, values)
     assert found[:, 0] == pytest.approx([1.0, 1.0, 2.0, 2.5, 2.0], abs=1e-4)
 
 

@@ -11,7 +11,7 @@ from pretouch.control.posture import brought_to
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.serving.fleet import FleetParams
-from pretouch.serving.network import NetworkParams, WayParams
+from pretouch.serving.network import ChannelParams, NetworkParams
 from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.imu import ImuParams, Imus
 from pretouch.sim.plant import Plant
@@ -19,9 +19,9 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 
-EVEN = WayParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)
+EVEN = ChannelParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)
 """As fast one way as the other: what remains of the clocks' offset is not the network's, which nobody could know."""
-LOSSY = WayParams(loss=0.3, delay_s=0.0012, jitter_s=0.003, overtaken=0.02, doubled=0.02)
+LOSSY = ChannelParams(loss=0.3, delay_s=0.0012, jitter_s=0.003, overtaken=0.02, doubled=0.02)
 
 
 def recorded(place, model, skin, network, duration, reboot_every):

@@ -8,20 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.contact.admittance import (
-    AdmittanceState,
-    admittance_init,
-    begun,
-    dead_band,
-    fastest_point,
-    learnt,
-    yielded,
-)
-from pretouch.params import ReactionParams
+from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
+from pretouch.params import AdmittanceParams
 from pretouch.robot.model import RobotModel
 
 DT, N = 0.01, 7
-P = ReactionParams(method="admittance", inertia_kg_m2=2.0, damping_nm_s=20.0, speed_max_m_s=1000.0)
+P = AdmittanceParams(inertia_kg_m2=2.0, damping_nm_s=20.0, speed_max_m_s=1000.0)
 NO_LAG = replace(P, lag_s=0.0)
 BAND = np.full(N, 1.0)
 
@@ -35,18 +27,18 @@ def only(joint: int, value: float) -> np.ndarray:
     return np.eye(N)[joint] * value
 
 
-def after(state: AdmittanceState, arm, torque, command=None, params=NO_LAG) -> AdmittanceState:
+def after(state: VirtualMass, arm, torque, command=None, params=NO_LAG) -> VirtualMass:
     command = np.copysign(1e9, state.velocity) if command is None else command
     return yielded(state, arm, np.asarray(torque, float), command, BAND, DT, params)
 
 
 def test_the_dead_band_grows_with_the_torque_limit():
     # 0.5 Nm and 2 % of 87 and 12 Nm
-    np.testing.assert_allclose(dead_band(np.array([87.0, 12.0]), ReactionParams()), [2.24, 0.74])
+    np.testing.assert_allclose(dead_band(np.array([87.0, 12.0]), AdmittanceParams()), [2.24, 0.74])
 
 
 def test_one_step_of_the_virtual_mass_by_hand(arm):
-    state = after(admittance_init(N, NO_LAG), arm, only(1, 6.0))
+    state = after(mass_init(N, NO_LAG), arm, only(1, 6.0))
     # (2 * 0 + 0.01 * (6 - 1)) / (2 + 0.01 * 20)
     np.testing.assert_allclose(state.velocity, only(1, 0.05 / 2.2), atol=1e-15)
     state = after(state, arm, only(1, 6.0))
@@ -56,19 +48,19 @@ def test_one_step_of_the_virtual_mass_by_hand(arm):
 
 
 def test_a_lasting_torque_keeps_up_the_speed_of_the_damper(arm):
-    state = admittance_init(N, NO_LAG)
+    state = mass_init(N, NO_LAG)
     for _ in range(300):
         state = after(state, arm, only(0, -5.0))
     np.testing.assert_allclose(state.velocity, only(0, -4.0 / 20.0), atol=1e-9)
 
 
 def test_a_torque_within_the_dead_band_moves_nothing(arm):
-    state = after(admittance_init(N, NO_LAG), arm, np.linspace(-1.0, 1.0, N))
+    state = after(mass_init(N, NO_LAG), arm, np.linspace(-1.0, 1.0, N))
     assert not state.velocity.any()
 
 
 def test_a_torque_is_told_from_its_mean_in_free_motion(arm):
-    state = admittance_init(N, NO_LAG)
+    state = mass_init(N, NO_LAG)
     for _ in range(5):
         state = learnt(state, np.full(N, 3.0), DT, NO_LAG)
     np.testing.assert_allclose(state.mean, 3.0)
@@ -76,7 +68,7 @@ def test_a_torque_is_told_from_its_mean_in_free_motion(arm):
 
 
 def test_what_has_lasted_for_60_ms_is_hardly_in_the_mean():
-    state = admittance_init(N, P)
+    state = mass_init(N, P)
     for _ in range(1000):
         state = learnt(state, np.zeros(N), DT, P)
     for _ in range(6):
@@ -85,30 +77,30 @@ def test_what_has_lasted_for_60_ms_is_hardly_in_the_mean():
 
 
 def test_a_contact_begins_at_the_damper_s_speed_as_far_as_the_start_energy_goes(arm):
-    weak = begun(admittance_init(N, P), *arm, only(3, 3.0), np.zeros(N), BAND, P)
+    weak = begun(mass_init(N, P), *arm, only(3, 3.0), np.zeros(N), BAND, P)
     np.testing.assert_allclose(weak.velocity, only(3, 2.0 / 20.0))
-    strong = begun(admittance_init(N, P), *arm, only(3, -60.0), np.zeros(N), BAND, P)
+    strong = begun(mass_init(N, P), *arm, only(3, -60.0), np.zeros(N), BAND, P)
     # 1/2 M v^2 = 0.2 J
     np.testing.assert_allclose(strong.velocity, only(3, -math.sqrt(0.2)))
 
 
 def test_the_lag_of_the_estimate_drives_nothing_once_the_force_has_ended(arm):
     keep = math.exp(-DT / P.lag_s)
-    state = replace(admittance_init(N, P), torque=only(0, 8.0), velocity=only(0, 0.1))
+    state = replace(mass_init(N, P), torque=only(0, 8.0), velocity=only(0, 0.1))
     state = after(state, arm, only(0, 8.0 * keep), params=P)
     # nothing but the damper acts
     np.testing.assert_allclose(state.velocity, only(0, 2.0 * 0.1 / 2.2))
 
 
 def test_a_torque_against_the_last_push_needs_a_wider_band(arm):
-    state = replace(admittance_init(N, NO_LAG), side=only(0, 1.0))
+    state = replace(mass_init(N, NO_LAG), side=only(0, 1.0))
     assert not after(state, arm, only(0, -1.9)).velocity.any()
     assert after(state, arm, only(0, -2.1)).velocity[0] < 0
     assert after(state, arm, only(0, 1.9)).velocity[0] > 0
 
 
 def test_a_joint_that_nothing_drives_is_asked_for_no_more_than_it_does(arm):
-    state = replace(admittance_init(N, NO_LAG), velocity=np.full(N, 0.3))
+    state = replace(mass_init(N, NO_LAG), velocity=np.full(N, 0.3))
     command = np.array([0.1, -0.1, 0.0, 0.5, 0.2, 0.05, 0.3])
     slower = 2.0 * 0.3 / 2.2
     np.testing.assert_allclose(
@@ -117,7 +109,7 @@ def test_a_joint_that_nothing_drives_is_asked_for_no_more_than_it_does(arm):
 
 
 def test_without_energy_in_the_tank_only_what_takes_energy_moves(arm):
-    state = replace(admittance_init(N, NO_LAG), velocity=np.array([0.3, 0.3, 0, 0, 0, 0, 0]), tank=-0.1)
+    state = replace(mass_init(N, NO_LAG), velocity=np.array([0.3, 0.3, 0, 0, 0, 0, 0]), tank=-0.1)
     moved = after(state, arm, [5.0, 0, 0, 0, 0, 0, 0]).velocity
     assert moved[0] > 0
     assert not moved[1:].any()
@@ -126,7 +118,7 @@ def test_without_energy_in_the_tank_only_what_takes_energy_moves(arm):
 def test_no_point_of_the_body_is_faster_than_the_bound(arm):
     model, kin = arm
     slow = replace(NO_LAG, speed_max_m_s=0.3)
-    state = admittance_init(N, slow)
+    state = mass_init(N, slow)
     for _ in range(200):
         state = after(state, arm, np.full(N, 40.0), params=slow)
     speeds = []
@@ -161,7 +153,7 @@ def test_it_takes_energy_and_gives_none_whatever_is_pushed(panda_model, pushes, 
     rng, keep = np.random.default_rng(seed), math.exp(-DT / P.lag_s)
     noise = 0.5 / ((1 + keep) / (1 - keep))  # with the bias within the dead band
     state, command, estimate = (
-        begun(admittance_init(N, P), *arm, np.zeros(N), np.zeros(N), BAND, P),
+        begun(mass_init(N, P), *arm, np.zeros(N), np.zeros(N), BAND, P),
         np.zeros(N),
         np.zeros(N),
     )
@@ -190,7 +182,7 @@ def test_it_takes_energy_and_gives_none_whatever_is_pushed(panda_model, pushes, 
 def test_a_push_never_moves_the_arm_towards_who_pushes(panda_model, torque):
     """The power that the person gives is never negative, on whatever link: it is torque times joint velocity."""
     arm = panda_model, panda_model.kinematics(panda_model.description.q_ready)
-    state = begun(admittance_init(N, NO_LAG), *arm, np.array(torque), np.zeros(N), BAND, NO_LAG)
+    state = begun(mass_init(N, NO_LAG), *arm, np.array(torque), np.zeros(N), BAND, NO_LAG)
     for _ in range(5):
         assert np.all(state.velocity * torque >= 0)
         state = after(state, arm, torque)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pretouch.contact.clamp import clamp_init, clamped, opened
-from pretouch.params import ReactionParams
+from pretouch.params import ClampParams
 
-P = ReactionParams(method="admittance", clamps=True)
+P = ClampParams()
 DT, N = 0.01, 7
 WAY, ASIDE = np.eye(N)[0], np.eye(N)[1]
 Q = np.zeros(N)
@@ -20,7 +20,7 @@ def judged(*course):
     for cycles, torque, velocity in course:
         for _ in range(cycles):
             if not state.torque:
-                state = clamped(state, torque, velocity, Q, 0.05, DT, P)
+                state = clamped(state, torque, velocity, Q, DT, P)
     return state
 
 
@@ -62,7 +62,7 @@ def moved() -> tuple:
     state, q = clamp_init(Q), Q
     for _ in range(100):
         q = q + 0.003 * WAY
-        state = clamped(state, 10.0 * WAY, 0.3 * WAY, q, 0.05, DT, P)
+        state = clamped(state, 10.0 * WAY, 0.3 * WAY, q, DT, P)
     return replace(state, torque=8.0), q
 
 

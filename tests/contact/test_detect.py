@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from pretouch.contact.detect import Detection, detect
-from pretouch.contact.window import WindowState, window_init
-from pretouch.params import ThresholdParams
+from pretouch.contact.detector import Detection
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.window import WindowState, add_force, window_init
+from pretouch.params import WindowParams
 from pretouch.types import Obstacles
 
 EE = np.array([0.5, 0.0, 0.3])
@@ -21,37 +22,44 @@ def points(*at: tuple[float, float, float]) -> Obstacles:
     )  # fmt: skip
 
 
-def quiet(params: ThresholdParams) -> WindowState:
+def detect(
+    state: WindowState, force: np.ndarray | None, obstacles: Obstacles, params: MovingThresholds
+) -> tuple[Detection, WindowState]:
+    window = add_force(state, force, WindowParams())
+    return params.judged(window, force, state.full, EE, obstacles), window
+
+
+def quiet(samples: int = 100) -> WindowState:
     """A full window of zeros."""
-    state = window_init(params.window_samples)
-    for _ in range(params.window_samples):
-        _, state = detect(state, np.zeros(3), EE, points(), params)
+    state = window_init(samples)
+    for _ in range(samples):
+        state = add_force(state, np.zeros(3), WindowParams())
     return state
 
 
-def push(params: ThresholdParams, obstacles: Obstacles, samples: int, force: np.ndarray = PUSH) -> list[Detection]:
+def push(params: MovingThresholds, obstacles: Obstacles, samples: int, force: np.ndarray = PUSH) -> list[Detection]:
     """Let a constant force act after a quiet time."""
-    state, found = quiet(params), []
+    state, found = quiet(), []
     for _ in range(samples):
-        detection, state = detect(state, force, EE, obstacles, params)
+        detection, state = detect(state, force, obstacles, params)
         found.append(detection)
     return found
 
 
 def test_nothing_is_detected_before_the_window_is_full():
-    params = ThresholdParams(window_samples=3, compare="raw")
+    params = MovingThresholds(compare="raw")
     state = window_init(3)
     for force in (0.0, 0.0, 1e3):
-        detection, state = detect(state, np.full(3, force), EE, points(), params)
+        detection, state = detect(state, np.full(3, force), points(), params)
         assert not detection.armed
         assert detection.contact is None
-    detection, _ = detect(state, np.full(3, 1e4), EE, points(), params)
+    detection, _ = detect(state, np.full(3, 1e4), points(), params)
     assert detection.armed
     assert detection.contact is not None
 
 
 def test_the_filtered_value_crosses_later_by_numbers():
-    found = push(ThresholdParams(), points(), 3)
+    found = push(MovingThresholds(), points(), 3)
     # eq. 8 on -50 N: -5, then -5 * 0.9 - 5 = -9.5, then -9.5 * 0.9 - 5 = -13.55
     # 3rd sample: mu = -(5 + 9.5 + 13.55) / 100 = -0.2805
     # sum of squares 25 + 90.25 + 183.6025 = 298.8525; sigma^2 = (298.8525 - 100 * 0.2805^2) / 99 = 2.93924
@@ -64,7 +72,7 @@ def test_the_filtered_value_crosses_later_by_numbers():
 
 
 def test_the_raw_sample_crosses_at_once():
-    found = push(ThresholdParams(compare="raw"), points(), 1)
+    found = push(MovingThresholds(compare="raw"), points(), 1)
     # the window got -5: mu = -0.05, so F_ext = -50 + 0.05
     np.testing.assert_allclose(found[0].contact.force, [0.0, -49.95, 0.0], atol=1e-12)
 
@@ -73,19 +81,18 @@ def test_the_raw_sample_crosses_at_once():
 def test_an_object_on_the_side_a_push_comes_from_eases_its_detection(y: float | None, detected: bool):
     # -8 N against T_l of about -10 - 0.08 (F_sigma of one sample); an object at +y within d_min raises it by 4 N
     near = points() if y is None else points((0.5, y, 0.3))
-    found = push(ThresholdParams(compare="raw"), near, 1, np.array([0.0, -8.0, 0.0]))
+    found = push(MovingThresholds(compare="raw"), near, 1, np.array([0.0, -8.0, 0.0]))
     assert (found[0].contact is not None) == detected
 
 
 def test_without_an_estimate_the_window_waits():
-    params = ThresholdParams(window_samples=3)
-    state = quiet(params)
-    detection, after = detect(state, None, EE, points(), params)
+    state = quiet(3)
+    detection, after = detect(state, None, points(), MovingThresholds())
     assert after is state
     assert detection.contact is None
     assert detection.armed
 
 
 def test_every_crossed_axis_is_named():
-    found = push(ThresholdParams(compare="raw"), points(), 1, np.array([30.0, -30.0, 2.0]))
+    found = push(MovingThresholds(compare="raw"), points(), 1, np.array([30.0, -30.0, 2.0]))
     assert found[0].contact.axes.tolist() == [True, True, False]

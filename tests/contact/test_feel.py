@@ -5,13 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.contact.alone import begun as feel_init
+from tests.contact.alone import feel
 
-from pretouch.contact.feel import feel, feel_init, learnt
 from pretouch.errors import ParameterError
-from pretouch.params import DetectionParams, profile
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import Obstacles, RobotState
+from pretouch_lab.baselines.fixed_bounds import FixedBounds
 
 MODEL = RobotModel(panda())
 Q = MODEL.description.q_ready
@@ -95,16 +97,13 @@ def weights_after(state, samples: int, p=PRETOUCH, near=NOTHING, reacting=False,
     for sample in noise(samples, 2):
         given = robot(sample + 1.0 if push is None else sample + push)
         _, state = feel(state, MODEL, KIN, given, near, reacting, p, watched)
-    found = learnt(state)
-    assert found is not None
-    return found.weights
+    return state.state.test.model.weights
 
 
 @given(st.floats(-0.05, 0.29))
 def test_nothing_is_learnt_near_an_object(distance):
-    before = learnt(SETTLED)
+    before = SETTLED.state.test.model
     after = weights_after(SETTLED, 45, near=object_at(distance, np.array([0.0, 0.0, 1.0])))
-    assert before is not None
     assert_array_equal(after, before.weights)
 
 
@@ -117,14 +116,12 @@ def test_nothing_is_learnt_near_an_object(distance):
     ],
 )
 def test_nothing_is_learnt_while_reacting_unwatched_or_when_told_not_to(how):
-    before = learnt(SETTLED)
-    assert before is not None
+    before = SETTLED.state.test.model
     assert_array_equal(weights_after(SETTLED, 60, **how), before.weights)
 
 
 def test_the_beginning_of_a_contact_is_not_learnt():
-    before = learnt(SETTLED)
-    assert before is not None
+    before = SETTLED.state.test.model
     calm = weights_after(SETTLED, 60, push=np.full(7, 0.3))
     assert np.abs(calm - before.weights).max() > 0  # free motion goes on being learnt
     assert_array_equal(weights_after(SETTLED, 60, push=0.3 + torques(np.array([0.0, 30.0, 0.0]))), before.weights)
@@ -178,10 +175,10 @@ def test_the_papers_rule_tells_its_evidence_and_passes_torques_on():
 
 def test_bounds_are_read_from_a_profiles_text_and_bad_ones_refused():
     given = profile("fixed:detection.joint_torques_nm=10,9,8")
-    assert given.detection.joint_torques_nm == (10.0, 9.0, 8.0)
+    assert given.detect.joint_torques_nm == (10.0, 9.0, 8.0)
     with pytest.raises(ParameterError, match="joint_torques_nm"):
-        DetectionParams(joint_torques_nm=(1.0, -1.0))
-    with pytest.raises(ParameterError, match="numbers with commas"):
+        FixedBounds(joint_torques_nm=(1.0, -1.0))
+    with pytest.raises(ParameterError, match="write a number"):
         profile("fixed:detection.joint_torques_nm=many")
 
 
@@ -200,10 +197,10 @@ def test_the_place_of_a_push_is_told_and_changes_nothing_else_that_is_felt():
     assert MODEL.rigid[said[-1].link[0]] == MODEL.rigid[MODEL.ee]
     assert said[-1].force[0, 1] > 15.0
     # the state without a switch holds nothing of it; without an estimate of torques the contact is over
-    assert two.where == ()
+    assert two.state.localisation is None
     found, one = feel(one, MODEL, KIN, robot(np.full(7, np.nan)), NOTHING, False, PRETOUCH)
     assert not len(found.touched.link)
-    assert one.where[0].steps == 0
+    assert one.state.localisation.steps == 0
 
 
 @pytest.mark.parametrize("name", ["paper", "blind", "fixed"])
@@ -212,4 +209,4 @@ def test_profiles_that_do_not_localise_say_nothing_of_places(name):
         feel_init(MODEL, profile(name)), MODEL, KIN, robot(np.full(7, 30.0)), NOTHING, False, profile(name)
     )
     assert not len(found.touched.link)
-    assert state.where == ()
+    assert state.state is None

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from tests.contact.alone import begun as feel_init
+from tests.contact.alone import feel
 
-from pretouch.contact.feel import feel, feel_init
 from pretouch.contact.lasting_load import is_load
-from pretouch.params import profile
 from pretouch.perception.closest import no_obstacles
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import Obstacles, RobotState

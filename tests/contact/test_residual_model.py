@@ -23,9 +23,9 @@ from pretouch.contact.residual_model import (
     spread_of_sample,
 )
 from pretouch.errors import ParameterError
-from pretouch.params import DetectionParams
+from pretouch.params import SequentialParams
 
-P = DetectionParams()
+P = SequentialParams()
 
 
 def test_recursive_least_squares_is_the_batch_solution_with_the_same_prior():

@@ -17,7 +17,7 @@ from pretouch.contact.sequential import (
     log_ratio,
     window_means,
 )
-from pretouch.params import DetectionParams
+from pretouch.params import SequentialParams
 from pretouch.types import FloatArray
 
 N = 3
@@ -53,8 +53,8 @@ def test_windows_are_means_of_the_newest_samples():
 
 def test_the_level_is_that_of_the_rate_of_false_alarms():
     # 360000 samples an hour at 100 Hz
-    assert alarm_level(DetectionParams(slack_nats=0.0), 0.01) == pytest.approx(math.log(360_000))
-    assert alarm_level(DetectionParams(slack_nats=0.0, false_alarms_per_hour=0.1), 0.01) == pytest.approx(
+    assert alarm_level(SequentialParams(slack_nats=0.0), 0.01) == pytest.approx(math.log(360_000))
+    assert alarm_level(SequentialParams(slack_nats=0.0, false_alarms_per_hour=0.1), 0.01) == pytest.approx(
         math.log(3_600_000)
     )
 
@@ -108,7 +108,7 @@ def test_the_expectation_of_the_statistic_in_free_motion_is_the_sum_of_the_weigh
 
 
 def test_false_alarms_on_noise_stay_within_the_bound():
-    rng, S, p = np.random.default_rng(6), spread(), DetectionParams(slack_nats=0.0, false_alarms_per_hour=3600.0)
+    rng, S, p = np.random.default_rng(6), spread(), SequentialParams(slack_nats=0.0, false_alarms_per_hour=3600.0)
     L, ring, weight = np.linalg.cholesky(S), np.zeros((LONGEST, N)), np.full(N, 1.0 / N)
     passed, samples, level = 0, 20_000, alarm_level(p, 0.01)
     for i in range(samples):
@@ -126,7 +126,7 @@ def test_a_push_is_found_and_its_window_is_that_of_its_length():
     means[3] = [6.0, 0.0, 0.0]
     log_r, window, _ = judge(means, 6, np.eye(N), np.full(N, 1e-3), no_point(np.full(N, 1.0 / N)), 15.0, 30.0)
     assert window == 3
-    assert log_r > alarm_level(DetectionParams(slack_nats=0.0), 0.01)
+    assert log_r > alarm_level(SequentialParams(slack_nats=0.0), 0.01)
 
 
 def test_an_outlier_of_one_sample_is_less_to_a_test_with_heavy_tails():

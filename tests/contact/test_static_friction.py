@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pretouch.contact.admittance import AdmittanceState, admittance_init, begun, dead_band, yielded
-from pretouch.params import PROFILES
+from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, mass_init, yielded
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 
 DT, N = 0.01, 7
-P = PROFILES["pretouch"].reaction
+P = PROFILES["pretouch"].react
 NOISE = np.array([1.0, 1.0, 1.0, 0.7, 0.05, 0.1, 0.02])
 """Deviation of a simulated Panda's estimate [Nm]."""
 
@@ -18,7 +18,7 @@ def arm(panda_model: RobotModel):
     return panda_model, panda_model.kinematics(panda_model.description.q_ready)
 
 
-def course(state: AdmittanceState, arm, torque: np.ndarray, seconds: float, rng) -> tuple[np.ndarray, AdmittanceState]:
+def course(state: VirtualMass, arm, torque: np.ndarray, seconds: float, rng) -> tuple[np.ndarray, VirtualMass]:
     """Velocities (T, n) under a constant torque and noise, of an arm that follows."""
     band, command, made = dead_band(arm[0].description.tau_max, P), state.velocity, []
     for _ in range(round(seconds / DT)):
@@ -32,7 +32,7 @@ def course(state: AdmittanceState, arm, torque: np.ndarray, seconds: float, rng)
 @pytest.mark.parametrize("bias", [2.0, -2.0])
 def test_a_bias_of_2_nm_never_moves_an_arm_that_stands(arm, joint: int, bias: float):
     rng = np.random.default_rng([1000, joint])
-    moved, state = course(admittance_init(N, P), arm, bias * np.eye(N)[joint], 60.0, rng)
+    moved, state = course(mass_init(N, P), arm, bias * np.eye(N)[joint], 60.0, rng)
     assert not moved.any()
     assert state.quiet > P.quiet_s, "and keeps it from nothing"
 
@@ -40,7 +40,7 @@ def test_a_bias_of_2_nm_never_moves_an_arm_that_stands(arm, joint: int, bias: fl
 @pytest.mark.parametrize("joint", range(N))
 def test_a_push_of_4_nm_moves_a_joint_within_half_a_second(arm, joint: int):
     rng = np.random.default_rng([1001, joint])
-    moved, state = course(admittance_init(N, P), arm, 4.0 * np.eye(N)[joint], 0.5, rng)
+    moved, state = course(mass_init(N, P), arm, 4.0 * np.eye(N)[joint], 0.5, rng)
     assert moved[-1, joint] > 0.03
     assert not np.delete(moved, joint, axis=1).any()
     assert state.quiet == 0.0
@@ -49,7 +49,7 @@ def test_a_push_of_4_nm_moves_a_joint_within_half_a_second(arm, joint: int):
 @pytest.mark.parametrize("joint", range(N))
 def test_a_joint_that_a_push_moved_stops_under_a_bias(arm, joint: int):
     rng, axis = np.random.default_rng([1002, joint]), np.eye(N)[joint]
-    moved, state = course(admittance_init(N, P), arm, 8.0 * axis, 1.0, rng)
+    moved, state = course(mass_init(N, P), arm, 8.0 * axis, 1.0, rng)
     assert moved[-1, joint] > 0.1
     moved, _ = course(state, arm, 2.0 * axis, 30.0, rng)
     assert not moved[200:].any()
@@ -59,7 +59,7 @@ def test_noise_of_one_sample_begins_no_motion(arm):
     band = dead_band(arm[0].description.tau_max, P)
     torque = np.array([9.0, -6.0, 4.0, 0.0, 0.0, 3.0, 2.0])
     before = np.array([7.0, 1.0, 2.0, 0.0, 0.0, 2.9, 2.0])
-    started = begun(admittance_init(N, P), *arm, torque, before, band, P)
+    started = begun(mass_init(N, P), *arm, torque, before, band, P)
     # the lesser of both beyond the band, where it is more than 0.85 times the friction
     np.testing.assert_array_equal(np.flatnonzero(started.velocity), [0, 5])
     assert started.velocity[0] / started.velocity[5] == pytest.approx((7.0 - 2.24) / (2.9 - 0.74))
@@ -79,7 +79,7 @@ def test_a_noisy_and_biased_estimate_moves_nobody_who_pushes_back(panda_model):
         for _ in range(16):
             torque = keep * torque + (1 - keep) * (J.T @ force)
             samples.append(torque + bias + M @ (0.48 * rng.standard_normal(N)))
-        state = begun(admittance_init(N, P), model, kin, samples[4], samples[3], band, P)
+        state = begun(mass_init(N, P), model, kin, samples[4], samples[3], band, P)
         for sample in samples[5:]:
             assert force @ J @ state.velocity >= 0.0
             state = yielded(state, (model, kin), sample, state.velocity, band, DT, P)

@@ -6,19 +6,22 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.contact.alone import begun as feel_init
+from tests.contact.alone import feel, sample, standing
 
-from pretouch.contact.cues import no_cues
-from pretouch.contact.feel import feel, feel_init
+from pretouch.contact.cues import Cues, no_cues
+from pretouch.contact.detector import Body
 from pretouch.contact.sequential import alarm_level
-from pretouch.contact.tactile import feel_touch, gain_of, surface_area, touch_init, touch_settings
-from pretouch.params import DetectionParams, profile
+from pretouch.contact.tactile import TouchSensors, gain_of, surface_area
+from pretouch.perception.closest import no_obstacles
+from pretouch.profiles import profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
 from pretouch.types import Obstacles, RobotState, TouchReadings, TouchStatus
 
-P = profile("pretouch").detection
+(P,) = profile("pretouch").detect.cues
 PERIOD = 0.01
 NOW = 5.0
 
@@ -35,6 +38,20 @@ def said(units: int, *touched: int, stamp: float = NOW, force: float = np.nan) -
     contact = np.zeros(units, np.bool_)
     contact[list(touched)] = True
     return TouchReadings(np.full(units, stamp), contact, np.full(units, force), np.zeros(units, np.int64))
+
+
+class Sensors:
+    """The touch sensors of an arm at rest, given readings."""
+
+    def __init__(self, model: RobotModel, skin: Skin) -> None:
+        self.body, self.kin = Body(model, skin, PERIOD), model.kinematics(model.description.q_ready)
+        self.robot, self.cue = standing(model), TouchSensors().on(self.body)
+        self.state = self.cue.init(self.body)
+
+    def cues(self, readings: TouchReadings | None) -> Cues | None:
+        given = sample(self.kin, self.robot, no_obstacles(), NOW, readings)
+        cues, self.state = self.cue.step(self.state, self.body, given)
+        return cues
 
 
 def test_the_gain_by_hand():
@@ -59,25 +76,20 @@ def test_the_surface_of_a_link_is_that_of_its_capsules():
 
 
 def test_units_that_say_nothing_and_skins_without_sensors_say_nothing(panda_model, paper_skin):
-    kin = panda_model.kinematics(panda_model.description.q_ready)
-    assert touch_settings(panda_model, paper_skin, P) is None
+    assert Sensors(panda_model, paper_skin).state is None
+    assert Sensors(panda_model, paper_skin).cues(said(len(paper_skin), 0)) is None
     skin = touching(paper_skin, panda_model)
-    for off in (replace(P, use_touch=False), DetectionParams(use_touch=True)):  # the second is the paper's method
-        assert touch_settings(panda_model, skin, off) is None
-    settings = touch_settings(panda_model, skin, P)
-    state = touch_init(settings)
+    sensors = Sensors(panda_model, skin)
     for nothing in (None, said(len(skin)), said(len(skin), 1, 2, 4, 5, 6)):
-        cues, after = feel_touch(state, settings, nothing, kin, NOW, PERIOD, P)
-        assert cues is None
-        assert after is state
+        before = sensors.state
+        assert sensors.cues(nothing) is None
+        assert sensors.state is before
 
 
 def test_a_touch_raises_the_prior_of_its_link_alone_and_tells_where_it_is(panda_model, paper_skin):
     skin = touching(paper_skin, panda_model, sigma=0.004)
-    settings = touch_settings(panda_model, skin, P)
-    assert settings is not None
-    kin = panda_model.kinematics(panda_model.description.q_ready)
-    cues, _ = feel_touch(touch_init(settings), settings, said(7, 3, force=2.5), kin, NOW, PERIOD, P)
+    sensors = Sensors(panda_model, skin)
+    cues = sensors.cues(said(7, 3, force=2.5))
     assert cues is not None
     link = int(skin.link[3])
     share = np.pi * 0.02**2 / surface_area(panda_model.capsules, link)
@@ -85,7 +97,7 @@ def test_a_touch_raises_the_prior_of_its_link_alone_and_tells_where_it_is(panda_
     assert np.delete(cues.gain, link) == pytest.approx(1.0)
     assert cues.link.tolist() == [link]
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = kin.rotation[link], kin.position[link]
+    T[:3, :3], T[:3, 3] = sensors.kin.rotation[link], sensors.kin.position[link]
     assert cues.point[0] == pytest.approx((T @ skin.T_link_sensor[3])[:3, 3])
     assert cues.sigma == pytest.approx([np.hypot(0.01, 0.004)])
     assert cues.force.tolist() == [2.5]
@@ -93,12 +105,9 @@ def test_a_touch_raises_the_prior_of_its_link_alone_and_tells_where_it_is(panda_
 
 def test_two_units_on_one_link_count_once(panda_model, paper_skin):
     skin = touching(paper_skin, panda_model, (0, 1))
-    settings = touch_settings(panda_model, skin, P)
-    assert settings is not None
     assert skin.link[0] == skin.link[1]
-    kin = panda_model.kinematics(panda_model.description.q_ready)
-    one, _ = feel_touch(touch_init(settings), settings, said(7, 0), kin, NOW, PERIOD, P)
-    both, _ = feel_touch(touch_init(settings), settings, said(7, 0, 1), kin, NOW, PERIOD, P)
+    one = Sensors(panda_model, skin).cues(said(7, 0))
+    both = Sensors(panda_model, skin).cues(said(7, 0, 1))
     assert one is not None
     assert both is not None
     assert both.gain.tolist() == one.gain.tolist()
@@ -116,22 +125,18 @@ def test_two_units_on_one_link_count_once(panda_model, paper_skin):
     ],
 )
 def test_what_is_old_early_or_of_a_failed_sensor_is_not_believed(panda_model, paper_skin, change):
-    settings = touch_settings(panda_model, touching(paper_skin, panda_model), P)
-    kin = panda_model.kinematics(panda_model.description.q_ready)
-    cues, _ = feel_touch(touch_init(settings), settings, replace(said(7, 0), **change), kin, NOW, PERIOD, P)
+    sensors = Sensors(panda_model, touching(paper_skin, panda_model))
+    cues = sensors.cues(replace(said(7, 0), **change))
     assert cues is None
 
 
 def test_a_sensor_that_is_stuck_is_believed_for_ten_seconds_and_comes_back_slowly(panda_model, paper_skin):
-    settings = touch_settings(panda_model, touching(paper_skin, panda_model), P)
-    kin = panda_model.kinematics(panda_model.description.q_ready)
-    state, believed = touch_init(settings), []
+    sensors = Sensors(panda_model, touching(paper_skin, panda_model))
+    believed = []
 
     def turns(seconds: float, readings: TouchReadings) -> None:
-        nonlocal state
         for _ in range(round(seconds / PERIOD)):
-            cues, state = feel_touch(state, settings, readings, kin, NOW, PERIOD, P)
-            believed.append(cues is not None)
+            believed.append(sensors.cues(readings) is not None)
 
     turns(60.0, said(7, 0))
     assert abs(sum(believed) * PERIOD - 10.0) < 2 * PERIOD
@@ -141,7 +146,7 @@ def test_a_sensor_that_is_stuck_is_believed_for_ten_seconds_and_comes_back_slowl
     turns(10.0, said(7, 0))
     assert abs(sum(believed) * PERIOD - 2.0) < 3 * PERIOD
     # the other unit has an account of its own
-    cues, _ = feel_touch(state, settings, said(7, 0, 3), kin, NOW, PERIOD, P)
+    cues = sensors.cues(said(7, 0, 3))
     assert cues is not None
     assert len(cues.link) == 1
 
@@ -165,5 +170,5 @@ def test_a_touch_counts_for_an_object_that_is_seen_at_its_link_as_well(panda_mod
             felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, cues)
         evidence.append(felt.evidence)
     # fifty times the prior of what says most: ln 50 in units of ln A, but for what the other hypotheses add
-    gained = np.log(50.0) / alarm_level(ours.detection, ours.task.control_period_s)
+    gained = np.log(50.0) / alarm_level(ours.detect, ours.task.control_period_s)
     assert 0.8 * gained < evidence[1] - evidence[0] <= gained * (1 + 1e-9)

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pretouch.contact.window import WindowState, add, weighted_value, window_init
+from pretouch.contact.window import WindowState, add_force, weighted_value, window_init
+from pretouch.params import WindowParams
 
 ALPHA, LAMBDA = 0.1, 0.75  # Table I
 
@@ -17,7 +18,7 @@ def filled(values: list[float], alpha: float = ALPHA) -> WindowState:
     """A window as large as the values, the same on all three axes."""
     state = window_init(len(values))
     for value in values:
-        state = add(state, np.full(3, value), alpha, LAMBDA)
+        state = add_force(state, np.full(3, value), WindowParams(alpha=alpha, lambda_=LAMBDA))
     return state
 
 
@@ -44,10 +45,10 @@ def test_raw_samples_fill_the_window_however_wild():
 
 def test_a_full_window_filters_with_its_last_statistics_and_its_last_value():
     state = filled([0.0, 0.0, 0.0, 0.0])
-    state = add(state, np.full(3, 5.0), ALPHA, LAMBDA)
+    state = add_force(state, np.full(3, 5.0), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
     # sigma = 0, so 5 is an outlier: 0.1 * 5 + 0.9 * 0 = 0.5
     np.testing.assert_allclose(state.newest, 0.5)
-    state = add(state, np.full(3, 5.0), ALPHA, LAMBDA)
+    state = add_force(state, np.full(3, 5.0), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
     # window 0, 0, 0, 0.5: mu = 0.125, sigma = 0.25, |5 - 0.125| > 0.1875; x_{t-1} is the 0.5 that was added, not 5:
     # 0.1 * 5 + 0.9 * 0.5 = 0.95
     np.testing.assert_allclose(state.newest, 0.95)
@@ -56,7 +57,7 @@ def test_a_full_window_filters_with_its_last_statistics_and_its_last_value():
 
 def test_the_oldest_value_leaves():
     state = filled([1.0, 2.0, 3.0], alpha=1.0)
-    state = add(state, np.full(3, 4.0), 1.0, LAMBDA)
+    state = add_force(state, np.full(3, 4.0), WindowParams(alpha=1.0, lambda_=LAMBDA))
     np.testing.assert_array_equal(np.sort(state.ring[:, 0]), [2.0, 3.0, 4.0])
     np.testing.assert_allclose(state.mean(), 3.0)
 
@@ -69,7 +70,7 @@ def test_statistics_equal_numpy_over_thousands_of_samples(samples: int, offset: 
     for i in range(3000):
         # phases of noise, of none, and single wild values
         scale = (3.0, 0.0, 50.0 if i % 17 == 0 else 0.01)[i // 500 % 3]
-        state = add(state, offset + scale * rng.standard_normal(3), ALPHA, LAMBDA)
+        state = add_force(state, offset + scale * rng.standard_normal(3), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
         ring.append(state.newest)
         np.testing.assert_allclose(state.mean(), np.mean(ring, axis=0), atol=1e-10)
         if len(ring) > 1:
@@ -79,7 +80,7 @@ def test_statistics_equal_numpy_over_thousands_of_samples(samples: int, offset: 
 def test_a_step_of_the_signal_leaves_no_lasting_error():
     state = window_init(50)
     for i in range(500):
-        state = add(state, np.full(3, 0.1 if i < 130 else 12345.678), 1.0, LAMBDA)
+        state = add_force(state, np.full(3, 0.1 if i < 130 else 12345.678), WindowParams(alpha=1.0, lambda_=LAMBDA))
         values = state.ring[: state.count]
         np.testing.assert_allclose(state.mean(), values.mean(axis=0), atol=1e-9)
     # the window holds equal values only: its deviation is exactly zero, so eq. 10 adds nothing
@@ -91,7 +92,7 @@ def test_a_step_of_the_signal_leaves_no_lasting_error():
 def test_statistics_equal_numpy_for_any_values(values: np.ndarray):
     state = window_init(8)
     for value in values:
-        state = add(state, value, ALPHA, LAMBDA)
+        state = add_force(state, value, WindowParams(alpha=ALPHA, lambda_=LAMBDA))
     held = state.ring[: state.count]
     np.testing.assert_allclose(state.mean(), held.mean(axis=0), atol=1e-9)
     expected = held.std(axis=0, ddof=1) if len(held) > 1 else np.zeros(3)
@@ -103,7 +104,7 @@ def test_constant_force_has_no_deviation_and_every_change_is_an_outlier():
     state = filled([-7.3] * 20)
     np.testing.assert_array_equal(state.std(), 0.0)
     np.testing.assert_array_equal(state.mean(), -7.3)
-    changed = add(state, np.full(3, -7.2), ALPHA, LAMBDA).newest
+    changed = add_force(state, np.full(3, -7.2), WindowParams(alpha=ALPHA, lambda_=LAMBDA)).newest
     np.testing.assert_allclose(changed, 0.1 * -7.2 + 0.9 * -7.3)
 
 
@@ -112,7 +113,7 @@ def test_empty_and_single():
     np.testing.assert_array_equal(empty.mean(), 0.0)
     np.testing.assert_array_equal(empty.std(), 0.0)
     assert not empty.full
-    one = add(empty, np.array([1.0, 2.0, 3.0]), ALPHA, LAMBDA)
+    one = add_force(empty, np.array([1.0, 2.0, 3.0]), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
     np.testing.assert_array_equal(one.mean(), [1.0, 2.0, 3.0])
     np.testing.assert_array_equal(one.std(), 0.0)
 
@@ -120,6 +121,6 @@ def test_empty_and_single():
 def test_adding_leaves_the_old_state_alone():
     state = filled([1.0, 2.0, 3.0])
     before = state.ring.copy()
-    add(state, np.full(3, 9.0), ALPHA, LAMBDA)
+    add_force(state, np.full(3, 9.0), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
     np.testing.assert_array_equal(state.ring, before)
     np.testing.assert_array_equal(state.newest, 3.0)

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from pretouch.control.interface import Body, MotionRequest, restriction_on
+from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import JointLimits
-from pretouch.control.motion import Motion, MotionState, joint_motion
+from pretouch.control.motion import Motion, MotionState, joint_motion, restriction_on
 from pretouch.control.setup import motion_setup
 from pretouch.params import Profile
 from pretouch.robot.model import Kinematics, RobotModel
@@ -15,7 +15,7 @@ class Mover:
     """An arm's motion with a profile, and what it remembers."""
 
     def __init__(self, model: RobotModel, limits: JointLimits, profile: Profile, units: int = 7) -> None:
-        self.body = Body(model, units, limits, profile.task)
+        self.body = MotionBody(model, units, limits, profile.task)
         self.setup = motion_setup(self.body, profile.null_space, profile.failure.solver_iterations)
         self.part = restriction_on(profile.approach, self.body)
         self.remembered: Any = None if profile.approach is None else profile.approach.init(self.body)

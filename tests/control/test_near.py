@@ -13,9 +13,9 @@ from pretouch.control.interface import MotionRequest, Restricted
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.motion import joint_motion
 from pretouch.errors import ParameterError
-from pretouch.params import PROFILES, NullSpaceMotion, Profile, profile
+from pretouch.params import NullSpaceMotion
 from pretouch.perception.closest import closest_points, no_obstacles
-from pretouch.profiles import with_restriction
+from pretouch.profiles import PROFILES, Profile, profile, with_restriction
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RobotState

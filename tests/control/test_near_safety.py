@@ -11,8 +11,8 @@ from tests.following_arm import DT, Arm
 from pretouch.control.braking import braking_cap
 from pretouch.control.interface import MotionRequest
 from pretouch.control.joint_box import joint_limits
-from pretouch.params import profile
 from pretouch.perception.closest import closest_points
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import QpOutcome, RobotState

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.joint_box import brake, joint_box
 from pretouch.control.path import Circle
 from pretouch.control.qp import Cost, solve
-from pretouch.control.restriction import ApproachRestriction, ApproachRows
+from pretouch.control.restriction import ApproachRows
 from pretouch.controller import Controller
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, Mode, QpOutcome, QpSolution, RangeReadings, RangeStatus, RobotState
@@ -306,7 +307,7 @@ def test_beyond_its_budget_the_controller_brakes_holds_and_says_so(
 ):
     paper = PROFILES["paper"]
     profile = replace(
-        paper, threshold=replace(paper.threshold, window_samples=5), approach=ApproachRestriction(rows=mode),
+        paper, window=replace(paper.window, samples=5), approach=ApproachRestriction(rows=mode),
         task=replace(paper.task, acceleration_m_s2=100.0),
     )  # fmt: skip
     hurried = replace(profile, failure=replace(profile.failure, solver_iterations=1))

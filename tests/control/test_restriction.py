@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.interface import Body, MotionRequest
+from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.restriction import ApproachRestriction, approach_limit, approach_rows, velocity_a, velocity_b
+from pretouch.control.restriction import approach_limit, approach_rows, velocity_a, velocity_b
 from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.robot.model import RobotModel
@@ -123,7 +124,7 @@ def test_an_empty_surrounding_has_no_rows(panda_model: RobotModel):
 def test_the_part_returns_the_same_rows_and_its_weight(panda_model: RobotModel, rows: str):
     q, obstacles = random_scene(panda_model, 1, reach=1.2)
     part = ApproachRestriction(rows=rows, slack_weight=500.0)
-    body = Body(panda_model, 12, joint_limits(panda_model, 0.01, 0.01), TaskParams())
+    body = MotionBody(panda_model, 12, joint_limits(panda_model, 0.01, 0.01), TaskParams())
     robot = RobotState(0.0, q, np.zeros(7), q, np.zeros(7), np.zeros(7), None)
     kin, request = panda_model.kinematics(q), MotionRequest(np.zeros(3), np.eye(3))
     allowed, state = part.step(part.init(body), body, kin, robot, obstacles, request)

@@ -22,7 +22,7 @@ def test_steps_of_the_grid_are_not_lost_to_rounding():
 
 
 def test_a_warning_that_no_way_is_long_enough_for():
-    said = r"has to be seen 1\.10 m before it touches, but ways are 0\.8 m long: give"
+    said = r"must be seen 1\.10 m before contact, but the paths are only 0\.8 m long: give"
     with pytest.raises(ParameterError, match=said):
         CoverageParams(object_speed_m_s=1.8)
     with pytest.raises(ParameterError, match=r"CoverageParams\.range_m is -1"):

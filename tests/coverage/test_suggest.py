@@ -76,5 +76,7 @@ def test_the_file_with_new_units_keeps_the_old_ones(made, panda_model, paper_ski
 
 
 def test_more_units_than_there_are_places(made, paper_skin):
-    with pytest.raises(SkinError, match=r"5 more units are asked for, and 3 places found: ask for 1 to 3"):
+    with pytest.raises(
+        SkinError, match=r"5 more units were requested, but only 3 positions were found: request 1 to 3"
+    ):
         suggest(made, paper_skin, 5, candidates(made, paper_skin)[:3])

@@ -6,9 +6,10 @@ from functools import cache
 
 import numpy as np
 
-from pretouch.control.restriction import ApproachRestriction, notice_m
-from pretouch.params import Profile
-from pretouch.profiles import restriction_mode
+from pretouch.contact.admittance import Admittance
+from pretouch.control.approach_restriction import ApproachRestriction, notice_m
+from pretouch.params import ClampParams
+from pretouch.profiles import Profile, restriction_mode
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Mode, QpOutcome, Touched
@@ -77,7 +78,7 @@ def check_touched(touched: Touched) -> None:
 def check_finite(step: ControlStep, e: Expected, p: Profile) -> None:
     """Every number is finite but for what is documented to be NaN."""
     unknown = MAY_BE_NAN if e.strained else MAY_BE_NAN | {"residual", "parts"}
-    unknown = unknown | {"parts"} if p.detection.method == "fixed" else unknown
+    unknown = unknown | {"parts"} if p.detect.name == "fixed" else unknown
     numbers = [array.ravel() for name, array in arrays_of(step) if name not in unknown]
     assert np.isfinite(np.concatenate(numbers)).all()
     assert np.isnan(step.force).all() if e.force is None else np.array_equal(step.force, e.force)
@@ -210,7 +211,8 @@ def check_mode(step: ControlStep, e: Expected, oracle: Oracle, resume: bool, lat
     if cause == "silent":
         assert all(name in step.reason for name in e.silent)
     skips = step.mode is Mode.HOLD and cause not in ("failed", "blocked")
-    if skips and oracle.p.reaction.soft_hold and oracle.p.reaction.method == "admittance":
+    r = oracle.p.react
+    if skips and isinstance(r, Admittance) and r.soft_hold:
         assert step.qp.outcome is QpOutcome.SKIPPED or cause in SOFT, cause
     else:
         assert (step.qp.outcome is QpOutcome.SKIPPED) == skips
@@ -220,7 +222,8 @@ def check_mode(step: ControlStep, e: Expected, oracle: Oracle, resume: bool, lat
         assert not step.desired_velocity.any()
     if step.mode is not Mode.REACT:
         assert not step.reaction_velocity.any()
-    r = oracle.p.reaction
-    most = r.speed_max_m_s if r.method == "decay" else 1.05 * max(r.speed_max_m_s, r.open_m_s)
+    most = r.speed_max_m_s
+    if isinstance(r, Admittance):
+        most = 1.05 * max(most, (r.clamp or ClampParams()).open_m_s)
     assert np.linalg.norm(step.reaction_velocity) <= most + 1e-12
     return cause

@@ -3,6 +3,7 @@
 from collections import Counter
 from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -19,14 +20,20 @@ DEEP = 10
 """Each so many steps the dear checks are made: shapes, inputs untouched, the same again."""
 
 
+@cache
+def _models(_use: str) -> tuple[RobotModel, RobotModel]:
+    """Read the arms once for each use."""
+    return RobotModel(panda()), RobotModel(fr3())
+
+
 class Machine:
     """One seed: worlds, one after the other, and what was reached in them."""
 
     def __init__(self, seed: int, lies: list[float] = weather.LIES) -> None:
         self.rng = np.random.default_rng(seed)
-        self.models = RobotModel(panda()), RobotModel(fr3())
+        self.models = _models("checked")
         # the checks' own, apart from the scratch memory of those that are checked
-        self.others = {"panda": RobotModel(panda()), "fr3": RobotModel(fr3())}
+        self.others = dict(zip(("panda", "fr3"), _models("checking"), strict=True))
         self.lies = lies
         self.reached: Counter[str] = Counter()
         self.given: tuple[object, ...] = ()
@@ -134,7 +141,7 @@ class Course:
         self.machine.reached.update([
             "step", f"arm {self.world.model.description.name}",
             f"mode {step.mode.name}", f"outcome {step.qp.outcome.name}", f"cause {cause}",
-            f"restriction {restriction_mode(p)}", f"detection {p.detection.method}", f"reaction {p.reaction.method}",
+            f"restriction {restriction_mode(p)}", f"detection {p.detect.name}", f"reaction {p.react.name}",
             f"period {p.task.control_period_s}", f"units {len(self.world.skin)}",
             f"sight {self.weather.sight}", f"force {self.weather.feel}", f"slack {bool(tight)}",
             f"slowed {step.speed_scale < 1}", f"on the axis {bool((step.obstacles.body_distance < -0.04).any())}",

@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.params import Profile
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.profiles import Profile
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RobotState
 
 SHOWN, NEAR, NO_TARGET = {0, 6, 11}, {3, 13}, {1, 2, 4, 7}
@@ -78,7 +80,8 @@ class Oracle:
         self.q, self.qd = robot.q_commanded.copy(), robot.qd_commanded.copy()
         self.mode, self.latched, self.reason = Mode.HOLD, False, ""
         self.samples = 0
-        self.reacted = profile.reaction.decay_cycles
+        self.decay_cycles = DecayingVelocity.of(profile.react, profile.task.control_period_s).decay_cycles
+        self.reacted = self.decay_cycles
 
     def expect(self, inputs: Inputs) -> Expected:
         """Judge the inputs of the next step."""
@@ -94,9 +97,7 @@ class Oracle:
         tau = np.array(np.nan if fault or robot.tau_ext is None else robot.tau_ext, dtype=np.float64)
         strained = tau.shape == self.qd_max.shape and bool((np.abs(tau) < STRONGEST).all())
         felt = w is not None and bool(np.isfinite(w).all() and np.abs(w).max() < p.failure.force_max_n)
-        self.force_stamp = (
-            now if (felt if p.detection.method == "thresholds" else strained) else min(self.force_stamp, now)
-        )
+        self.force_stamp = now if (felt if not p.detect.by_torques else strained) else min(self.force_stamp, now)
         self._hear(inputs, now, now < last)
         age = now - self.heard if p.perception.enabled and len(self.ids) else np.zeros(0)
         slow, stop = p.perception.slow_after_s, p.perception.silent_after_s
@@ -149,8 +150,8 @@ class Oracle:
         if MODES.get(cause) is Mode.REACT:
             self.reacted = 1 if cause == "contact" or self.mode is not Mode.REACT else self.reacted + 1
         else:
-            self.reacted = self.p.reaction.decay_cycles
-        self.samples = min(self.samples + (e.force is not None), self.p.threshold.window_samples)
+            self.reacted = self.decay_cycles
+        self.samples = min(self.samples + (e.force is not None), self.p.window.samples)
         self.mode, self.latched, self.reason = step.mode, cause in LATCHING, step.reason
         self.q, self.qd = self.q + step.command * self.p.task.control_period_s, step.command.copy()
         return cause
@@ -168,17 +169,14 @@ class Oracle:
         """What decides the mode of a step whose inputs can be believed, before the quadratic program."""
         if self.latched and not resume:
             return "latched"
-        if (
-            self.p.reaction.method == "decay"
-            and self.mode is Mode.REACT
-            and self.reacted < self.p.reaction.decay_cycles
-        ):
+        decays = isinstance(self.p.react, DecayingVelocity)
+        if decays and self.mode is Mode.REACT and self.reacted < self.decay_cycles:
             return "reacting"
         if self.mode is not Mode.REACT and self.feels_contact(e, step):
             return "contact"
-        if self.p.detection.method != "thresholds" or self.p.reaction.method != "decay":
+        if self.p.detect.by_torques or not decays:
             return self._told(e, step)
-        filling = self.samples < self.p.threshold.window_samples
+        filling = self.samples < self.p.window.samples
         seen = {"silent": bool(e.silent), "no force": e.no_force, "overrun": e.overrun, "filling": filling}
         # how long the path has been blocked is remembered by the arm's motion, and said only while it tracks
         blocked = self.mode is Mode.TRACK and self.p.task.blocked_after_s is not None
@@ -194,23 +192,23 @@ class Oracle:
             return told if waiting else "yielding" if told == "blocked reaction" else "clear"
         seen = {
             "silent": bool(e.silent),
-            "no force": e.no_force or (self.p.detection.method != "thresholds" and not e.strained),
+            "no force": e.no_force or (self.p.detect.by_torques and not e.strained),
             "overrun": e.overrun,
         }
         first = next((cause for cause, here in seen.items() if here), "")
         free = ("given up", "pressed", "filling", "path blocked", "clear")
         assert first or told in free, (told, step.reason)
         if not first and told in ("path blocked", "clear"):
-            assert self.samples >= self.p.threshold.window_samples
+            assert self.samples >= self.p.window.samples
         return first or told
 
     def feels_contact(self, e: Expected, step: ControlStep) -> bool:
         """Whether the force crosses the thresholds the step gives."""
-        r = self.p.reaction
-        sticks = self.mode is Mode.HOLD and r.soft_hold and r.method == "admittance" and r.static_friction_nm > 0
-        if self.p.detection.method != "thresholds" or sticks:
+        r = self.p.react
+        sticks = self.mode is Mode.HOLD and isinstance(r, Admittance) and r.soft_hold and r.static_friction_nm > 0
+        if self.p.detect.by_torques or sticks:
             return step.contact is not None
-        if e.force is None or self.samples < self.p.threshold.window_samples:
+        if e.force is None or self.samples < self.p.window.samples:
             return False
-        compared = step.filtered_force if self.p.threshold.compare == "filtered" else e.force
+        compared = step.filtered_force if self.p.detect.compare == "filtered" else e.force
         return bool(np.any((compared > step.thresholds.upper) | (compared < step.thresholds.lower)))

@@ -8,8 +8,8 @@ import pytest
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError
-from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
@@ -17,7 +17,7 @@ from pretouch.types import Inputs, QpOutcome, RangeReadings, RobotState
 from tests.fuzz.invariants import arrays_of
 
 PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=5))
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 PARAMETERS = [
     f"{group.name}.{item.name}"
     for group in fields(Profile)

@@ -12,15 +12,15 @@ from numba.core.registry import CPUDispatcher
 from pretouch.control.path import Circle
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import PretouchError
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
 from tests.fuzz.invariants import arrays_of, same
 
 PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=5))
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 NUMBERS = ["q", "qd", "q_commanded", "qd_commanded", "wrench", "stamp", "distance"]
 
 
@@ -132,7 +132,7 @@ def test_a_window_that_fills_keeps_no_buffer(panda_model, paper_skin):
     step, state = moving.controller.step(state, inputs)
     inputs.robot.wrench[:] = 99.0
     np.testing.assert_array_equal(step.filtered_force, 0.5)
-    np.testing.assert_array_equal(state.feel.window.newest, 0.5)
+    np.testing.assert_array_equal(state.window.newest, 0.5)
     robot = deepcopy(moving.next.robot)
     state = moving.controller.init(robot)
     robot.qd_commanded[:] = 99.0

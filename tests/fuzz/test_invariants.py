@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.description import fr3
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, RangeStatus
 from tests.fuzz import invariants
@@ -16,7 +16,7 @@ from tests.fuzz.oracle import Expected, Oracle
 from tests.fuzz.worlds import World
 
 PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=5))
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 
 
 @pytest.fixture

@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pretouch.control.path import Circle, line
-from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import with_restriction
+from pretouch.profiles import PROFILES, Profile, with_restriction
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
@@ -22,7 +21,7 @@ from tests.fuzz.worlds import World
 MODEL = RobotModel(panda())
 SKIN = paper_skin(MODEL)
 PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, threshold=replace(PAPER.threshold, window_samples=3, compare="raw"))
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=3), detect=replace(PAPER.detect, compare="raw"))
 K, N = len(SKIN), MODEL.n
 READY = MODEL.description.q_ready
 

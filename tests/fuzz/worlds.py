@@ -4,26 +4,34 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.reaction import Reaction
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.braking_curve import BrakingCurve
 from pretouch.control.path import Circle, Path, WayPoints, line
-from pretouch.control.restriction import ApproachRestriction
 from pretouch.params import (
+    ClampParams,
     FailureParams,
+    GiveUpParams,
+    LocalisationParams,
     PerceptionParams,
-    Profile,
-    ReactionParams,
+    PinchParams,
+    ProximityPriorParams,
     SpeedReduction,
     TaskParams,
-    ThresholdParams,
+    WindowParams,
 )
 from pretouch.params.anticipation import EffectiveMass, NullSpaceMotion, Tangential
-from pretouch.params.detection import DetectionParams
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
-from pretouch.profiles import profile
+from pretouch.profiles import Profile, profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit
+from pretouch_lab.baselines.fixed_bounds import FixedBounds
 
 # for each parameter its usual value and values far to both sides; what a check bounds, up to the bound
 CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
@@ -46,12 +54,12 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
         "d_repulse_m": (0.1, 1e-3, 1.0), "d_crit_m": (0.1, 1e-3), "d_notice_m": (0.6, 0.2, 5.0),
         "floor_m_s": (0.02, 0.0, 1.0), "slack_weight": (1000.0, 1e-2, 1e6),
     },
-    ThresholdParams: {
-        "window_samples": (5, 2, 30), "alpha": (0.1, 0.0, 1.0), "lambda_": (0.75, 0.0, 5.0), "f_base_n": (10.0, 4.1),
-        "f_std_n": (3.0, 0.0), "sigma_max_n": (3.0, 1e-3), "f_d_n": (4.0, 0.0), "d_max_m": (0.8, 5.0),
-        "d_min_m": (0.05, 0.0, 0.79), "compare": ("filtered", "raw"),
+    WindowParams: {"samples": (5, 2, 30), "alpha": (0.1, 0.0, 1.0), "lambda_": (0.75, 0.0, 5.0)},
+    MovingThresholds: {
+        "f_base_n": (10.0, 4.1), "f_std_n": (3.0, 0.0), "sigma_max_n": (3.0, 1e-3), "f_d_n": (4.0, 0.0),
+        "d_max_m": (0.8, 5.0), "d_min_m": (0.05, 0.0, 0.79), "compare": ("filtered", "raw"),
     },
-    ReactionParams: {
+    DecayingVelocity: {
         "compliance_m_s_n": (0.03, 1e-4, 1.0), "speed_max_m_s": (0.3, 0.01, 2.0), "decay_cycles": (20, 1, 200),
     },
     FailureParams: {
@@ -80,25 +88,25 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "tighten_m_s2": (3.0, 0.1, 100.0), "loosen_m_s2": (1.0, 0.1, 100.0),
     },
     NullSpaceMotion: {"speed_m_s": (0.1, 2.0), "joint_rad_s": (0.5, 5.0), "rate_rad_s2": (1.0, 100.0)},
-    DetectionParams: {
-        "method": ("sequential", "sequential", "fixed", "thresholds"), "freeze_while_reacting": (True, False),
-        "false_alarms_per_hour": (1.0, 3600.0), "use_proximity": (True, False), "near_gain": (100.0, 1e4),
-        "learn": (True, False), "learn_unseen": (False, True), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0),
-        "suspect": (0.6, 1.0), "confirm_samples": (1, 3), "localise": (True, False),
+    WindowParams: {"freeze_while_reacting": (True, False)},
+    SequentialTest: {
+        "false_alarms_per_hour": (1.0, 3600.0),
+        "proximity": (ProximityPriorParams(), ProximityPriorParams(gain=1e4), None),
+        "learn": ("watched", "always", "never"), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0), "suspect": (0.6, 1.0),
+        "confirm_samples": (1, 3), "localise": (LocalisationParams(), None),
     },
-    ReactionParams: {
-        "method": ("admittance", "admittance", "decay"), "clamps": (True, False), "gives_up": (True, False),
-        "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2), "inertia_kg_m2": (1.5, 1e-3, 100.0),
-        "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0), "dead_band_fraction": (0.02, 0.0, 0.5),
-        "static_friction_nm": (3.0, 0.0, 20.0),
-        "reverse_band": (2.0, 1.0), "start_energy_j": (0.2, 0.0, 50.0), "tank_max_j": (2.0, 1e-3),
-        "mean_s": (0.5, 0.01), "quiet_s": (0.05, 1.0), "patience_s": (0.1, 10.0), "clamp_nm": (4.0, 0.1),
-        "clamp_s": (0.03, 0.01), "clamp_turns": (2, 1), "open_m_s": (0.1, 2.0), "open_s": (0.05, 0.5),
-        "pinches": (True, False), "pinch_gap_m": (0.2, 5.0), "pinch_closing_m_s": (0.02, 1e-6), "pinch_n": (10.0, 0.01),
-        "pinch_along": (0.85, 0.0), "pinch_rest": (9.0, 1e6), "pinch_explained": (27.0, 1e-6),
-        "give_up_contacts": (3, 1), "place_m": (0.1, 10.0), "clear_s": (0.1, 1.0), "retry_s": (0.3, 30.0),
+    FixedBounds: {},
+    Admittance: {
+        "speed_max_m_s": (0.3, 0.01, 2.0), "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2),
+        "inertia_kg_m2": (1.5, 1e-3, 100.0), "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0),
+        "dead_band_fraction": (0.02, 0.0, 0.5), "static_friction_nm": (3.0, 0.0, 20.0),
+        "start_energy_j": (0.2, 0.0, 50.0), "quiet_s": (0.05, 1.0), "patience_s": (0.1, 10.0),
     },
+    ClampParams: {"torque_nm": (4.0, 0.1), "open_m_s": (0.1, 2.0), "open_s": (0.05, 0.5)},
+    PinchParams: {"gap_m": (0.2, 5.0), "force_n": (10.0, 0.01)},
+    GiveUpParams: {"contacts": (3, 1), "push_j": (0.3, 1e-3, 50.0), "retry_s": (0.3, 30.0)},
 }  # fmt: skip
+DETECTORS = (SequentialTest, SequentialTest, FixedBounds, MovingThresholds)
 NAMED = ("pretouch", "pretouch", "fixed", "observer", "flacco", "ding")
 
 
@@ -121,10 +129,10 @@ class World:
 
 def any_world(rng: np.random.Generator, model: RobotModel) -> World:
     """Draw a world."""
-    profile = any_profile(rng)
-    q, qd = any_start(rng, model, profile.task.position_margin_rad)
+    chosen = any_profile(rng)
+    q, qd = any_start(rng, model, chosen.task.position_margin_rad)
     return World(
-        model, profile, any_skin(rng, model), any_fixtures(rng), any_path(rng, model, q), q, qd,
+        model, chosen, any_skin(rng, model), any_fixtures(rng), any_path(rng, model, q), q, qd,
         lying=rng.random() < 0.15, measured_off=float(rng.choice([0.0, 1e-3, 0.03])),
     )  # fmt: skip
 
@@ -134,17 +142,28 @@ def any_profile(rng: np.random.Generator) -> Profile:
     usual = 0.85 if rng.random() < 1 / 3 else 0.4
     if rng.random() < 0.15:
         named = profile(str(rng.choice(NAMED)))
-        return replace(named, threshold=replace(named.threshold, window_samples=5))
+        return replace(named, window=replace(named.window, samples=5))
     ours = rng.random() < 0.6
     groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES or (ours and f.type in OURS)}
     choices = {group: CHOICES.get(group, {}) | (OURS.get(group, {}) if ours else {}) for group in groups.values()}
     drawn = {name: group(**_drawn(rng, choices[group], usual)) for name, group in groups.items()}
+    detector = DETECTORS[int(rng.integers(len(DETECTORS)))] if ours else MovingThresholds
+    drawn["detect"] = detector(**_drawn(rng, CHOICES.get(detector, {}) | OURS.get(detector, {}), usual))
     drawn |= {"slow": _one_of(rng, usual, SpeedReduction, None), "null_space": None}
     drawn["approach"] = _one_of(rng, usual, ApproachRestriction, ApproachRestriction, None)
     if ours:
         drawn["approach"] = _one_of(rng, usual, BrakingCurve, BrakingCurve, ApproachRestriction, None)
         drawn["null_space"] = _one_of(rng, usual, NullSpaceMotion, None)
-    return Profile(**{**drawn, "name": "fuzzed"})
+    return Profile(**{**drawn, "name": "fuzzed", "react": any_reaction(rng, ours, usual)})
+
+
+def any_reaction(rng: np.random.Generator, ours: bool, usual: float) -> Reaction:
+    """Draw the paper's reaction, or an admittance that looks for clamps, for things caught, for places, or not."""
+    if not ours or rng.random() < 0.2:
+        return DecayingVelocity(**_drawn(rng, CHOICES[DecayingVelocity], usual))
+    drawn = {kind: kind(**_drawn(rng, OURS[kind], usual)) for kind in (ClampParams, PinchParams, GiveUpParams)}
+    clamp, pinch, give_up = (found if rng.random() < 0.8 else None for found in drawn.values())
+    return Admittance(**_drawn(rng, OURS[Admittance], usual), clamp=clamp, pinch=pinch, give_up=give_up)
 
 
 def _one_of(rng: np.random.Generator, usual: float, *kinds: type | None) -> object:

@@ -8,8 +8,8 @@ from functools import partial
 from types import ModuleType
 
 from pretouch.controller import Controller
-from pretouch.params import profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.workload import Workload
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import dynamic, static

@@ -8,8 +8,8 @@ import numpy as np
 
 from pretouch.control.path import line
 from pretouch.controller import Controller
-from pretouch.params import profile
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin

@@ -8,8 +8,7 @@ import pytest
 
 from pretouch.errors import ParameterError
 from pretouch.hardware.findings import findings
-from pretouch.hardware.health import Counts, Standing, unit_health
-from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.health import Counts, HealthParams, UnitStatus, unit_health
 from pretouch.hardware.wire import NO_FORCE, Flag, TouchPart
 from tests.hardware.traffic import NOW, heard, traffic
 
@@ -18,7 +17,7 @@ WELL = int(Flag.RANGE_NEW)
 
 
 def found(samples, counted=None, **standing):
-    unit = unit_health("hand-1", samples, NOW, Standing.of(traffic(**standing)), counted or Counts(500))
+    unit = unit_health("hand-1", samples, NOW, UnitStatus.of(traffic(**standing)), counted or Counts(500))
     return findings([unit], LIMITS)
 
 
@@ -31,8 +30,8 @@ def wide(number):
 
 
 CASES = {
-    "never heard": (lambda: found([], state="never heard", last_arrival=-np.inf), "fault", "silent", "not been heard"),
-    "greeting": (lambda: found([], state="greeting", last_arrival=-np.inf), "fault", "silent", "opens no session"),
+    "never heard": (lambda: found([], state="never heard", last_arrival=-np.inf), "fault", "silent", "nothing so far"),
+    "greeting": (lambda: found([], state="greeting", last_arrival=-np.inf), "fault", "silent", "asks for a session"),
     "silent": (
         lambda: found(heard(until=NOW - 2.0), state="silent", last_arrival=NOW - 2.0), "fault", "silent",
         "nothing for 2.0 s (limit 0.3 s)",
@@ -47,13 +46,13 @@ CASES = {
     "lossy": (lambda: found(heard(), Counts(400, 100)), "warning", "loss", "loses 20% of its samples"),
     "hardly lossy": (
         lambda: found(heard(), Counts(424, 76)), "warning", "loss",
-        "loses 15.2% of its samples on their way (limit 15%)",
+        "loses 15.2% of its samples in transmission (limit 15%)",
     ),
     "very lossy": (lambda: found(heard(), Counts(340, 160)), "fault", "loss", "loses 32% of its samples"),
     "late": (lambda: found(heard(latency=0.07)), "warning", "latency", "in the median 70 ms (limit 50 ms)"),
-    "clock": (lambda: found(heard(), bound=0.02), "warning", "clock", "known to 20.0 ms only (limit 10 ms)"),
+    "clock": (lambda: found(heard(), bound=0.02), "warning", "clock", "known only to within 20.0 ms (limit 10 ms)"),
     "clock never known": (
-        lambda: found(without_clock(), bound=np.inf), "fault", "clock", "clock has not been known for 10 s (limit 2 s)"
+        lambda: found(without_clock(), bound=np.inf), "fault", "clock", "clock has been unknown for 10 s (limit 2 s)"
     ),
     "jumps": (lambda: found(heard(), Counts(500, 0, 0, 2)), "warning", "clock jump", "jumped 2 times"),
     "sigma": (lambda: found(heard(range_sigma=80)), "warning", "sigma", "own error at 20 mm (limit 15 mm)"),
@@ -69,7 +68,7 @@ CASES = {
     ),
     "touched for long": (
         lambda: found(heard(flags=WELL | 128, touch=TouchPart(1, 0, 900, 2000, 0).encode())), "warning", "touch held",
-        "has said for 10 s that it is touched (limit 9 s)",
+        "has reported a touch for 10 s (limit 9 s)",
     ),
     "touched now and then": (
         lambda: found(heard(flags=WELL | 128, touch=lambda n: TouchPart(n % 50 > 0, 0, 900, 2000, 0).encode())), None,
@@ -81,7 +80,7 @@ CASES = {
     ),
     "range late": (
         lambda: found(heard(flags=lambda n: WELL | (64 if n % 100 == 0 else 0))), "warning", "range late",
-        "nothing measured in time 5 times in 10 s (limit 3)",
+        "no new range in time 5 times in 10 s (limit 3)",
     ),
     "battery low": (lambda: found(heard(battery_mv=3450)), "warning", "battery", "at 3.45 V (limit 3.5 V)"),
     "battery flat": (lambda: found(heard(battery_mv=3250)), "fault", "battery", "at 3.25 V (limit 3.3 V)"),
@@ -117,10 +116,10 @@ def test_nothing_is_said_of_a_unit_that_is_well():
 
 
 def test_old_firmware_is_named():
-    unit = unit_health("hand-1", heard(), NOW, Standing.of(traffic(firmware=0x0003)), Counts(500))
+    unit = unit_health("hand-1", heard(), NOW, UnitStatus.of(traffic(firmware=0x0003)), Counts(500))
     (finding,) = findings([unit], HealthParams(firmware=0x0102))
     assert finding.level == "fault"
-    assert "runs firmware 0.3 (oldest that is served: 1.2)" in finding.sentence
+    assert "runs firmware 0.3 (oldest supported: 1.2)" in finding.sentence
 
 
 def test_rates_are_not_judged_before_a_unit_has_settled():
@@ -151,7 +150,7 @@ def test_rate_and_clock_are_not_judged_while_the_window_holds_a_silence_or_a_reb
     [
         ({}, {"battery_mv": 3499}, "at 3.499 V (limit 3.5 V)"),
         ({}, {"range_sigma": 61}, "at 15.2 mm (limit 15 mm)"),
-        ({"bound": 0.01004}, {}, "known to 10.04 ms only (limit 10 ms)"),
+        ({"bound": 0.01004}, {}, "known only to within 10.04 ms (limit 10 ms)"),
     ],
 )
 def test_a_value_is_told_with_as_many_digits_as_set_it_off_from_its_limit(standing, changes, words):

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.hardware.health import Counts, Standing, UnitWindow, unit_health
+from pretouch.hardware.health import Counts, UnitStatus, UnitWindow, unit_health
 from pretouch.hardware.traffic import UnitTraffic
 from pretouch.hardware.wire import NO_TEMPERATURE, Flag
 from tests.hardware.traffic import NOW, heard, traffic
 
 
 def health(samples, counted=None, **standing):
-    return unit_health("hand-1", samples, NOW, Standing.of(traffic(**standing)), counted or Counts(500))
+    return unit_health("hand-1", samples, NOW, UnitStatus.of(traffic(**standing)), counted or Counts(500))
 
 
 def test_a_unit_that_is_well_has_the_numbers_it_was_given():
@@ -82,7 +82,7 @@ def test_what_a_unit_cannot_tell_is_not_known():
     unit = health(heard(battery_mv=0, temperature_cdeg=NO_TEMPERATURE))
     assert math.isnan(unit.battery_v)
     assert math.isnan(unit.temperature_c)
-    nothing = unit_health("hand-1", [], NOW, Standing())
+    nothing = unit_health("hand-1", [], NOW, UnitStatus())
     assert nothing.silent_s == math.inf
     assert math.isnan(nothing.rate_hz)
     assert nothing.statuses == {}

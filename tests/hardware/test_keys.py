@@ -44,19 +44,19 @@ def test_a_file_others_can_get_at_is_refused(tmp_path, mode):
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("x = ", "no TOML"),
+        ("x = ", "not a TOML"),
         ("hand = 3", "a number and a key"),
         ("[hand]\nnumber = 1", "a number and a key"),
         (f"[hand]\nnumber = 1\nkey = '{'0' * 62}'", "31 bytes, not 32"),
         (f"[hand]\nnumber = 1\nkey = '{'x' * 64}'", "hexadecimal"),
-        ("[hand]\nnumber = 1\nkey = 5", "no text"),
+        ("[hand]\nnumber = 1\nkey = 5", "not text"),
         (f"[hand]\nnumber = 0\nkey = '{'0' * 64}'", "number of unit hand is 0"),
         (f"[hand]\nnumber = true\nkey = '{'0' * 64}'", "number of unit hand is True"),
-        (f"[hand]\nnumber = {'9' * 5000}\nkey = '{'0' * 64}'", "no TOML"),
+        (f"[hand]\nnumber = {'9' * 5000}\nkey = '{'0' * 64}'", "not a TOML"),
         (f"[hand]\nnumber = 0x{'f' * 5000}\nkey = '{'0' * 64}'", "number of unit hand is one of 20000 bits"),
         (f"[hand]\nnumber = '3'\nkey = '{'0' * 64}'", "number of unit hand is of type str"),
-        (f"a = {'[' * 20000}{']' * 20000}", "no TOML"),
-        (f'["a\\u001b[2J"]\nnumber = 1\nkey = "{"0" * 64}"', "can be printed"),
+        (f"a = {'[' * 20000}{']' * 20000}", "not a TOML"),
+        (f'["a\\u001b[2J"]\nnumber = 1\nkey = "{"0" * 64}"', "printable name"),
         (f"[a]\nnumber = 1\nkey = '{'0' * 64}'\n[b]\nnumber = 1\nkey = '{'1' * 64}'", "both have the number 1"),
         (f"[a]\nnumber = 1\nkey = '{'0' * 64}'\n[b]\nnumber = 2\nkey = '{'0' * 64}'", "the same key"),
     ],
@@ -82,9 +82,9 @@ def test_a_file_that_is_not_there_or_cannot_be_written_is_an_error_of_ours(tmp_p
 
 
 def test_a_path_that_no_file_can_have_is_an_error_of_ours(tmp_path):
-    with pytest.raises(HardwareError, match="can be no file"):
+    with pytest.raises(HardwareError, match="cannot be a file name"):
         load_keys(tmp_path / "a\0b")
-    with pytest.raises(HardwareError, match="can be no file"):
+    with pytest.raises(HardwareError, match="cannot be a file name"):
         save_keys(Keys(), tmp_path / "a\0b")
 
 

@@ -3,12 +3,12 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.hardware.link import WIDTH, Allowance, Answered, Window
+from pretouch.hardware.link import WIDTH, AnsweredChallenges, RateLimiter, ReplayWindow
 
 
 @given(st.lists(st.one_of(st.integers(0, 300), st.integers(2**32 - 200, 2**32 - 1)), max_size=300))
 def test_a_window_admits_what_is_new_and_not_too_old(sequences):
-    window, seen = Window(), set()
+    window, seen = ReplayWindow(), set()
     for sequence in sequences:
         newest = max(seen, default=0)
         wanted = sequence >= 1 and sequence not in seen and sequence > newest - WIDTH
@@ -21,7 +21,7 @@ def test_a_window_admits_what_is_new_and_not_too_old(sequences):
 
 @given(st.lists(st.integers(1, 500), max_size=300))
 def test_lost_and_missing_are_what_never_came(sequences):
-    window, seen, lost = Window(), set(), 0
+    window, seen, lost = ReplayWindow(), set(), 0
     for sequence in sequences:
         if window.admits(sequence):
             lost += window.take(sequence)
@@ -33,7 +33,7 @@ def test_lost_and_missing_are_what_never_came(sequences):
 
 @given(st.lists(st.floats(0.0, 0.5), max_size=200))
 def test_an_allowance_is_so_many_a_second_and_as_many_at_once(gaps):
-    allowance, left, now = Allowance(20.0), 20.0, 100.0
+    allowance, left, now = RateLimiter(20.0), 20.0, 100.0
     for gap in gaps:
         now += gap
         left = min(20.0, left + 20.0 * gap)
@@ -44,12 +44,12 @@ def test_an_allowance_is_so_many_a_second_and_as_many_at_once(gaps):
 
 
 def test_of_challenges_the_latest_are_remembered():
-    answered = Answered()
+    answered = AnsweredChallenges()
     for k in range(1000):
         answered.add(b"%d" % k, float(k))
         answered.add(b"often", float(k))
     assert len(answered) == 256
-    assert answered.told(b"999") == (1, 999.0)
-    assert answered.told(b"1")[0] == 0
-    assert answered.worn(b"often")
-    assert not answered.worn(b"999")
+    assert answered.answers(b"999") == (1, 999.0)
+    assert answered.answers(b"1")[0] == 0
+    assert answered.exhausted(b"often")
+    assert not answered.exhausted(b"999")

@@ -80,7 +80,7 @@ def test_a_value_of_which_one_byte_is_wrong_is_not_given(place):
     box.write(b"first")
     assert box.read() == (1, b"first")
     box.write(b"x" * 20)
-    slot = box._place(2)
+    slot = box._offset(2)
     box._memory.bytes[slot + place - 64] ^= 1
     assert box.read() == (1, b"first")
 

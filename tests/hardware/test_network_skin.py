@@ -152,7 +152,7 @@ def test_a_taken_port_and_a_missing_key_are_told_at_the_start():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
         holder.bind(("127.0.0.1", 0))
         port = holder.getsockname()[1]
-        with pytest.raises(HardwareError, match=f"Port {port} of 127.0.0.1 is taken"):
+        with pytest.raises(HardwareError, match=f"Port {port} of 127.0.0.1 is in use"):
             NetworkSkin(IDS, KEYS, port=port)
     with pytest.raises(HardwareError, match="no key for unit 9"):
         NetworkSkin(("unit 9",), KEYS)
@@ -166,7 +166,7 @@ def test_a_priority_there_is_not_is_told_at_the_start():
 @pytest.mark.parametrize("port", ["x", 70000, 1.5, True])
 def test_what_is_no_port_is_told_before_anything_starts(port, monkeypatch):
     monkeypatch.setattr("pretouch.hardware.network_skin.get_context", None)
-    with pytest.raises(HardwareError, match="no port"):
+    with pytest.raises(HardwareError, match="is not valid"):
         NetworkSkin(IDS, KEYS, port=port)
 
 
@@ -198,7 +198,7 @@ def test_ctrl_c_while_it_starts_leaves_no_process(monkeypatch):
         raise KeyboardInterrupt
 
     before = set(active_children())
-    monkeypatch.setattr("pretouch.hardware.network_skin._greeted", interrupted)
+    monkeypatch.setattr("pretouch.hardware.network_skin._wait_listening", interrupted)
     with pytest.raises(KeyboardInterrupt):
         NetworkSkin(IDS, KEYS)
     assert set(begun) - before
@@ -241,10 +241,10 @@ def test_it_ends_with_a_killed_parent(program):
 def test_ctrl_c_reaches_the_parent_only_and_the_child_ends_without_a_word(program):
     parent, child = program
     os.killpg(parent.pid, signal.SIGINT)
-    _, said = parent.communicate(timeout=30)
+    _, answer = parent.communicate(timeout=30)
     until(lambda: not runs(child))
-    assert said.count("KeyboardInterrupt") == 1
-    assert said.count("Traceback") == 1
+    assert answer.count("KeyboardInterrupt") == 1
+    assert answer.count("Traceback") == 1
 
 
 def test_it_leaves_no_open_handles():

@@ -149,14 +149,14 @@ def test_the_same_unit_is_told_again_without_ado_and_another_one_only_if_asked(u
         (("--host", "0.0.0.0"), "A unit cannot send to 0.0.0.0"),  # noqa: S104
         (("--host", "255.255.255.255"), "A unit cannot send to 255.255.255.255"),
         (("--host", "224.0.0.1"), "A unit cannot send to 224.0.0.1"),
-        (("--host", "010.0.0.1"), "The host '010.0.0.1' is no IPv4 address"),
-        (("--ssid", "caf\udce9"), "The network's name is no Unicode text: give it in UTF-8."),
-        (("--host", "my-pc"), "The host 'my-pc' is no IPv4 address"),
+        (("--host", "010.0.0.1"), "The host '010.0.0.1' is not an IPv4 address"),
+        (("--ssid", "caf\udce9"), "The network's name is not Unicode text: give it in UTF-8."),
+        (("--host", "my-pc"), "The host 'my-pc' is not an IPv4 address"),
         (("--port", "0"), "The port is 0"),
         (("--ssid", "x" * 33), "give 1 to 32 bytes"),
         (("--number", "70000"), "The number of unit hand-1 is 70000"),
         (("--device", "/dev/none-such"), "There is no device /dev/none-such: plug the unit in"),
-        (("--device", "/dev/null"), "/dev/null is no serial line"),
+        (("--device", "/dev/null"), "/dev/null is not a serial line"),
         (("--password-file", "/nowhere"), "The password file /nowhere cannot be read"),
         (("--keys", "/nowhere/keys.toml"), "The keys cannot be written to /nowhere/keys.toml"),
     ],
@@ -172,7 +172,7 @@ def test_a_password_that_is_none_is_said_without_showing_it(unit, tmp_path, pass
     password.write_text("short\n")
     assert cli.main(arguments(unit, tmp_path, password)) == 2
     said = capsys.readouterr().err
-    assert "The password has 5 bytes: WPA has 8 to 63" in said
+    assert "The password has 5 bytes: give 8 to 63 for WPA" in said
     assert "short" not in said
 
 
@@ -180,7 +180,7 @@ def test_a_mute_line_and_one_with_something_else_are_told_apart(unit_like):
     mute, chatty = unit_like(lambda line: None, b""), unit_like(lambda line: b">>> NameError: name 'null'")
     with SerialLine(mute.device) as line, pytest.raises(HardwareError, match=r"Nothing answers within 0\.3 s: press"):
         greet(line, 0.3)
-    with SerialLine(chatty.device) as line, pytest.raises(HardwareError, match=r"no unit of ours .*NameError"):
+    with SerialLine(chatty.device) as line, pytest.raises(HardwareError, match=r"not a Pretouch unit .*NameError"):
         greet(line, 0.3)
 
 
@@ -258,7 +258,7 @@ def test_a_line_that_goes_away_is_said():
     line = SerialLine(os.ttyname(slave))
     os.close(slave)
     os.close(master)
-    with pytest.raises(HardwareError, match="went away"):
+    with pytest.raises(HardwareError, match="disappeared"):
         line.read(1.0)
     line.close()
 
@@ -269,7 +269,7 @@ def test_a_unit_that_goes_away_when_it_is_reset_is_said_with_the_way_out():
         os.close(slave)
         os.close(master)
         line.reset()
-        with pytest.raises(HardwareError, match=r"went away.*within 3 s after its reset"):
+        with pytest.raises(HardwareError, match=r"disappeared.*within 3 s after a reset"):
             greet(line, 1.0)
 
 

@@ -215,8 +215,8 @@ def test_a_beacon_that_finds_nobody_disturbs_nothing(bench):
 
 def test_an_address_nothing_can_be_sent_to_is_counted(bench, monkeypatch):
     bench.join()
-    station = bench.receiver._stations[0]
-    station.address = ("255.255.255.255", 9)  # needs a permission the socket has not
+    endpoint = bench.receiver._endpoints[0]
+    endpoint.address = ("255.255.255.255", 9)  # needs a permission the socket has not
     bench.now += 1.0
     bench.receiver.receive()
     assert bench.receiver.unsent == 1
@@ -224,7 +224,7 @@ def test_an_address_nothing_can_be_sent_to_is_counted(bench, monkeypatch):
 
 def test_a_taken_port_is_named(bench):
     port = bench.receiver.address[1]
-    with pytest.raises(HardwareError, match=f"Port {port} of 127.0.0.1 is taken"):
+    with pytest.raises(HardwareError, match=f"Port {port} of 127.0.0.1 is in use"):
         SkinReceiver(IDS, KEYS, port=port)
 
 
@@ -237,7 +237,7 @@ def test_an_address_that_cannot_be_had_is_an_error_of_ours(host, port):
 def test_units_need_a_key_and_a_name_of_their_own():
     with pytest.raises(HardwareError, match="no key for unit 9"):
         SkinReceiver(("unit 3", "unit 9"), KEYS)
-    with pytest.raises(HardwareError, match="stands twice"):
+    with pytest.raises(HardwareError, match="named twice"):
         SkinReceiver(("unit 3", "unit 3"), KEYS)
 
 

@@ -40,15 +40,15 @@ def test_a_unit_gone_mad_harms_only_itself(bench, changes):
 
 def test_the_holder_of_a_key_costs_bounded_memory_and_time(bench):
     bench.join()
-    unit, station = bench.units[0], bench.receiver._stations[0]
+    unit, endpoint = bench.units[0], bench.receiver._endpoints[0]
     began, base, taken = bench.now, unit.us(bench.now), 0
     for k in range(10_000):
         bench.now += 0.001
         taken += bench.send(unit.sample(bench.now, time_us=base, beacon=1 + k % 2, beacon_hold_us=400_000 - k))
     assert taken <= 200 * (bench.now - began) + 201
     assert bench.receiver.rejected["too fast"] == 10_000 - taken
-    assert len(station._clock._highs) <= 1024
-    assert len(station._clock._lows) <= 1024
+    assert len(endpoint._clock._highs) <= 1024
+    assert len(endpoint._clock._lows) <= 1024
 
 
 def test_twice_the_rate_of_a_unit_is_taken(bench):
@@ -201,4 +201,4 @@ def test_a_flood_takes_no_memory(unfiltered):
     for made in sockets:
         made.close()
     assert grown < 20_000
-    assert len(unfiltered.receiver._stations[0]._link._pending) <= LinkParams().pending_most
+    assert len(unfiltered.receiver._endpoints[0]._link._pending) <= LinkParams().pending_most

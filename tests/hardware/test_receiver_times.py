@@ -98,7 +98,7 @@ def test_after_a_jump_a_beacon_is_sent_at_once_and_only_its_echo_tells_the_time(
 def test_an_echo_of_a_beacon_that_is_long_past_tells_nothing(bench):
     bench.join()
     bench.run(20.0)
-    session = bench.receiver._stations[0]._session
+    session = bench.receiver._endpoints[0]._session
     assert sorted(session.sent) == list(range(session.number - 63, session.number + 1))
     assert bench.send(bench.units[0].sample(bench.now, beacon=1, beacon_hold_us=0)) == 1
     assert bench.receiver.units[0].clock_jumps == 0
@@ -106,7 +106,7 @@ def test_an_echo_of_a_beacon_that_is_long_past_tells_nothing(bench):
 
 def test_each_beacon_is_taken_as_echoed_once(bench):
     bench.join()
-    clock = bench.receiver._stations[0]._clock
+    clock = bench.receiver._endpoints[0]._clock
     [before] = clock._lows
     # were it taken again, each of these would be another bound
     for k in range(3):

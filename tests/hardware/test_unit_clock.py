@@ -29,10 +29,10 @@ class Wire:
 
     def echo(self, made):
         """Return sending instant and hold of the newest beacon heard before."""
-        heard = np.flatnonzero(self._down <= made)
-        if not len(heard):
+        update = np.flatnonzero(self._down <= made)
+        if not len(update):
             return None, 0.0
-        number = heard[-1]
+        number = update[-1]
         return self.sent[number], self.unit(made) - self.unit(self._down[number])
 
 
@@ -51,7 +51,7 @@ def test_the_true_offset_is_within_the_bounds(offset, drift, down, up):
     newest = -math.inf
     for made, arrival in wire.order:
         sent, hold = wire.echo(made)
-        assert clock.heard(wire.unit(made), arrival, sent, hold)
+        assert clock.update(wire.unit(made), arrival, sent, hold)
         newest = max(newest, made)
         true = newest - wire.unit(newest)
         assert clock.low <= true <= clock.high + 1e-9
@@ -74,7 +74,7 @@ def test_after_a_jump_it_recovers(jump, forward, seed):
         jumped = made > 3.0
         heard_before = sent is not None and made - hold <= 3.0
         mixed = hold + shift if jumped and heard_before else hold
-        clock.heard(
+        clock.update(
             wire.unit(made) + (shift if jumped else 0.0), arrival, sent if mixed >= 0 else None, max(mixed, 0.0)
         )
     assert clock.jumps >= 1
@@ -86,7 +86,7 @@ def test_after_a_jump_it_recovers(jump, forward, seed):
 
 def test_nothing_is_known_before_an_echo():
     clock = UnitClock(DRIFT, 10.0)
-    assert clock.heard(5.0, 100.0, None, 0.0)
+    assert clock.update(5.0, 100.0, None, 0.0)
     assert not clock.known
     assert math.isnan(clock.offset)
     assert clock.earliest(5.0) == -math.inf
@@ -94,7 +94,7 @@ def test_nothing_is_known_before_an_echo():
 
 def test_a_round_trip_gives_its_half_as_bound():
     clock = UnitClock(DRIFT, 10.0)
-    clock.heard(5.0, 100.03, 99.99, 0.02)
+    clock.update(5.0, 100.03, 99.99, 0.02)
     assert clock.offset == pytest.approx(95.02, abs=1e-5)
     assert clock.bound == pytest.approx(0.01, abs=1e-5)
     assert clock.earliest(4.9) == pytest.approx(99.91 - 1.0e-6 - TICK - DRIFT * 0.12, abs=1e-6)
@@ -112,7 +112,7 @@ def test_no_stamp_is_later_than_the_truth_and_newer_readings_have_later_stamps(o
     wire, clock = Wire(offset, 1.0 + drift, down, up), UnitClock(DRIFT, window)
     for made, arrival in wire.order:
         sent, hold = wire.echo(made)
-        assert clock.heard(wire.unit(made), arrival, sent, hold)
+        assert clock.update(wire.unit(made), arrival, sent, hold)
         true = made - ages[round((made - 0.3) / 0.02)]
         instant, newest, before = wire.unit(true), clock.last_reading, clock._last_stamp
         at_least = clock.earliest(instant)
@@ -129,14 +129,14 @@ def test_jumps_too_small_to_be_seen_make_no_stamp_later_than_it_can_be():
     for k in range(6000):
         host = 0.02 * k
         made = host + 0.015 * (k // 600)
-        assert clock.heard(made, host + 0.02, host - 0.02, 0.0)
+        assert clock.update(made, host + 0.02, host - 0.02, 0.0)
         assert clock.stamp(made) <= min(made + clock.high, host + 0.02)
     assert clock.jumps == 0
 
 
 def test_what_a_beacon_told_allows_for_the_resolution_of_the_units_clock():
     clock = UnitClock(DRIFT, 10.0)
-    clock.heard(5.0, 100.0, 100.0, 0.0)
+    clock.update(5.0, 100.0, 100.0, 0.0)
     assert clock.low == pytest.approx(95.0 - TICK, abs=1e-9)
     assert clock.known
 
@@ -144,7 +144,7 @@ def test_what_a_beacon_told_allows_for_the_resolution_of_the_units_clock():
 def test_its_memory_is_bounded_however_the_units_clock_goes():
     clock = UnitClock(DRIFT, 10.0)
     for k in range(5000):
-        clock.heard(5.0, 100.0 + 1e-6 * k, 90.0 - 1e-6 * k, 1e-6 * k)
+        clock.update(5.0, 100.0 + 1e-6 * k, 90.0 - 1e-6 * k, 1e-6 * k)
     assert len(clock._lows) <= 1024
     assert len(clock._highs) <= 1024
 
@@ -153,7 +153,7 @@ def test_its_memory_is_bounded():
     clock = UnitClock(DRIFT, 10.0)
     for k in range(5000):
         # each sample a little later than the one before: every bound is worse than the last, so that all are kept
-        clock.heard(0.02 * k, 0.02 * k + 1e-3 + 1e-5 * k, 0.02 * k - 0.01 - 1e-5 * k, 0.005)
+        clock.update(0.02 * k, 0.02 * k + 1e-3 + 1e-5 * k, 0.02 * k - 0.01 - 1e-5 * k, 0.005)
     assert len(clock._lows) <= 502
     assert len(clock._highs) <= 502
 
@@ -176,7 +176,7 @@ def test_on_networks_as_they_are_the_offset_is_good_to_milliseconds(busy, saving
     errors = []
     for made, arrival in wire.order:
         sent, hold = wire.echo(made)
-        assert clock.heard(wire.unit(made), arrival, sent, hold)
+        assert clock.update(wire.unit(made), arrival, sent, hold)
         if made > 10.0:
             errors.append(wire.unit(made) + clock.offset - made)
             assert abs(errors[-1]) <= clock.bound + DRIFT * 0.2

@@ -26,16 +26,16 @@ def arm(folder, text, ee=""):
     [
         ("", "is not valid XML"),
         ("<robot", "is not valid XML"),
-        ("<sdf/>", "is a <sdf>: give a URDF"),
+        ("<sdf/>", "starts with <sdf>: give a URDF"),
         (BOMB, "has a document type"),
         (FILE_ENTITY, "has a document type"),
         ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="x"/></robot>', "xacro template"),
         ("<robot name='r'/>", "has no links"),
         (
             f"<robot name='r'>{link('a')}{link('b')}{joint('j', 'a', 'b')}{joint('k', 'b', 'a')}</robot>",
-            "^The links a, b hang on each other in a ring: leave one joint out",
+            "^The links a, b form a loop: leave one joint out",
         ),
-        (f"<robot name='r'>{link('a')}{link('b')}</robot>", r"hang on 2 roots \(a, b\)"),
+        (f"<robot name='r'>{link('a')}{link('b')}</robot>", r"have 2 roots \(a, b\)"),
         (f"<robot name='r'>{link('a')}{link('a')}</robot>", "same name"),
         (
             f"<robot name='r'>{link('a')}{joint('j', 'a', 'nowhere')}</robot>",
@@ -43,17 +43,17 @@ def arm(folder, text, ee=""):
         ),
         (
             f"<robot name='r'>{link('r')}{link('a')}{link('b')}{joint('j', 'a', 'b')}{joint('k', 'b', 'a')}</robot>",
-            "a, b hang on each other in a ring",
+            "a, b form a loop",
         ),
         (six_axis(changed={2: {"kind": "screw"}}), "joint2 is of the type 'screw': choose from revolute"),
-        (six_axis(changed={2: {"axis": "0 0 0"}}), "joint2 has an axis of no length"),
+        (six_axis(changed={2: {"axis": "0 0 0"}}), "joint2 has an axis of length zero"),
         (six_axis(changed={2: {"axis": "0 1"}}), "joint2: xyz of <axis> is '0 1': give 3 numbers"),
         (six_axis(changed={2: {"xyz": "0 nan 0"}}), "xyz of <origin> is 'nan': give a finite number"),
         (six_axis(changed={2: {"limit": '<limit velocity="1"/>'}}), "joint2 has the range 0 to 0: give it lower"),
-        (six_axis(changed={4: {"kind": "prismatic"}}), "joint4 slides, only hinges .* --ee, such as link3"),
-        (six_axis(changed={4: {"kind": "floating"}}), "joint4 is no hinge"),
-        (six_axis(changed={4: {"more": '<mimic joint="joint3"/>'}}), "The joint joint4 follows another one.*--ee"),
-        (six_axis().replace('<box size="0.08 0.08 0.2"/>', '<box size="0 1 1"/>', 1), "has a box of no size"),
+        (six_axis(changed={4: {"kind": "prismatic"}}), "joint4 is prismatic, but only hinge .* --ee, such as link3"),
+        (six_axis(changed={4: {"kind": "floating"}}), "joint4 is not a hinge"),
+        (six_axis(changed={4: {"more": '<mimic joint="joint3"/>'}}), "The joint joint4 mimics another one.*--ee"),
+        (six_axis().replace('<box size="0.08 0.08 0.2"/>', '<box size="0 1 1"/>', 1), "has a box of size zero"),
         (six_axis().replace('<box size="0.08 0.08 0.2"/>', "<cone/>", 1), "a shape 'cone': use box, sphere"),
     ],
 )
@@ -85,7 +85,7 @@ def test_the_tool_frame_is_taken_for_the_end_effector(tmp_path):
     found = arm(tmp_path, six_axis(link("camera", inertial="") + joint("c", "link6", "camera", "fixed")))
     assert found.source.links[found.ee].name == "tool0"
     assert [j.name for j in found.joints] == [f"joint{k}" for k in range(1, 7)]
-    assert "--ee chooses another one: camera" in found.remarks[0]
+    assert "choose another one with --ee: camera" in found.remarks[0]
 
 
 def fingers():
@@ -110,7 +110,9 @@ def test_a_single_finger_is_fixed_unless_asked_for(tmp_path, joint_name, link_na
     more = link(link_name, BOX) + joint(joint_name, "link6", link_name, axis="0 1 0")
     found = arm(tmp_path, six_axis(more))
     assert [j.name for j in found.joints] == [f"joint{k}" for k in range(1, 7)]
-    assert f"{joint_name} is taken for a gripper's joint, no joint of the arm; --ee {link_name}" in found.remarks[0]
+    assert (
+        f"{joint_name} is treated as a gripper's joint, not as a joint of the arm; --ee {link_name}" in found.remarks[0]
+    )
     assert any(f"fixed at 0, or at the nearest limit: {joint_name}" in r for r in found.remarks)
     assert [j.name for j in arm(tmp_path, six_axis(more), link_name).joints][-1] == joint_name
 
@@ -202,30 +204,30 @@ def test_a_package_is_found_in_the_path_given(tmp_path):
         surface_of(read_source(file).links[1].collision)
     for folder in (tmp_path / "elsewhere", tmp_path / "elsewhere" / "my_arm"):
         assert len(surface_of(read_source(file, (folder,)).links[1].collision).faces) == 1
-    with pytest.raises(RobotModelError, match=r"The package path .* is no folder"):
+    with pytest.raises(RobotModelError, match=r"The package path .* is not a folder"):
         read_source(file, (tmp_path / "none",))
 
 
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
-        ("a.stl", b"", "holds no triangle, or is cut off"),
-        ("a.stl", b"\0" * 100, "holds no triangle, or is cut off"),
-        ("a.stl", b"\0" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "holds no triangle, or is cut off"),
-        ("a.stl", b"version https://git-lfs.github.com/spec/v1\n", "holds no triangle, or is cut off"),
-        ("a.stl", ASCII_STL[:-12].encode(), "holds no triangle, or is cut off"),
+        ("a.stl", b"", "holds no triangle, or is truncated"),
+        ("a.stl", b"\0" * 100, "holds no triangle, or is truncated"),
+        ("a.stl", b"\0" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "holds no triangle, or is truncated"),
+        ("a.stl", b"version https://git-lfs.github.com/spec/v1\n", "holds no triangle, or is truncated"),
+        ("a.stl", ASCII_STL[:-12].encode(), "holds no triangle, or is truncated"),
         ("a.stl", ASCII_STL.replace("0 50 0", "0 50 zero").encode(), "is damaged: .* could not be read to its end"),
         ("a.stl", ASCII_STL.replace("0 50 0", "0 50").encode(), "is damaged: incorrect number of vertices"),
         ("a.stl", ASCII_STL.replace("vertex 0 50 0", "").encode(), "is damaged: .* array of size 2"),
         ("a.stl", ASCII_STL.replace("0 50 0", "50 0 0").encode(), "has no area"),
-        ("a.obj", b"v 0 0 0\nf a b c\n", "is damaged: line 2 names no corners by number"),
-        ("a.stl", ASCII_STL.replace("100", "nan").encode(), "a coordinate is no finite number"),
-        ("a.obj", b"v 0 0 0\nf 1 2 3\n", "a corner that is not there"),
-        ("a.obj", b"v 0 0\nf 1 1 1\n", "is damaged: line 1 holds no three numbers"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "a corner that is not there"),
+        ("a.obj", b"v 0 0 0\nf a b c\n", "is damaged: line 2 does not number its corners"),
+        ("a.stl", ASCII_STL.replace("100", "nan").encode(), "a coordinate is not finite"),
+        ("a.obj", b"v 0 0 0\nf 1 2 3\n", "a missing corner"),
+        ("a.obj", b"v 0 0\nf 1 1 1\n", "is damaged: line 1 does not hold three numbers"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "a missing corner"),
         ("a.obj", b"", "holds no triangle"),
         ("a.dae", b"<COLLADA", "is damaged|extra 'meshes'"),
-        ("a.passwd", b"root:x", "none that can be read: use .stl, .obj, .dae"),
+        ("a.passwd", b"root:x", "has an unknown format: use .stl, .obj, .dae"),
     ],
 )
 def test_a_broken_mesh_is_refused_in_one_sentence(tmp_path, name, content, sentence):

@@ -16,7 +16,7 @@ from pretouch.importing.body import fit_error
 from pretouch.importing.folder import write_folder
 from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import ImportOptions, import_robot
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
@@ -144,7 +144,7 @@ def test_a_folder_that_is_there_is_kept(imported, tmp_path):
     out = tmp_path / "arm"
     out.mkdir()
     (out / "mine.txt").write_text("precious")
-    with pytest.raises(RobotModelError, match="arm is there: give another --out, or --force"):
+    with pytest.raises(RobotModelError, match="arm exists already: give another --out, or --force"):
         write_folder(imported, out)
     for k in (1, 2):
         kept = write_folder(imported, out, force=True)
@@ -205,7 +205,7 @@ def test_a_ready_posture_outside_the_limits_is_refused(source):
 def test_a_ready_posture_in_which_the_arm_is_in_itself_is_named(source):
     ready = import_robot(source, ImportOptions(ready=(0.0, 0.0, 2.7, 0.0, 2.7, 0.0), capsules=1)).ready
     assert ready.clear < 0
-    assert re.search(r"the capsules of (base|link\d) and link\d are \d+ mm in each other", ready.conflict)
+    assert re.search(r"the capsules of (base|link\d) and link\d overlap by \d+ mm", ready.conflict)
 
 
 def test_meshes_in_millimetres_are_named(tmp_path):
@@ -224,7 +224,7 @@ def test_a_broken_mesh_is_said_before_the_first_link_is_fitted(tmp_path, monkeyp
     monkeypatch.setattr("pretouch.importing.body.fitted", lambda *_: pytest.fail("fitted"))
     text = six_axis()
     at = text.rindex(BOX)
-    with pytest.raises(RobotModelError, match=r"The mesh none.stl is not there"):
+    with pytest.raises(RobotModelError, match=r"The mesh none.stl was not found"):
         import_robot(
             written(tmp_path, text[:at] + '<geometry><mesh filename="none.stl"/></geometry>' + text[at + len(BOX) :]),
             ImportOptions(ready=READY),
@@ -259,13 +259,13 @@ def test_links_without_inertial_are_estimated_from_their_capsules(tmp_path):
 def test_an_impossible_inertia_is_mended_with_a_sentence(tmp_path):
     text = six_axis().replace('izz=".01"', 'izz="9"', 1).replace(BOX, "<geometry/>", 5)
     found = import_robot(written(tmp_path, text), ImportOptions(ready=READY, capsules=1))
-    assert any("an inertia no body can have" in r and "base" in r for r in found.remarks)
+    assert any("an impossible inertia" in r and "base" in r for r in found.remarks)
 
 
 def test_visual_shapes_stand_in_for_collision_shapes(tmp_path):
     text = six_axis().replace(link("link2", BOX), link("link2", BOX, what="visual"))
     found = import_robot(written(tmp_path, text), ImportOptions(ready=READY, capsules=1))
-    assert any("fitted to what is drawn: link2" in r for r in found.remarks)
+    assert any("fitted to the visual geometry: link2" in r for r in found.remarks)
     assert found.model.link_index("link2") in found.model.capsules.link
 
 
@@ -312,10 +312,10 @@ def test_what_an_mjcf_says_of_friction_is_left_out_with_a_sentence(tmp_path):
         ("<mujoco><worldbody><body><freejoint/></body></worldbody></mujoco>", "arm.xml cannot be read"),
         ("<mujoco><worldbody><geom type='mesh' mesh='none'/></worldbody></mujoco>", "arm.xml cannot be read"),
         ("<mujoco/>", "No joint moves world: .* the file has no joint"),
-        (mjcf().replace('name="j3"', 'name="j3" type="slide"'), "j3 slides"),
+        (mjcf().replace('name="j3"', 'name="j3" type="slide"'), "j3 is prismatic"),
         (
             mjcf().replace('name="j3"', 'name="j3" type="ball"').replace('axis="0 1 0"', "", 2),
-            "cannot be read|no hinge",
+            "cannot be read|not a hinge",
         ),
     ],
 )

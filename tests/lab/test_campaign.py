@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError, ParameterError, SkinError
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import PAPER_SKIN
-from pretouch.whole_file import write_json
 from pretouch_lab import campaign, workers
 from pretouch_lab.campaign import (
     Request,

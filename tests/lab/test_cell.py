@@ -21,7 +21,7 @@ def test_files_of_different_cells_differ():
 
 
 def test_a_cell_that_is_named_twice_runs_once():
-    tasks = Request(("release",), 1, profiles=("paper", "paper:reaction.decay_cycles=50")).tasks()
+    tasks = Request(("release",), 1, profiles=("paper", "paper:react.decay_cycles=50")).tasks()
     names = [cell.name for cell, _ in tasks]
     assert len(names) == len(set(names))
 

@@ -1,5 +1,5 @@
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 from html.parser import HTMLParser
 from shutil import copytree
 
@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError, RecordingError
 from pretouch.recording.reader import open_recording
+from pretouch.recording.run_record import columns_of
 from pretouch.text_table import TextTable
-from pretouch.whole_file import write_json
 from pretouch_lab.campaign import Request, open_folder, recording_file, trial_file
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper import dynamic, static
 from pretouch_lab.registry import EXPERIMENTS, summarise
 from pretouch_lab.report import write_report
-from pretouch_lab.trace import Trace, read_trace, trace_of
+from pretouch_lab.trace import read_trace, trace_of
 from pretouch_lab.trial import record_of
 
 LINE = ("line", "-y")
@@ -102,8 +103,10 @@ def test_a_recorded_trial_has_the_course_of_the_trial_itself(context, tmp_path):
     _, record = static.trial(cell, 101, replace(context, recording=place))
     trace, again = trace_of(record), read_trace(place)
     assert again[1] == context.skin.ids
-    for field in fields(Trace):
-        np.testing.assert_array_equal(getattr(again[0], field.name), getattr(trace, field.name))
+    for name in columns_of(record.steps):
+        np.testing.assert_array_equal(getattr(again[0], name), getattr(trace, name))
+    np.testing.assert_array_equal(again[0].true_force, trace.true_force)
+    np.testing.assert_array_equal(again[0].detected, trace.detected)
     kept = record_of(open_recording(place))
     assert [(t.time, t.link, t.velocity.tolist()) for t in kept.touches] == [
         (t.time, t.link, t.velocity.tolist()) for t in record.touches

@@ -7,7 +7,7 @@ import pytest
 
 import pretouch
 import pretouch_lab
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.source_digest import Sources
 from pretouch_lab import result_key as keys
 from pretouch_lab.benchmarks.avoidance import run as avoidance

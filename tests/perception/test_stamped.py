@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from pretouch.groups import Chain, Sensors
-from pretouch.params import PROFILES, PerceptionParams
+from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import poses, track_init
 from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.perception.stamped import move_back
+from pretouch.profiles import PROFILES
 from pretouch.types import RangeReadings, RangeStatus, RobotState
 
 LATE_S = 0.05

@@ -10,15 +10,15 @@ from pretouch.control.path import Circle
 from pretouch.control.path import Path as Course
 from pretouch.controller import Controller, ControllerState
 from pretouch.loop import Cycle
-from pretouch.params import PROFILES, Profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, Profile
 from pretouch.recording.writer import Recording
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, RangeReadings, RobotState
 
-SHORT: Profile = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=5))
+SHORT: Profile = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
 """The paper's profile, with a window that is soon full."""
 
 

@@ -134,6 +134,6 @@ def test_inputs_of_a_run_that_are_no_posture_are_left_out(tmp_path, panda_model,
 def test_what_is_no_recording_of_ours_is_refused(tmp_path):
     (tmp_path / "empty.mcap").touch()
     (tmp_path / "text.mcap").write_text("text")
-    for name, words in (("none", "there is none"), ("empty", "is empty"), ("text", "is no MCAP file")):
+    for name, words in (("none", "it does not exist"), ("empty", "is empty"), ("text", "is not an MCAP file")):
         with pytest.raises(RecordingError, match=words):
             read_measured(tmp_path / f"{name}.mcap")

@@ -75,7 +75,7 @@ def test_types_are_prepared():
     ("spoil", "said"),
     [
         (lambda data: b"", "header"),
-        (lambda data: b"\0\0" + data[2:], "header is not that of little-endian"),
+        (lambda data: b"\0\0" + data[2:], "header is not little-endian"),
         (lambda data: data[:4], "requires a buffer"),
         (lambda data: data[:-1], "a row in it is cut off"),
         (lambda data: data + bytes(4), "4 bytes are left over"),

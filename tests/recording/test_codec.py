@@ -245,7 +245,7 @@ def test_messages_mirror_the_types_field_by_field():
 def test_the_rows_of_the_thresholds_have_their_names():
     step = replace(decode_step(encode_step(0, some_step()))[1], thresholds=Thresholds(np.arange(18.0).reshape(6, 3)))
     message = decoded(STEP, encode_step(0, step)).thresholds
-    for name, _, _ in fields_of(f"{PACKAGE}/msg/Thresholds"):
+    for name, *_ in fields_of(f"{PACKAGE}/msg/Thresholds"):
         assert getattr(message, name).tobytes() == getattr(step.thresholds, name).tobytes()
 
 

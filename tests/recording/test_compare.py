@@ -8,13 +8,13 @@ import pytest
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
-from pretouch.params import PROFILES, at_rate, profile
+from pretouch.profiles import PROFILES, at_rate, profile
 from pretouch.recording.compare import Found, compare, matched
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
-from tests.foreign.files import pushed
+from tests.imported_data.files import pushed
 from tests.reference.contact import Touch
 
 PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]
@@ -73,7 +73,7 @@ def test_the_same_profile_decides_exactly_what_was_recorded(arm):
 def test_another_profile_decides_what_the_plain_detector_does(arm):
     force = pushed(7.0, PUSHES)
     found = compare(played(arm, force, seen={0: 0.25}), profile("blind:threshold.window_samples=60"))
-    touch, nothing = Touch(replace(BLIND.threshold, window_samples=60)), type("Nothing", (), {"point": ()})()
+    touch, nothing = Touch(BLIND.detect, replace(BLIND.window, samples=60)), type("Nothing", (), {"point": ()})()
     limits = [touch.feel(sample, np.zeros(3), nothing)[0] for sample in force]
     np.testing.assert_allclose(found.other.upper, [t.upper for t in limits], atol=1e-9)
     np.testing.assert_allclose(found.other.lower, [t.lower for t in limits], atol=1e-9)
@@ -98,7 +98,7 @@ def test_it_goes_on_through_a_change_of_profile(arm):
     force = pushed(7.0, PUSHES)
     for sample in force[:400]:
         arm.turn(sample)
-    arm.switch(replace(BLIND, threshold=replace(BLIND.threshold, f_base_n=30.0)))
+    arm.switch(replace(BLIND, detect=replace(BLIND.detect, f_base_n=30.0)))
     found = compare(played(arm, force[400:]), PAPER)
     assert len(found.recorded.time) == len(found.other.time) == 700
     assert [round(c.time, 1) for c in found.recorded.contacts] == [2.1]

@@ -194,7 +194,7 @@ def foreign(place: Path, profile: str = "ros2", topic: str = "/scan", kind: str 
 
 def test_what_is_no_recording_of_ours_is_refused_with_the_way_out(tmp_path):
     place = tmp_path / "a.mcap"
-    with pytest.raises(RecordingError, match="there is none"):
+    with pytest.raises(RecordingError, match="it does not exist"):
         open_recording(place)
     with pytest.raises(RecordingError, match="Is a directory"):
         open_recording(tmp_path)
@@ -205,7 +205,7 @@ def test_what_is_no_recording_of_ours_is_refused_with_the_way_out(tmp_path):
     with pytest.raises(RecordingError, match="pretouch detect"):
         open_recording(place)
     foreign(place)
-    with pytest.raises(RecordingError, match=r"no recording of pretouch.*pretouch detect"):
+    with pytest.raises(RecordingError, match=r"not a recording of pretouch.*pretouch detect"):
         open_recording(place)
     foreign(place, profile="", topic="/pretouch/step", kind="json")
     with pytest.raises(RecordingError, match="no control step"):
@@ -261,12 +261,12 @@ def test_a_later_format_is_refused(tiny, tmp_path):
 def test_a_profile_of_another_version_can_be_looked_at_and_not_recomputed(tiny, tmp_path):
     profile = json.loads(decoded(RUN, raw_run(tiny[0])).profile)
     profile["task"]["elbow"] = 1
-    del profile["reaction"], profile["threshold"]["alpha"]
+    del profile["react"], profile["window"]["alpha"]
     opened = open_recording(run_with(tiny, tmp_path / "a.mcap", profile=json.dumps(profile)))
     assert len(opened) == len(open_recording(tiny[0]))
-    assert opened.runs[0].unlike == ("reaction", "task.elbow", "threshold.alpha")
-    assert opened.runs[0].profile.threshold.alpha == 0.1
-    with pytest.raises(RecordingError, match=r"differs in reaction, task\.elbow, threshold\.alpha from .* made it, 0"):
+    assert opened.runs[0].unlike == ("react", "task.elbow", "window.alpha")
+    assert opened.runs[0].profile.window.alpha == 0.1
+    with pytest.raises(RecordingError, match=r"in react, task\.elbow, window\.alpha: .* made it, 0"):
         verify(opened)
 
 

@@ -63,7 +63,7 @@ def test_they_are_sorted_and_what_is_no_number_or_came_twice_is_left_out(tmp_pat
 
 
 def test_another_arm_in_the_same_file_is_refused(tmp_path):
-    with pytest.raises(RecordingError, match="states of the joints a, b beside those of panda_joint1, panda_joint2"):
+    with pytest.raises(RecordingError, match="states of the joints a, b and of panda_joint1, panda_joint2"):
         recorded(tmp_path / "a.mcap", (STAMP, Q, None, NAMES), (STAMP, Q, None, ("a", "b")))
 
 

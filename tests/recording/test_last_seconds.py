@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.recording.last_seconds import LastSeconds
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
@@ -152,4 +152,4 @@ def test_a_folder_that_cannot_be_made_is_one_sentence_and_raises_nothing(control
         kept.record(run.turn(broken if i == 10 else going_on))
     kept.close()
     assert kept.written == []
-    assert "were not kept" in kept.trouble
+    assert "were not saved" in kept.trouble

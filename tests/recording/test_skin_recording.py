@@ -142,7 +142,7 @@ def test_an_imu_message_is_what_the_general_encoder_makes_of_it(unit, time, numb
 def test_other_commands_say_what_can_be_done_with_it(place, capsys, command):
     assert cli.main([command[0], str(place), *command[1:]]) == 2
     said = capsys.readouterr().err
-    assert "holds what sensor units sent, and no control step" in said
+    assert "holds samples of sensor units, but no control step" in said
     assert said.count("\n") == 1
 
 
@@ -163,14 +163,14 @@ def test_a_file_that_is_cut_off_is_read_and_recovered(place, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "words"), [(b"", "is no MCAP file"), (b"\x89MCAP0\r\n", "holds no samples of sensor units")]
+    ("content", "words"), [(b"", "is not an MCAP file"), (b"\x89MCAP0\r\n", "holds no samples of sensor units")]
 )
 def test_a_file_of_something_else_is_refused(tmp_path, content, words):
     other = tmp_path / "other.mcap"
     other.write_bytes(content)
     with pytest.raises(RecordingError, match=words):
         read_skin(other)
-    with pytest.raises(RecordingError, match="there is none"):
+    with pytest.raises(RecordingError, match="it does not exist"):
         read_skin(tmp_path / "none.mcap")
 
 
@@ -197,7 +197,7 @@ def test_samples_of_another_version_are_refused(place, tmp_path):
 
 
 def test_nothing_is_written_over(place):
-    with pytest.raises(RecordingError, match="There is something at"):
+    with pytest.raises(RecordingError, match="exists already"):
         SkinRecording(place)
 
 
@@ -247,5 +247,5 @@ def test_a_full_disk_is_said_in_a_sentence(tmp_path):
         signal.signal(signal.SIGXFSZ, handler)
     assert said == recording.trouble
     assert "ended early" in said
-    assert "make room, then record again" in said
+    assert "free some space, then record again" in said
     assert read_skin(tmp_path / "full.mcap").complete

@@ -41,7 +41,7 @@ def test_any_numbers_counts_and_lengths_come_back(states, number, samples, latch
     watch = replace(state.watch, stamp=number, sent=tuple((number, np.full(7, number)) for _ in range(sent)))
     window = replace(window_init(max(1, samples)), count=count)
     odd = replace(
-        state, watch=watch, feel=replace(state.feel, window=window), mode=ModeState(mode, "Für ä: 'x'.", latched),
+        state, watch=watch, window=window, mode=ModeState(mode, "Für ä: 'x'.", latched),
         tracks=replace(state.tracks, point=np.full((0, 3), number)), command=np.full(7, number),
     )  # fmt: skip
     anew, back = decode_state(encode_state(0, odd, False))

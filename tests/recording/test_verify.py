@@ -9,14 +9,13 @@ from pretouch.contact.window import window_init
 from pretouch.control.path import line
 from pretouch.control.posture import brought_to
 from pretouch.loop import Cycle, turn
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.recording import verify as verifying
 from pretouch.recording.codec import STEP, decode_step, encode_step
-from pretouch.recording.difference import differing
 from pretouch.recording.messages import decoded, encoded
 from pretouch.recording.reader import open_recording
 from pretouch.recording.state_codec import STATE
-from pretouch.recording.verify import verify
+from pretouch.recording.verify import differing, verify
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -117,7 +116,7 @@ def test_a_change_of_profile_and_path_is_followed(controller, tmp_path):
     with Recording(tmp_path / "a.mcap", controller) as recording:
         for i in range(90):
             if i in (30, 60):
-                changed = replace(SHORT, name=f"p{i}", threshold=replace(SHORT.threshold, window_samples=i))
+                changed = replace(SHORT, name=f"p{i}", window=replace(SHORT.window, samples=i))
                 path = line((0.4, 0.0, 0.5), (0.4, i / 100, 0.4))
                 other = controller_of(controller.model, controller.skin, changed, path)
                 run.state, run.controller = other.adopt(run.state, run.controller), other

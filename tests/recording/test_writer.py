@@ -234,10 +234,10 @@ def test_what_is_there_is_never_written_over(controller, tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_named(controller, tmp_path):
-    with pytest.raises(RecordingError, match=r"folder .*nowhere.* is not there"):
+    with pytest.raises(RecordingError, match=r"folder .*nowhere.* does not exist"):
         Recording(tmp_path / "nowhere" / "a.mcap", controller)
     (tmp_path / "file").touch()
-    with pytest.raises(RecordingError, match="is not there"):
+    with pytest.raises(RecordingError, match="does not exist"):
         Recording(tmp_path / "file" / "a.mcap", controller)
 
 

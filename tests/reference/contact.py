@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from pretouch.params import ReactionParams, ThresholdParams
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.params import ThresholdParams, WindowParams
 from pretouch.types import Contact, Obstacles, Thresholds
 
 
@@ -23,8 +24,8 @@ def statistics(samples: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 class Touch:
     """What is remembered of the force."""
 
-    def __init__(self, params: ThresholdParams) -> None:
-        self.params = params
+    def __init__(self, params: ThresholdParams, window: WindowParams) -> None:
+        self.params, self.window = params, window
         self.samples: list[np.ndarray] = []
         self.newest = np.zeros(3)
 
@@ -33,7 +34,7 @@ class Touch:
     ) -> tuple[Thresholds, Contact | None, bool]:
         """Take a sample in; return the thresholds, a contact or None, and whether the window was full before."""
         p = self.params
-        armed = len(self.samples) == p.window_samples
+        armed = len(self.samples) == self.window.samples
         if force is not None:
             self._add(force, armed)
         mean, sigma = statistics(self.samples)
@@ -65,11 +66,11 @@ class Touch:
         value = np.array(force)
         if full:
             mean, sigma = statistics(self.samples)
-            alpha = self.params.alpha
+            alpha = self.window.alpha
             for axis in range(3):  # eq. 8
-                if abs(force[axis] - mean[axis]) > self.params.lambda_ * sigma[axis]:
+                if abs(force[axis] - mean[axis]) > self.window.lambda_ * sigma[axis]:
                     value[axis] = alpha * force[axis] + (1 - alpha) * self.newest[axis]
-        self.samples = [*self.samples, value][-self.params.window_samples :]
+        self.samples = [*self.samples, value][-self.window.samples :]
         self.newest = value
 
     def _obstacle_force(self, distance: float) -> float:
@@ -77,7 +78,7 @@ class Touch:
         return min(max((p.d_max_m - distance) / (p.d_max_m - p.d_min_m), 0.0), 1.0) * p.f_d_n
 
 
-def reaction(force: np.ndarray, params: ReactionParams) -> np.ndarray:
+def reaction(force: np.ndarray, params: DecayingVelocity) -> np.ndarray:
     """Velocity (3,) a contact of F_ext starts [m/s]: eq. 12, its norm bounded."""
     velocity = params.compliance_m_s_n * force
     return velocity * min(1.0, params.speed_max_m_s / np.linalg.norm(velocity)) if velocity.any() else velocity

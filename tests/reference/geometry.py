@@ -107,8 +107,8 @@ def first_hit(p: np.ndarray, rays: np.ndarray, a: np.ndarray, b: np.ndarray, rad
 
 def _within(offset: np.ndarray, rate: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """From and up to which t (C, R) |offset + t rate| <= radius; an empty range (inf, -inf) where never."""
-    qa = (rate**2).sum(axis=2)
-    qb, qc = (rate * offset[:, None]).sum(axis=2), ((offset**2).sum(axis=1) - radius**2)[:, None]
+    qa, qb = np.einsum("crk,crk->cr", rate, rate), np.einsum("crk,ck->cr", rate, offset)
+    qc = ((offset**2).sum(axis=1) - radius**2)[:, None]
     root = np.sqrt(np.maximum(qb**2 - qa * qc, 0.0))
     still = qa < 1e-24
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pretouch.control.path import Circle, Path, line
-from pretouch.params import PROFILES, Profile, ThresholdParams
+from pretouch.params import WindowParams
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -15,7 +16,7 @@ from pretouch.sensing.unit import SensorUnit
 from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
 
 READY = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)
-QUICK = replace(PROFILES["paper"], threshold=ThresholdParams(window_samples=20))
+QUICK = replace(PROFILES["paper"], window=WindowParams(samples=20))
 """The paper's profile with a window that is full sooner."""
 
 ODD = [s.value for s in RangeStatus if s is not RangeStatus.STUCK]
@@ -188,17 +189,17 @@ SINGULAR_PLACE = (
 """The hand's origin cannot move along one line, found by minimising the smallest singular value of its Jacobian."""
 PUSHES: dict[Span, tuple[float, float, float]] = {(30, 45): (0.0, 40.0, 0.0), (70, 75): (-35.0, 0.0, 20.0)}
 
-SHORT = changed(reaction={"decay_cycles": 25})
+SHORT = changed(react={"decay_cycles": 25})
 HARD = changed(SHORT, approach={"rows": "hard"})
 FLOOR = changed(approach={"rows": "floor"})
 OFF = replace(QUICK, approach=None)
 FREE = changed(SHORT, task={"orientation": "free"})
 BLIND = replace(SHORT, perception=PROFILES["blind"].perception, approach=PROFILES["blind"].approach)
-RAW = changed(SHORT, threshold={"compare": "raw"})
+RAW = changed(SHORT, detect={"compare": "raw"})
 FAST = changed(task={"control_period_s": 0.001})
-AT_ONCE = changed(threshold={"window_samples": 2})
+AT_ONCE = changed(window={"samples": 2})
 HARD_AT_ONCE = changed(AT_ONCE, approach={"rows": "hard"})
-GENTLE = changed(AT_ONCE, threshold={"compare": "raw"}, reaction={"compliance_m_s_n": 0.002})
+GENTLE = changed(AT_ONCE, detect={"compare": "raw"}, react={"compliance_m_s_n": 0.002})
 YIELDS = ("track", "react", "hold", "solved", "skipped", "filling", "A contact of")
 
 SCENES = (
@@ -249,7 +250,7 @@ SCENES = (
     Scene("singular-place", changed(GENTLE, task={"orientation": "free"}), posture=SINGULAR_PLACE, error=0.0,
           near=(0.1, 0.9), pushes={(2, 9): (20.0, -15.0, 30.0)}, cycles=20, meets=("damped", "react")),
     Scene("millisecond", FAST, near=(0.03, 0.5), pushes=PUSHES, swing=40.0, meets=YIELDS),
-    Scene("millisecond-32", changed(FAST, threshold={"window_samples": 2}), 32, near=(0.02, 0.3), cycles=45,
+    Scene("millisecond-32", changed(FAST, window={"samples": 2}), 32, near=(0.02, 0.3), cycles=45,
           speed=0.2, swing=40.0, meets=("many",)),
     Scene("millisecond-hard", changed(FAST, approach={"rows": "hard"}), 32, near=(0.15, 0.8), swing=40.0, cycles=70,
           meets=("track", "infeasible")),

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.params import Profile
 from pretouch.perception.scene_filter import Fixtures
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Contact, ControlStep, Inputs, Mode, QpOutcome, QpSolution, RobotState
@@ -38,11 +38,11 @@ class ReferenceController:
         self.model, self.path, self.profile, self.tree = model, path, profile, tree_of(model)
         self.trust = modes.Trust(robot, profile.failure, model.description.qd_max)
         self.eyes = Eyes(model, skin, fixtures, profile.perception)
-        self.touch = Touch(profile.threshold)
+        self.touch = Touch(profile.detect, profile.window)
         self.fading = Fading(profile.slow, profile.task.restore_cycles)
         self.progress = Progress(path, profile.task)
         self.behaviour = modes.Behaviour()
-        self.push, self.pushed_for = np.zeros(3), profile.reaction.decay_cycles
+        self.push, self.pushed_for = np.zeros(3), profile.react.decay_cycles
         self.command = robot.qd_commanded
         self.goal = Posture(self.tree, robot.q).T[model.ee, :3, :3]
 
@@ -92,23 +92,23 @@ class ReferenceController:
         p, before = self.profile, self.behaviour.mode
         if touched is not None:
             seen[modes.CONTACT] = f"{np.linalg.norm(touched.force):.1f} N"
-        left = p.reaction.decay_cycles - self.pushed_for
+        left = p.react.decay_cycles - self.pushed_for
         if left > 0:
             seen[modes.REACTING] = f"{left * p.task.control_period_s:.2f} s"
         if silent:
             seen[modes.SILENT] = silent
         if not armed:
-            seen[modes.FILLING] = f"{len(self.touch.samples)} of {p.threshold.window_samples} samples"
+            seen[modes.FILLING] = f"{len(self.touch.samples)} of {p.window.samples} samples"
         self.behaviour.decide(seen, resume)
         begins = self.behaviour.mode is Mode.REACT and before is not Mode.REACT
         if begins:
             assert touched is not None
-            self.push, self.pushed_for = reaction(touched.force, p.reaction), 0
+            self.push, self.pushed_for = reaction(touched.force, p.react), 0
         return touched if begins else None
 
     def _yielding(self) -> np.ndarray:
         """Velocity (3,) [m/s] of the reaction in this cycle: linear to zero."""
-        return self.push * max(0.0, 1.0 - self.pushed_for / self.profile.reaction.decay_cycles)
+        return self.push * max(0.0, 1.0 - self.pushed_for / self.profile.react.decay_cycles)
 
     def _pose(
         self, J: np.ndarray, R: np.ndarray, wanted: np.ndarray, robot: RobotState, G: np.ndarray, h: np.ndarray
@@ -148,5 +148,5 @@ class ReferenceController:
         if self.behaviour.mode is Mode.REACT:
             self.pushed_for += 1
         else:
-            self.push, self.pushed_for = np.zeros(3), self.profile.reaction.decay_cycles
+            self.push, self.pushed_for = np.zeros(3), self.profile.react.decay_cycles
         self.command = command

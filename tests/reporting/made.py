@@ -8,7 +8,7 @@ from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import run
-from pretouch.params import profile as find_profile
+from pretouch.profiles import profile as find_profile
 from pretouch.recording.truth import Truth
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant, PlantClock

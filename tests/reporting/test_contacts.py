@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pretouch.reporting.course import Truth
+from pretouch.recording.run_record import TrueForces
 from pretouch.reporting.measures import measure
 from pretouch.reporting.touches import touches_of
 from pretouch.types import Mode
@@ -20,7 +20,7 @@ def true_course(*pushes):
 
 def truth_of(*pushes, touches=()):
     time, force = true_course(*pushes)
-    return Truth(time, np.stack([0 * force, -force, 0 * force], axis=1), touches)
+    return TrueForces(time, np.stack([0 * force, -force, 0 * force], axis=1), touches)
 
 
 def test_a_true_touch_is_from_1_newton_until_it_is_over():
@@ -147,5 +147,5 @@ def test_numbers_are_those_of_the_static_experiment(panda_model, paper_skin, pro
 
 @pytest.mark.parametrize("time", [[0.0, np.nan, 0.002], [np.nan] * 3, [0.0, np.inf, 0.002]])
 def test_a_truth_without_times_knows_no_touch(time):
-    truth = Truth(np.array(time), np.full((3, 3), 20.0), ())
+    truth = TrueForces(np.array(time), np.full((3, 3), 20.0), ())
     assert touches_of(truth) == []

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.reporting.distances import distances
 from pretouch.reporting.gather import gather
 from pretouch.reporting.health import loop_health, robot_health, unit_health

@@ -9,7 +9,7 @@ from pretouch.cli.report import titles, write_page
 from pretouch.controller import Controller
 from pretouch.errors import ExperimentError, ParameterError, RecordingError
 from pretouch.loop import Cycle
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.reporting.measures import measure

@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pretouch.reporting.thin import envelope, stretches
+from pretouch.reporting.figures.marks import envelope, stretches
 
 
 def test_a_short_course_stays_as_it_is():

@@ -34,7 +34,7 @@ def test_an_axis_turned_by_a_quaternion_is_turned():
 
 
 def test_geoms_that_are_no_capsules_are_refused_by_name():
-    with pytest.raises(RobotModelError, match=r"The geoms plate, ball are no capsules.*capsules only"):
+    with pytest.raises(RobotModelError, match=r"The geoms plate, ball are not capsules.*capsules only"):
         capsules_of(_model('<geom name="plate" type="box" size="1 1 1"/><geom name="ball" size="1"/>'))
 
 

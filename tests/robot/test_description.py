@@ -59,7 +59,7 @@ def test_limits_of_the_wrong_shape_are_refused(shape):
 
 
 def test_a_missing_mjcf_file_is_named():
-    with pytest.raises(PretouchError, match=r"panda: there is no MJCF file at nowhere/arm\.xml"):
+    with pytest.raises(PretouchError, match=r"panda: the MJCF file nowhere/arm\.xml does not exist"):
         replace(panda(), mjcf=Path("nowhere/arm.xml"))
 
 
@@ -76,7 +76,7 @@ GOOD = SpeedEnvelope(np.full(2, 0.3), np.full(2, 12.0), np.ones(2), -np.ones(2),
         ("slope", np.array([12.0, np.nan]), r"slope is .*give one finite number a joint"),
         ("q_upper", np.array([1.0, np.inf]), r"q_upper is .*give one finite number a joint"),
         ("q_lower", -np.ones(3), r"q_lower is .*give one finite number a joint"),
-        ("q_upper", np.array([1.0, -0.99]), "may move nowhere both ways: give each q_upper above its q_lower"),
+        ("q_upper", np.array([1.0, -0.99]), "cannot move in both directions: give each q_upper above its q_lower"),
     ],
 )
 def test_an_envelope_that_is_none_is_refused(name, bad, message):
@@ -99,5 +99,5 @@ def test_an_envelope_moves_in_by_a_margin():
     np.testing.assert_allclose(closer.q_upper, 0.8)
     np.testing.assert_allclose(closer.q_lower, -0.8)
     np.testing.assert_array_equal(closer.offset, GOOD.offset)
-    with pytest.raises(RobotModelError, match="may move nowhere"):
+    with pytest.raises(RobotModelError, match="cannot move in both"):
         GOOD.moved_in(1.0)

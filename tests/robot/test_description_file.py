@@ -30,7 +30,7 @@ def test_a_description_is_read_back_as_it_was(folder):
     [
         ("name = ", "naem = ", "the key 'naem' is unknown: use name, mjcf"),
         ('"panda"', "7", "name is 7: give printable text"),
-        ('"panda.xml"', '"none.xml"', r"there is no MJCF file at .*none.xml\. \(in "),
+        ('"panda.xml"', '"none.xml"', r"the MJCF file .*none.xml does not exist: check its name\. \(in "),
         ('"panda.xml"', '"' + "x" * 5000 + '"', "in .*robot.toml"),
         ("2.175,", '"fast",', r"qd_max is .*: give a list of 7 finite numbers, one a joint \[rad/s\]"),
         ("2.175,", "nan,", "qd_max is"),

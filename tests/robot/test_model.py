@@ -263,10 +263,10 @@ def test_an_arm_of_one_hinge_is_accepted(tmp_path):
 @pytest.mark.parametrize(
     ("joint", "geom", "message"),
     [
-        ('type="slide" range="-1 1"', '<geom type="capsule" size="0.1 0.2"/>', "joint pivot is no hinge"),
+        ('type="slide" range="-1 1"', '<geom type="capsule" size="0.1 0.2"/>', "joint pivot is not a hinge"),
         ("", '<geom type="capsule" size="0.1 0.2"/>', "joint pivot has no range: give it its position limits"),
         ('type="ball"', '<geom type="capsule" size="0.1 0.2"/>', "the MJCF has 3 joints, q_ready 1"),
-        ('range="-90 90"', '<geom name="plate" type="box" size="1 1 1"/>', "plate are no capsules"),
+        ('range="-90 90"', '<geom name="plate" type="box" size="1 1 1"/>', "plate are not capsules"),
         ('range="-90 90"', "", "no joint moves a capsule"),
         ('range="-90 90"', "<geom", "cannot be read"),
     ],

@@ -264,10 +264,10 @@ def test_what_is_wrong_with_a_unit_is_said_with_unit_and_file(panda_model, tmp_p
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"names no unit: give at least one \[\[unit\]\] with id, link and pose"),
-        ("unit = []", "names no unit"),
-        ("unit = 3", "names no unit"),
-        ("[unit]\nid = 'a'", "names no unit"),
+        ("", r"has no unit: give at least one \[\[unit\]\] with id, link and pose"),
+        ("unit = []", "has no unit"),
+        ("unit = 3", "has no unit"),
+        ("[unit]\nid = 'a'", "has no unit"),
         ("unit = [3]", r"A unit is 3: write it as a \[\[unit\]\] table"),
         ("[[unit]\n", "is not valid TOML"),
         ("unit = " + "[" * 100_000, "is not valid TOML: maximum recursion depth exceeded"),

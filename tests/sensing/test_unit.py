@@ -31,9 +31,9 @@ def test_a_unit_keeps_its_own_read_only_pose():
         (np.eye(3), "give a finite 4 x 4 matrix"),
         (_pose(position=np.array([np.nan, 0, 0])), "give a finite 4 x 4 matrix"),
         (_pose(rotation=np.full((3, 3), np.inf)), "give a finite 4 x 4 matrix"),
-        (_pose(rotation=np.diag([1.0, 1.0, -1.0])), "no proper rotation .determinant -1.*right-handed"),
-        (_pose(rotation=1.01 * np.eye(3)), "no proper rotation .*give a right-handed rotation"),
-        (_pose(rotation=np.zeros((3, 3))), "no proper rotation .determinant 0"),
+        (_pose(rotation=np.diag([1.0, 1.0, -1.0])), "not a proper rotation .determinant -1.*right-handed"),
+        (_pose(rotation=1.01 * np.eye(3)), "not a proper rotation .*give a right-handed rotation"),
+        (_pose(rotation=np.zeros((3, 3))), "not a proper rotation .determinant 0"),
         (_pose(last_row=np.array([0.0, 0.0, 0.0, 2.0])), "last row of its pose .*must be 0 0 0 1"),
     ],
 )

@@ -35,7 +35,7 @@ def test_once_all_units_are_heard_the_arm_makes_its_motion_and_each_state_is_kep
             receiver.receive(0.02)
         over.set()
         other.join()
-        heard = receiver.take_imu()
+        received = receiver.take_imu()
     assert said[-1] == "The motion of 3 s is over."
     stamp, q = (np.array([getattr(state, name) for state in states]) for name in ("stamp", "q"))
     assert (np.diff(stamp) > 0).all()
@@ -44,8 +44,8 @@ def test_once_all_units_are_heard_the_arm_makes_its_motion_and_each_state_is_kep
     assert np.ptp(q, axis=0) == pytest.approx(np.ptp(plan.sampled(100).q, axis=0), rel=0.05, abs=0.003)
     assert np.abs(q[-1] - plan.end).max() < 0.01
     moves = stamp[np.abs(q - q[0]).max(axis=1) > 0.01]
-    at = np.concatenate([batch.stamp for batch in heard if batch.unit == 0])
-    turning = np.concatenate([batch.angular_velocity for batch in heard if batch.unit == 0])
+    at = np.concatenate([batch.stamp for batch in received if batch.unit == 0])
+    turning = np.concatenate([batch.angular_velocity for batch in received if batch.unit == 0])
     standing, moving = at < moves[0] - 0.2, (at > moves[0]) & (at < moves[-1])
     assert np.ptp(turning[moving], axis=0).max() > 10 * np.ptp(turning[standing], axis=0).max()
 
@@ -80,5 +80,5 @@ def test_a_machine_that_is_late_leaves_time_out_or_makes_up_for_it(panda_model, 
 
 
 def test_a_receiver_that_cannot_be_found_is_said(panda_model, options):
-    with pytest.raises(HardwareError, match="No receiver is given"):
+    with pytest.raises(HardwareError, match="The receiver's address is empty"):
         run_motion(options(("", 9)), swinging(panda_model), print, lambda: True, print)

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from pretouch.errors import ParameterError
-from pretouch.serving.network import NetworkParams, Way, WayParams, network
+from pretouch.serving.network import Channel, ChannelParams, NetworkParams, network
 
 
-def course(params: WayParams, count: int = 20_000, seed: int = 0) -> tuple[np.ndarray, list[int]]:
+def course(params: ChannelParams, count: int = 20_000, seed: int = 0) -> tuple[np.ndarray, list[int]]:
     """Arrival times (M,) [s] of datagrams sent 20 ms apart, and their numbers in the order of arrival."""
-    way, times, numbers = Way[int](params, np.random.default_rng(seed)), [], []
+    channel, times, numbers = Channel[int](params, np.random.default_rng(seed)), [], []
     for ms in range(20 * count + 2000):
         if ms % 20 == 0 and ms < 20 * count:
-            way.put(ms // 20, 1e-3 * ms)
-        for number in way.take(1e-3 * ms):
+            channel.put(ms // 20, 1e-3 * ms)
+        for number in channel.take(1e-3 * ms):
             times.append(1e-3 * ms - 0.02 * number)
             numbers.append(number)
     return np.array(times), numbers
@@ -26,7 +26,7 @@ def runs(numbers: list[int], count: int) -> list[int]:
 
 
 def test_by_default_all_arrive_late_by_the_least_delay_and_an_exponential_jitter():
-    delay, numbers = course(WayParams())
+    delay, numbers = course(ChannelParams())
     assert sorted(numbers) == list(range(20_000))
     assert delay.min() >= 0.008
     assert delay.mean() == pytest.approx(0.008 + 0.004 + 0.0005, abs=2e-4)  # looked at each millisecond
@@ -41,21 +41,21 @@ def test_the_way_down_is_shorter_and_its_jitter_narrower():
 
 @pytest.mark.parametrize("loss", [0.1, 0.3])
 def test_losses_are_of_the_size_asked_for_and_independent(loss):
-    _, numbers = course(WayParams(loss=loss))
+    _, numbers = course(ChannelParams(loss=loss))
     assert 1 - len(numbers) / 20_000 == pytest.approx(loss, abs=0.01)
     assert np.mean(runs(numbers, 20_000)) == pytest.approx(1 / (1 - loss), rel=0.05)
 
 
 def test_losses_in_runs_have_the_same_size_and_the_mean_run_asked_for():
-    _, numbers = course(WayParams(loss=0.1, loss_run=5.0), count=40_000)
+    _, numbers = course(ChannelParams(loss=0.1, loss_run=5.0), count=40_000)
     assert 1 - len(numbers) / 40_000 == pytest.approx(0.1, abs=0.015)
     assert np.mean(runs(numbers, 40_000)) == pytest.approx(5.0, rel=0.1)
 
 
 def test_a_datagram_held_up_is_overtaken():
-    _, in_order = course(WayParams(jitter_s=0.0), count=2000)
+    _, in_order = course(ChannelParams(jitter_s=0.0), count=2000)
     assert in_order == sorted(in_order)
-    _, numbers = course(WayParams(jitter_s=0.0, overtaken=0.1), count=2000)
+    _, numbers = course(ChannelParams(jitter_s=0.0, overtaken=0.1), count=2000)
     overtaken = sum(
         number < newest for number, newest in zip(numbers[1:], np.maximum.accumulate(numbers), strict=False)
     )
@@ -64,7 +64,7 @@ def test_a_datagram_held_up_is_overtaken():
 
 
 def test_a_datagram_is_doubled_as_often_as_asked_for():
-    _, numbers = course(WayParams(doubled=0.2), count=5000)
+    _, numbers = course(ChannelParams(doubled=0.2), count=5000)
     assert len(numbers) - len(set(numbers)) == pytest.approx(1000, abs=100)
 
 
@@ -77,9 +77,9 @@ def test_a_seed_decides_the_course():
 
 
 def test_all_or_nothing_can_be_lost():
-    assert course(WayParams(loss=1.0), 50)[1] == []
-    assert course(WayParams(loss=1.0, loss_run=3.0), 50)[1] == []
-    assert len(course(WayParams(loss_run=3.0), 50)[1]) == 50
+    assert course(ChannelParams(loss=1.0), 50)[1] == []
+    assert course(ChannelParams(loss=1.0, loss_run=3.0), 50)[1] == []
+    assert len(course(ChannelParams(loss_run=3.0), 50)[1]) == 50
 
 
 def test_a_network_is_lossy_both_ways_and_its_jitter_is_that_of_the_way_up():
@@ -92,12 +92,12 @@ def test_a_network_is_lossy_both_ways_and_its_jitter_is_that_of_the_way_up():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"loss": 1.5}, "WayParams.loss is 1.5"),
+        ({"loss": 1.5}, "ChannelParams.loss is 1.5"),
         ({"loss": 0.1, "loss_run": 0.5}, "it must be 0, or at least 1"),
         ({"loss": 0.9, "loss_run": 2.0}, "give at least 9"),
-        ({"delay_s": -0.1}, "WayParams.delay_s"),
+        ({"delay_s": -0.1}, "ChannelParams.delay_s"),
     ],
 )
 def test_a_network_that_cannot_be_is_refused(given, said):
     with pytest.raises(ParameterError, match=said):
-        WayParams(**given)
+        ChannelParams(**given)

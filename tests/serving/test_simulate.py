@@ -11,7 +11,7 @@ from pretouch.hardware.receiver import SkinReceiver
 from pretouch.serving import simulate
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import network
-from pretouch.serving.simulate import SimulateOptions, Visitor, run
+from pretouch.serving.simulate import SimulateOptions, VisitingHand, run
 from pretouch.serving.unit import UnitParams
 from pretouch.serving.wire_skin import made_keys
 from pretouch.sim.imu import ImuParams
@@ -97,22 +97,22 @@ def test_a_receiver_that_does_not_answer_is_named_once():
     fleet = SimpleNamespace(ids=["a"], units=units, sent=0, lost=0, receiver=("desk", 29470))
     clock = SimpleNamespace(now=0.0, left_out=0.0)
     cycle = SimpleNamespace(step=SimpleNamespace(ee_velocity=np.zeros(3), mode=Mode.TRACK))
-    teller = simulate._Teller(fleet, clock, said.append)
+    printer = simulate._StatusPrinter(fleet, clock, said.append)
     for second in range(1, 20):
         clock.now, units[0].in_session = float(second), 8 <= second < 12
-        teller.record(cycle)
-    named = [i for i, line in enumerate(said) if line.startswith("Nobody answers at desk:29470: ")]
+        printer.record(cycle)
+    named = [i for i, line in enumerate(said) if line.startswith("No answer from desk:29470: ")]
     assert [i - k for k, i in enumerate(named)] == [3, 14]  # after the lines of so many seconds
 
 
 def test_a_unit_there_is_not_cannot_be_silenced(options):
-    with pytest.raises(HardwareError, match=r"There is no unit elbow: choose from hand_left"):
+    with pytest.raises(HardwareError, match=r"Unknown unit elbow: choose from hand_left"):
         options(("127.0.0.1", 9), silenced=frozenset({"elbow"}))
     with pytest.raises(ParameterError, match=r"SimulateOptions.duration_s"):
         options(("127.0.0.1", 9), duration_s=-1.0)
     with pytest.raises(ParameterError, match=r"SimulateOptions.seed is -1"):
         options(("127.0.0.1", 9), seed=-1)
-    with pytest.raises(HardwareError, match=r"No receiver is given"):
+    with pytest.raises(HardwareError, match=r"The receiver's address is empty"):
         run(options(("", 9)), lambda: True, lambda _: None)
     with pytest.raises(HardwareError, match=r"port is 0"):
         run(options(("127.0.0.1", 0)), lambda: True, lambda _: None)
@@ -122,7 +122,7 @@ def test_the_hand_comes_and_goes():
     class Arm:
         link_position = np.array([[0.5, 0.1, 0.4]])
 
-    hand, goal = Visitor(0), []
+    hand, goal = VisitingHand(0), []
     for at in (4.9, 5.1, 9.9, 10.1, 20.1, 25.1):
         goal.append(hand.goal(at, np.zeros(3), Arm()).position.tolist())
     near, away = [0.8, 0.1, 0.4], [1.2, 0.0, 0.8]

@@ -59,7 +59,7 @@ class Desk:
         """Answer the newest hello."""
         self.number += 1
         newest = self.hellos(self.said)[-1][1].challenge
-        self.unit.heard(Beacon(unit, self.number, nonce).encode(key, challenge or newest), self.now)
+        self.unit.receive_beacon(Beacon(unit, self.number, nonce).encode(key, challenge or newest), self.now)
 
     def session(self, nonce: bytes = NONCE) -> Mac:
         return session_mac(MAC, self.hellos(self.said)[-1][1].challenge, nonce)
@@ -181,8 +181,8 @@ def test_only_a_fresh_beacon_of_its_own_opens_and_keeps_a_session(desk):
     on.beacon(key=Mac(bytes(32)))
     on.beacon(challenge=b"12345678")
     on.beacon(unit=8)
-    on.unit.heard(b"PT" + bytes(BEACON_SIZE - 2), on.now)
-    on.unit.heard(b"", on.now)
+    on.unit.receive_beacon(b"PT" + bytes(BEACON_SIZE - 2), on.now)
+    on.unit.receive_beacon(b"", on.now)
     assert not on.unit.in_session
     on.beacon()
     assert on.unit.in_session

@@ -9,7 +9,7 @@ from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError
 from pretouch.loop import turn
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.serving.fleet import Fleet, FleetParams
 from pretouch.serving.network import NetworkParams, network
 from pretouch.serving.unit import UnitParams

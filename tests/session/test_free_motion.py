@@ -11,10 +11,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from pretouch.contact.residual_model import kept
-from pretouch.controller import Controller
-from pretouch.errors import RobotModelError
+from pretouch.errors import ParameterError, RobotModelError
 from pretouch.loop import Cycle
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
@@ -22,7 +21,7 @@ from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.robot.residual_file import Residual, save_residual
 from pretouch.sensing.skin import paper_skin as skin_of_arm
-from pretouch.session.free_motion import FreeMotion, Home, home_of
+from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of
 from pretouch.types import Inputs
 from tests.following_arm import Arm
 
@@ -32,12 +31,12 @@ DAY_S = 86_400.0
 
 
 @pytest.fixture
-def home(tmp_path):
-    return home_of("panda at 172.16.0.2, hand 0.73 kg", tmp_path / "pretouch")
+def file(tmp_path):
+    return model_file_of("panda at 172.16.0.2, hand 0.73 kg", tmp_path / "pretouch")
 
 
-def begun(home, arm, now=1e9, **more):
-    return FreeMotion(home, arm.controller, now=lambda: now, **more)
+def begun(file, arm, now=1e9, **more):
+    return FreeMotion(file, arm.controller, now=lambda: now, **more)
 
 
 def turned(arm, free, steps, recording=None, drift=0.0):
@@ -65,41 +64,41 @@ def another(panda_model, paper_skin):
     return Arm(panda_model, paper_skin, PROFILE)
 
 
-def test_a_second_run_begins_with_what_the_first_has_learnt(home, arm, another):
-    first = begun(home, arm)
+def test_a_second_run_begins_with_what_the_first_has_learnt(file, arm, another):
+    first = begun(file, arm)
     assert first.begin is None
-    assert "Nothing is known yet" in first.found[0]
+    assert "This robot's free motion is not known yet" in first.found[0]
     residuals = turned(arm, first, 400)
     (said,) = first.keep()
-    assert str(home.place) in said
-    second = begun(home, another, now=1e9 + DAY_S)
-    assert "this robot is known since 2001-09-09 01:46 UTC, 3 s of it" in second.found[0]
-    assert_array_equal(second.begin.weights, arm.state.feel.sequential[0].model.weights)
+    assert str(file.path) in said
+    second = begun(file, another, now=1e9 + DAY_S)
+    assert "this robot is known since 2001-09-09 01:46 UTC (3 s" in second.found[0]
+    assert_array_equal(second.begin.weights, arm.state.detector.test.model.weights)
     again = turned(another, second, 100)
     assert residuals[0] > 1.0
     assert again[:50].max() < 0.3 * residuals[:50].max()
 
 
-def test_a_recording_of_a_run_that_began_with_something_is_recomputed_bit_for_bit(tmp_path, home, arm, another):
-    first = begun(home, arm)
+def test_a_recording_of_a_run_that_began_with_something_is_recomputed_bit_for_bit(tmp_path, file, arm, another):
+    first = begun(file, arm)
     turned(arm, first, 200)
     first.keep()
     with Recording(tmp_path / "run.mcap", another.controller) as recording:
-        turned(another, begun(home, another), 50, recording)
+        turned(another, begun(file, another), 50, recording)
     recorded = open_recording(tmp_path / "run.mcap")
     verdict = verify(recorded)
     assert verdict.agrees
     assert verdict.exact
     assert verdict.checked == 50
-    assert np.abs(recorded[0].snapshot.feel.sequential[0].model.weights).max() > 0.1
+    assert np.abs(recorded[0].snapshot.detector.test.model.weights).max() > 0.1
 
 
-def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_does_not(home, arm):
-    free = begun(home, arm)
+def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_does_not(file, arm):
+    free = begun(file, arm)
     turned(arm, free, 400)
     free.keep()
-    at_once, later = (begun(home, arm, now=1e9 + pause).begin.covariance for pause in (0.0, DAY_S))
-    learnt, prior = arm.state.feel.sequential[0].model.covariance, PROFILE.detection
+    at_once, later = (begun(file, arm, now=1e9 + pause).begin.covariance for pause in (0.0, DAY_S))
+    learnt, prior = arm.state.detector.test.model.covariance, PROFILE.detect
     assert_array_equal(at_once, learnt)
     grown = (later - learnt)[:, range(12), range(12)]
     assert np.all(grown[:, 0] > 0.4 * (0.25 * prior.offset_prior_nm) ** 2)
@@ -107,57 +106,57 @@ def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_do
     assert np.all(later[:, 0, 0] < prior.offset_prior_nm**2)
     np.testing.assert_allclose(later[:, 11, 11], prior.payload_prior_kg**2)
     assert np.linalg.eigvalsh(later).min() > 0.0
-    backwards = begun(home, arm, now=1e9 - DAY_S).begin.covariance  # the machine's time was set back
+    backwards = begun(file, arm, now=1e9 - DAY_S).begin.covariance  # the machine's time was set back
     np.testing.assert_allclose(backwards, later)
 
 
 @pytest.mark.parametrize(("pause", "felt"), [(0.0, True), (DAY_S, False)])
-def test_an_arm_that_drifted_in_a_long_pause_feels_no_contact_that_is_none(home, arm, another, pause, felt):
-    free = begun(home, arm)
+def test_an_arm_that_drifted_in_a_long_pause_feels_no_contact_that_is_none(file, arm, another, pause, felt):
+    free = begun(file, arm)
     turned(arm, free, 3000)
     free.keep()
-    turned(another, begun(home, another, now=1e9 + pause), 60, drift=0.2)
-    assert (another.state.feel.sequential[0].calm == 0) is felt
+    turned(another, begun(file, another, now=1e9 + pause), 60, drift=0.2)
+    assert (another.state.detector.test.calm == 0) is felt
 
 
-def test_a_run_that_learns_nothing_leaves_the_file_as_it_is(home, arm, another):
-    free = begun(home, arm)
+def test_a_run_that_learns_nothing_leaves_the_file_as_it_is(file, arm, another):
+    free = begun(file, arm)
     assert free.keep() == ()
     turned(arm, free, 5)
     assert free.keep() == ()
-    assert not home.place.exists()
+    assert not file.path.exists()
     turned(arm, free, 200)
     free.keep()
-    before = home.place.read_bytes()
-    second = begun(home, another, now=2e9)
+    before = file.path.read_bytes()
+    second = begun(file, another, now=2e9)
     turned(another, second, 5)
     assert second.keep() == ()
-    assert home.place.read_bytes() == before
+    assert file.path.read_bytes() == before
 
 
-def test_it_adds_up_over_runs_and_keeps_since_when(home, arm, another):
-    free = begun(home, arm)
+def test_it_adds_up_over_runs_and_keeps_since_when(file, arm, another):
+    free = begun(file, arm)
     turned(arm, free, 200)
     free.keep()
-    second = begun(home, another, now=1e9 + DAY_S)
+    second = begun(file, another, now=1e9 + DAY_S)
     turned(another, second, 200)
     second.keep()
-    third = begun(home, another, now=1e9 + 2 * DAY_S)
-    assert third.begin.seen.sum() > 1.5 * arm.state.feel.sequential[0].model.seen.sum()
+    third = begun(file, another, now=1e9 + 2 * DAY_S)
+    assert third.begin.seen.sum() > 1.5 * arm.state.detector.test.model.seen.sum()
     assert "since 2001-09-09 01:46 UTC" in third.found[0]
-    assert "the last 2001-09-10 01:46 UTC" in third.found[0]
+    assert "last saved 2001-09-10 01:46 UTC" in third.found[0]
 
 
-def test_anew_begins_with_nothing_and_replaces_what_was(home, arm, another):
-    free = begun(home, arm)
+def test_anew_begins_with_nothing_and_replaces_what_was(file, arm, another):
+    free = begun(file, arm)
     turned(arm, free, 200)
     free.keep()
-    second = begun(home, another, now=2e9, anew=True)
+    second = begun(file, another, now=2e9, relearn=True)
     assert second.begin is None
-    assert home.place.exists()
+    assert file.path.exists()
     turned(another, second, 200)
     second.keep()
-    assert "since 2033-05-18 03:33 UTC" in begun(home, arm, now=2e9).found[0]
+    assert "since 2033-05-18 03:33 UTC" in begun(file, arm, now=2e9).found[0]
 
 
 @pytest.mark.parametrize(
@@ -167,42 +166,42 @@ def test_anew_begins_with_nothing_and_replaces_what_was(home, arm, another):
         (lambda text: "", "format = None"),
         (lambda text: text.replace('arm = "panda"', 'arm = "fr3"'), "arm = 'fr3'"),
         (lambda text: text.replace("format = 1", "format = 2"), "format = 2"),
-        (lambda text: text.replace("172.16.0.2", "172.16.0.3"), "is of panda at 172.16.0.3"),
-        (lambda text: text.replace("saved = 1000000000.0", "saved = nan"), "since when"),
-        (lambda text: text.replace("saved = 1000000000.0", "saved = 1e300"), "since when"),
+        (lambda text: text.replace("172.16.0.2", "172.16.0.3"), "belongs to panda at 172.16.0.3"),
+        (lambda text: text.replace("saved = 1000000000.0", "saved = nan"), "start time"),
+        (lambda text: text.replace("saved = 1000000000.0", "saved = 1e300"), "start time"),
     ],
 )
-def test_a_file_that_cannot_be_used_is_named_and_put_aside_once_something_is_learnt(home, arm, spoil, said):
-    free = begun(home, arm)
+def test_a_file_that_cannot_be_used_is_named_and_put_aside_once_something_is_learnt(file, arm, spoil, said):
+    free = begun(file, arm)
     turned(arm, free, 200)
     free.keep()
-    good = home.place.read_text()
+    good = file.path.read_text()
     spoilt = spoil(good)
     assert spoilt != good
-    home.place.write_text(spoilt)
-    free = begun(home, arm)
+    file.path.write_text(spoilt)
+    free = begun(file, arm)
     assert free.begin is None
     assert said in free.found[0]
-    assert str(home.place) in free.found[0]
-    assert home.place.read_text() == spoilt
+    assert str(file.path) in free.found[0]
+    assert file.path.read_text() == spoilt
     turned(arm, free, 200)
-    assert "is kept" in free.keep()[0]
-    assert home.place.with_name(home.place.name + ".unusable").read_text() == spoilt
-    assert begun(home, arm).begin is not None
+    assert "saved" in free.keep()[0]
+    assert file.path.with_name(file.path.name + ".unusable").read_text() == spoilt
+    assert begun(file, arm).begin is not None
 
 
-@pytest.mark.parametrize("anew", [False, True])
-def test_a_named_file_that_cannot_be_used_is_refused_and_never_written_over(tmp_path, arm, anew):
+@pytest.mark.parametrize("relearn", [False, True])
+def test_a_named_file_that_cannot_be_used_is_refused_and_never_written_over(tmp_path, arm, relearn):
     (tmp_path / "skin.toml").write_text("[[unit]]\n")
     with pytest.raises(RobotModelError, match=r"skin\.toml cannot be used as --learnt"):
-        begun(Home("panda at here", tmp_path / "skin.toml", True), arm, anew=anew)
+        begun(ModelFile("panda at here", tmp_path / "skin.toml", True), arm, relearn=relearn)
 
 
-def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kind(home, arm):
-    free = begun(home, arm)
+def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kind(file, arm):
+    free = begun(file, arm)
     turned(arm, free, 200)
     free.keep()
-    named = Home("panda at 172.16.0.9", home.place, True)
+    named = ModelFile("panda at 172.16.0.9", file.path, True)
     found = begun(named, arm)
     assert found.begin is not None
     assert "of panda at 172.16.0.2" in found.found[0]
@@ -221,22 +220,22 @@ def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kin
         ("seen", lambda a: -a - 1.0),
     ],
 )
-def test_numbers_that_no_arm_can_have_are_not_taken(home, arm, name, change):
-    numbers = kept(arm.state.feel.sequential[0].model)
+def test_numbers_that_no_arm_can_have_are_not_taken(file, arm, name, change):
+    numbers = kept(arm.state.detector.test.model)
     numbers[name] = change(numbers[name])
-    home.place.parent.mkdir(parents=True)
-    save_residual(home.place, arm.model, Residual(numbers, home.robot, 1e9, 1e9))
-    free = begun(home, arm)
+    file.path.parent.mkdir(parents=True)
+    save_residual(file.path, arm.model, Residual(numbers, file.robot, 1e9, 1e9))
+    free = begun(file, arm)
     assert free.begin is None
     assert "learn it anew" in free.found[0]
 
 
-def test_writing_that_fails_is_a_sentence_and_leaves_the_old_file(home, arm, another, monkeypatch):
-    free = begun(home, arm)
+def test_writing_that_fails_is_a_sentence_and_leaves_the_old_file(file, arm, another, monkeypatch):
+    free = begun(file, arm)
     turned(arm, free, 200)
     free.keep()
-    before = home.place.read_bytes()
-    second = begun(home, another, now=2e9)
+    before = file.path.read_bytes()
+    second = begun(file, another, now=2e9)
     turned(another, second, 200)
 
     def fail(*_):
@@ -245,45 +244,42 @@ def test_writing_that_fails_is_a_sentence_and_leaves_the_old_file(home, arm, ano
     monkeypatch.setattr(os, "fsync", fail)
     (said,) = second.keep()
     assert "No space left on device" in said
-    assert "What was kept before is still there" in said
-    assert home.place.read_bytes() == before
-    assert [file.name for file in home.place.parent.iterdir()] == [home.place.name]
+    assert "The previous file is unchanged" in said
+    assert file.path.read_bytes() == before
+    assert [file.name for file in file.path.parent.iterdir()] == [file.path.name]
 
 
 def test_a_folder_that_cannot_be_made_is_a_sentence(tmp_path, arm):
     (tmp_path / "file").write_text("")
-    free = begun(home_of("panda at here", tmp_path / "file"), arm)
+    free = begun(model_file_of("panda at here", tmp_path / "file"), arm)
     turned(arm, free, 200)
-    assert "is lost" in free.keep()[0]
+    assert "could not be saved" in free.keep()[0]
 
 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
 os.fsync = lambda _: os.kill(os.getpid(), signal.SIGKILL)
-from pretouch.whole_file import write_whole
-write_whole(Path(sys.argv[1]), "half of it")
+from pretouch.atomic_write import atomic_write
+atomic_write(Path(sys.argv[1]), "half of it")
 """
 
 
 def test_a_process_that_is_killed_while_it_writes_leaves_the_old_file(tmp_path):
-    place = tmp_path / "kept.toml"
-    place.write_text("precious")
-    done = subprocess.run([sys.executable, "-c", KILLED, str(place)], check=False)
+    path = tmp_path / "kept.toml"
+    path.write_text("precious")
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
     assert done.returncode == -signal.SIGKILL
-    assert place.read_text() == "precious"
+    assert path.read_text() == "precious"
 
 
 def test_robots_have_files_of_their_own(tmp_path):
-    names = {home_of(f"{kind} at {where}, hand 0.7 kg", tmp_path).place for kind in "ab" for where in ("x", "y")}
+    names = {model_file_of(f"{kind} at {where}, hand 0.7 kg", tmp_path).path for kind in "ab" for where in ("x", "y")}
     assert len(names) == 4
-    strange = home_of("../../etc/passwd: a\0b", tmp_path).place
+    strange = model_file_of("../../etc/passwd: a\0b", tmp_path).path
     assert strange.parent == tmp_path / "free-motion"
 
 
-def test_the_paper_s_detector_has_nothing_to_keep(home, panda_model, paper_skin):
-    paper = Arm(panda_model, paper_skin)
-    assert isinstance(paper.controller, Controller)
-    free = begun(home, paper)
-    turned(paper, free, 5)
-    assert free.keep() == ()
+def test_the_paper_s_detector_learns_nothing_to_keep(file, panda_model, paper_skin):
+    with pytest.raises(ParameterError, match="The profile paper learns no free motion"):
+        begun(file, Arm(panda_model, paper_skin))

@@ -7,16 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch import realtime
 from pretouch.calibration.motion.plan import Plan
-from pretouch.cli.ending import Terminated, ends_raise
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.loop import MonotonicClock
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
-from pretouch.session.motion import Ending, Wishes, follow, go
+from pretouch.session.motion import Ending, follow, go
 from pretouch.session.session import NoUnits
+from pretouch.signals import Terminated, ends_raise
 from pretouch.types import Mode
 from tests.session.arms import FollowingArm
 
@@ -25,7 +26,7 @@ from tests.session.arms import FollowingArm
 def controller(panda_model):
     x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
     blind = PROFILES["blind"]
-    profile = replace(blind, threshold=replace(blind.threshold, window_samples=10))  # moves after a tenth of a second
+    profile = replace(blind, window=replace(blind.window, samples=10))  # moves after a tenth of a second
     path = line((x, y, z), (x, y + 0.4, z))
     return Controller(panda_model, Skin((), panda_model), no_fixtures(), path, profile)
 
@@ -45,10 +46,8 @@ class Keeper:
 def followed(controller, arm, keeper, cycles=80):
     ending = Ending()
     clock = MonotonicClock(0.01)
-    follow(
-        arm, NoUnits(), controller, clock, keeper, lambda _: len(keeper.steps) >= cycles, lambda: False, Wishes(),
-        lambda _: None, ending,
-    )  # fmt: skip
+    options = realtime.Options(tell=lambda _: None)
+    follow(controller, arm, NoUnits(), clock, keeper, lambda _: len(keeper.steps) >= cycles, options, ending)
     return ending
 
 
@@ -107,11 +106,13 @@ def test_an_arm_that_takes_no_more_commands_is_said_and_its_motion_ended(control
     assert arm.ended == 1
 
 
-@pytest.mark.parametrize(("stands", "unrest"), [(True, ""), (False, "The arm does not answer.")])
-def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, panda_model, stands, unrest):
+@pytest.mark.parametrize(("stands", "rest_unknown"), [(True, ""), (False, "The arm does not answer.")])
+def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, panda_model, stands, rest_unknown):
     arm = FollowingArm(panda_model.description.q_ready)
     arm.end_fails, arm.gone = True, not stands
-    assert followed(controller, arm, Keeper(), 20) == Ending(stopped="The arm does not answer.", unrest=unrest)
+    assert followed(controller, arm, Keeper(), 20) == Ending(
+        stopped="The arm does not answer.", rest_unknown=rest_unknown
+    )
 
 
 def test_an_arm_goes_along_a_plan_and_a_signal_stops_it(controller, panda_model):

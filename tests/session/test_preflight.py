@@ -10,12 +10,12 @@ from pretouch.control.path import Circle, line
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.limits import LimiterParams
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.session.preflight import PreflightParams, check
-from pretouch.session.standing import watch
-from pretouch.session.start import check_start, way_to_start
+from pretouch.session.standstill import watch
+from pretouch.session.start import check_start, plan_to_start
 from tests.session.arms import PushedArm
 
 
@@ -40,11 +40,11 @@ def test_a_sound_arm_is_found_fit(controller, panda_model):
 @pytest.mark.parametrize(
     ("about", "what", "said"),
     [
-        ({"force": lambda _: np.array([0.0, 0.0, 6.0])}, "bias", r"\(0\.0, 0\.0, 6\.0\) N, more than 5 N"),
+        ({"force": lambda _: np.array([0.0, 0.0, 6.0])}, "bias", r"\(0\.0, 0\.0, 6\.0\) N \(limit 5 N"),
         ({"noise": 4.0}, "noise", "standard deviation of"),
         (
             {"force": lambda t: np.array([0.0, 9.0 if 101.0 < t < 101.3 else 0.0, 0.0])},
-            "touched", "let nobody touch the arm",
+            "touched", "do not touch the arm",
         ),
     ],
 )  # fmt: skip
@@ -95,7 +95,7 @@ def test_an_arm_away_from_its_path_is_refused_with_the_way_out(controller, panda
 
 def test_the_way_to_the_start_ends_there_and_is_slow(controller, panda_model):
     q = panda_model.description.q_ready
-    way = way_to_start(panda_model, q, controller.path, -0.2)
+    way = plan_to_start(panda_model, q, controller.path, -0.2)
     assert np.allclose(way.at(0.0)[0], q)
     assert not check_start(controller, way.at(way.duration)[0])
     times = np.linspace(0.0, way.duration, 200)
@@ -104,10 +104,10 @@ def test_the_way_to_the_start_ends_there_and_is_slow(controller, panda_model):
 
 
 def test_no_way_is_planned_where_the_arm_is_at_the_start(controller, panda_model):
-    goal = way_to_start(panda_model, panda_model.description.q_ready, controller.path, -0.2)
-    assert way_to_start(panda_model, goal.at(goal.duration)[0], controller.path, -0.2) is None
+    goal = plan_to_start(panda_model, panda_model.description.q_ready, controller.path, -0.2)
+    assert plan_to_start(panda_model, goal.at(goal.duration)[0], controller.path, -0.2) is None
 
 
 def test_a_way_through_the_floor_is_an_error(panda_model):
-    with pytest.raises(RobotError, match="no way to the start"):
-        way_to_start(panda_model, panda_model.description.q_ready, line((0.5, 0.0, -0.1), (0.5, 0.1, -0.1)), 0.0)
+    with pytest.raises(RobotError, match="No motion to the start"):
+        plan_to_start(panda_model, panda_model.description.q_ready, line((0.5, 0.0, -0.1), (0.5, 0.1, -0.1)), 0.0)

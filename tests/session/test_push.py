@@ -5,7 +5,7 @@ import pytest
 
 from pretouch.errors import RobotError
 from pretouch.session.push import DIRECTIONS, GuidedPush, PushParams
-from pretouch.session.standing import watch
+from pretouch.session.standstill import watch
 from tests.session.arms import PushedArm
 
 PARAMS = PushParams(timeout_s=8.0)
@@ -71,7 +71,7 @@ def test_a_force_against_the_joint_torques_is_refused(panda_model):
 @pytest.mark.parametrize(
     ("push", "said"),
     [
-        (lambda axis: 14.0 * np.array([0.0, 0.0, 1.0]), "not along the axis"),
+        (lambda axis: 14.0 * np.array([0.0, 0.0, 1.0]), "not along the requested axis"),
         (lambda axis: 5.0 * axis, ""),
         (lambda axis: 0.0 * axis, ""),
     ],
@@ -97,7 +97,7 @@ def test_torques_that_do_not_fit_the_force_are_said_and_decide_nothing(panda_mod
     rest = watch(arm, arm, panda_model.description.qd_max, 1.0)
     with pytest.raises(RobotError, match="No clear push"):
         GuidedPush(arm, arm, panda_model, person.ask(arm), heard.append, PARAMS).confirm(rest)
-    assert "do not fit" in heard[0]
+    assert "do not match" in heard[0]
 
 
 def test_a_push_shorter_than_asked_decides_nothing(panda_model):

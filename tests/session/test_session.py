@@ -7,12 +7,12 @@ from pretouch.control.path import Circle, line
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.loop import MonotonicClock
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.session.preflight import PreflightParams
 from pretouch.session.session import NoUnits, Session
-from pretouch.session.standing import watch
+from pretouch.session.standstill import watch
 from tests.session.arms import PushedArm
 
 PARAMS = PreflightParams()
@@ -39,7 +39,7 @@ def test_an_arm_that_stands_where_it_was_checked_may_move(panda_model):
 def test_an_arm_that_was_guided_since_it_was_checked_may_not(panda_model, approach, moved):
     session, seen = checked(panda_model)
     session.arm.q = session.arm.q + moved * np.eye(7)[1]
-    with pytest.raises(RobotError, match=r"moved since it was checked, panda_joint\d by .* start again"):
+    with pytest.raises(RobotError, match=r"moved after the checks, panda_joint\d by .* start again"):
         session.recheck(seen, PARAMS, approach)
 
 

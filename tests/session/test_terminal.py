@@ -4,7 +4,7 @@ import os
 import pty
 import threading
 
-from pretouch.session.terminal import EnterKey, Narrator
+from pretouch.session.terminal import BackgroundPrinter, EnterKey
 
 
 def test_enter_is_heard_once_and_other_keys_are_not():
@@ -46,7 +46,7 @@ def test_a_terminal_that_takes_nothing_does_not_keep_the_caller_waiting():
         free.wait()
         said.append(sentence)
 
-    with Narrator(say) as tell:
+    with BackgroundPrinter(say) as tell:
         for k in range(1000):
             tell(str(k))
         assert not said
@@ -58,6 +58,6 @@ def test_a_terminal_that_is_gone_ends_nothing():
     def say(_):
         raise BrokenPipeError
 
-    with Narrator(say) as tell:
+    with BackgroundPrinter(say) as tell:
         tell("a")
         tell("b")

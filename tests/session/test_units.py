@@ -44,7 +44,7 @@ def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(c
 def test_units_that_are_not_heard_are_named(checked):
     arm, units, check = checked
     arm._arm.fleet.units[0].silent = True
-    with pytest.raises(HardwareError, match=f"hand_left is not heard at 127.0.0.1:{units.address[1]}"):
+    with pytest.raises(HardwareError, match=f"No data from hand_left at 127.0.0.1:{units.address[1]}"):
         check.wait(MonotonicClock(0.01), 1.5, 1.0)
 
 

@@ -60,7 +60,7 @@ def test_commands_come_in_the_order_they_were_given():
 
 def test_a_known_arm_is_that_arm_whatever_the_seed():
     known = {
-        "offsets_nm": (0.1,) * 7, "mass_factors": (1.01,) * len(MODEL.links), "payloads_kg": (0.25,),
+        "offsets_nm": (0.1,) * 7, "mass_factors": (1.01,) * len(MODEL.links), "payload_kg": 0.25,
         "ripple_phases_rad": (0.5,) * 7,
     }  # fmt: skip
     for seed in (1001, 1002):
@@ -71,7 +71,7 @@ def test_a_known_arm_is_that_arm_whatever_the_seed():
 
 
 def test_what_is_known_changes_no_other_draw():
-    one, other = plant(), plant(payloads_kg=(0.0,))
+    one, other = plant(), plant(payload_kg=0.0)
     assert np.array_equal(one.offset_nm, other.offset_nm)
     assert np.array_equal(one.error.mass_factor, other.error.mass_factor)
 
@@ -81,5 +81,5 @@ def test_what_is_known_of_another_arm_is_refused():
         plant(mass_factors=(1.0, 1.0, 1.0))
     with pytest.raises(ParameterError, match="offsets_nm has 6 values"):
         plant(offsets_nm=(0.0,) * 6)
-    with pytest.raises(ParameterError, match=r"payloads_kg is .* none may be below 0"):
-        PlantParams(payloads_kg=(-0.1,))
+    with pytest.raises(ParameterError, match=r"payload_kg is -0.1: it must be at least 0"):
+        PlantParams(payload_kg=-0.1)

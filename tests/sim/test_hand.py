@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pretouch.sim.hand import Hand, HandGoal, point_on_arm
+from pretouch.sim.hand import Hand, HandGoal, PersonArm, point_on_arm
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
@@ -45,7 +45,7 @@ def each_step(plant: Plant, duration: float, look: Callable[[], object]) -> np.n
 
 
 def test_a_hand_travels_at_the_speed_of_its_person_and_arrives(plant_with_hand):
-    hand = Hand(plant := plant_with_hand(FREE), Script(stay((1.2, 1.0, 0.8))), speed_max=0.5)
+    hand = Hand(plant := plant_with_hand(FREE), Script(stay((1.2, 1.0, 0.8))), PersonArm(speed_max=0.5))
     assert hand.position == pytest.approx(np.array(FREE))
     velocity = each_step(plant, 1.9, lambda: hand.velocity)
     assert velocity[200:1800] == pytest.approx(np.tile([0.0, 0.5, 0.0], (1600, 1)), abs=0.01)
@@ -59,7 +59,7 @@ def test_a_hand_never_jumps_though_its_goal_does(plant_with_hand):
     def jumping(time: float) -> FloatArray:
         return np.array([1.2, 0.5 if int(time / 0.05) % 2 else -0.5, 0.8])
 
-    hand = Hand(plant := plant_with_hand(FREE), Script(jumping), speed_max=0.5)
+    hand = Hand(plant := plant_with_hand(FREE), Script(jumping), PersonArm(speed_max=0.5))
     path = np.vstack([FREE, each_step(plant, 1.0, lambda: hand.position)])
     limit = 0.5 * (1.0 + 2.0 / 6.0)  # the spring overshoots by a sixth, at a reversal twice
     assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() < limit * 0.001
@@ -102,7 +102,7 @@ def test_a_disturbed_hand_comes_to_rest(plant_with_hand):
 def push_up(hand_plant: Callable[..., Plant], force_max: float) -> tuple[Plant, Hand]:
     """A hand 2 cm below the fingertip that wants to go 10 cm up."""
     plant = hand_plant((0.3069, 0.0, 0.4082))
-    return plant, Hand(plant, Script(stay((0.3069, 0.0, 0.5)), force_max), speed_max=0.1)
+    return plant, Hand(plant, Script(stay((0.3069, 0.0, 0.5)), force_max), PersonArm(speed_max=0.1))
 
 
 @pytest.mark.parametrize("force_max", [5.0, 20.0, 40.0])
@@ -117,7 +117,7 @@ def test_a_hand_pushes_with_no_more_than_its_force(plant_with_hand, force_max):
 
 def test_a_soft_goal_inside_the_arm_pushes_as_its_spring(plant_with_hand):
     plant = plant_with_hand((0.3069, 0.0, 0.4262))
-    Hand(plant, Script(stay((0.3069, 0.0, 0.4362)), force_max=100.0), speed_max=0.1)
+    Hand(plant, Script(stay((0.3069, 0.0, 0.4362)), force_max=100.0), PersonArm(speed_max=0.1))
     plant.advance(1.0)
     depth = 0.4362 - (plant.mj_data.body("hand").xpos[2])
     assert 0.006 < depth < 0.01
@@ -127,7 +127,7 @@ def test_a_soft_goal_inside_the_arm_pushes_as_its_spring(plant_with_hand):
 def test_a_hand_that_pushes_to_the_left_puts_a_force_to_the_left_on_the_arm(plant_with_hand):
     # between the two capsules of the gripper's side, where the ball rests stably
     plant = plant_with_hand((0.3069, -0.18, 0.5595))
-    Hand(plant, Script(stay((0.3069, -0.132, 0.5595)), force_max=50.0), speed_max=0.1)
+    Hand(plant, Script(stay((0.3069, -0.132, 0.5595)), force_max=50.0), PersonArm(speed_max=0.1))
     before = np.mean(each_step(plant, 0.2, lambda: plant.read().wrench), axis=0)
     plant.advance(1.0)
     assert plant.true_force[1] > 20.0
@@ -139,7 +139,7 @@ def test_a_hand_that_pushes_to_the_left_puts_a_force_to_the_left_on_the_arm(plan
 def test_a_person_who_lets_go_pulls_back_at_once(plant_with_hand):
     plant = plant_with_hand((0.3069, 0.0, 0.4082))
     up, down = np.array([0.3069, 0.0, 0.5]), np.array([0.3069, 0.0, 0.3])
-    hand = Hand(plant, Script(lambda time: up if time < 1.0 else down, 30.0), speed_max=0.2)
+    hand = Hand(plant, Script(lambda time: up if time < 1.0 else down, 30.0), PersonArm(speed_max=0.2))
     plant.advance(1.0)
     assert plant.true_force[2] == pytest.approx(30.0, rel=0.02)
     force = each_step(plant, 0.3, lambda: plant.true_force[2])
@@ -175,7 +175,7 @@ def lower(plant: Plant, speed: float) -> None:
 def test_a_push_is_one_touch_and_the_next_one_after_letting_go_another(plant_with_hand):
     plant = plant_with_hand((0.3069, 0.0, 0.4082))
     up, down = np.array([0.3069, 0.0, 0.5]), np.array([0.3069, 0.0, 0.3])
-    Hand(plant, Script(lambda time: down if 1.0 < time < 2.0 else up, 30.0), speed_max=0.1)
+    Hand(plant, Script(lambda time: down if 1.0 < time < 2.0 else up, 30.0), PersonArm(speed_max=0.1))
     plant.advance(0.19)
     assert plant.touches == []
     plant.advance(0.81)
@@ -191,7 +191,7 @@ def test_a_push_is_one_touch_and_the_next_one_after_letting_go_another(plant_wit
 
 def test_an_arm_that_comes_down_on_a_hand_closes_downwards(plant_with_hand):
     start = (0.3069, 0.0, 0.4082)
-    Hand(plant := plant_with_hand(start), Script(stay(start)), speed_max=0.1)
+    Hand(plant := plant_with_hand(start), Script(stay(start)), PersonArm(speed_max=0.1))
     lower(plant, 0.1)
     plant.advance(0.4)
     assert touched(plant) == ["panda_hand"]

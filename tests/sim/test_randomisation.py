@@ -64,8 +64,8 @@ def test_what_an_experiment_varies_stays():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[plant.mas]\nvalue = 1.0\n", "has plant.mas: choose from period_s"),
-        ("[plants.mass_error]\nvalue = 1.0\n", "has 'plants': its tables are about, plant, ranging, misplaced"),
+        ("[plant.mas]\nvalue = 1.0\n", "has an unknown field plant.mas: choose from period_s"),
+        ("[plants.mass_error]\nvalue = 1.0\n", "has an unknown table 'plants': use about, plant, ranging, misplaced"),
         ("[plant.mass_error]\nuniform = [0.2, 0.1]\n", "give two numbers, the lower first"),
         ("[plant.mass_error]\nlog_uniform = [0.0, 0.1]\n", "and above 0"),
         ("[plant.mass_error]\nuniform = [0.0, 0.1]\nvalue = 3\n", "give one of value, uniform"),
@@ -74,7 +74,10 @@ def test_what_an_experiment_varies_stays():
         ("[plant.ripple_nm]\nvalue = 0.1\n", "give a list of numbers"),
         ("[plant.offsets_nm]\nvalue = [nan]\n", "give a list of numbers"),
         ("[ranging.mode]\nvalue = 'wide'\n", "choose one of short, long"),
-        ("nothing", "no TOML file"),
+        ("[plant.payloads_kg]\nvalue = [0.5]\n", "write plant.payload_kg, value = 0.5 in place of"),
+        ("[plant.payload_kg]\nvalue = [0.5]\n", "give a number"),
+        ("[plant.payload_kg]\nuniform = [0.9, 1.1]\ntimes = true\n", "no usual value that it could be a factor on"),
+        ("nothing", "not valid TOML"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_with_the_field(tmp_path, text, said):
@@ -85,10 +88,10 @@ def test_a_file_that_is_wrong_is_refused_with_the_field(tmp_path, text, said):
 
 
 def test_a_name_that_is_none_says_which_there_are():
-    with pytest.raises(ParameterError, match="none of nominal, realistic, stress"):
+    with pytest.raises(ParameterError, match="not one of nominal, realistic, stress"):
         world_set("real")
 
 
 def test_all_fields_of_a_plant_can_be_set():
     names = {f.name for f in fields(PlantParams)}
-    assert {"state_delay_s", "command_delay_s", "offsets_nm", "payloads_kg"} <= names
+    assert {"state_delay_s", "command_delay_s", "offsets_nm", "payload_kg"} <= names

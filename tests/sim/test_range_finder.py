@@ -1,68 +1,16 @@
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.sim.ranging import CONE_MEAN, EXACT, FORWARD, NO_ERROR, ball, wall
 
 from pretouch.errors import ParameterError
 from pretouch.perception.scene_filter import ray_capsule
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.plant import Plant
-from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.range_finder import MODES, RangeFinderParams, RangeFinders, RangeSample, _flat_wall
-from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch.sim.range_finder import MODES, RangeFinderParams, RangeFinders, _flat_wall
+from pretouch.sim.scene import SceneSpec
 from pretouch.types import RangeStatus
-
-FORWARD = np.array([[0.0, 0.0, 1.0, 0.027], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.03], [0.0, 0.0, 0.0, 1.0]])
-"""Pose on the hand whose beam points along +x of the base in the ready posture."""
-ORIGIN = np.array([0.33389, 0.0, 0.56028])
-"""Where that sensor is then [m]."""
-CONE_MEAN = 1.0198
-"""A flat wall of one brightness, seen through 1 + 6 + 12 rays tilted by 0, 6.75 and 13.5 degrees and weighted by
-their strength cos(tilt)^3, would be read farther than it is by this factor, sum of cos^2 over sum of cos^3, if the
-sensor were not calibrated against one. So what fills only the middle of the cone is read nearer by as much."""
-EXACT = {"offset_max_m": 0.0, "noise_floor_m": 0.0, "noise_rate": 0.0, "dropout": 0.0}
-NO_ERROR = PlantParams(mass_error=0.0, payload_max_kg=0.0)
-
-
-def wall(distance: float, name: str = "wall", half_width: float = 2.0) -> Box:
-    return Box(name, (ORIGIN[0] + distance + 0.05, 0.0, ORIGIN[2]), (0.05, half_width, half_width), 75_000.0)
-
-
-def ball(gap: float) -> HandSpec:
-    """A hand, its surface `gap` [m] in front of the sensor."""
-    return HandSpec(start=(ORIGIN[0] + gap + 0.05, 0.0, ORIGIN[2]))
-
-
-@dataclass
-class Rig:
-    """Some units in a room, and all they report."""
-
-    plant: Plant
-    finders: RangeFinders
-
-    def collect(self, duration: float) -> dict[str, np.ndarray]:
-        """Each reading that became the newest of its unit: when it was seen, unit, stamp, distance, status."""
-        rows, last = [], self.finders.read().stamp
-        for _ in range(round(duration / 0.001)):
-            self.plant.advance(0.001)
-            now = self.finders.read()
-            for unit in np.flatnonzero(now.stamp > last):
-                rows.append((self.plant.time, unit, now.stamp[unit], now.distance[unit], now.status[unit]))
-            last = now.stamp
-        return dict(zip(("seen", "unit", "stamp", "distance", "status"), np.array(rows).T, strict=True))
-
-
-@pytest.fixture
-def rig(panda_model) -> Callable[..., Rig]:
-    def make(*boxes: Box, units: int = 1, hand: HandSpec | None = None, seed: int = 0, link: str = "panda_hand",
-             pose: np.ndarray = FORWARD, **params: object) -> Rig:  # fmt: skip
-        skin = Skin([SensorUnit(f"unit_{i}", link, pose) for i in range(units)], panda_model)
-        plant = Plant(panda_model, SceneSpec(boxes, hand), NO_ERROR, panda_model.description.q_ready, seed)
-        return Rig(plant, RangeFinders(plant, skin, RangeFinderParams(**params), seed))
-
-    return make
 
 
 def test_the_hand_numbers_of_the_cone():
@@ -292,63 +240,6 @@ def test_a_skin_without_units_reads_nothing(panda_model):
     finders = RangeFinders(plant, Skin([], panda_model), RangeFinderParams(), seed=0)
     plant.advance(0.05)
     assert len(finders.read().stamp) == 0
-
-
-# All that a sensor says, for whoever brings it somewhere
-
-
-def sent(model, skin, duration: float, *boxes: Box, seed: int = 0, **params: object) -> list[RangeSample]:
-    samples: list[RangeSample] = []
-    plant = Plant(model, SceneSpec(boxes=boxes), NO_ERROR, model.description.q_ready, seed)
-    finders = RangeFinders(plant, skin, RangeFinderParams(**params), seed, samples.append)
-    plant.advance(duration)
-    assert not np.isfinite(finders.read().stamp).any(), "what is sent elsewhere is not read here"
-    return samples
-
-
-def test_what_is_sent_is_what_would_have_been_read(panda_model, paper_skin, rig):
-    at_once = {"latency_s": 0.0, "jitter_s": 1e-6, "dropout": 0.0}
-    samples = sent(panda_model, paper_skin, 0.5, wall(0.5), **at_once)
-    plant = Plant(panda_model, SceneSpec(boxes=(wall(0.5),)), NO_ERROR, panda_model.description.q_ready, 0)
-    read = Rig(plant, RangeFinders(plant, paper_skin, RangeFinderParams(**at_once), 0)).collect(0.5)
-    told = sorted((s.unit, s.time, s.distance, s.status) for s in samples)
-    seen = sorted(zip(*(read[key].tolist() for key in ("unit", "stamp", "distance", "status")), strict=True))
-    assert len(told) >= len(seen) > 150
-    assert set(seen) <= set(told)
-
-
-def test_a_silenced_sensor_sends_nothing(panda_model, paper_skin):
-    samples: list[RangeSample] = []
-    plant = Plant(panda_model, SceneSpec(), NO_ERROR, panda_model.description.q_ready, 0)
-    finders = RangeFinders(plant, paper_skin, RangeFinderParams(), 0, samples.append)
-    finders.silenced = {2}
-    plant.advance(0.2)
-    assert {s.unit for s in samples} == {0, 1, 3, 4, 5, 6}
-
-
-def test_light_falls_off_with_the_distance_and_never_repeats_itself(panda_model):
-    skin = Skin([SensorUnit("front", "panda_hand", FORWARD)], panda_model)
-    by_distance = {d: sent(panda_model, skin, 2.0, wall(d)) for d in (0.2, 0.6, 1.2)}
-    whole = {
-        d: np.mean([s.signal * 256 / s.spads for s in samples if s.status == RangeStatus.OK])
-        for d, samples in by_distance.items()
-    }
-    assert whole[0.2] / whole[0.6] == pytest.approx(9.0, rel=0.1)
-    assert whole[0.6] / whole[1.2] == pytest.approx(4.0, rel=0.15)
-    for samples in by_distance.values():
-        assert all(s.signal + s.ambient < 20.5 and 0 < s.spads <= 256 for s in samples)
-        wire = [(round(1e3 * s.distance), round(128 * s.signal), round(128 * s.ambient)) for s in samples]
-        assert max(wire.count(one) for one in wire) < 10
-        assert all(s.sigma == pytest.approx(0.003 + 0.006 * s.distance, abs=0.003) for s in samples)
-
-
-def test_without_a_target_only_ambient_light_is_left(panda_model):
-    skin = Skin([SensorUnit("front", "panda_hand", FORWARD)], panda_model)
-    samples = sent(panda_model, skin, 1.0)
-    assert {(s.status, s.distance, s.sigma, s.spads) for s in samples} == {(RangeStatus.SIGNAL, 0.0, 0.0, 256.0)}
-    assert max(s.signal for s in samples) < 0.01
-    assert np.mean([s.ambient for s in samples]) == pytest.approx(0.3, rel=0.01)
-    assert len({round(s.ambient, 4) for s in samples}) > 20
 
 
 def test_units_measure_as_often_as_they_are_told():

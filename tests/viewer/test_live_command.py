@@ -24,7 +24,7 @@ def test_a_busy_port_is_one_sentence_with_the_next_free_one(capsys: pytest.Captu
     out, err = capsys.readouterr()
     assert out == ""
     assert err.count("\n") == 1
-    assert err.startswith(f"Port {port} on 127.0.0.1 is taken")
+    assert err.startswith(f"Port {port} on 127.0.0.1 is in use")
     assert "is free" in err
 
 

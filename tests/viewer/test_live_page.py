@@ -18,9 +18,9 @@ from pretouch.types import Mode
 from pretouch.viewer.controls import toggle_recording
 from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage, serve_live
+from pretouch.viewer.room import Faults, LiveSettings
 from pretouch.viewer.scene import GIZMO_M
 from pretouch.viewer.server import ServeOptions, served
-from pretouch.viewer.settings import Faults, LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -175,7 +175,7 @@ def test_a_folder_for_recordings_that_cannot_be_made_is_said(
     Path("runs").write_text("in the way")
     clock.page.ask(lambda: toggle_recording(simulation))
     clock.turn(0.1)
-    assert clock.page.notice == "Not done: The folder runs cannot be made: File exists."
+    assert clock.page.notice == "Not done: The folder runs cannot be created: File exists."
     assert simulation.recording is None
 
 
@@ -193,7 +193,7 @@ def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: Li
 
 @pytest.mark.parametrize(
     ("typed", "said"),
-    [("", ""), ("2.5", "Not done: TaskParams.restore_cycles is 2.5: it must be a whole number."),
+    [("", ""), ("2.5", "Not done: task.restore_cycles is '2.5': write a whole number."),
      ("many", "Not done: l_max is 'many': give a number such as 200.")],
 )  # fmt: skip
 def test_what_is_no_value_goes_back_to_the_one_that_holds(clock: Clock, typed: str, said: str) -> None:
@@ -210,7 +210,7 @@ def test_a_number_typed_counts_before_what_is_clicked_afterwards(clock: Clock, s
     give(clock.page, "F_b [N]", "8")
     click(clock.page, "Reset parameters")
     clock.turn(2 * SETTLE_S)
-    assert simulation.world.profile.threshold.f_base_n == 10.0
+    assert simulation.world.profile.detect.f_base_n == 10.0
     assert handle(clock.page, "F_b [N]").value == "10"
 
 

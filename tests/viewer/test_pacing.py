@@ -38,7 +38,7 @@ def test_a_slow_machine_is_named_after_a_while_and_the_share_is_right() -> None:
     run(pace, now, 4.0, 2 * PERIOD)
     assert pace.slow
     assert "50 %" in pace.sentence()
-    assert "the physics is not simplified" in pace.sentence()
+    assert "with the same physics" in pace.sentence()
 
 
 def test_a_hiccup_is_not_slowness() -> None:

@@ -9,7 +9,7 @@ from tests.viewer.browser import Served, chromium
 
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.network_skin import NetworkSkin
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.recording.compare import compare
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
@@ -21,8 +21,8 @@ from pretouch.types import FloatArray, Mode
 from pretouch.viewer.live import serve_live
 from pretouch.viewer.real_units import RealUnits
 from pretouch.viewer.replay import serve_replay
+from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.scene import GIZMO_M
-from pretouch.viewer.settings import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 pytestmark = pytest.mark.slow
@@ -72,7 +72,7 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
         assert simulation.world.profile.approach.d_crit_m == 0.1
         visitor.wait_until(lambda: visitor.value("d_crit [m]") == "0.1")
         visitor.type("F_b [N]", 8)
-        visitor.wait_until(lambda: simulation.world.profile.name == "paper:threshold.f_base_n=8")
+        visitor.wait_until(lambda: simulation.world.profile.name == "paper:detect.f_base_n=8")
         visitor.tab("World")
         visitor.tick("hand_left")
         visitor.wait_for("reason", "No usable reading from hand_left")
@@ -90,7 +90,7 @@ def test_a_number_typed_key_by_key_is_the_one_that_counts(tmp_path: Path) -> Non
         visitor.type_slowly("d_crit [m]", "0.05", delay=1.2)  # longer than what counts as typed: 0.0 is refused
         visitor.wait_until(lambda: simulation.world.profile.name == "paper:approach.d_crit_m=0.05")
         visitor.type_slowly("F_b [N]", "12")
-        visitor.wait_until(lambda: simulation.world.profile.threshold.f_base_n == 12.0)
+        visitor.wait_until(lambda: simulation.world.profile.detect.f_base_n == 12.0)
         visitor.field("F_b [N]").fill("")
         visitor.wait_until(lambda: visitor.value("F_b [N]") == "12")
         visitor.field("sigma_max [N]").scroll_into_view_if_needed()

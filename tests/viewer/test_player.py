@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.types import Contact, ControlStep, Mode
-from pretouch.viewer.player import Happenings, Player
+from pretouch.viewer.player import Player, Timeline
 
 STAMPS = 100.0 + np.arange(101) / 100
 
@@ -56,29 +56,29 @@ def test_what_happened_is_found_bit_by_bit(some_step: ControlStep) -> None:
         replace(some_step, mode=Mode.REACT if 40 <= i < 60 else Mode.TRACK, contact=contact if i == 40 else None)
         for i in range(100)
     ]
-    happenings = Happenings(steps.__getitem__, len(steps))
-    happenings.look(45)
-    assert [h.index for h in happenings.found] == [40]
-    assert happenings.share == 0.45
-    happenings.look(100)
-    assert happenings.done
-    assert [(h.index, h.what) for h in happenings.found] == [(40, "Contact of 12.0 N"), (60, "REACT to TRACK")]
-    first, second = happenings.found
-    assert happenings.after(0) is first
-    assert happenings.after(40) is second
-    assert happenings.after(60) is None
-    assert happenings.before(60) is first
-    assert happenings.before(40) is None
+    timeline = Timeline(steps.__getitem__, len(steps))
+    timeline.search(45)
+    assert [h.index for h in timeline.found] == [40]
+    assert timeline.share == 0.45
+    timeline.search(100)
+    assert timeline.done
+    assert [(h.index, h.what) for h in timeline.found] == [(40, "Contact of 12.0 N"), (60, "REACT to TRACK")]
+    first, second = timeline.found
+    assert timeline.after(0) is first
+    assert timeline.after(40) is second
+    assert timeline.after(60) is None
+    assert timeline.before(60) is first
+    assert timeline.before(40) is None
 
 
 def test_what_is_known_of_a_step_comes_in_its_turn(some_step: ControlStep) -> None:
     contact = Contact(np.array([12.0, 0.0, 0.0]), np.array([True, False, False]))
     steps = [replace(some_step, mode=Mode.TRACK, contact=contact if i == 40 else None) for i in range(100)]
-    happenings = Happenings(steps.__getitem__, len(steps), {40: "Contact with another", 70: "Contact with a third"})
-    happenings.look(60)
-    assert happenings.after(40) is None
-    happenings.look(100)
-    assert [(h.index, h.what) for h in happenings.found] == [
+    timeline = Timeline(steps.__getitem__, len(steps), {40: "Contact with another", 70: "Contact with a third"})
+    timeline.search(60)
+    assert timeline.after(40) is None
+    timeline.search(100)
+    assert [(h.index, h.what) for h in timeline.found] == [
         (40, "Contact of 12.0 N; Contact with another"),
         (70, "Contact with a third"),
     ]

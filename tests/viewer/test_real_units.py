@@ -153,7 +153,7 @@ def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_ar
 
 def test_real_units_cannot_be_made_to_fail_but_can_be_reset(room: Room, real: RealUnits) -> None:
     simulation = LiveSimulation(real=real)
-    with pytest.raises(ParameterError, match="units are real ones: unplug or cover one"):
+    with pytest.raises(ParameterError, match="units are real: unplug or cover one"):
         simulation.set_faults(frozenset({"hand_left"}))
     simulation.advance(0.5)
     room.hear()
@@ -191,7 +191,7 @@ def test_the_panel_shows_each_unit_and_what_is_wrong_with_it(room: Room) -> None
     gui = _Gui()
     panel = UnitPanel(gui, room, tuple(unit.id for unit in room.units))  # type: ignore[arg-type]
     panel.draw(room.now)
-    assert "unit_0 has not been heard" in gui.html.content
+    assert "unit_0 has sent nothing so far" in gui.html.content
     room.units[0].state, room.units[0].accepted = "live", 500
     arrivals = room.now + 0.02 * np.arange(500)
     room.samples = [Received(0, t, t - 0.012, 0.0, 0.001, sample(k + 1)) for k, t in enumerate(arrivals.tolist())]
@@ -199,7 +199,7 @@ def test_the_panel_shows_each_unit_and_what_is_wrong_with_it(room: Room) -> None
     panel.draw(float(arrivals[-1]))
     html = gui.html.content
     assert "<b>unit_0</b> 50 Hz · 0 % lost · 12 ms · 3.90 V" in html
-    assert "unit_1 has not been heard" in html
+    assert "unit_1 has sent nothing so far" in html
     panel.draw(float(arrivals[-1]) + 0.9 * PERIOD_S)
     assert gui.html.content == html
 

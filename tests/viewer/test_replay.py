@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from tests.ports import free_port
 
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.recording.compare import Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.types import Mode
-from pretouch.viewer.compared import compared
-from pretouch.viewer.replay import ReplayPage, frame_of, serve_replay, world_of
+from pretouch.viewer.replay import ReplayPage, comparison_html, frame_of, serve_replay, world_of
 from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
 
@@ -82,13 +81,13 @@ def test_what_another_profile_finds_is_named_and_can_be_jumped_to(recorded: Reco
     found = Found(float(stamps[150]), np.array([0.0, 12.0, 9.0]), np.array([False, True, False]))
     comparison = compare(recorded, PROFILES["blind"])
     comparison = replace(comparison, other=replace(comparison.other, contacts=(found,)))
-    said = compared(comparison, stamps[0])
+    said = comparison_html(comparison, stamps[0])
     assert "As recorded, paper: no contact. On the same data blind finds contacts of 15.0 N at 1.50 s." in said
     with served(ServeOptions(port=free_port()), "test") as server:
         page = ReplayPage(server, recorded, comparison)
-        while not page.happenings.done:
+        while not page.timeline.done:
             page.turn(0.0, 0.0)
-        assert (150, "Contact of 15.0 N found by blind") in [(h.index, h.what) for h in page.happenings.found]
+        assert (150, "Contact of 15.0 N found by blind") in [(h.index, h.what) for h in page.timeline.found]
 
 
 def test_after_a_jump_the_plots_begin_ten_seconds_before_or_at_the_start(recorded: Recorded) -> None:

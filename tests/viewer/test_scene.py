@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from tests.viewer.fake_scene import FakeScene
 
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.types import ControlStep, Obstacles, Touched, untouched
 from pretouch.viewer import palette
 from pretouch.viewer.frame import Frame, World

@@ -17,18 +17,18 @@ def test_a_busy_port_is_one_sentence_with_the_next_free_one() -> None:
         with pytest.raises(ViewerError) as caught:
             check_port(ServeOptions(port=port))
     said = str(caught.value)
-    assert said.startswith(f"Port {port} on 127.0.0.1 is taken")
+    assert said.startswith(f"Port {port} on 127.0.0.1 is in use")
     assert "\n" not in said
-    named = int(said.split("--port ")[1].split()[0])
-    assert named > port
-    check_port(ServeOptions(port=named))
+    free = int(said.split("--port ")[1].split()[0])
+    assert free > port
+    check_port(ServeOptions(port=free))
 
 
 def test_a_second_page_on_the_same_port_is_refused_and_the_first_goes_on(capfd: pytest.CaptureFixture[str]) -> None:
     options = ServeOptions(port=free_port())
     with served(options, "first") as server:
         with (
-            pytest.raises(ViewerError, match=rf"Port {options.port} on 127\.0\.0\.1 is taken"),
+            pytest.raises(ViewerError, match=rf"Port {options.port} on 127\.0\.0\.1 is in use"),
             served(options, "second"),
         ):
             pass

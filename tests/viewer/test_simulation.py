@@ -12,8 +12,8 @@ from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import run
-from pretouch.params import at_rate, profile
-from pretouch.sim.hand import Hand
+from pretouch.profiles import at_rate, profile
+from pretouch.sim.hand import Hand, PersonArm
 from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -21,7 +21,7 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
 from pretouch.types import ControlStep, Mode
 from pretouch.viewer.mouse import HAND_FORCE_N, HAND_SPEED_M_S, Mouse
-from pretouch.viewer.settings import LiveSettings
+from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 OBJECTS = ("none", "board -y", "board +y")
@@ -42,7 +42,7 @@ def test_a_session_runs_as_an_experiment_does(live, panda_model, paper_skin):
     scene = SceneSpec(hand=hand)
     plant = Plant(panda_model, scene, PlantParams(), brought_to(panda_model, path.point(0.0)), 7)
     units = RangeFinders(plant, paper_skin, RangeFinderParams(), 7)
-    Hand(plant, Mouse(np.array(hand.start), scene, hand), HAND_SPEED_M_S)
+    Hand(plant, Mouse(np.array(hand.start), scene, hand), PersonArm(HAND_SPEED_M_S))
     plant.advance(0.2)
     kept: list[ControlStep] = []
 

@@ -5,10 +5,10 @@ import pytest
 from tests.viewer.sessions import ARMED_S, poke, set_speed
 
 from pretouch.errors import RecordingError
-from pretouch.params import PROFILES, profile
+from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
-from pretouch.viewer.settings import LiveSettings
+from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -45,7 +45,7 @@ def test_each_step_is_kept_with_what_only_the_simulation_knows(session, tmp_path
     recorded = open_recording(place)
     assert len(recorded) == len(steps)
     assert [run.profile.perception.enabled for run in recorded.runs] == [True, False, True, True]
-    assert [run.profile.threshold.window_samples for run in recorded.runs] == [100, 100, 40, 40]
+    assert [run.profile.window.samples for run in recorded.runs] == [100, 100, 40, 40]
     assert [run.profile.task.speed_m_s for run in recorded.runs] == [0.3, 0.3, 0.3, 0.2]
     assert [run.path.length for run in recorded.runs][-1] == pytest.approx(2.0)
     for kept, step in zip(recorded, steps, strict=True):

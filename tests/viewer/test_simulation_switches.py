@@ -7,9 +7,9 @@ import pytest
 from tests.viewer.sessions import ARMED_S, AWAY, holds, kept_within_limits, modes, poke, set_speed
 
 from pretouch.errors import ParameterError
-from pretouch.params import PROFILES, profile
+from pretouch.profiles import PROFILES, profile
 from pretouch.types import Mode
-from pretouch.viewer.settings import LiveSettings
+from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -56,7 +56,7 @@ def test_a_profile_switched_in_a_reaction_lets_it_end(running):
     steps = poke(running)
     steps += running.advance(0.5)
     phase = steps[-1].path_phase
-    running.set_profile(profile("paper:reaction.decay_cycles=150:restriction.mode=hard"))
+    running.set_profile(profile("paper:react.decay_cycles=150:restriction.mode=hard"))
     after = running.advance(4.0)
     assert after[0].mode is Mode.REACT
     assert after[0].path_phase == phase
@@ -94,7 +94,9 @@ def test_another_speed_is_reached_gently(running):
 
 def test_what_cannot_be_is_refused_and_nothing_changes(running):
     settings, world = running.settings, running.world
-    with pytest.raises(ParameterError, match=r"The control period is 0.002 s: it stays 0.01 s until a reset"):
+    with pytest.raises(
+        ParameterError, match=r"The control period is 0.002 s, but can change only by a reset: it stays 0.01 s"
+    ):
         running.set_profile(profile("paper:task.control_period_s=0.002"))
     with pytest.raises(ParameterError, match=r"speed_m_s is -1"):
         set_speed(running, -1)
@@ -102,7 +104,7 @@ def test_what_cannot_be_is_refused_and_nothing_changes(running):
         running.set_path("square")
     with pytest.raises(ParameterError, match=r"LiveSettings.stiffness is 10: it must be at least 3000"):
         running.set_stiffness(10)
-    with pytest.raises(ParameterError, match=r"There is no unit nose to be silenced: choose from "):
+    with pytest.raises(ParameterError, match=r"Unknown unit nose: choose from "):
         running.set_faults(frozenset({"nose"}))
     with pytest.raises(ParameterError, match=r"Faults.noise_factor is 21: it must be at most 20"):
         running.set_faults(noise_factor=21)
@@ -246,7 +248,7 @@ def test_no_command_leaves_the_limits_whatever_a_person_does(live, seed):
         lambda: session.set_profile(PROFILES[names[rng.integers(len(names))]]),
         lambda: session.set_profile(profile(f"paper:threshold.window_samples={rng.integers(20, 120)}")),
         lambda: session.set_profile(profile(f"paper:restriction.mode={rng.choice(['off', 'hard', 'slack', 'floor'])}")),
-        lambda: session.set_profile(profile("paper:reaction.decay_cycles=50:task.position_margin_rad=0.05")),
+        lambda: session.set_profile(profile("paper:react.decay_cycles=50:task.position_margin_rad=0.05")),
         lambda: set_speed(session, rng.uniform(0.05, 1.0)),
         lambda: session.set_path(str(rng.choice(["circle", "line"]))),
         lambda: session.set_faults(frozenset({ids[rng.integers(len(ids))]}), rng.uniform(0, 10), rng.uniform(0, 0.1)),

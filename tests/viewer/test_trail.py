@@ -4,7 +4,7 @@ import numpy as np
 from tests.viewer.fake_scene import FakeScene
 
 from pretouch.types import ControlStep, Mode
-from pretouch.viewer.trail import BLOCK, BLOCKS, SPACING_M, Going, Trail, going
+from pretouch.viewer.trail import BLOCK, BLOCKS, SPACING_M, Activity, Trail, activity
 
 
 def at(step: ControlStep, x: float, **more: object) -> ControlStep:
@@ -26,23 +26,23 @@ def kept_off(step: ControlStep, held: bool) -> ControlStep:
 
 def test_an_arm_on_its_path_follows_it(some_step: ControlStep) -> None:
     assert some_step.mode is Mode.TRACK
-    assert going(some_step) is Going.FOLLOWING
+    assert activity(some_step) is Activity.FOLLOWING
 
 
 def test_off_the_path_an_arm_avoids_while_an_obstacle_holds_it_and_then_recovers(some_step: ControlStep) -> None:
-    assert going(kept_off(some_step, held=True)) is Going.AVOIDING
-    assert going(kept_off(some_step, held=False)) is Going.RECOVERING
+    assert activity(kept_off(some_step, held=True)) is Activity.AVOIDING
+    assert activity(kept_off(some_step, held=False)) is Activity.RECOVERING
 
 
 def test_a_violated_row_holds_too(some_step: ControlStep) -> None:
     step = kept_off(some_step, held=False)
-    assert going(replace(step, qp=replace(step.qp, slack=np.array([0.01])))) is Going.AVOIDING
+    assert activity(replace(step, qp=replace(step.qp, slack=np.array([0.01])))) is Activity.AVOIDING
 
 
 def test_reactions_and_holds_have_their_own_colours(some_step: ControlStep) -> None:
-    for mode, expected in ((Mode.REACT, Going.REACTING), (Mode.HOLD, Going.HOLDING)):
-        assert going(replace(kept_off(some_step, held=True), mode=mode)) is expected
-    assert len({kind.value for kind in Going}) == len(Going)
+    for mode, expected in ((Mode.REACT, Activity.REACTING), (Mode.HOLD, Activity.HOLDING)):
+        assert activity(replace(kept_off(some_step, held=True), mode=mode)) is expected
+    assert len({kind.value for kind in Activity}) == len(Activity)
 
 
 def test_a_trail_is_of_bounded_length(some_step: ControlStep) -> None:

@@ -37,7 +37,7 @@ def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(
     monkeypatch.setattr(vendor, "_folder", lambda: None)
     found, said = vendor_surfaces(panda_model)
     assert found == {}
-    assert said == f"The arm is drawn by its capsules: for the vendor's surfaces, run {MESHES.command}"
+    assert said == f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
 
 
 def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model: RobotModel) -> None:

@@ -20,7 +20,7 @@ def little_used(arm: ArmMotion) -> list[Finding]:
     if used >= 0.5 * whole:
         return []
     sentence = (
-        f"Of {whole:.1f} s of joint states, {used:.1f} s have no gap near by and could be used: record every state."
+        f"Of {whole:.1f} s of joint states only {used:.1f} s are without gaps and could be used: record every state."
     )
     return [Finding("joints_little_used", sentence, False)]
 
@@ -35,8 +35,8 @@ def clocks_apart(units: tuple[UnitCalibration, ...], params: CalibrationParams) 
     middle = float(np.median(late))
     late_or_early = "late" if middle > 0 else "early"
     sentence = (
-        f"The clocks of all units are {late_or_early} by about {abs(middle):.2f} s: joints and units were stamped by"
-        " different clocks. Correct the stamps of all units by that."
+        f"The clocks of all units are {late_or_early} by about {abs(middle):.2f} s, because joints and units were"
+        " stamped by different clocks: correct the stamps of all units by that."
     )
     return [Finding("clocks", sentence, False)]
 
@@ -56,6 +56,6 @@ def leaning(units: list[Located]) -> list[Finding]:
     axis = int(np.argmax(np.abs(lean)))
     sentence = (
         f"The arm leans by {np.rad2deg(angle):.1f} degrees, mostly towards {'-' if lean[axis] < 0 else '+'}{'xy'[axis]}"
-        " of its base. The places allow for it; what else takes the base as level does not."
+        " of its base. The unit poses account for it, but nothing else does: level the base."
     )
     return [Finding("leaning", sentence, False)]

@@ -43,7 +43,7 @@ def end_finding(arm: ArmMotion, located: Located) -> Finding | None:
         what = f"It slipped, or was put on, {until:.1f} s after the first joint state: until then"
     else:
         return None
-    return Finding("slipped", f"{what} it did not move as its link. Fasten it and calibrate again.", True)
+    return Finding("slipped", f"{what} it did not move with its link. Fasten it and calibrate again.", True)
 
 
 def share_findings(arm: ArmMotion, located: Located, params: CalibrationParams) -> list[Finding]:
@@ -53,23 +53,23 @@ def share_findings(arm: ArmMotion, located: Located, params: CalibrationParams) 
     findings = []
     if missing + outliers > params.unusable:
         sentence = (
-            f"{missing + outliers:.0%} of the run could not be used, {params.unusable:.0%} are bearable: during"
-            f" {missing:.0%} it measured nothing or was out of range, during {outliers:.0%} it did not move as its"
-            " link. Mend that and calibrate again."
+            f"{missing + outliers:.0%} of the run could not be used (limit {params.unusable:.0%}): during {missing:.0%}"
+            f" it measured nothing or was out of range, and during {outliers:.0%} it did not move with its link. Fix"
+            " that and calibrate again."
         )
         findings.append(Finding("unusable", sentence, True))
     elif outliers > _MANY:
         sentence = (
-            f"During {outliers:.0%} of the run it did not move as its link, and was left out: was it knocked, or is it"
-            " loose?"
+            f"During {outliers:.0%} of the run it did not move with its link, so that part was left out: check whether"
+            " it is loose."
         )
         findings.append(Finding("outliers", sentence, False))
     turning, acceleration = float(located.noise[0]), float(located.noise[3])
     if turning > params.tolerated_angular_velocity or acceleration > params.tolerated_acceleration:
         sentence = (
-            f"{turning:.3g} rad/s and {acceleration:.3g} m/s^2 of what it measured are not explained:"
-            f" {params.tolerated_angular_velocity:g} rad/s and {params.tolerated_acceleration:g} m/s^2 are bearable."
-            " Check that it is fastened, and that scales and axes of both sensors are right."
+            f"{turning:.3g} rad/s and {acceleration:.3g} m/s^2 of its measurements are unexplained (limits"
+            f" {params.tolerated_angular_velocity:g} rad/s and {params.tolerated_acceleration:g} m/s^2). Check that it"
+            " is fastened, and that scales and axes of both sensors are right."
         )
         findings.append(Finding("unexplained", sentence, True))
     return findings
@@ -121,13 +121,13 @@ def unknown_finding(
     elif noise is not None:
         worst = int(np.argmax(np.where(moving, noise, 0.0)))
         way_out = (
-            f"The noise of the joint positions hides it, most that of {model.joints[worst]}, which passes for"
-            f" {noise[worst]:.2g} rad/s^2: record them with all their digits, each with its own stamp."
+            f" The noise of the joint positions hides it, mostly that of {model.joints[worst]}, equal to"
+            f" {noise[worst]:.2g} rad/s^2: record positions with all their digits, each with its own stamp."
         )
     if moving.sum() == 1:
         joint = model.joints[int(np.flatnonzero(moving)[0])]
-        way_out = f"{joint} alone moves {model.links[link]}, so no motion tells it: measure it by hand."
-    rest = f" Known are {_listed(known.known)}." if known.known else ""
+        way_out = f"{joint} alone moves {model.links[link]}, so no motion can determine it: measure it by hand."
+    rest = f" Known: {_listed(known.known)}." if known.known else ""
     return [Finding("unobservable", f"Not known: {_listed(known.unknown)}.{rest} {way_out}", True)]
 
 

@@ -22,12 +22,11 @@ from pretouch.calibration.link_motion import LinkMotion, skew
 from pretouch.calibration.params import CalibrationParams
 from pretouch.types import FloatArray
 
-TURN, PLACE, GRAVITY = slice(0, 3), slice(3, 6), slice(20, 23)
-"""Of the unknowns: rotation in the sensor frame [rad], position in the link frame [m], and what holds against gravity,
-in the base frame [m/s^2]."""
-_ACC_BIAS, _GYRO_BIAS, _CLOCK, _LAG = slice(6, 9), slice(9, 12), 12, 13
-_ACC_SCALE, _GYRO_SCALE = slice(14, 17), slice(17, 20)
-_UNKNOWNS = 23
+TURN, PLACE, ACC_BIAS, GYRO_BIAS, CLOCK, LAG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12, 13
+ACC_SCALE, GYRO_SCALE, GRAVITY = slice(14, 17), slice(17, 20), slice(20, 23)
+"""Of the unknowns: rotation in the sensor frame [rad], position in the link frame [m], biases, lateness of the clock
+and lag of the accelerometer [s], errors of scale, and what holds against gravity, in the base frame [m/s^2]."""
+UNKNOWNS = 23
 _REWEIGHTINGS = 4
 POSE_PRIOR = np.array([np.pi, np.pi, np.pi, 0.5, 0.5, 0.5])
 """Standard deviation of the pose before anything is measured [rad, m]: no unit is further from its link's origin. Only
@@ -67,11 +66,19 @@ class Estimate:
     gravity: FloatArray
     """(3,) proper acceleration of what is at rest, base frame [m/s^2]."""
 
+    @property
+    def rest(self) -> FloatArray:
+        """All unknowns but the pose (17,), in the order of the fit."""
+        return np.concatenate([
+            self.acceleration_bias, self.angular_velocity_bias, [self.late, self.lag], self.acceleration_scale,
+            self.angular_velocity_scale, self.gravity,
+        ])  # fmt: skip
+
     def moved(self, x: FloatArray) -> "Estimate":
         """Return the estimate that differs from this one by x (23,): the pose by x on the manifold, the rest is x."""
         return Estimate(
-            self.R @ Rotation.from_rotvec(x[TURN]).as_matrix(), self.p + x[PLACE], x[_ACC_BIAS], x[_GYRO_BIAS],
-            x[_ACC_SCALE], x[_GYRO_SCALE], float(x[_CLOCK]), float(x[_LAG]),
+            self.R @ Rotation.from_rotvec(x[TURN]).as_matrix(), self.p + x[PLACE], x[ACC_BIAS], x[GYRO_BIAS],
+            x[ACC_SCALE], x[GYRO_SCALE], float(x[CLOCK]), float(x[LAG]),
             x[GRAVITY],
         )  # fmt: skip
 
@@ -104,6 +111,15 @@ def start(motion: LinkMotion, measured: Measured, gravity: float) -> Estimate:
     return Estimate(R, found[:3], found[3:] @ R, bias, none, none, 0.0, 0.0, np.array([0.0, 0.0, gravity]))
 
 
+def prior(params: CalibrationParams, late: float) -> FloatArray:
+    """Standard deviations (23,) of the unknowns before anything is measured; `late` is the clock's [s]."""
+    return np.concatenate([
+        POSE_PRIOR, np.full(3, params.acceleration_bias), np.full(3, params.angular_velocity_bias),
+        [late, params.delay_difference_s], np.full(6, params.scale_error),
+        np.full(2, params.gravity * np.deg2rad(params.lean_deg)), [params.gravity_error],
+    ])  # fmt: skip
+
+
 class Problem:
     """The least squares for the unknowns x (23,): the pose relative to an estimate, the rest itself."""
 
@@ -111,12 +127,8 @@ class Problem:
         self, motion: LinkMotion, measured: Measured, base: Estimate, noise: FloatArray, params: CalibrationParams
     ) -> None:
         self.motion, self.measured, self.base, self.noise = motion, measured, base, noise
-        self.prior = np.concatenate([
-            POSE_PRIOR, np.full(3, params.acceleration_bias), np.full(3, params.angular_velocity_bias),
-            [np.inf, params.delay_difference_s], np.full(6, params.scale_error),
-            np.full(2, params.gravity * np.deg2rad(params.lean_deg)), [params.gravity_error],
-        ])  # fmt: skip
-        self.expected = np.append(np.zeros(_UNKNOWNS - 1), params.gravity)
+        self.prior = prior(params, np.inf)
+        self.expected = np.append(np.zeros(UNKNOWNS - 1), params.gravity)
 
     def residuals(self, x: FloatArray) -> FloatArray:
         """Differences from data and priors (6 N + 23,), each divided by its standard deviation."""
@@ -126,19 +138,19 @@ class Problem:
     @property
     def equal(self) -> FloatArray:
         """Weights of residuals that count alike."""
-        return np.ones(6 * len(self.motion.w) + _UNKNOWNS)
+        return np.ones(6 * len(self.motion.w) + UNKNOWNS)
 
     def weights(self, x: FloatArray) -> FloatArray:
         """Roots of the weights by which a large residual counts in proportion to its size only (soft L1)."""
         weights = (1.0 + self.residuals(x) ** 2) ** -0.25
-        weights[-_UNKNOWNS:] = 1.0
+        weights[-UNKNOWNS:] = 1.0
         return weights
 
     def jacobian(self, x: FloatArray) -> FloatArray:
         """Return their derivatives (6 N + 23, 23)."""
         motion, N = self.motion, len(self.motion.w)
         e = self.base.moved(x)
-        J = np.zeros((N, 6, _UNKNOWNS))
+        J = np.zeros((N, 6, UNKNOWNS))
         turned = motion.w @ e.R, e.felt(motion) @ e.R
         scales = 1 + np.concatenate([e.angular_velocity_scale, e.acceleration_scale])
         for half, v in enumerate(turned):
@@ -147,13 +159,13 @@ class Problem:
         J[:, 3:, GRAVITY] = e.R.T @ motion.R_link_base
         J *= scales[:, None]
         for i in range(3):
-            J[:, i, _GYRO_BIAS.start + i] = J[:, 3 + i, _ACC_BIAS.start + i] = 1.0
-            J[:, i, _GYRO_SCALE.start + i] = turned[0][:, i]
-            J[:, 3 + i, _ACC_SCALE.start + i] = turned[1][:, i]
-        J[:, :, _CLOCK] = -self.measured.rates
-        J[:, 3:, _LAG] = -self.measured.rates[:, 3:]
+            J[:, i, GYRO_BIAS.start + i] = J[:, 3 + i, ACC_BIAS.start + i] = 1.0
+            J[:, i, GYRO_SCALE.start + i] = turned[0][:, i]
+            J[:, 3 + i, ACC_SCALE.start + i] = turned[1][:, i]
+        J[:, :, CLOCK] = -self.measured.rates
+        J[:, 3:, LAG] = -self.measured.rates[:, 3:]
         J /= self.noise[:, None]
-        return np.vstack([J.reshape(-1, _UNKNOWNS), np.diag(1 / self.prior)])
+        return np.vstack([J.reshape(-1, UNKNOWNS), np.diag(1 / self.prior)])
 
 
 def _right_jacobian(turn: FloatArray) -> FloatArray:
@@ -191,10 +203,7 @@ def fit(
         robust: let large differences count less.
     """
     problem = Problem(motion, measured, begin, noise, params)
-    x = np.concatenate([
-        np.zeros(6), begin.acceleration_bias, begin.angular_velocity_bias, [begin.late, begin.lag],
-        begin.acceleration_scale, begin.angular_velocity_scale, begin.gravity,
-    ])  # fmt: skip
+    x = np.concatenate([np.zeros(6), begin.rest])
     for _ in range(_REWEIGHTINGS if robust else 1):
         weights = problem.weights(x) if robust else problem.equal
         # MINPACK: beside other programs the threads of LAPACK, which other methods call, cost ten times as much
@@ -216,12 +225,12 @@ def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatAr
     The usual (J^T J)^-1 takes every residual as independent, and is far too small for errors that a motion repeats. Few
     blocks may agree by chance, so the fewer there are, the more of the usual is added.
     """
-    data = len(residuals) - _UNKNOWNS
+    data = len(residuals) - UNKNOWNS
     N = data // 6
-    scores = np.einsum("nik,ni->nk", J[:data].reshape(N, 6, _UNKNOWNS), residuals[:data].reshape(N, 6))
+    scores = np.einsum("nik,ni->nk", J[:data].reshape(N, 6, UNKNOWNS), residuals[:data].reshape(N, 6))
     blocks = np.add.reduceat(scores, np.arange(0, N, per_block), axis=0)
     prior = J[data:]
     H, count = J.T @ J, len(blocks)
     inverse = np.linalg.inv(H)
-    told = count / max(1, count - _UNKNOWNS / 6) * blocks.T @ blocks + prior.T @ prior
-    return inverse @ (told + (_UNKNOWNS / count) ** 3 * H) @ inverse
+    told = count / max(1, count - UNKNOWNS / 6) * blocks.T @ blocks + prior.T @ prior
+    return inverse @ (told + (UNKNOWNS / count) ** 3 * H) @ inverse

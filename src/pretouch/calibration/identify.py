@@ -74,7 +74,7 @@ class Identifier:
         least = params.least_swing_rad / np.ptp(arm.time)
         self._turning = {body: rms for body, rms in turning.items() if rms > least}
         if not self._turning:
-            raise CalibrationError("No link turned to and fro: let the arm make a calibration motion.")
+            raise CalibrationError("No link turned back and forth: run a calibration motion.")
 
     def identify(self, unit: UnitData) -> Identified:
         """Find the link of a unit whose data passed all checks of its own."""
@@ -156,7 +156,7 @@ class Identifier:
             return Finding("gyroscope_scale", sentence, True)
         U, size, Vt = np.linalg.svd((w - w.mean(axis=0)).T @ (sensed - sensed.mean(axis=0)))
         if size[2] > 0.01 * size[0] and np.linalg.det(U @ Vt) < 0:
-            sentence = "Its gyroscope's axes are mirrored: one has the wrong sign, or two are exchanged; correct them."
+            sentence = "Its gyroscope's axes are mirrored: one has the wrong sign, or two are swapped; correct them."
             return Finding("mirrored", sentence, True)
         return None
 
@@ -167,7 +167,9 @@ class Identifier:
         joints = ", ".join(np.array(model.joints)[differ])
         sentence = f"It sits on {names}, which moved alike: move {joints} more, or name the link."
         if given:
-            sentence = f"It may sit on {names}, which moved alike: it was taken as said; move {joints} more to be sure."
+            sentence = (
+                f"It may sit on {names}, which moved alike, so the given link was used: move {joints} more to be sure."
+            )
         return Finding("ambiguous", sentence, not given)
 
 
@@ -186,16 +188,17 @@ def _never_moved(values: FloatArray, least: float) -> Finding:
         )
         return Finding("no_link", sentence, True)
     sentence = (
-        f"It never moved: its gyroscope varied by {turned:.2g} degrees/s while the arm moved. Clip it onto a link that"
-        " a joint moves."
+        f"It never moved: its gyroscope varied by {turned:.2g} degrees/s while the arm moved. Mount it on a link that a"
+        " joint moves."
     )
     return Finding("never_moved", sentence, True)
 
 
 def _fits_none(best: float, params: CalibrationParams) -> Finding:
     sentence = (
-        f"It fits no link of this arm: at most {best:.0%} of its turning is that of a link, {params.likeness:.0%} are"
-        " needed. Check that its data are of this run and arm, and that it does not swing or slip on its link."
+        f"It fits no link of this arm: at most {best:.0%} of its rotation matches a link (at least"
+        f" {params.likeness:.0%} needed). Check that its data are of this run and arm, and that it does not swing or"
+        " slip on its link."
     )
     return Finding("no_link", sentence, True)
 
@@ -210,8 +213,8 @@ def _clock(late: float, params: CalibrationParams) -> Finding:
 
 def _too_little(params: CalibrationParams) -> Finding:
     sentence = (
-        f"Less than {params.shortest_s:g} s remain in which both its samples and joint states were measured without"
-        " gaps and within range: record again."
+        f"Less than {params.shortest_s:g} s remain with both its samples and joint states free of gaps and within"
+        " range: record again."
     )
     return Finding("too_little", sentence, True)
 
@@ -223,7 +226,7 @@ def _mistaken(scale: float) -> str:
 
 def _shaken(scale: float, link: str) -> Finding:
     sentence = (
-        f"It does not sit on the arm: it turned as {link}, but {scale:.2g} times as much, as on something that the arm"
-        " shakes. Clip it onto its link, or check its gyroscope's scale."
+        f"It does not sit on the arm: it turned as {link}, but {scale:.2g} times as much, as if on something that the"
+        " arm shakes. Mount it on its link, or check its gyroscope's scale."
     )
     return Finding("no_link", sentence, True)

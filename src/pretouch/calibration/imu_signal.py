@@ -5,7 +5,8 @@ import numpy as np
 from pretouch.calibration.data import UnitData
 from pretouch.calibration.fit import Measured
 from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.signals import HALF_S, gaps, interpolated, outside, rate_of_change, smooth, times
+from pretouch.calibration.signals import FINE_S, HALF_S, gaps, outside, rate_of_change, smooth, times
+from pretouch.traces import on_grid
 from pretouch.types import BoolArray, FloatArray
 
 _FULL = 0.999
@@ -26,7 +27,7 @@ class ImuSignal:
 
     def at(self, stamp: FloatArray) -> Measured:
         """Return what it measured at instants (N,) of its clock [s]."""
-        return Measured(interpolated(stamp, self._fine, self._values), interpolated(stamp, self._fine, self._rates))
+        return Measured(*(on_grid(stamp, self._fine[0], FINE_S, known) for known in (self._values, self._rates)))
 
     def usable(self, stamp: FloatArray) -> BoolArray:
         """Tell at which of the instants (N,), in order, it measured all around, and within its range."""

@@ -45,7 +45,7 @@ def checked_joints(
     for kept, named in ((_own_stamp, _repeated), (_spaced, _bunched), (_renewed, _held)):
         keep = kept(joints, params)
         findings += [] if keep.all() else [named(keep)]
-        joints = JointTrace(joints.stamp[keep], joints.q[keep])
+        joints = joints.at(keep)
     _check_rate(joints, params)
     return joints, (*findings, *_missing(joints.stamp, params))
 
@@ -56,7 +56,7 @@ def moved_joints(joints: JointTrace, params: CalibrationParams) -> BoolArray:
     moved: BoolArray = high - low > params.least_swing_rad
     if not moved.any():
         raise CalibrationError(
-            f"The arm did not move: no joint by more than {np.rad2deg((high - low).max()):.2g} degrees; let it make a"
+            f"The arm did not move: no joint by more than {np.rad2deg((high - low).max()):.2g} degrees; run a"
             " calibration motion while units and joints are recorded."
         )
     return moved
@@ -85,7 +85,7 @@ def standing_joints(model: RobotModel, moved: BoolArray) -> tuple[Finding, ...]:
     still = np.flatnonzero(~model.moved_by[1:][:, moved].any(axis=1)) + 1
     stayed = f" {', '.join(model.links[i] for i in still)} did not move at all." if len(still) else ""
     sentence = (
-        f"{names} did not move: the links on either side cannot be told apart, and units beyond are known less"
+        f"{names} did not move, so the links on either side cannot be distinguished, and units beyond are located less"
         f" well.{stayed} Move every joint."
     )
     return (Finding("joints_stood", sentence, False),)
@@ -111,7 +111,7 @@ def _own_stamp(joints: JointTrace, params: CalibrationParams) -> BoolArray:
 
 def _repeated(keep: BoolArray) -> Finding:
     sentence = (
-        f"{np.sum(~keep)} joint states of {len(keep)} have the stamp of another one and were left out: record each"
+        f"{np.sum(~keep)} joint states of {len(keep)} repeat the stamp of another one and were left out: record each"
         " state once, with its own stamp."
     )
     return Finding("joints_repeated", sentence, False)
@@ -175,7 +175,7 @@ def _check_range(model: RobotModel, q: FloatArray) -> None:
         j = int(np.argmax(beyond.sum(axis=0)))
         worst = q[np.argmax(np.maximum(model.q_min[j] - q[:, j], q[:, j] - model.q_max[j])), j]
         raise CalibrationError(
-            f"{model.joints[j]} is at {worst:.4g} rad, out of its range from {model.q_min[j]:.4g} to"
+            f"{model.joints[j]} is at {worst:.4g} rad, outside its range from {model.q_min[j]:.4g} to"
             f" {model.q_max[j]:.4g}: give radians, in the order of the arm's joints, of this arm."
         )
 
@@ -185,7 +185,7 @@ def _check_span(stamp: FloatArray, params: CalibrationParams) -> None:
     if span < params.shortest_s:
         raise CalibrationError(
             f"There are {len(stamp)} joint states in {span:.3g} s: at least {params.shortest_s:g} s of motion are"
-            " needed, 60 s are good."
+            " needed, 60 s are recommended."
         )
     if of_several_clocks(stamp):
         raise CalibrationError(
@@ -214,6 +214,6 @@ def _missing(stamp: FloatArray, params: CalibrationParams) -> tuple[Finding, ...
     first = holes[np.argmax(long), 0] - stamp[0]
     sentence = (
         f"Gaps in the joint states: {len(holes)}, {long.sum():.2f} s in all, the longest {long.max():.2f} s from"
-        f" {first:.1f} s after the first one on. What units measured around them was left out: record all of them."
+        f" {first:.1f} s after the first one on. Samples of units around them were left out: record all states."
     )
     return (Finding("joints_missing", sentence, False),)

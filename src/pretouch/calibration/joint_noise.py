@@ -12,8 +12,8 @@ from pretouch.calibration.fit import PLACE, POSE_PRIOR
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
 from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.signals import interpolated, smooth, times
-from pretouch.traces import JointTrace
+from pretouch.calibration.signals import FINE_S, smooth, times
+from pretouch.traces import JointTrace, on_grid
 from pretouch.types import FloatArray
 
 _EVERY = 10
@@ -28,7 +28,7 @@ class JointNoise:
 
     def __init__(self, arm: ArmMotion, joints: JointTrace, params: CalibrationParams) -> None:
         fine = times(joints.stamp[0], joints.stamp[-1])
-        rest = joints.q - interpolated(joints.stamp, fine, smooth(joints.stamp, joints.q, fine, params))
+        rest = joints.q - on_grid(joints.stamp, fine[0], FINE_S, smooth(joints.stamp, joints.q, fine, params))
         rate = 1 / float(np.median(np.diff(joints.stamp)))
         passed = min(1.0, 2 * params.cutoff_hz / rate)
         # of normal noise, half the values are within 0.6745 standard deviations

@@ -86,7 +86,7 @@ class _Words:
     def alone(self, owners: list[str]) -> Finding:
         sentence = f"It is said to sit on {self.said}, but its data fit {self.links}: correct its link, or move it."
         if owners:
-            sentence = f"It sits on {self.links}, where {owners[0]} should, instead of on {self.said}: correct its"
+            sentence = f"It sits on {self.links}, where {owners[0]} should sit, instead of on {self.said}: correct its"
             sentence += " link, or move it."
         return Finding("wrong_link", sentence, True)
 

@@ -84,7 +84,7 @@ def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Findi
     if facing < _INWARDS:
         tilt = np.rad2deg(np.arccos(np.clip(facing, -1.0, 1.0)))
         sentence = (
-            f"Its beam, the z axis, points into {name}, {tilt:.0f} degrees from outwards: turn the board over, or give"
+            f"Its beam (z axis) points into {name}, {tilt:.0f} degrees away from outwards: turn the board over, or give"
             " the IMU's data in the axes of the range finder."
         )
         findings.append(Finding("inwards", sentence, True))
@@ -105,16 +105,16 @@ def moved_out(model: RobotModel, link: int, p: FloatArray) -> FloatArray | None:
 def _inside(name: str, depth: float, way_out: bool) -> Finding:
     if depth > DEEPEST or not way_out:
         sentence = (
-            f"It lies {1000 * depth:.0f} mm inside {name}, where nothing can sit: check its link, and the arm's model."
+            f"It lies {1000 * depth:.0f} mm inside {name}, which is impossible: check its link and the arm's model."
         )
         return Finding("inside", sentence, True)
     sentence = (
-        f"It lies {1000 * depth:.1f} mm inside the capsules that stand for {name}: a skin file has it moved out to"
-        " their surface, and that much less certain."
+        f"It lies {1000 * depth:.1f} mm inside the capsules of {name}: in the skin file it is moved out to their"
+        " surface, with a larger sigma."
     )
     return Finding("inside", sentence, False)
 
 
 def _far(name: str, height: float) -> Finding:
-    sentence = f"It lies {1000 * height:.0f} mm off {name}: check that it sits on a bracket as high as that."
+    sentence = f"It lies {1000 * height:.0f} mm off {name}: check that it sits on a bracket of that height."
     return Finding("far", sentence, height > _FARTHEST)

@@ -35,14 +35,6 @@ def rate_of_change(signal: FloatArray) -> FloatArray:
     return derivative
 
 
-def interpolated(at: FloatArray, fine: FloatArray, signal: FloatArray) -> FloatArray:
-    """Values (N, c) at instants (N,) of a signal (F, c) given at the instants `fine` (F,), linearly between them."""
-    place = np.clip((at - fine[0]) / FINE_S, 0.0, len(fine) - 1.000001)
-    before = place.astype(np.int64)
-    part = (place - before)[:, None]
-    return (1.0 - part) * signal[before] + part * signal[before + 1]
-
-
 def gaps(stamp: FloatArray, longest: float) -> FloatArray:
     """Intervals (G, 2) [s] in which nothing was measured for longer than that; the ends of time among them."""
     inside = np.flatnonzero(np.diff(stamp) > longest)

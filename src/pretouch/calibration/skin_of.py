@@ -43,9 +43,7 @@ def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = Non
     units = {name: located.get(name) or old.get(name) for name in names}
     there = [unit for unit in units.values() if unit is not None]
     if not there:
-        raise CalibrationError(
-            "No unit's place can be trusted: there is nothing to make a skin of; see each unit's findings."
-        )
+        raise CalibrationError("No unit was located reliably, so no skin can be made: see the findings of each unit.")
     return CalibratedSkin(
         Skin(there, model),
         tuple(name for name in names if name in located),
@@ -61,7 +59,7 @@ def _sensor_unit(unit: UnitCalibration, model: RobotModel, orientation_floor: fl
     """
     place = unit.place
     if place is None:
-        raise CalibrationError(f"Unit {unit.id} has no place: leave it out.")
+        raise CalibrationError(f"Unit {unit.id} was not located: leave it out.")
     T = place.T_link_sensor.copy()
     link = model.link_index(place.link)
     below = seat(model, link, T[:3, 3])

@@ -70,8 +70,7 @@ class _Rows:
 
     def __init__(self, course: Course, estimate: Estimate, params: CalibrationParams) -> None:
         problem = Problem(course.motion, course.measured, estimate, course.noise, params)
-        rest = _rest(estimate)
-        x = np.concatenate([np.zeros(_POSE), rest])
+        x = np.concatenate([np.zeros(_POSE), estimate.rest])
         unknowns, N = len(x), len(course.time)
         J, residuals = problem.jacobian(x), problem.residuals(x)
         tolerated = np.array([params.tolerated_angular_velocity, params.tolerated_acceleration])
@@ -81,15 +80,6 @@ class _Rows:
         self.residuals: FloatArray = residuals[:-unknowns].reshape(N, 6) * weight
         self.prior_J: FloatArray = J[-unknowns:]
         self.prior_residuals: FloatArray = residuals[-unknowns:]
-
-
-def _rest(estimate: Estimate) -> FloatArray:
-    """Return all unknowns but the pose (17,), in the order of the fit."""
-    e = estimate
-    return np.concatenate([
-        e.acceleration_bias, e.angular_velocity_bias, [e.late, e.lag], e.acceleration_scale, e.angular_velocity_scale,
-        e.gravity,
-    ])  # fmt: skip
 
 
 def _best_split(rows: _Rows, per_block: int) -> tuple[int, float]:
@@ -123,7 +113,7 @@ def _two_poses(
             first = int(np.argmin(_costs(early, late, per_block)))
         J, residuals = _joined(early, late, first)
         step = np.linalg.lstsq(J, -residuals, rcond=None)[0]
-        rest = _rest(before) + step[_POSE:-_POSE]
+        rest = before.rest + step[_POSE:-_POSE]
         before, after = (
             e.moved(np.concatenate([d, rest])) for e, d in ((before, step[:_POSE]), (after, step[-_POSE:]))
         )

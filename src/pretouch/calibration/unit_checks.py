@@ -38,7 +38,7 @@ def checked_unit(unit: UnitData, params: CalibrationParams) -> tuple[UnitData, l
         sentence = f"Accelerations {felt.shape} and angular velocities {turned.shape} do not fit {stamp.shape} stamps."
         return unit, [Finding("shape", f"{sentence} Give three of each for each stamp.", True)]
     if not len(stamp):
-        return unit, [Finding("silent", "It sent no IMU samples: check that it is on, and has an IMU.", True)]
+        return unit, [Finding("silent", "It sent no IMU samples: check that it is switched on and has an IMU.", True)]
     finite = np.asarray(np.isfinite(np.column_stack([stamp, felt, turned])).all(axis=1))
     findings = [] if finite.all() else [_not_finite(finite, params)]
     later = _later(np.where(finite, stamp, -np.inf))
@@ -68,11 +68,11 @@ def _unordered(stamp: FloatArray, later: BoolArray, params: CalibrationParams) -
         return []
     back = float(max(0.0, -np.diff(stamp).min()))
     if back > params.longest_gap_s:
-        sentence = f"Its stamps go back by {back:.3g} s: it, or its clock, began anew half-way; calibrate again."
+        sentence = f"Its stamps go back by {back:.3g} s, because the unit or its clock restarted: calibrate again."
         return [Finding("clock", sentence, True)]
     sentence = (
-        f"{np.mean(~later):.1%} of its samples are no later than ones before them, by up to {back:.3g} s, and were left"
-        " out: give them in the order in which they were measured, on one clock."
+        f"{np.mean(~later):.1%} of its samples are not later than ones before them, by up to {back:.3g} s, and were"
+        " left out: give them in the order in which they were measured, on one clock."
     )
     return [Finding("unordered", sentence, bool(np.mean(~later) > params.unusable))]
 
@@ -99,8 +99,8 @@ def _losses(unit: UnitData, params: CalibrationParams) -> list[Finding]:
     if missing < _LOST * np.ptp(stamp):
         return []
     sentence = (
-        f"Gaps in its samples: {len(holes)}, {missing:.2f} s in all ({missing / np.ptp(stamp):.1%}). What is around"
-        " them was left out: bring the access point nearer, or use fewer units at once."
+        f"Gaps in its samples: {len(holes)}, {missing:.2f} s in all ({missing / np.ptp(stamp):.1%}). Samples around"
+        " them were left out: move the access point closer, or use fewer units at once."
     )
     return [Finding("lost", sentence, False)]
 

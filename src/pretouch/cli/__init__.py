@@ -7,9 +7,9 @@ from typing import Annotated, Any, Union
 import tyro
 from rich.console import Console
 
-from pretouch.cli.ending import Terminated, ends_raise, exit_code
 from pretouch.cli.registry import Command, check_moved, command_class, command_names
 from pretouch.errors import PluginError, PretouchError
+from pretouch.signals import Terminated, ends_raise, exit_code
 
 # the rest of the package takes a second to import: only the commands that run something do
 

@@ -15,16 +15,16 @@ class Live:
     """Watch the simulated arm in a browser and touch it: a page with the arm, your hand, plots and all parameters."""
 
     profile: str = "pretouch"
-    """Profile to begin with, or PROFILE:GROUP.FIELD=VALUE."""
+    """Profile to start with, or PROFILE:GROUP.FIELD=VALUE."""
     path: str = "circle"
     """circle or line."""
     seed: int = 0
-    """Simulated arm to take: each has other errors and noise."""
+    """Seed of the simulated arm: each has different errors and noise."""
     world: str = ""
     """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, as `pretouch identify`
     writes one, of which the seed draws its own; by default the usual ones."""
     record: str = ""
-    """Recording to write from the start; the page can begin and end recordings too."""
+    """Recording to write from the start; the page can also start and stop recordings."""
     host: str = "127.0.0.1"
     """Address to serve the page at. Anyone who can reach it can move the simulated arm."""
     port: int = 8080
@@ -34,9 +34,9 @@ class Live:
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
     units_host: str = HOST
-    """Address at which real units are heard. They need 0.0.0.0, which is every address of this machine."""
+    """Address to receive real units at. They need 0.0.0.0, which is every address of this machine."""
     units_port: int = PORT
-    """UDP port at which real units are heard."""
+    """UDP port to receive real units at."""
 
     def run(self) -> None:
         """Serve the page until interrupted."""
@@ -47,12 +47,12 @@ class Live:
 
 @dataclass(frozen=True)
 class Replay:
-    """Look at a recording on the page, recompute it, or see what another profile would have felt."""
+    """View a recording on the page, recompute it, or compare it with what another profile would have detected."""
 
     file: tyro.conf.Positional[str]
-    """Recording; one of a killed process as well."""
+    """Recording; that of a killed process works too."""
     verify: bool = False
-    """Recompute every step, and report the first that came out otherwise; the exit code is then 1. Opens no page."""
+    """Recompute every step, and report the first that differs; the exit code is then 1. Opens no page."""
     profile: str = ""
     """Profile whose decisions on the same force and range data are shown beside the recorded ones."""
     page: bool = True
@@ -63,7 +63,7 @@ class Replay:
     """Port to serve the page at."""
 
     def run(self) -> int:
-        """Tell of the recording, and check, compare or show it."""
+        """Describe the recording, and check, compare or show it."""
         from pretouch.cli.replay import replay
 
         return replay(Path(self.file), self.verify, self.profile, self.page, self.host, self.port)
@@ -71,15 +71,15 @@ class Replay:
 
 @dataclass(frozen=True)
 class Recover:
-    """Make a recording that a killed process left behind open everywhere."""
+    """Repair a recording that a killed process left behind, so that every program can open it."""
 
     file: tyro.conf.Positional[str]
-    """Recording; it stays as it is."""
+    """Recording; it is not changed."""
     out: str = ""
     """File to write; by default NAME.recovered.mcap beside it."""
 
     def run(self) -> None:
-        """Write the mended file."""
+        """Write the repaired file."""
         from pretouch.cli.replay import recover
 
         recover(Path(self.file), Path(self.out) if self.out else None)
@@ -93,19 +93,19 @@ class Detect:
     """ROS 2 bag (folder, .mcap, .db3), ROS 1 .bag, or .csv with columns time_s, force_x_N, force_y_N, force_z_N."""
     profiles: str = "paper"
     """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter."""
-    # the choices of pretouch.foreign.source, spelt out: the help is to need none of the heavy packages
+    # the choices of pretouch.imported_data.source, spelt out: the help is to need none of the heavy packages
     sign: Literal["on-robot", "by-robot"] = "on-robot"
-    """Whose force it is: on the robot by its environment, or by the robot, as Franka's O_F_ext_hat_K."""
+    """Whether the force is on the robot (by its environment) or by the robot, as Franka's O_F_ext_hat_K."""
     frame: Literal["base", "ee"] = "base"
-    """Frame the force is given in; ee, the end-effector's, needs joint positions of a Panda or FR3."""
+    """Frame of the force; ee, the end-effector's, needs joint positions of a Panda or FR3."""
     zeros: Literal["auto", "missing", "kept"] = "auto"
-    """Whether six zeros mean that there is no estimate; auto: with --sign by-robot."""
+    """Whether six zeros mean no estimate; auto: yes with --sign by-robot."""
     wrench: str = ""
     """Topic of the force, if there are several."""
     joints: str = ""
     """Topic of the joint positions, if there are several."""
     arm: Literal["auto", "panda", "fr3"] = "auto"
-    """The arm; auto: what its joints' names say, or else a Panda."""
+    """The arm; auto: by the names of its joints, otherwise a Panda."""
     skin: str = ""
     """Skin file, to use the recording's ranges; by default only the force is used."""
     rate: float = 0.0
@@ -118,7 +118,7 @@ class Detect:
     def run(self) -> None:
         """Run the detectors, and show and write what they found."""
         from pretouch.cli.detect import detect
-        from pretouch.foreign.source import Choice
+        from pretouch.imported_data.source import Choice
 
         choice = Choice(self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, ranges=bool(self.skin))
         skin, out, json = (Path(text) if text else None for text in (self.skin, self.out, self.json))
@@ -127,7 +127,7 @@ class Detect:
 
 @dataclass(frozen=True)
 class Report:
-    """Write what recordings tell as one page that needs no network: contacts, forces, distances, margins, health."""
+    """Write a report of recordings as one page that needs no network: contacts, forces, distances, margins, health."""
 
     files: tyro.conf.Positional[tuple[str, ...]]
     """Recordings."""
@@ -146,12 +146,66 @@ class Report:
 
 @dataclass(frozen=True)
 class WarmUp:
-    """Compile a control step, once after an installation: what comes later then starts within a second."""
+    """Compile a control step, once after an installation: later commands then start within a second."""
 
     def run(self) -> None:
-        """Compile, and say where it is kept."""
+        """Compile, and print where it is cached."""
         from pretouch.cli.warm_up import compile_step
 
         kept = compile_step()
-        nowhere = "Compiled, but there is nowhere to keep it: HOME is not writable."
-        print(f"Compiled, and kept in {kept}." if kept else nowhere)
+        nowhere = "Compiled, but not cached: HOME is not writable."
+        print(f"Compiled, and cached in {kept}." if kept else nowhere)
+
+
+@dataclass(frozen=True)
+class ServeFci:
+    """Serve a simulated Panda or FR3 to programs that use the vendor's library, as the robot itself would be."""
+
+    robot: Literal["panda", "fr3"] = "panda"
+    """The robot: panda speaks protocol 5 (libfranka 0.9), fr3 protocol 10 (libfranka 0.18 and later)."""
+    host: str = "127.0.0.1"
+    """Address to serve at. Anyone who can reach it can move the simulated arm."""
+    port: int = 1337
+    """TCP port; the vendor's library supports no other. 0 lets the system choose one."""
+    lockstep: bool = False
+    """Send each state only after the command for the last one: repeatable, and faster than real time."""
+    patience: float = 60.0
+    """In lockstep, a command that has not arrived after this time is lost [s]."""
+    grace: float = 0.01
+    """In real time, extra time beyond its millisecond to wait for a command [s]: this machine may be slow. 0 is as
+    strict as the robot."""
+    scene: Literal["empty", "static", "dynamic"] = "empty"
+    """Surroundings: nothing, the board of the static experiment, or the person of the dynamic one."""
+    trajectory: Literal["circle", "line"] = "circle"
+    """Path of the static experiment, beside which its board stands."""
+    side: Literal["+y", "-y"] = "+y"
+    """Side of the board."""
+    stiffness: float = 25_000.0
+    """Contact stiffness of the board [N/m], greater than 0."""
+    start: Literal["ready", "path"] = "ready"
+    """Initial posture of the arm: its usual one, or that at the start of the path."""
+    seed: int = 0
+    """Seed of the simulated arm and scene: each arm has different errors and noise, each scene different positions."""
+    push: tuple[str, ...] = ()
+    """Forces on the arm at its TCP, each T:FX,FY,FZ or T:FX,FY,FZ:DURATION [s, N, s], base frame, up to
+    1000 N. T counts from the start of the server; in lockstep, from the first motion on, while the arm moves."""
+    hand: bool = False
+    """Let a person's hand come and go before the arm, in the empty scene."""
+    units: str = ""
+    """HOST:PORT of the receiver of the arm's sensor units; by default they are switched off."""
+    keys: str = ""
+    """File of the keys of the units, the same as the receiver's."""
+    skin: str = ""
+    """Skin file; by default the seven units that come with the package."""
+    truth: str = ""
+    """CSV file for the ground truth: true force on the arm and joint positions, each millisecond."""
+    drop: str = ""
+    """Commands to lose, such as 3/50: the first 3 of every 50."""
+    once: bool = False
+    """End when the first client has disconnected."""
+
+    def run(self) -> None:
+        """Serve until interrupted."""
+        from pretouch.cli.serve_fci import serve_fci
+
+        serve_fci(self)

@@ -12,14 +12,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
-from pretouch.foreign.detect import detect_foreign, units_topics
-from pretouch.foreign.samples import Foreign, read_foreign
-from pretouch.foreign.source import Choice
-from pretouch.foreign.summary import Summary, findings, guidance, summary
-from pretouch.params import Profile, at_rate
-from pretouch.params import profile as find_profile
+from pretouch.imported_data.detect import detect_imported, units_topics
+from pretouch.imported_data.samples import ImportedData, read_imported
+from pretouch.imported_data.source import Choice
+from pretouch.imported_data.summary import Summary, findings, guidance, summary
+from pretouch.profiles import Profile, at_rate
+from pretouch.profiles import profile as find_profile
 from pretouch.recording.compare import Decisions, Found, matched
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin
@@ -54,18 +55,18 @@ def detect(
     if not used:
         raise ParameterError("No profile is given: name one or more, separated by commas.")
     if out and out.suffix not in _ENDINGS:
-        raise RecordingError(f"The figure {out} has no ending that says its format: use {', '.join(_ENDINGS)}.")
+        raise RecordingError(f"The figure {out} has an unknown format: use one of the endings {', '.join(_ENDINGS)}.")
     if out:
         FIGURES.need("A figure")
     for what, target in (("figure", out), ("file", json_file)):
         if target:
             check_writable(what, target)
-    foreign = read_foreign(place, choice)
-    skin = load_skin(skin_file, _model(foreign)) if skin_file else None
-    columns = [(p, d, summary(d, p)) for p in used for d in [detect_foreign(foreign, p, skin)]]
-    notes = list(dict.fromkeys([*foreign.notes, *_unheard(skin, foreign), *_said(foreign, columns, skin)]))
+    imported = read_imported(place, choice)
+    skin = load_skin(skin_file, _model(imported)) if skin_file else None
+    columns = [(p, d, summary(d, p)) for p in used for d in [detect_imported(imported, p, skin)]]
+    notes = list(dict.fromkeys([*imported.notes, *_unheard(skin, imported), *_said(imported, columns, skin)]))
     if out:
-        from pretouch.foreign.figure import decisions_figure
+        from pretouch.imported_data.figure import decisions_figure
 
         image = BytesIO()
         figure = decisions_figure([d for _, d, _ in columns], place.name)
@@ -73,10 +74,10 @@ def detect(
         with unwritable_said("figure", out):
             out.write_bytes(image.getvalue())
     if json_file:
-        text = json.dumps(_plain(_numbers(foreign, columns, notes)), indent=1, allow_nan=False)
+        text = json.dumps(_plain(_numbers(imported, columns, notes)), indent=1, allow_nan=False)
         with unwritable_said("file", json_file):
             json_file.write_text(text + "\n", encoding="utf-8")
-    _show(foreign, columns, notes)
+    _show(imported, columns, notes)
     for what, target in (("Figure", out), ("Numbers", json_file)):
         if target:
             print(f"{what}: {target}")
@@ -86,36 +87,36 @@ def _profile(name: str, rate: float) -> Profile:
     return at_rate(find_profile(name), rate) if rate else find_profile(name)
 
 
-def _model(foreign: Foreign) -> RobotModel:
-    if foreign.model is None:
-        raise RecordingError(f"{foreign.place} was read without ranges: a skin needs them.")
-    return foreign.model
+def _model(imported: ImportedData) -> RobotModel:
+    if imported.model is None:
+        raise RecordingError(f"{imported.place} was read without ranges: a skin needs them.")
+    return imported.model
 
 
-def _unheard(skin: Skin | None, foreign: Foreign) -> list[str]:
+def _unheard(skin: Skin | None, imported: ImportedData) -> list[str]:
     if skin is None:
         return []
-    silent = [unit for unit, topic in zip(skin.ids, units_topics(skin, foreign.ranges), strict=True) if topic is None]
-    return [f"No range topic is of {', '.join(silent)}: taken as silent."] if silent else []
+    silent = [unit for unit, topic in zip(skin.ids, units_topics(skin, imported.ranges), strict=True) if topic is None]
+    return [f"No range topic belongs to {', '.join(silent)}, which count as silent."] if silent else []
 
 
-def _said(foreign: Foreign, columns: list[Column], skin: Skin | None) -> list[str]:
-    said = [sentence for p, d, _ in columns for sentence in findings(foreign, d, p)]
-    if skin is None and any(p.perception.enabled and p.threshold.f_d_n for p, _, _ in columns):
-        said.append("Without ranges (--skin) nothing is near: eq. 11 lowers no threshold.")
+def _said(imported: ImportedData, columns: list[Column], skin: Skin | None) -> list[str]:
+    said = [sentence for p, d, _ in columns for sentence in findings(imported, d, p)]
+    if skin is None and any(p.perception.enabled and thresholds_of(p.detect).f_d_n for p, _, _ in columns):
+        said.append("Without ranges (--skin) no obstacle is known, so eq. 11 lowers no threshold.")
     return said
 
 
-def _show(foreign: Foreign, columns: list[Column], notes: list[str]) -> None:
+def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> None:
     console = Console(highlight=False, soft_wrap=True)
-    time = foreign.force.time
+    time = imported.force.time
     seconds = (time[-1] - time[0]) / 1e9
     console.print(
-        f"{foreign.place}: {len(time)} samples in {seconds:.1f} s, {foreign.rate:.4g} Hz, the first at"
+        f"{imported.place}: {len(time)} samples in {seconds:.1f} s, {imported.rate:.4g} Hz, the first at"
         f" {time[0] / 1e9:.3f} s: times below count from it.",
         markup=False,
     )
-    console.print(foreign.said, markup=False)
+    console.print(imported.said, markup=False)
     for note in notes:
         console.print(note, markup=False)
     console.print("\nContacts, force on the robot [N]", style="bold", markup=False)
@@ -124,8 +125,8 @@ def _show(foreign: Foreign, columns: list[Column], notes: list[str]) -> None:
     for _, d, _ in columns[1:]:
         both, only_first, only_other = matched(first.contacts, d.contacts)
         console.print(
-            f"{first.name} and {d.name}: {len(both)} contacts of both, {len(only_first)} of {first.name} only,"
-            f" {len(only_other)} of {d.name} only.",
+            f"{first.name} and {d.name}: {len(both)} contacts in both, {len(only_first)} only in {first.name},"
+            f" {len(only_other)} only in {d.name}.",
             markup=False,
         )
     console.print("\nFree motion [N]", style="bold", markup=False)
@@ -166,12 +167,12 @@ def _noise_table(columns: list[Column]) -> Table:
     return table
 
 
-def _numbers(foreign: Foreign, columns: list[Column], notes: list[str]) -> dict[str, Any]:
-    time = foreign.force.time
+def _numbers(imported: ImportedData, columns: list[Column], notes: list[str]) -> dict[str, Any]:
+    time = imported.force.time
     return {
-        "recording": str(foreign.place), "assumed": foreign.said, "notes": notes, "samples": len(time),
+        "recording": str(imported.place), "assumed": imported.said, "notes": notes, "samples": len(time),
         "first_sample_s": time[0] / 1e9,
-        "duration_s": (time[-1] - time[0]) / 1e9, "rate_hz": foreign.rate,
+        "duration_s": (time[-1] - time[0]) / 1e9, "rate_hz": imported.rate,
         "profiles": [
             {
                 "profile": d.name, "control_rate_hz": 1 / p.task.control_period_s,

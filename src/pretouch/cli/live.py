@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from pretouch.cli.ending import ended
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.extras import VIEWER
 from pretouch.hardware.address import EVERYWHERE, HOST
-from pretouch.params import profile as find_profile
+from pretouch.profiles import profile as find_profile
+from pretouch.signals import ended
+from pretouch.viewer.room import LiveSettings, PathName
 from pretouch.viewer.server import ServeOptions, check_port
-from pretouch.viewer.settings import LiveSettings, PathName
 
 if TYPE_CHECKING:
     from pretouch.cli.commands import Live
@@ -67,5 +67,5 @@ def _units(command: "Live", ids: Sequence[str]) -> Iterator["RealUnits | None"]:
 
     with NetworkSkin(ids, load_keys(Path(command.keys)), command.units_host, command.units_port) as source:
         heard = "anywhere" if command.units_host == EVERYWHERE else f"{command.units_host} only"
-        print(f"Units are heard from {heard}, at UDP port {source.address[1]}.", flush=True)
+        print(f"Receiving units from {heard}, at UDP port {source.address[1]}.", flush=True)
         yield RealUnits(source)

@@ -22,7 +22,7 @@ OWN = {
     "warm-up": "pretouch.cli.commands:WarmUp",
     "robot": "pretouch.cli.robot_commands:Robot",
     "run": "pretouch.cli.run.options:Run",
-    "serve-fci": "pretouch.cli.serve_fci_command:ServeFci",
+    "serve-fci": "pretouch.cli.commands:ServeFci",
 }
 """Class of each command of the product: a table, because a look at all installed distributions takes time."""
 LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")
@@ -60,7 +60,10 @@ def command_class(name: str) -> type[Command] | None:
     if name in plugins.names(GROUP):
         found: Any = plugins.load(GROUP, name)
         if not isinstance(found, type) or not callable(getattr(found, "run", None)):
-            raise PluginError(f"The command {name!r} is given by an entry point that names no class with run().")
+            raise PluginError(
+                f"The entry point of the command {name!r} is not a class with run(): uninstall the distribution that"
+                " provides it, or correct it."
+            )
         return found
     if name in LAB:
         raise PluginError(

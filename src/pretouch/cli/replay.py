@@ -10,13 +10,13 @@ from rich.progress import Progress
 from rich.table import Table
 
 from pretouch.cli.detect import axes_shown
-from pretouch.cli.ending import ended
 from pretouch.extras import VIEWER
-from pretouch.params import profile as find_profile
+from pretouch.profiles import profile as find_profile
 from pretouch.recording import recover as recovering
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.verify import verify as recompute
+from pretouch.signals import ended
 from pretouch.types import Mode
 
 
@@ -126,9 +126,11 @@ def _show(console: Console, comparison: Comparison) -> None:
         markup=False,
     )
     if comparison.left_out:
-        console.print(f"{_many(comparison.left_out, 'step')} left out: no usable inputs were recorded.", markup=False)
+        console.print(
+            (f"{_many(comparison.left_out, 'step')} left out, without usable inputs in the recording."), markup=False
+        )
     console.print(
-        "Detector only: the arm's motion is the recorded one in both; another profile would have moved it otherwise.\n",
+        "Detector only: both use the recorded motion of the arm, which another profile would have changed.\n",
         style="dim", markup=False,
     )  # fmt: skip
 

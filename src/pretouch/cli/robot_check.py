@@ -34,14 +34,14 @@ def check_arm(command: "Check") -> None:
     together = ", ".join(f"{a} and {b}" for a, b in never_apart(model)) or "none"
     note = (
         f"{len(model.capsules)} capsules, {len(model.body)} of them on moving links. {ready_said(ready)} Units:"
-        f" {', '.join(skin.ids) if skin else 'no skin file'}. Links that never come apart, so that they are not looked"
-        f" at: {together}."
+        f" {', '.join(skin.ids) if skin else 'no skin file'}. Pairs of links that always touch, so they are not"
+        f" checked: {together}."
     )
     console = Console(highlight=False)
     show(console, [joint_table(model, ready, note)])
     if ready.conflict:
         raise RobotModelError(f"{ready.conflict} ({file}: q_ready)")
-    console.print(f"In order: {folder}.", markup=False, soft_wrap=True)
+    console.print(f"No problem found: {folder}.", markup=False, soft_wrap=True)
 
 
 def joint_table(model: RobotModel, ready: Ready, note: str) -> TextTable:

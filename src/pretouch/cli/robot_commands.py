@@ -14,30 +14,30 @@ class Import:
     """
 
     file: tyro.conf.Positional[str]
-    """URDF file (of xacro, not the template) or MJCF file."""
+    """URDF file (not a xacro template) or MJCF file."""
     out: str = ""
     """Folder to write robot.toml, arm.xml and skin.toml to; by default the arm's name."""
     ee: str = ""
-    """Link whose origin is the end-effector; by default the likeliest one."""
+    """Link whose origin is the end-effector; by default the most likely one."""
     name: str = ""
     """Name of the arm; by default the file's."""
     package_path: str = ""
-    """Folders that hold the ROS packages of package:// paths, separated by commas; those above the file are searched
-    anyhow."""
+    """Folders that hold the ROS packages of package:// paths, separated by commas; those above the file are
+    searched in any case."""
     qd_max: str = ""
-    """Joint velocity limits [rad/s], one or one a joint, separated by commas; by default the file's."""
+    """Joint velocity limits [rad/s], one for all or one per joint, separated by commas; by default the file's."""
     qdd_max: str = ""
     """Joint acceleration limits [rad/s^2]; no file has them."""
     tau_max: str = ""
     """Joint torque limits [Nm]; by default the file's."""
     ready: str = ""
-    """Usual posture to start from [rad], one position a joint, separated by commas; by default one is searched for."""
+    """Usual start posture [rad], one position per joint, separated by commas; by default one is searched for."""
     capsules: int = 3
-    """Capsules for one link at most."""
+    """Largest number of capsules per link."""
     cover: bool = False
-    """Enlarge the capsules until no surface sticks out of them: the arm then keeps farther off than its shape asks."""
+    """Enlarge the capsules until no surface sticks out of them: the arm then keeps more distance than necessary."""
     force: bool = False
-    """Write to a folder that is there: what is in it is kept under another name."""
+    """Write to an existing folder: its contents are kept under another name."""
     json: str = ""
     """File for the numbers of the fit."""
 
@@ -50,7 +50,7 @@ class Import:
 
 @dataclass(frozen=True)
 class Check:
-    """Read an arm's folder as everything else does, after a change by hand, and say what is wrong with it."""
+    """Check an arm's folder after a change by hand, and report what is wrong with it."""
 
     folder: tyro.conf.Positional[str]
     """Folder of the arm, or its robot.toml."""
@@ -66,7 +66,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Robot:
-    """Arms of your own: import one from its URDF or MJCF file, or check one that was changed by hand."""
+    """Your own arms: import one from its URDF or MJCF file, or check one that was changed by hand."""
 
     what: Annotated[Import, tyro.conf.subcommand("import")] | Annotated[Check, tyro.conf.subcommand("check")]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from pretouch.atomic_write import write_json
 from pretouch.cli.robot_check import joint_table, ready_said
 from pretouch.cli.tables import show
 from pretouch.cli.words import words
@@ -17,7 +18,6 @@ from pretouch.importing.folder import check_free, write_folder
 from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
 from pretouch.text_table import TextTable
-from pretouch.whole_file import write_json
 
 if TYPE_CHECKING:
     from pretouch.cli.robot_commands import Import
@@ -52,7 +52,7 @@ def import_arm(command: "Import") -> None:
     for sentence in [*found.remarks, *_said(found)]:
         console.print(f"- {sentence}", markup=False, soft_wrap=True)
     if kept:
-        console.print(f"What was in {folder} is in {kept}.", markup=False, soft_wrap=True)
+        console.print(f"The previous contents of {folder} are now in {kept}.", markup=False, soft_wrap=True)
     console.print(
         f"\nWritten: {folder}. Try it: pretouch reproduce static --arm {folder} --seeds 1", markup=False, soft_wrap=True
     )
@@ -81,10 +81,10 @@ def _capsules(found: Imported) -> TextTable:
     out = max((body.sticks_out for body in found.bodies), default=0.0)
     rows.append(("whole arm", str(sum(len(b.rods) for b in found.bodies)), *_row(found.error), f"{1000 * out:.1f}"))
     note = (
-        "Distance to the capsules minus distance to the surfaces, of points outside within"
-        f" {FARTHEST:g} m; of the whole arm in {found.error.points} places in many postures. Negative: the capsules"
-        " stand over the surface. Last: how far the surface sticks out of the capsules at most; a person may be that"
-        " much nearer."
+        f"Distance to the capsules minus distance to the surfaces, of points outside within {FARTHEST:g} m; of the"
+        f" whole arm in {found.error.points} places in many postures. Negative: the capsules extend beyond the surface."
+        " Last: the largest distance by which the surface sticks out of the capsules; a person may be closer by that"
+        " much."
     )
     header = ("link", "capsules", "p5\n[mm]", "p95\n[mm]", "largest\n[mm]", "rms\n[mm]", "sticks out\n[mm]")
     return TextTable("Capsules for the links", header, tuple(rows), note, 1)
@@ -99,9 +99,9 @@ def _said(found: Imported) -> list[str]:
     units = ", ".join(f"{unit.id} ({unit.link})" for unit in found.skin.units) or "none"
     return [
         *_sticking_out(found),
-        f"{ready_said(found.ready)} --ready gives another one.",
+        f"{ready_said(found.ready)} Use --ready to set another one.",
         *([found.ready.conflict] if found.ready.conflict else []),
-        f"Proposed units: {units}. skin.toml holds where each would sit; give yours, or calibrate them.",
+        f"Proposed units: {units}. skin.toml holds their proposed poses; replace them by yours, or calibrate.",
     ]
 
 

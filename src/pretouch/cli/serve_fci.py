@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, TextIO
 import numpy as np
 
 from pretouch.cli.arms import arm_model
-from pretouch.cli.ending import ended
 from pretouch.control.path import Circle
 from pretouch.control.path import Path as ArmPath
 from pretouch.control.posture import brought_to
@@ -26,13 +25,14 @@ from pretouch.serving.fci.options import ServeOptions, drop_of
 from pretouch.serving.fci.pushes import Pushes, push_of, typed_push
 from pretouch.serving.fci.server import FciServer
 from pretouch.serving.fci.units import UnitsSetup
-from pretouch.serving.simulate import Visitor
+from pretouch.serving.simulate import VisitingHand
+from pretouch.signals import ended
 from pretouch.sim.hand import HandScript
 from pretouch.sim.paper_scenes import dynamic_pushes, static_path, static_scene
 from pretouch.sim.scene import HandSpec, SceneSpec
 
 if TYPE_CHECKING:
-    from pretouch.cli.serve_fci_command import ServeFci
+    from pretouch.cli.commands import ServeFci
 
 _say = partial(print, flush=True)
 _STIFFEST = 1e6
@@ -54,7 +54,7 @@ def serve_fci(command: "ServeFci") -> None:
         _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}).")
         typed = TypedPushes(arm.pushes, sys.stdin)
         if typed.possible:
-            _say("Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force as 0,15,0 [N].")
+            _say("Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force such as 0,15,0 [N].")
         server.serve(lambda: ended() or typed.take())
 
 
@@ -90,7 +90,7 @@ class TypedPushes:
 def _setup(c: "ServeFci") -> ArmSetup:
     model = arm_model(c.robot)
     if c.hand and c.scene != "empty":
-        raise ParameterError(f"--hand goes with --scene empty: in {c.scene} there is what the experiment has.")
+        raise ParameterError(f"--hand needs --scene empty: {c.scene} is the scene of an experiment.")
     if not 0 < c.stiffness <= _STIFFEST:
         raise ParameterError(f"--stiffness is {c.stiffness:g} N/m: give more than 0, and at most {_STIFFEST:g}.")
     if c.seed < 0:
@@ -111,7 +111,7 @@ def _scene(c: "ServeFci", model: RobotModel) -> tuple[SceneSpec, HandScript | No
             return SceneSpec(hand=HandSpec()), Pusher(model, dynamic_pushes(c.seed)), Circle()
     path = static_path(c.trajectory, c.side)
     if c.hand:
-        return SceneSpec(hand=HandSpec(start=Visitor.away)), Visitor(model.ee), path
+        return SceneSpec(hand=HandSpec(start=VisitingHand.away)), VisitingHand(model.ee), path
     return SceneSpec(), None, path
 
 
@@ -120,7 +120,7 @@ def _units(c: "ServeFci", model: RobotModel) -> UnitsSetup | None:
         return None
     host, _, port = c.units.rpartition(":")
     if not host or not port.isdecimal():
-        raise HardwareError(f"--units is {c.units!r}: give address and port of the receiver, as 127.0.0.1:7337.")
+        raise HardwareError(f"--units is {c.units!r}: give address and port of the receiver, such as 127.0.0.1:7337.")
     if not c.keys:
         raise HardwareError("--units needs --keys, the file with the keys that the receiver has.")
     skin = load_skin(Path(c.skin), model) if c.skin else paper_skin(model)

@@ -6,8 +6,61 @@ from typing import Annotated, Literal
 import tyro
 
 from pretouch.cli.calibrate.options import Calibrate
-from pretouch.cli.skin_coverage_options import Coverage
 from pretouch.hardware.address import HOST, PORT
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Share of the paths to the arm on which a skin sees an object in time; blind spots; where more units help most."""
+
+    skin: tyro.conf.Positional[str] = ""
+    """Skin file; by default the seven units that come with the package, or the skin in the arm's folder."""
+    arm: str = "panda"
+    """panda, fr3, or the folder of an arm that `pretouch robot import` wrote."""
+    workspace: str = "paths"
+    """Postures to average over: circle, line, paths (both of the paper's), joints (their whole range), or opposite
+    corners x,y,z,x,y,z of a box of hand positions [m]."""
+    speed: float = 0.5
+    """Speed of the approaching object [m/s]."""
+    arm_speed: float = 0.3
+    """Speed at which the arm moves towards it [m/s]."""
+    deceleration: float = 0.6
+    """Deceleration with which the arm brakes [m/s^2]."""
+    object_radius: float = 0.05
+    """Radius of the approaching object [m]: a fist by default."""
+    rate: float = 50.0
+    """Readings of a unit a second [Hz]."""
+    latency: float = 0.04
+    """Time from a measurement to a motion [s]."""
+    range: float = 1.3
+    """Farthest target that fills a unit's cone [m]."""
+    reflectance: float = 0.5
+    """Reflectance of the approaching object at 940 nm."""
+    way: float = 0.8
+    """Length of the straight path on which it approaches [m]."""
+    floor: float = -0.2
+    """Height of the floor in the base frame [m]."""
+    postures: int = 50
+    """Number of postures."""
+    seed: int = 0
+    """Seed of the random postures and paths: the same seed gives the same numbers."""
+    suggest: int = 0
+    """Number of additional units to place where they help most."""
+    out: str = ""
+    """Skin file to write, with --suggest: the existing units and the new ones."""
+    figure: str = ""
+    """File for a figure of the arm, ending in .png, .pdf or .svg."""
+    json: str = ""
+    """File for the numbers."""
+    replace: bool = False
+    """Overwrite existing files."""
+
+    def run(self) -> int:
+        """Measure, show, and write the requested files."""
+        from pretouch.cli.skin_coverage import skin_coverage
+
+        skin_coverage(self)
+        return 0
 
 
 @dataclass(frozen=True)
@@ -23,14 +76,14 @@ class Monitor:
     arm: Literal["panda", "fr3"] = "panda"
     """The arm of the skin file."""
     posture: str = ""
-    """Joint positions [rad], separated by commas, of the arm that stands still: with --skin, units that do not see what
-    they must by the model are named. Nothing but the arm may be near."""
+    """Joint positions [rad], separated by commas, of the arm that stands still: with --skin, units whose readings
+    contradict the model are named. Nothing but the arm may be near."""
     host: str = HOST
     """Address to listen at. Real units need 0.0.0.0, which is every address of this machine."""
     port: int = PORT
     """UDP port to listen at."""
     record: str = ""
-    """Recording to write: all samples as they came, ranges, IMU and diagnostics."""
+    """Recording to write: all samples as received, ranges, IMU and diagnostics."""
     duration: float = 0.0
     """Time to watch [s]; 0: until Ctrl-C. The exit code is then 1 if a unit is faulty at the end."""
     once: bool = False
@@ -47,7 +100,7 @@ class Monitor:
 
 @dataclass(frozen=True)
 class Provision:
-    """Tell a unit over USB who it is: its number, its own random key, your Wi-Fi, and where to send.
+    """Set up a unit over USB: its number, its own random key, your Wi-Fi, and the receiver's address.
 
     The password is asked for, and shown nowhere.
     """
@@ -55,29 +108,29 @@ class Provision:
     id: str
     """Name of the unit, as in the skin file."""
     keys: str
-    """File of the units' keys; it is made if it is not there, for your eyes only."""
+    """File of the units' keys; created if it is missing, readable only by you."""
     ssid: str
     """Name of the Wi-Fi network (2.4 GHz)."""
     host: str
     """IPv4 address of this machine in that network."""
     number: int = 0
-    """Number of the unit in datagrams, 1 to 65535; by default as in the file of keys, or the first that is free."""
+    """Number of the unit in datagrams, 1 to 65535; by default that in the file of keys, or the first free one."""
     device: str = "/dev/ttyUSB0"
     """Serial device of the unit."""
     port: int = PORT
     """UDP port of the receiver."""
     battery_full_mv: int = 0
-    """Voltage of the battery that fills the unit's converter [mV] (docs/how-to/wiring.md); 0: none is wired to it."""
+    """Battery voltage at the full scale of the unit's converter [mV] (docs/how-to/wiring.md); 0: no battery."""
     touch_ohm: int = 0
-    """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: it has no such sensor."""
+    """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: no touch sensor."""
     touch_least_mn: int = 500
     """Smallest force that counts as a touch [mN]: `force_min_n` of the skin file."""
     touch_mn_per_us: int = 10
     """Force by the touch sensor's conductance [mN/uS], as calibrated."""
     password_file: str = ""
-    """File whose first line is the Wi-Fi password, instead of being asked for it."""
+    """File whose first line is the Wi-Fi password, instead of typing it."""
     replace: bool = False
-    """Go on if the unit has another number or key already."""
+    """Replace another number or key that the unit already has."""
 
     def run(self) -> int:
         """Set the unit up."""
@@ -89,15 +142,15 @@ class Provision:
 
 @dataclass(frozen=True)
 class Keys:
-    """List the units of a file of keys, or add some: random keys, to try `simulate` and `monitor` with."""
+    """List the units of a file of keys, or add some with random keys, to try `simulate` and `monitor`."""
 
     keys: str
-    """File of the units' keys; it is made if it is not there, for your eyes only."""
+    """File of the units' keys; created if it is missing, readable only by you."""
     new: str = ""
     """Names of units to add, separated by commas."""
 
     def run(self) -> int:
-        """List the units, with those that are added."""
+        """List the units, including added ones."""
         from pretouch.cli.skin_keys import keys_file, list_keys
 
         list_keys(keys_file(self.keys), self.new)
@@ -106,10 +159,10 @@ class Keys:
 
 @dataclass(frozen=True)
 class Simulate:
-    """Simulate a skin that sends what real units send: an arm on its path, a hand that comes and goes."""
+    """Simulate a skin that sends what real units send: an arm on its path, and a hand that comes and goes."""
 
     keys: str
-    """File of the units' keys; one that is not there is made. `pretouch skin monitor` takes the same."""
+    """File of the units' keys, created if it is missing. `pretouch skin monitor` needs the same file."""
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
     arm: Literal["panda", "fr3"] = "panda"
@@ -119,7 +172,7 @@ class Simulate:
     port: int = PORT
     """UDP port of the receiver."""
     loss: float = 0.0
-    """Share of datagrams lost on their way, in either direction."""
+    """Share of datagrams lost, in either direction."""
     loss_run: float = 0.0
     """Mean number lost in a row; 0: each is lost or not by itself."""
     delay: float = 0.008

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from pretouch.atomic_write import write_json
 from pretouch.cli.calibrate.outputs import check_free, same_file
 from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
 from pretouch.cli.tables import show
@@ -24,10 +25,9 @@ from pretouch.robot.description import fr3, panda
 from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
-from pretouch.whole_file import write_json
 
 if TYPE_CHECKING:
-    from pretouch.cli.skin_coverage_options import Coverage as Asked
+    from pretouch.cli.skin_commands import Coverage as Asked
 
 _FORMATS = (".png", ".pdf", ".svg")
 _SPOTS = 8
@@ -93,13 +93,17 @@ def _params(command: "Asked") -> CoverageParams:
 def _check_outputs(command: "Asked", source: Path | None) -> None:
     """Refuse, before anything is computed, what could not be done or would be lost."""
     if command.suggest < 0:
-        raise SkinError(f"{command.suggest} more units are asked for: give 1 or more, or leave out --suggest.")
+        raise SkinError(f"--suggest is {command.suggest}: give 1 or more, or leave it out.")
     if command.out and not command.suggest:
-        raise SkinError(f"--out {command.out} is for the skin with more units: say how many with --suggest.")
+        raise SkinError(
+            f"--out {command.out} writes the skin with the suggested units: give their number with --suggest."
+        )
     if command.seed < 0:
         raise ParameterError(f"The seed is {command.seed}: give 0 or more.")
     if command.figure and Path(command.figure).suffix not in _FORMATS:
-        raise ExperimentError(f"The figure {command.figure} ends in none of {', '.join(_FORMATS)}: name it so.")
+        raise ExperimentError(
+            f"The figure {command.figure} has an unknown format: use one of the endings {', '.join(_FORMATS)}."
+        )
     if command.figure:
         FIGURES.need("A figure")
     places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
@@ -107,9 +111,7 @@ def _check_outputs(command: "Asked", source: Path | None) -> None:
     for i, (what, place) in enumerate(given):
         others = [other for _, other in given[:i]] + ([source] if source else [])
         if any(same_file(other, place) or same_file(place, other) for other in others):
-            raise ExperimentError(
-                f"The {what} {place} would take the place of another file that is read or written: give another."
-            )
+            raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
     for what, place in given:
         check_free(what, place, command.replace)
         check_writable(what, place)

@@ -23,9 +23,10 @@ def link_table(found: Coverage, setting: Setting) -> TextTable:
         f"Seen in time: {setting.model.description.name}, {setting.postures} postures of {setting.workspace}",
         ("link", "area\n[cm^2]", "ways\n[%]", "95 %", "surface\n[%]", "95 %"),
         rows,
-        f"A ball of {100 * p.object_radius_m:g} cm radius comes straight at a point at {p.object_speed_m_s:g} m/s, the"
-        f" arm at {p.arm_speed_m_s:g} m/s towards it: it has to come into view {p.warning_m:.2f} m before it touches."
-        " Ways: of all ways to the surface that are free. Surface: points to which at least half of them are seen.",
+        f"A ball of {100 * p.object_radius_m:g} cm radius approaches a point in a straight line at"
+        f" {p.object_speed_m_s:g} m/s, and the arm moves towards it at {p.arm_speed_m_s:g} m/s: it must be seen"
+        f" {p.warning_m:.2f} m before contact. Paths: share of the free paths to the surface that are seen in time."
+        " Surface: points to which at least half of the paths are seen in time.",
         names=1,
     )
 
@@ -48,7 +49,8 @@ def unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
         "What each unit sees",
         ("unit", "link", "ways\n[%]", "alone\n[%]"),
         rows,
-        "Of all free ways to the arm. Alone: that no other unit sees, which is what would be lost without it.",
+        "Share of all free paths to the arm. Alone: paths that no other unit sees, which would be lost without this"
+        " unit.",
     )
 
 
@@ -68,18 +70,18 @@ def suggestion_table(suggested: Suggestions, before: Coverage, after: Coverage) 
         f"{len(suggested.chosen)} more units: {_said(before.arm.ways)} before, {_said(after.arm.ways)} after",
         ("unit", "link", "position\n[m]", "beam", "gain\n[%]"),
         rows,
-        f"Chosen one after the other of {suggested.candidates} places, each where it adds most; gains by the ways they"
-        " were chosen by, before and after by others. No choice of as many of these places could add more than"
-        f" {100 * suggested.most:.1f} %; this way adds at least 63 % (1 - 1/e) of what the best would.",
+        f"Chosen one by one from {suggested.candidates} positions, each where it adds most. Gains are measured on the"
+        " paths used for choosing, before and after on others. No choice of as many positions could add more than"
+        f" {100 * suggested.most:.1f} %; this greedy choice adds at least 63 % (1 - 1/e) of the optimum.",
     )
 
 
 def spot_lines(spots: tuple[BlindSpot, ...], most: int) -> list[str]:
     """Name the largest blind spots, one a line."""
     if not spots:
-        return [f"No blind spots: of the ways to each place at least {100 * BLIND:g} % are seen in time."]
+        return [f"No blind spots: at least {100 * BLIND:g} % of the paths to each point are seen in time."]
     total = 1e4 * sum(spot.area_m2 for spot in spots)
-    said = [f"Blind spots, less than {100 * BLIND:g} % of the ways seen: {len(spots)}, {total:.0f} cm^2 in all."]
+    said = [f"Blind spots, with less than {100 * BLIND:g} % of the paths seen: {len(spots)}, {total:.0f} cm^2 in all."]
     said += [f"  {spot.sentence}" for spot in spots[:most]]
     return said + ([f"  and {len(spots) - most} smaller ones"] if len(spots) > most else [])
 

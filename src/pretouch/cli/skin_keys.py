@@ -24,7 +24,7 @@ def list_keys(place: Path, new: str = "") -> None:
 def keys_file(text: str) -> Path:
     """Return the file of keys that is named; none is a HardwareError."""
     if not text:
-        raise HardwareError("No file of keys is given: name one with --keys.")
+        raise HardwareError("The file of keys is missing: name one with --keys.")
     return Path(text)
 
 
@@ -37,7 +37,7 @@ def with_new(keys: Keys, names: Sequence[str]) -> Keys:
     """Return keys with new ones for some names, under the first free numbers. One there already is a HardwareError."""
     there = [name for name in names if name in keys]
     if there:
-        raise HardwareError(f"There is a key for {', '.join(there)} already: give other names.")
+        raise HardwareError(f"{', '.join(there)} already has a key: give other names.")
     for name in names:
         keys = Keys([*keys.values(), UnitKey(name, free_number(keys), new_key())])
     return keys

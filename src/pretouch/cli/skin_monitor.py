@@ -16,7 +16,6 @@ from rich.console import Console
 from rich.live import Live
 
 from pretouch.cli.arms import arm_model
-from pretouch.cli.ending import Terminated
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_record import record
 from pretouch.cli.skin_table import line, thrown_away, view
@@ -24,15 +23,16 @@ from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import HardwareError
 from pretouch.hardware.address import EVERYWHERE, HOST
-from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.health import HealthParams
 from pretouch.hardware.keys import load_keys
 from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
-from pretouch.hardware.monitor import Posture, Turn, watch
+from pretouch.hardware.monitor import MonitorUpdate, Posture, watch
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
+from pretouch.signals import Terminated
 from pretouch.types import FloatArray
 
 if TYPE_CHECKING:
@@ -50,22 +50,24 @@ def monitor(command: "Monitor") -> int:
     if json_file:
         check_writable("file", json_file)
     if not command.host:
-        raise HardwareError(f"No address to listen at is given: give {HOST}, or {EVERYWHERE} for all of this machine.")
+        raise HardwareError(
+            f"The address to listen on is empty: give {HOST}, or {EVERYWHERE} for every address of this machine."
+        )
     keys = load_keys(keys_file(command.keys))
     ids, posture = _watched(command, tuple(keys))
     with ExitStack() as stack:
         receiver = stack.enter_context(SkinReceiver(ids, keys, command.host, command.port))
         recording = stack.enter_context(SkinRecording(Path(command.record))) if command.record else None
-        turns = watch(receiver, HealthParams(), duration, posture)
+        updates = watch(receiver, HealthParams(), duration, posture)
         try:
-            last, code = _shown(turns, receiver, recording, command.once)
+            last, code = _shown(updates, receiver, recording, command.once)
         except Terminated:
             if recording:
                 with suppress(OSError):  # the terminal may be gone
                     print(recording.close(), flush=True)
             raise
         sentence = recording.close() if recording else ""
-    notes = [note for note in (_unheard(receiver), sentence) if note]
+    notes = [note for note in (_nothing_received(receiver), sentence) if note]
     console = Console(highlight=False, soft_wrap=True)
     if last is not None:
         console.print(view(last, receiver.rejected, notes))
@@ -82,7 +84,7 @@ def monitor(command: "Monitor") -> int:
 
 def _duration(command: "Monitor") -> float:
     if not (math.isfinite(command.duration) and command.duration >= 0):
-        raise HardwareError(f"The duration is {command.duration:g} s: give 0 or more.")
+        raise HardwareError(f"--duration is {command.duration:g} s: give 0 or more.")
     return command.duration or (_ONCE_S if command.once else math.inf)
 
 
@@ -91,7 +93,7 @@ def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[tuple[str, .
     if command.skin and command.units:
         raise HardwareError("Both --skin and --units are given: leave one of them out.")
     if command.posture and not command.skin:
-        raise HardwareError("A --posture needs --skin: it says where the units are.")
+        raise HardwareError("--posture needs --skin, the file with the poses of the units.")
     if not command.skin:
         ids = words(command.units) or all_ids
         if not ids:
@@ -117,46 +119,46 @@ def _posture(text: str, model: RobotModel) -> FloatArray:
     if len(beyond):
         i = beyond[0]
         raise HardwareError(
-            f"The posture has joint {i + 1} at {q[i]:g} rad, out of its range of {model.q_min[i]:.2f} to"
+            f"The posture has joint {i + 1} at {q[i]:g} rad, outside its range of {model.q_min[i]:.2f} to"
             f" {model.q_max[i]:.2f} rad: give joint positions of this arm."
         )
     return q
 
 
 def _shown(
-    turns: Iterator[Turn], receiver: SkinReceiver, recording: SkinRecording | None, quiet: bool
-) -> tuple[Turn | None, int]:
-    """Show and record the turns until the last; return it and the exit code so far."""
+    updates: Iterator[MonitorUpdate], receiver: SkinReceiver, recording: SkinRecording | None, quiet: bool
+) -> tuple[MonitorUpdate | None, int]:
+    """Show and record the updates until the last; return it and the exit code so far."""
     console, last, second = Console(highlight=False, soft_wrap=True), None, 0.0
     live = None if quiet or not console.is_terminal else Live(console=console, auto_refresh=False, transient=True)
     lines = None if quiet or live else _Lines(console)
     try:
         with live or nullcontext():
-            for turn in turns:
-                last, full = turn, turn.elapsed >= second
+            for update in updates:
+                last, full = update, update.elapsed >= second
                 second += _SECOND_S * full
                 if recording:
-                    record(recording, turn, receiver, full)
+                    record(recording, update, receiver, full)
                 if live:
-                    live.update(view(turn, receiver.rejected, _notes(receiver, recording)), refresh=True)
+                    live.update(view(update, receiver.rejected, _notes(receiver, recording)), refresh=True)
                 elif lines and full:
-                    lines.show(turn)
+                    lines.show(update)
     except KeyboardInterrupt:
         return last, _INTERRUPTED
     return last, 0
 
 
 class _Lines:
-    """Says a turn in a line, and each finding when it comes and when it goes."""
+    """Prints a line for each update, and each finding when it appears and when it is over."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
         self._known: dict[tuple[str, str], str] = {}
 
-    def show(self, turn: Turn) -> None:
+    def show(self, update: MonitorUpdate) -> None:
         """Say it."""
-        self._console.print(line(turn), markup=False)
-        known = {(f.unit, f.what): f"{f.level}: {f.sentence}" for f in turn.findings}
+        self._console.print(line(update), markup=False)
+        known = {(f.unit, f.what): f"{f.level}: {f.sentence}" for f in update.findings}
         for sentence in (known[key] for key in known if key not in self._known):
             self._console.print(f"  {sentence}", markup=False)
         for unit, what in (key for key in self._known if key not in known):
@@ -165,19 +167,19 @@ class _Lines:
 
 
 def _notes(receiver: SkinReceiver, recording: SkinRecording | None) -> list[str]:
-    notes = [_unheard(receiver)]
+    notes = [_nothing_received(receiver)]
     if recording:
         notes.append(recording.trouble or f"Recording {recording.place}: {recording.samples} samples.")
     return [note for note in notes if note]
 
 
-def _unheard(receiver: SkinReceiver) -> str:
-    """Say, while nothing has been heard at all, where is listened and what may be amiss, or ''."""
+def _nothing_received(receiver: SkinReceiver) -> str:
+    """Return where the receiver listens and what may be wrong while nothing has been received, or ''."""
     if any(unit.state != "never heard" for unit in receiver.units):
         return ""
     host, port = receiver.address
-    local = f"; only what runs on this machine is heard there: real units need --host {EVERYWHERE}"
-    return f"Nothing was heard at {host}:{port}{local if only_here(host) else ''}."
+    local = f", which only programs on this machine can reach: real units need --host {EVERYWHERE}"
+    return f"Nothing was received at {host}:{port}{local if only_here(host) else ''}."
 
 
 @cache
@@ -190,11 +192,11 @@ def only_here(host: str) -> bool:
     return ip_address(str(found).partition("%")[0]).is_loopback
 
 
-def _numbers(turn: Turn, receiver: SkinReceiver, notes: list[str]) -> dict[str, Any]:
+def _numbers(update: MonitorUpdate, receiver: SkinReceiver, notes: list[str]) -> dict[str, Any]:
     return {
-        "elapsed_s": turn.elapsed,
-        "units": [_plain(asdict(unit)) for unit in turn.units],
-        "findings": [asdict(finding) for finding in turn.findings],
+        "elapsed_s": update.elapsed,
+        "units": [_plain(asdict(unit)) for unit in update.units],
+        "findings": [asdict(finding) for finding in update.findings],
         "rejected": dict(receiver.rejected),
         "notes": [*notes, *filter(None, [thrown_away(receiver.rejected)])],
     }

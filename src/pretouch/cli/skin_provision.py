@@ -47,11 +47,12 @@ def _unit(keys: Keys, name: str, number: int, place: Path) -> UnitKey:
     if name not in keys:
         taken = keys.by_number.get(number)
         if taken is not None:
-            raise HardwareError(f"The number {number} is that of {taken.id} in {place}: give another, or leave it out.")
+            raise HardwareError(f"The number {number} belongs to {taken.id} in {place}: give another, or leave it out.")
         return UnitKey(name, number or free_number(keys), new_key())
     if number not in (0, keys[name].number):
         raise HardwareError(
-            f"{name} has the number {keys[name].number} in {place}, not {number}: give that one, or leave it out."
+            f"{name} has the number {keys[name].number} in {place}, not {number}: give {keys[name].number}, or leave it"
+            " out."
         )
     return keys[name]
 
@@ -63,7 +64,7 @@ def _password(command: "Provision") -> str:
                 warnings.simplefilter("error", getpass.GetPassWarning)
                 return getpass.getpass(f"Password of {command.ssid} (empty for an open network): ")
         except (EOFError, getpass.GetPassWarning):
-            raise HardwareError("There is no terminal to type the password at: name a --password-file.") from None
+            raise HardwareError("There is no terminal for the password: give a --password-file.") from None
     try:
         lines = Path(command.password_file).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 
-from pretouch.hardware.monitor import Turn
+from pretouch.hardware.monitor import MonitorUpdate
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.traffic import Received, imu_batch
 from pretouch.hardware.wire import Flag
@@ -12,11 +12,11 @@ from pretouch.recording.skin_recording import Diagnosis, Level, SkinRecording
 _LEVELS = {"warning": Level.WARN, "fault": Level.ERROR}
 
 
-def record(recording: SkinRecording, turn: Turn, receiver: SkinReceiver, diagnose: bool) -> None:
-    """Keep the samples of a turn, and if asked for how the units are."""
-    record_samples(recording, turn.heard, [unit.id for unit in receiver.units])
+def record(recording: SkinRecording, update: MonitorUpdate, receiver: SkinReceiver, diagnose: bool) -> None:
+    """Record the samples of an update and, if asked for, the health of the units."""
+    record_samples(recording, update.heard, [unit.id for unit in receiver.units])
     if diagnose:
-        recording.health(turn.time, _diagnoses(turn))
+        recording.health(update.time, _diagnoses(update))
 
 
 def record_samples(recording: SkinRecording, heard: Iterable[Received], ids: Sequence[str]) -> None:
@@ -28,10 +28,10 @@ def record_samples(recording: SkinRecording, heard: Iterable[Received], ids: Seq
             recording.imu(ids[one.unit], batch.stamp, batch.acceleration, batch.angular_velocity)
 
 
-def _diagnoses(turn: Turn) -> list[Diagnosis]:
+def _diagnoses(update: MonitorUpdate) -> list[Diagnosis]:
     rows = []
-    for unit in turn.units:
-        found = [f for f in turn.findings if f.unit == unit.unit]
+    for unit in update.units:
+        found = [f for f in update.findings if f.unit == unit.unit]
         level = max((_LEVELS[f.level] for f in found), default=Level.OK)
         values = {name: str(value) for name, value in asdict(unit).items() if name not in ("unit", "standing")}
         rows.append(Diagnosis(unit.unit, level, " ".join(f.sentence for f in found) or "Nothing is wrong.", values))

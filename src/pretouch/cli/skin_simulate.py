@@ -11,10 +11,10 @@ from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, save_keys
-from pretouch.params import profile as find_profile
+from pretouch.profiles import profile as find_profile
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.serving.fleet import FleetParams
-from pretouch.serving.network import NetworkParams, WayParams
+from pretouch.serving.network import ChannelParams, NetworkParams
 from pretouch.serving.simulate import run, run_motion
 from pretouch.serving.simulated_arm import SimulateOptions
 from pretouch.sim.imu import ImuParams
@@ -30,11 +30,11 @@ def simulate_units(command: "Simulate") -> None:
     """Simulate until interrupted, or for the given time."""
     c = command
     if c.calibration_joints and c.duration:
-        raise HardwareError("--duration does not go with --calibration-joints, which ends with the motion.")
-    up = WayParams(
+        raise HardwareError("--duration cannot be combined with --calibration-joints, which ends with the motion.")
+    up = ChannelParams(
         loss=c.loss, loss_run=c.loss_run, delay_s=c.delay, jitter_s=c.jitter, overtaken=c.overtaken, doubled=c.doubled
     )
-    down = WayParams(
+    down = ChannelParams(
         loss=c.loss, loss_run=c.loss_run, delay_s=0.15 * c.delay, jitter_s=0.3 * c.jitter, jitter_shape=2.0
     )
     fleet = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=c.reboot_every)

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from pretouch.hardware.findings import Finding
 from pretouch.hardware.health import UnitHealth, status_name
-from pretouch.hardware.monitor import Turn
+from pretouch.hardware.monitor import MonitorUpdate
 from pretouch.types import RangeStatus
 
 _COLUMNS = (
@@ -21,10 +21,10 @@ _TARGET = (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeS
 """Statuses of readings that have a distance."""
 _STYLES = {"fault": "bold red", "warning": "yellow"}
 _MEANINGS = {
-    "size": "no size of ours",
-    "format": "no magic, version or kind of ours",
-    "unit": "a number that none of these units has",
-    "tag": "a wrong tag: another key, or a forgery",
+    "size": "a size that no message has",
+    "format": "an unknown magic, version or kind",
+    "unit": "the number of an unknown unit",
+    "tag": "a wrong tag (another key, or a forgery)",
     "replayed": "a sequence number seen already",
     "no session": "a sample outside a session",
     "too many hellos": "more hellos than are answered",
@@ -32,12 +32,12 @@ _MEANINGS = {
 }
 
 
-def view(turn: Turn, rejected: Mapping[str, int], notes: Sequence[str]) -> RenderableType:
-    """Return all that is to be seen of a turn."""
-    lines = [Text(f"{f.level}: {f.sentence}", style=_STYLES[f.level]) for f in turn.findings]
+def view(update: MonitorUpdate, rejected: Mapping[str, int], notes: Sequence[str]) -> RenderableType:
+    """Return the whole view of an update."""
+    lines = [Text(f"{f.level}: {f.sentence}", style=_STYLES[f.level]) for f in update.findings]
     said = thrown_away(rejected)
     below = [Text(text, style="dim") for text in (*notes, *([said] if said else []))]
-    return Group(table(turn.units, turn.findings), *(lines or [Text("Nothing is wrong.", style="green")]), *below)
+    return Group(table(update.units, update.findings), *(lines or [Text("Nothing is wrong.", style="green")]), *below)
 
 
 def table(units: Sequence[UnitHealth], found: Sequence[Finding]) -> Table:
@@ -77,16 +77,16 @@ def number(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
-def line(turn: Turn) -> str:
-    """Return a turn as one line."""
-    live = [unit for unit in turn.units if unit.standing.state == "live"]
+def line(update: MonitorUpdate) -> str:
+    """Return an update as one line."""
+    live = [unit for unit in update.units if unit.standing.state == "live"]
     rates = [unit.rate_hz for unit in live if math.isfinite(unit.rate_hz)]
     losses = [unit.loss for unit in live if math.isfinite(unit.loss)]
     slowest, most = min(rates, default=math.nan), max(losses, default=math.nan)
-    faults = sum(f.level == "fault" for f in turn.findings)
+    faults = sum(f.level == "fault" for f in update.findings)
     return (
-        f"{turn.elapsed:.0f} s: {len(live)} of {len(turn.units)} units live, slowest {number(slowest, 1)} Hz,"
-        f" largest loss {number(100 * most, 1)} %, {faults} faults, {len(turn.findings) - faults} warnings."
+        f"{update.elapsed:.0f} s: {len(live)} of {len(update.units)} units live, slowest {number(slowest, 1)} Hz,"
+        f" largest loss {number(100 * most, 1)} %, {faults} faults, {len(update.findings) - faults} warnings."
     )
 
 

@@ -15,7 +15,7 @@ def unwritable_said(what: str, place: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise ExperimentError(f"The {what} {place} cannot be written: {error.strerror}: give another.") from error
+        raise ExperimentError(f"The {what} {place} cannot be written ({error.strerror}): give another file.") from error
 
 
 def check_writable(what: str, place: Path) -> None:

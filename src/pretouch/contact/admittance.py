@@ -1,290 +1,226 @@
-"""Yielding to a push as long as it is felt: a virtual mass and damper in joint space that take energy and give none.
+"""Yielding to a push as long as it lasts: the admittance, with clamps and places where the arm gives up."""
 
-Each joint obeys M dv/dt = d(tau) - D v, integrated implicitly, with tau the external torque less its mean in free
-motion. See docs/explanation/reaction.md for why joint space, and for the bound on the energy (Hannaford and Ryu 2002;
-Ferraguti et al. 2015; both bound it with what they call passivity observer and energy tank).
-"""
-
-import math
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry
-from pretouch.groups import CapsuleArrays
-from pretouch.params import ReactionParams
-from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.types import BoolArray, FloatArray
+from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
+from pretouch.contact.detector import Body
+from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
+from pretouch.contact.repeated_contact import (
+    RepeatedContactState,
+    count_contact,
+    discount_push,
+    forget_passed,
+    given_up,
+    repeated_contact_init,
+    wait_to_retry,
+)
+from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
+from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
+from pretouch.modes import Event, ModeState
+from pretouch.params.reaction import AdmittanceParams, ClampParams
+from pretouch.types import FloatArray, Mode
 from pretouch.values import value
+
+Doing = Literal["task", "learn", "react", "soft", "still"]
+"""What the arm does: follow its task or stand with its window filling (`learn`), react, hold softly, hold still."""
 
 
 @value
 class AdmittanceState:
-    """Memory of the admittance of n joints."""
+    """Memory of the admittance."""
 
-    mean: FloatArray
-    """(2, n) residual torque filtered once and twice [Nm]; the latter is the mean in free motion."""
-    samples: int
-    """How many samples the mean holds."""
-    torque: FloatArray
-    """(n,) last residual less the mean [Nm]."""
-    velocity: FloatArray
-    """(n,) of the virtual mass [rad/s]."""
-    side: FloatArray
-    """(n,) sign of the torque that last drove each joint in this reaction, 0 for none."""
-    tank: float
-    """Energy taken from the push and not given back, with the start value [J]."""
-    steady: FloatArray
-    """(2, n) torque filtered once and twice, without most of its noise [Nm]."""
-    sliding: FloatArray
-    """(n,) 1 of a joint that a push has torn loose from static friction, 0 of one that sticks."""
-    quiet: float
-    """Time since a torque moved a joint or kept it moving [s]."""
-    unfelt: float
-    """Time since the detector felt a contact [s]."""
-    since: float
-    """Time since the contact that began a reaction [s], infinite without one."""
+    mass: VirtualMass
+    clamp: ClampState
+    place: RepeatedContactState
 
 
-def admittance_init(n: int, params: ReactionParams) -> AdmittanceState:
-    """Return the state of n joints at rest, before the first sample."""
-    none, twice = np.zeros(n), np.zeros((2, n))
-    return AdmittanceState(twice, 0, none, none, none, params.start_energy_j, twice, none, 0.0, 0.0, math.inf)
+@dataclass(frozen=True)
+class Admittance(AdmittanceParams, Reaction, name="admittance"):
+    """A passive admittance in joint space (docs/explanation/reaction.md)."""
+
+    State = AdmittanceState
+    by_torques = True
+
+    def init(self, body: Body, q: FloatArray) -> AdmittanceState:
+        """Return the state without a contact, at joint positions (n,) [rad]."""
+        return AdmittanceState(mass_init(len(q), self), clamp_init(q), repeated_contact_init())
+
+    def sense(
+        self, state: AdmittanceState, body: Body, inputs: ReactionInputs
+    ) -> tuple[dict[Event, str], AdmittanceState]:
+        """Let the virtual mass move, look for clamps, count places; name what the reaction is at."""
+        doing, near = self._doing(inputs.mode, inputs.detection.armed), self._near(inputs)
+        mass, clamp = self._moved(state, doing, body, inputs), state.clamp
+        q, dt = inputs.robot.q_commanded, body.period
+        if doing == "react" and self.clamp is not None and not clamp.torque:
+            clamp = self._pinched(clamped(clamp, mass.torque, mass.velocity, q, dt, self.clamp), body, inputs)
+        elif doing == "task" and self.pinch is not None:
+            clamp = gone(clamp, q, dt)
+        place = self._placed(state.place, doing, mass.tank - self.start_energy_j, near, dt, inputs)
+        state = AdmittanceState(mass, clamp_init(q) if inputs.resume else clamp, place)
+        return self._events(state, doing, near, inputs), state
+
+    def move(
+        self, state: AdmittanceState, body: Body, inputs: ReactionInputs, mode: ModeState
+    ) -> tuple[ReactionMotion | None, AdmittanceState]:
+        """Return the joint velocities of the virtual mass, or of the way out of a clamp."""
+        if new_contact(inputs, mode) is not None:
+            state = self._begun(state, body, inputs)
+        doing = self._doing(mode, inputs.detection.armed)
+        if doing not in ("react", "soft"):
+            return None, state
+        qd, model, kin = state.mass.velocity, body.model, inputs.kin
+        opens = doing == "react" and state.clamp.torque > 0 and not state.clamp.open
+        if opens:
+            p = self._way_out
+            way, clamp = opened(state.clamp, state.mass.torque, inputs.robot.q_commanded, body.period, p)
+            fastest = fastest_point(kin, model.moved_by, model.body.arrays, way)
+            qd = way * min(1.0, p.open_m_s / fastest) if fastest > 0 else way
+            state = replace(state, clamp=clamp, mass=replace(state.mass, velocity=np.zeros(len(qd))))
+        if doing == "soft" and not qd.any():
+            return None, state
+        # a pushed arm touches nothing that it sees; one that is caught is between two things, and must get out
+        touch_speed = self._way_out.open_m_s if opens else 0.0
+        return ReactionMotion(model.ee_jacobian(kin)[:3] @ qd, qd, touch_speed), state
+
+    def announced(self, period: float) -> str:
+        """Say how fast the arm goes with a push, and when it goes on."""
+        return (
+            f"When pushed, it yields at up to {self.speed_max_m_s:g} m/s as long as the push lasts, and continues"
+            f" {self.quiet_s:g} s later: keep everything it could hit away from it."
+        )
+
+    @property
+    def _way_out(self) -> ClampParams:
+        """How the arm opens, what is caught between links included where no other clamp is looked for."""
+        return self.clamp or ClampParams()
+
+    def _doing(self, mode: ModeState, armed: bool) -> Doing:
+        """What the arm does in a mode, as far as contacts matter."""
+        if mode.mode is Mode.REACT:
+            return "react"
+        if mode.mode is Mode.TRACK:
+            return "task"
+        return "learn" if not armed else "soft" if mode.soft and self.soft_hold else "still"
+
+    def _near(self, inputs: ReactionInputs) -> bool:
+        """Whether something is seen near the body, or may be missed."""
+        return inputs.unseen or float(inputs.obstacles.body_distance.min(initial=np.inf)) < self.near_m
+
+    def _moved(self, state: AdmittanceState, doing: Doing, body: Body, inputs: ReactionInputs) -> VirtualMass:
+        """Let the mass learn in free motion, and yield to what is felt in a reaction or a soft hold."""
+        mass, clamp, detection, dt = state.mass, state.clamp, inputs.detection, body.period
+        if doing == "learn" or (doing == "task" and detection.contact is None):
+            return learnt(mass, _residual(mass, inputs), dt, self)
+        if doing not in ("react", "soft"):
+            return mass
+        model, residual, felt = body.model, _residual(mass, inputs), detection.evidence >= 1.0
+        band = dead_band(model.description.tau_max, self)
+        mass = yielded(mass, (model, inputs.kin), residual, inputs.command, band, dt, self, felt)
+        if doing == "soft" and clamp.torque:
+            # out of the clamp it may be moved, not back into it
+            mass = replace(mass, velocity=np.where(mass.velocity * clamp.course > 0, 0.0, mass.velocity))
+        return mass
+
+    def _placed(
+        self, place: RepeatedContactState, doing: Doing, energy: float, near: bool, dt: float, inputs: ReactionInputs
+    ) -> RepeatedContactState:
+        """Judge the contact under way by its energy [J], wait at a place given up, or forget one that is passed."""
+        if inputs.resume:
+            return repeated_contact_init()
+        if self.give_up is None:
+            return place
+        if doing == "react":
+            return discount_push(place, energy)
+        if given_up(place, self.give_up):
+            return wait_to_retry(place, near, dt, self.give_up)
+        return forget_passed(place, inputs.path_phase) if doing == "task" else place
+
+    def _begun(self, state: AdmittanceState, body: Body, inputs: ReactionInputs) -> AdmittanceState:
+        """Begin to move with the contact that was found; one the arm brought about in its task counts for its place."""
+        model, kin, command = body.model, inputs.kin, inputs.command
+        doing = self._doing(inputs.mode, inputs.detection.armed)
+        torque = _residual(state.mass, inputs) - state.mass.mean[1]
+        band = dead_band(model.description.tau_max, self)
+        before = {"soft": state.mass.steady[0], "still": torque}.get(doing, state.mass.torque)
+        mass = begun(state.mass, model, kin, torque, before, band, self)
+        # what the arm ran into pushes against its motion; what pushes it on has come by itself
+        mine = doing == "task" and float(torque @ command) < 0
+        place = replace(state.place, counted=False)
+        if mine and self.give_up is not None:
+            kinetic = 0.5 * float(command @ model.mass_matrix(inputs.robot.q) @ command)
+            point, near = kin.position[model.ee], self._near(inputs)
+            place = count_contact(state.place, inputs.path_phase, point, near, kinetic, self.give_up)
+        came = command if doing == "task" else np.zeros(len(torque))
+        clamp = self._pinched(clamp_begun(state.clamp, inputs.robot.q_commanded, came), body, inputs)
+        return AdmittanceState(mass, clamp, place)
+
+    def _pinched(self, clamp: ClampState, body: Body, inputs: ReactionInputs) -> ClampState:
+        """Look for something caught between two links, or one and a fixture, as long as a contact is felt."""
+        p, found, kin = self.pinch, inputs.detection, inputs.kin
+        if p is None or clamp.torque or found.clear is None:
+            return clamp
+        torque, covariance = found.clear
+        pinch = find_self_clamp(body.model, kin, torque, covariance, clamp.came, p)
+        names = body.model.links
+        if pinch is not None:
+            one, other = (names[link] for link in pinch.link)
+            return caught_between(clamp, f"{one} and {other}", pinch.force, torque)
+        if presses_on_fixture(body.model, kin, found.touched, body.planes, body.standing, clamp.came, p):
+            force = float(np.linalg.norm(found.touched.force[0]))
+            return caught_between(clamp, f"{names[found.touched.link[0]]} and a fixture", force, torque)
+        return clamp
+
+    def _events(self, state: AdmittanceState, doing: Doing, near: bool, inputs: ReactionInputs) -> dict[Event, str]:
+        """Name a contact that moves the arm, what the reaction is at, and what the arm gave up."""
+        mass, clamp, place = state.mass, state.clamp, state.place
+        # an arm that holds softly sticks to static friction
+        sticks = doing == "soft" and self.static_friction_nm > 0 and not mass.sliding.any()
+        events = {} if sticks else contact_event(inputs.detection)
+        if clamp.torque:
+            events[Event.CLAMPED if clamp.open else Event.OPENING] = _caught(clamp)
+        elif doing == "react" and self._waits(state, near, inputs.detection.lasting):
+            clear = ", once nothing is seen near it" if near and not given_up(place, self.give_up) else ""
+            events[Event.YIELDING] = f"{self.quiet_s:g} s after the last push{clear}"
+        elif doing in ("react", "soft") and self._presses(mass) and mass.quiet >= max(self.quiet_s, self.patience_s):
+            torque = np.abs(mass.steady[1])
+            events[Event.PRESSED] = f"{self.patience_s:g} s, about {torque.max():.0f} Nm at joint {torque.argmax() + 1}"
+        if self.give_up is not None and given_up(place, self.give_up):
+            x, y, z = place.point
+            when = f"{self.give_up.retry_s:g} s have passed"
+            when = f"nothing is seen within {self.near_m:g} m of it" if place.seen else when
+            events[Event.GIVEN_UP] = (
+                f"{place.contacts} contacts at one place of the path, ({x:.2f}, {y:.2f}, {z:.2f}) m: clear it; the arm"
+                f" tries again when {when}, or on resume"
+            )
+        return events
+
+    def _waits(self, state: AdmittanceState, near: bool, lasting: bool) -> bool:
+        """Whether the arm still yields, or waits for more of the push, or for what presses or is near to go.
+
+        For what is near it waits only where it will go on; it waits too while it is being found out if what is felt is
+        a load (`Detection.lasting`).
+        """
+        quiet = state.mass.quiet
+        waits_for = (near and not given_up(state.place, self.give_up)) or self._presses(state.mass)
+        return lasting or quiet < self.quiet_s or (waits_for and quiet < self.patience_s)
+
+    def _presses(self, mass: VirtualMass) -> bool:
+        """Whether an arm that static friction holds has felt something of late."""
+        return self.static_friction_nm > 0 and mass.unfelt < self.quiet_s
 
 
-def dead_band(torque_limit: FloatArray, params: ReactionParams) -> FloatArray:
-    """External torque (n,) that moves nothing [Nm], given the joints' torque limits (n,) [Nm]."""
-    return params.dead_band_nm + params.dead_band_fraction * torque_limit
+def _residual(mass: VirtualMass, inputs: ReactionInputs) -> FloatArray:
+    """Return the external torques (n,) [Nm]; without an estimate, those of free motion, which drive nothing."""
+    found = inputs.detection.residual
+    return mass.mean[1] if np.isnan(found).any() else found
 
 
-def learnt(state: AdmittanceState, residual: FloatArray, dt: float, params: ReactionParams) -> AdmittanceState:
-    """Let a sample of free motion into the mean.
-
-    Of two filters in a row the second takes in little of what has only begun: of a torque that has lasted for 60 ms
-    less than one part in a hundred.
-    """
-    weight = max(1.0 - math.exp(-dt / params.mean_s), 1.0 / (state.samples + 1))
-    none, mean, torque = np.zeros(len(residual)), np.empty((2, len(residual))), np.empty(len(residual))
-    _learn(state.mean, residual, weight, mean, torque)
-    return AdmittanceState(
-        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros_like(mean), none,
-        0.0, 0.0, math.inf,
-    )  # fmt: skip
-
-
-@compiled
-def _learn(before: FloatArray, residual: FloatArray, weight: float, mean: FloatArray, torque: FloatArray) -> None:
-    """Write the mean (2, n) after a sample, and what of the sample (n,) it leaves."""
-    for j in range(len(residual)):
-        mean[0, j] = before[0, j] + weight * (residual[j] - before[0, j])
-        mean[1, j] = before[1, j] + weight * (mean[0, j] - before[1, j])
-        torque[j] = residual[j] - mean[1, j]
-
-
-def begun(
-    state: AdmittanceState, model: RobotModel, kin: Kinematics, torque: FloatArray, before: FloatArray,
-    band: FloatArray, params: ReactionParams,
-) -> AdmittanceState:  # fmt: skip
-    """Begin a reaction: at the speed that the torque (n,) [Nm] would keep up, as far as the start energy allows.
-
-    With static friction a joint begins only where what was felt `before` (n,) [Nm] says the same, and at the lesser of
-    both: what only noise or a small bias says moves no joint, and so none towards who pushes.
-    """
-    lesser, least = torque, band
-    if params.static_friction_nm > 0:
-        lesser = np.where(torque * before > 0, np.sign(torque) * np.minimum(np.abs(torque), np.abs(before)), 0.0)
-        least = np.maximum(band, _KEEPS * params.static_friction_nm)
-    drive = np.where(np.abs(lesser) > least, _shrunk(lesser, band), 0.0)
-    velocity = drive / params.damping_nm_s
-    energy = 0.5 * params.inertia_kg_m2 * float(velocity @ velocity)
-    if energy > params.start_energy_j:
-        velocity = velocity * math.sqrt(params.start_energy_j / energy)
-    velocity = _no_faster(velocity, model, kin, params.speed_max_m_s)
-    return AdmittanceState(
-        state.mean, state.samples, torque, velocity, np.sign(drive), params.start_energy_j, np.stack((torque, lesser)),
-        np.abs(np.sign(drive)), 0.0, 0.0, 0.0,
-    )  # fmt: skip
-
-
-def yielded(
-    state: AdmittanceState, arm: tuple[RobotModel, Kinematics], residual: FloatArray, command: FloatArray,
-    band: FloatArray, dt: float, params: ReactionParams, contact: bool = True,
-) -> AdmittanceState:  # fmt: skip
-    """Move the virtual mass by one period under the torque that is felt.
-
-    Args:
-        state: memory.
-        arm: model and posture.
-        residual: (n,) external torque [Nm].
-        command: (n,) joint velocities commanded last [rad/s].
-        band: (n,) dead band [Nm].
-        dt: period [s].
-        params: parameters.
-        contact: whether the detector feels one.
-    """
-    p, torque = params, residual - state.mean[1]
-    velocity, side, sliding, steady = np.empty_like(band), np.empty_like(band), np.empty_like(band), state.steady.copy()
-    keep = math.exp(-dt / p.lag_s) if p.lag_s > 0 else 0.0
-    # just after a contact the filters still lag, and the detector has found a push already
-    at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
-    tank, pushed = _yield(
-        torque, command, band, state, p, (keep, at_once, 1.0 - math.exp(-dt / _STEADY_S), dt),
-        (velocity, side, sliding, steady),
-    )  # fmt: skip
-    velocity = _no_faster(velocity, *arm, p.speed_max_m_s)
-    quiet, unfelt = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.unfelt + dt
-    return AdmittanceState(
-        state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, unfelt, state.since + dt
-    )
-
-
-def _no_faster(velocity: FloatArray, model: RobotModel, kin: Kinematics, most: float) -> FloatArray:
-    """Scale joint velocities (n,) [rad/s] so that no point of the body's axes is faster than `most` [m/s]."""
-    body = model.body
-    fastest = fastest_point(kin, model.moved_by, body.arrays, velocity)
-    return velocity * (most / fastest) if fastest > most else velocity
-
-
-_STEADY_S = 0.1
-"""Time constant of each of the two filters that take the noise out of the torque [s]."""
-_KEEPS = 0.85
-"""Share of the static friction beyond which a torque keeps a joint moving that it tore loose: a bias of two thirds of
-it lets a joint stop, and does not tear it loose again."""
-_AT_ONCE = 2.0
-"""Times the static friction from which two samples in a row tear a joint loose, whatever the filters say."""
-_FIRST_S = 0.3
-"""Time after the onset of a contact in which two samples beyond what keeps a joint moving do the same [s]."""
-_REST_RAD_S = 1e-3
-"""Speed at which a joint that nothing drives sticks [rad/s]: none that can be seen."""
-
-
-class _Before(NamedTuple):
-    """As of `AdmittanceState`."""
-
-    torque: FloatArray
-    velocity: FloatArray
-    side: FloatArray
-    sliding: FloatArray
-    tank: float
-
-
-class _Params(NamedTuple):
-    """What is taken of `ReactionParams`."""
-
-    inertia_kg_m2: float
-    damping_nm_s: float
-    reverse_band: float
-    static_friction_nm: float
-    tank_max_j: float
-
-
-class _Step(NamedTuple):
-    """What a period comes to."""
-
-    keep: float
-    """Part of the torque before that the estimate still shows."""
-    at_once: float
-    """Times the static friction from which two samples tear a joint loose."""
-    weight: float
-    """Of a sample in the filters."""
-    dt: float
-    """[s]"""
-
-
-class _After(NamedTuple):
-    """Room for what follows, as of `AdmittanceState`; `steady` is that of before."""
-
-    velocity: FloatArray
-    side: FloatArray
-    sliding: FloatArray
-    steady: FloatArray
-
-
-@entry
-def _yield(
-    torque: FloatArray, command: FloatArray, band: FloatArray, state: ByName[_Before], p: ByName[_Params], step: _Step,
-    after: _After,
-) -> tuple[float, bool]:  # fmt: skip
-    """Write what follows; return the energy in the tank [J], and whether a push goes on."""
-    before, v, side, loose, tank = state
-    inertia, damping, reverse, friction, tank_max = p
-    keep, at_once, weight, dt = step
-    velocity, sides, sliding, steady = after
-    n, power, pushed = len(v), 0.0, False
-    for i in range(n):
-        steady[0, i] += weight * (torque[i] - steady[0, i])
-        steady[1, i] += weight * (steady[0, i] - steady[1, i])
-        lasts = abs(steady[0, i]) > max(band[i], _KEEPS * friction)
-        starts = _both(steady[0, i], steady[1, i], friction) or _both(torque[i], before[i], at_once * friction)
-        sliding[i] = 1.0 if friction == 0.0 or starts or (loose[i] > 0.0 and lasts) else 0.0
-        pushed = pushed or (lasts and sliding[i] > 0.0)
-
-        # what acted in the last period, by the exact inverse of the estimate's lag over one period
-        acted = (torque[i] - keep * before[i]) / (1.0 - keep)
-        # the least energy that it gave, whichever of the two is true and whatever is wrong within the dead band
-        power += min(torque[i] * v[i], acted * v[i]) - band[i] * abs(v[i])
-        felt, now = _beyond(torque[i], band[i]), _beyond(acted, band[i])
-        drive = 0.0
-        if felt * now > 0.0 and sliding[i] > 0.0:
-            drive = felt if abs(felt) < abs(now) else now
-        if drive * side[i] < 0.0:
-            least = reverse * band[i]
-            far = min(abs(torque[i]), abs(acted)) > least
-            drive = drive if far else 0.0
-        velocity[i] = (inertia * v[i] + dt * drive) / (inertia + dt * damping)
-        sides[i] = side[i]
-        if drive != 0.0:
-            sides[i] = np.sign(drive)
-        elif velocity[i] * command[i] <= 0.0 or (friction > 0.0 and abs(velocity[i]) < _REST_RAD_S):
-            velocity[i] = 0.0
-        elif abs(velocity[i]) > abs(command[i]):
-            # nothing drives it: it is never asked for more than it does
-            velocity[i] = command[i]
-    tank = min(tank + dt * power, tank_max)
-    if tank < 0.0:
-        # no more to give: only what takes energy may move
-        for i in range(n):
-            acted = (torque[i] - keep * before[i]) / (1.0 - keep)
-            if min(torque[i] * velocity[i], acted * velocity[i]) <= band[i] * abs(velocity[i]):
-                velocity[i] = 0.0
-    return tank, pushed
-
-
-@compiled
-def _both(one: float, other: float, level: float) -> bool:
-    """Whether both are beyond a level, on the same side."""
-    return one * other > 0.0 and min(abs(one), abs(other)) > level
-
-
-@compiled
-def _beyond(torque: float, band: float) -> float:
-    """How far a torque lies beyond the dead band, with its sign: never more than it is without a bias that small."""
-    return np.sign(torque) * max(0.0, abs(torque) - band)
-
-
-def _shrunk(torque: FloatArray, band: FloatArray) -> FloatArray:
-    return np.sign(torque) * np.maximum(0.0, np.abs(torque) - band)
-
-
-@entry
-def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, qd: FloatArray) -> float:
-    """Speed [m/s] of the fastest end of any capsule's axis at joint velocities `qd` (n,) [rad/s].
-
-    The speed along an axis is convex, so no point of it is faster than both its ends.
-    """
-    position, rotation, anchor, axis = kin
-    link, a, b = capsules.link, capsules.a, capsules.b
-    fastest = 0.0
-    for c in range(len(link)):
-        k = link[c]
-        for end in (a[c], b[c]):
-            point = rotation[k] @ end + position[k]
-            vx, vy, vz = 0.0, 0.0, 0.0
-            for j in range(len(qd)):
-                if moved_by[k, j]:
-                    x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
-                    vx += (axis[j, 1] * z - axis[j, 2] * y) * qd[j]
-                    vy += (axis[j, 2] * x - axis[j, 0] * z) * qd[j]
-                    vz += (axis[j, 0] * y - axis[j, 1] * x) * qd[j]
-            fastest = max(fastest, np.sqrt(vx * vx + vy * vy + vz * vz))
-    return fastest
+def _caught(clamp: ClampState) -> str:
+    """Say what the arm is caught between, or how that shows."""
+    if clamp.between:
+        return f"{clamp.between}, pushed apart with {clamp.force:.0f} N"
+    return f"{clamp.torque:.1f} Nm against the way it yielded"

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.params import ReactionParams
+from pretouch.params.reaction import ClampParams
 from pretouch.types import FloatArray
 from pretouch.values import value
 
@@ -84,8 +84,7 @@ def caught_between(state: ClampState, between: str, force: float, torque: FloatA
 
 
 def clamped(
-    state: ClampState, torque: FloatArray, velocity: FloatArray, q: FloatArray, least: float, dt: float,
-    params: ReactionParams,
+    state: ClampState, torque: FloatArray, velocity: FloatArray, q: FloatArray, dt: float, params: ClampParams
 ) -> ClampState:  # fmt: skip
     """Judge one period of yielding.
 
@@ -98,31 +97,30 @@ def clamped(
         torque: (n,) external torque [Nm].
         velocity: (n,) of the virtual mass [rad/s].
         q: (n,) commanded joint positions [rad].
-        least: speed in joint space from which the arm is on a course [rad/s].
         dt: period [s].
         params: parameters.
     """
     p, speed = params, float(np.sqrt(velocity @ velocity))
     along = float(torque @ state.course)
-    opposed = state.opposed + dt if along < -p.clamp_nm else 0.0
-    soon = state.pushed < p.clamp_window_s + p.clamp_s
+    opposed = state.opposed + dt if along < -p.torque_nm else 0.0
+    soon = state.pushed < _WINDOW_S + _OPPOSED_S
     course, pushed, turns, turned = state.course, state.pushed + dt, state.turns, state.turned + dt
-    if speed > least and torque @ velocity > 0.5 * p.clamp_nm * speed and not (soon and opposed > 0):
+    if speed > _COURSE_RAD_S and torque @ velocity > 0.5 * p.torque_nm * speed and not (soon and opposed > 0):
         reversed_ = bool(velocity @ course < 0)
-        turns = (turns if turned < p.turn_s else 0) + 1 if reversed_ else turns
+        turns = (turns if turned < _TURN_S else 0) + 1 if reversed_ else turns
         course, pushed, turned = velocity / speed, 0.0, 0.0 if reversed_ else turned
-    caught = (soon and opposed >= p.clamp_s - 1e-9) or turns >= p.clamp_turns
+    caught = (soon and opposed >= _OPPOSED_S - 1e-9) or turns >= _TURNS
     trail, marked = state.trail, state.marked + dt
     if marked >= _APART_S:
         trail, marked = np.vstack((q[None], trail[:-1])), 0.0
     return ClampState(
         course, pushed, opposed, turns, turned, trail, marked,
-        max(abs(along), p.clamp_nm) if caught else 0.0, 0.0, False, state.path, state.came, state.between, state.force,
+        max(abs(along), p.torque_nm) if caught else 0.0, 0.0, False, state.path, state.came, state.between, state.force,
     )  # fmt: skip
 
 
 def opened(
-    state: ClampState, torque: FloatArray, q: FloatArray, dt: float, params: ReactionParams
+    state: ClampState, torque: FloatArray, q: FloatArray, dt: float, params: ClampParams
 ) -> tuple[FloatArray, ClampState]:
     """Return the joint velocities (n,) [rad/s] back to the next place of the way the arm came, of any length.
 
@@ -143,11 +141,9 @@ def opened(
     way = trail[0] - q
     way = np.zeros(len(q)) if _closes(state, way) else way
     length = float(np.sqrt(way @ way))
-    against = length > 0 and float(torque @ way) < -params.clamp_nm * length
+    against = length > 0 and float(torque @ way) < -params.torque_nm * length
     opposed = state.opposed + dt if against else 0.0
-    over = (
-        state.opening + dt > params.open_s or opposed >= params.clamp_s - 1e-9 or float(np.abs(way).max()) < _NEAR_RAD
-    )
+    over = state.opening + dt > params.open_s or opposed >= _OPPOSED_S - 1e-9 or float(np.abs(way).max()) < _NEAR_RAD
     return way / dt, ClampState(
         state.course, state.pushed, opposed, state.turns, state.turned, trail, state.marked, state.torque,
         state.opening + dt, state.open or over, state.path, state.came, state.between, state.force,
@@ -159,6 +155,16 @@ def _closes(state: ClampState, way: FloatArray) -> bool:
     return state.between != "" and float(way @ state.came) > 0.0
 
 
+_COURSE_RAD_S = 0.05
+"""Speed in joint space from which the arm is on a course [rad/s]."""
+_OPPOSED_S = 0.03
+"""Time for which a torque must oppose the yielding to be a clamp [s]: longer than noise of the estimate does."""
+_WINDOW_S = 0.25
+"""Time after a push in which what opposes the yielding is a clamp and no push of its own [s]."""
+_TURNS = 2
+"""Reversals of the yielding, less than `_TURN_S` apart, that leave no way out and are a clamp too."""
+_TURN_S = 2.0
+"""See `_TURNS` [s]."""
 _MOVED_RAD = 0.15
 """More than a joint turns from one place of the way to the next while the arm follows its path [rad]."""
 _NEAR_RAD = 0.002

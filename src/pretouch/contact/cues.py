@@ -1,9 +1,12 @@
 """What sensor units say of a touch beside the arm's torques: where one is likelier, and where there is one."""
 
 from functools import cache
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from pretouch.composition import Part
+from pretouch.contact.detector import Body, Readings, Sample
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
@@ -42,3 +45,22 @@ def together(*cues: Cues) -> Cues:
         np.concatenate([c.sigma for c in cues]),
         np.concatenate([c.force for c in cues]),
     )
+
+
+class Cue(Part, group="pretouch.cues"):
+    """A kind of sensor on the units that says something of a touch. As a detector, it is a frozen dataclass."""
+
+    reads: ClassVar[Readings]
+    """What it takes of the units."""
+
+    def on(self, body: Body) -> Self:
+        """Return the cue for an arm with all prepared that does not change; by default itself."""
+        return self
+
+    def init(self, body: Body) -> Any:
+        """Return what is remembered before the first step."""
+        return None
+
+    def step(self, state: Any, body: Body, sample: Sample) -> tuple[Cues | None, Any]:
+        """Return what the units say in one step, None for nothing, and what to remember."""
+        raise NotImplementedError

@@ -1,4 +1,4 @@
-"""The contacts that the sequential test looks for in one posture: given to `sequential.judge`."""
+"""The hypotheses of the sequential test in one posture, which `sequential.judge` weighs: contacts and their priors."""
 
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ def write_hypotheses(
     kin: Kinematics, mechanism: Mechanism, qd: FloatArray, obstacles: ObstacleArrays, touch_gain: FloatArray,
     p: NearPrior, contacts: Hypotheses,
 ) -> None:  # fmt: skip
-    """Write the contacts that are looked for: of each joint, then of each link, then of the nearest objects.
+    """Write the hypotheses: any wrench beyond each joint, a force on each link, one by each of the nearest objects.
 
     Joints move at `qd` (n,) [rad/s]. All weights are times `touch_gain` (L,) of the link; of several links behind one
     joint the largest counts.
@@ -36,6 +36,8 @@ def write_hypotheses(
     J, joints, weight, away = contacts
     n, count, full, point = len(anchor), len(parts), np.empty((6, len(anchor))), np.empty(3)
     order, k = nearest_of(distance, len(J) - count), 0
+    # joints and links without what is seen share a weight of 1: half for any wrench on a link, which moves the joints
+    # before it, half for a force at the middle of a link
     weight[:n] = 0.0
     for body in range(len(moved_by)):
         before = moved_by[body].sum()
@@ -43,21 +45,23 @@ def write_hypotheses(
             weight[before - 1] = max(weight[before - 1], 0.5 / n * touch_gain[body])
     for h in range(len(J)):
         if h < count:
-            touched = parts[h]
-            weight[n + h] = (0.5 / count) * touch_gain[touched]
+            link = parts[h]
+            weight[n + h] = (0.5 / count) * touch_gain[link]
             for a in range(3):
-                point[a] = position[touched, a]
+                point[a] = position[link, a]
                 for b in range(3):
-                    point[a] += rotation[touched, a, b] * middle[h, b]
+                    point[a] += rotation[link, a, b] * middle[h, b]
         else:
             k = order[h - count]
-            touched, point[:] = obstacles.link[k], obstacles.body_point[k]
-        jacobian_into(anchor, axis, moved_by[touched], point, full)
-        J[h], joints[h] = full[:3], moved_by[touched].sum()
+            link, point[:] = obstacles.link[k], obstacles.body_point[k]
+        jacobian_into(anchor, axis, moved_by[link], point, full)
+        J[h], joints[h] = full[:3], moved_by[link].sum()
         if h >= count:
+            # closing speed: that of the object towards the body, and u^T J qd of the body towards the object; a force
+            # away from the object has the direction -u
             speed = obstacles.closing_speed[k]
             for a in range(3):
                 away[h, a] = -direction[k, a]
                 for j in range(n):
                     speed += direction[k, a] * J[h, a, j] * qd[j]
-            weight[n + h] = p.near_gain * nearness(distance[k], speed, p.near_m, p.near_horizon_s) * touch_gain[touched]
+            weight[n + h] = p.near_gain * nearness(distance[k], speed, p.near_m, p.near_horizon_s) * touch_gain[link]

@@ -1,58 +1,98 @@
-"""Moving with a push: eq. 12, and its linear decay."""
+"""What a reaction to a contact is: the interface of the parts, what they are given, and what they answer."""
+
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from pretouch.params import ReactionParams
-from pretouch.types import FloatArray
+from pretouch.composition import Part
+from pretouch.contact.detector import Body, Detection
+from pretouch.modes import Event, ModeState
+from pretouch.robot.model import Kinematics
+from pretouch.types import Contact, FloatArray, Mode, Obstacles, RobotState
 from pretouch.values import value
 
 
 @value
-class ReactionState:
-    """A reaction under way, or none."""
+class ReactionInputs:
+    """What a reaction is given in one step."""
+
+    mode: ModeState
+    """Mode of the step before."""
+    kin: Kinematics
+    robot: RobotState
+    detection: Detection
+    obstacles: Obstacles
+    unseen: bool
+    """Whether something near may be missed, for a unit or another source is silent."""
+    command: FloatArray
+    """(n,) joint velocities commanded last [rad/s]."""
+    path_phase: float
+    """Arc length of the task along its path [m]."""
+    resume: bool
+    """Whether a person asks to go on."""
+
+
+@value
+class ReactionMotion:
+    """How the arm moves with a contact in one step."""
 
     velocity: FloatArray
-    """(3,) velocity the reaction began with [m/s]."""
-    cycle: int
-    """Cycles since then; the reaction is over at `decay_cycles`."""
+    """(3,) of the end-effector origin [m/s], base frame."""
+    qd: FloatArray | None = None
+    """(n,) joint velocities [rad/s], None where only the end-effector's are asked for."""
+    touch_speed: float | None = None
+    """Speed at which the arm may touch what it sees [m/s], None as without a contact."""
 
 
-def reaction_init(params: ReactionParams) -> ReactionState:
-    """Return the state without a reaction."""
-    return ReactionState(np.zeros(3), params.decay_cycles)
+class Reaction(Part, group="pretouch.reactions"):
+    """How the arm answers a contact.
 
-
-def external_force(reading: FloatArray, mean: FloatArray) -> FloatArray:
-    """F_ext = F_reading - mu (3,) [N], the first part of eq. 12 of the paper."""
-    return reading - mean
-
-
-def reaction_velocity(force: FloatArray, compliance: float, speed_max: float) -> FloatArray:
-    """Velocity x_des = C F_ext (3,) [m/s], the second part of eq. 12 of the paper, its norm clipped at `speed_max`.
-
-    `force` (3,) [N] acts on the robot, base frame; `compliance` [(m/s)/N] is the diagonal of C. The arm moves the
-    way it was pushed.
+    In each step the controller calls `sense`, takes the mode that follows, and calls `move` with the same inputs. The
+    arm reacts as long as `sense` names an event that keeps it in REACT, such as `Event.REACTING` (`modes.TABLE`).
     """
-    velocity = compliance * force
-    speed = float(np.sqrt(velocity @ velocity))
-    return velocity if speed <= speed_max else velocity * (speed_max / speed)
+
+    by_torques: ClassVar[bool] = False
+    """Whether it needs an estimate of the external torque of each joint."""
+
+    def init(self, body: Body, q: FloatArray) -> Any:
+        """Return the state without a contact, at joint positions (n,) [rad]."""
+        return None
+
+    def sense(self, state: Any, body: Body, inputs: ReactionInputs) -> tuple[dict[Event, str], Any]:
+        """Take a step in before its mode is known.
+
+        Returns what may change the mode, each event with the detail its sentence needs, and the state to go on with.
+        """
+        return contact_event(inputs.detection), state
+
+    def move(
+        self, state: Any, body: Body, inputs: ReactionInputs, mode: ModeState
+    ) -> tuple[ReactionMotion | None, Any]:
+        """Return how the arm moves in a mode, None where the reaction does not move it, and the state to go on with.
+
+        The reaction begins where `mode` is REACT and `inputs.mode` is not: with `inputs.detection.contact`.
+        """
+        raise NotImplementedError
+
+    def adopted(self, state: Any, body: Body, before: "Reaction", q: FloatArray) -> Any:
+        """Return the state to go on with from that of another profile's reaction, at joint positions (n,) [rad]."""
+        return state if type(before) is type(self) else self.init(body, q)
+
+    def stretched(self, factor: float) -> Self:
+        """Return the reaction whose counts of control cycles are longer by a factor: at a rate higher by as much."""
+        return self
+
+    def announced(self, period: float) -> str:
+        """Say to people beside the arm what it does where it is pushed, with a control period [s]."""
+        return f"Pushed, it reacts as the part {self.name} does: nothing it could hit may be near it."
 
 
-def start_reaction(force: FloatArray, params: ReactionParams) -> ReactionState:
-    """Begin to move with an external force F_ext (3,) [N]."""
-    return ReactionState(reaction_velocity(force, params.compliance_m_s_n, params.speed_max_m_s), 0)
+def contact_event(detection: Detection) -> dict[Event, str]:
+    """Name a contact that is detected, with its force."""
+    found = detection.contact
+    return {} if found is None else {Event.CONTACT: f"{np.linalg.norm(found.force):.1f} N"}
 
 
-def active(state: ReactionState, params: ReactionParams) -> bool:
-    """Whether the reaction still moves the arm."""
-    return state.cycle < params.decay_cycles
-
-
-def decayed(state: ReactionState, params: ReactionParams) -> FloatArray:
-    """Velocity (3,) [m/s] now: linear from the first value to zero over `decay_cycles`."""
-    return state.velocity * max(0.0, 1.0 - state.cycle / params.decay_cycles)
-
-
-def advance(state: ReactionState) -> ReactionState:
-    """Let one control cycle pass."""
-    return ReactionState(state.velocity, state.cycle + 1)
+def new_contact(inputs: ReactionInputs, mode: ModeState) -> Contact | None:
+    """Return the contact that a reaction begins with in a step that ends in a mode, None where none begins."""
+    return inputs.detection.contact if mode.mode is Mode.REACT is not inputs.mode.mode else None

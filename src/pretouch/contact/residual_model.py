@@ -22,7 +22,7 @@ from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, entry
 from pretouch.errors import ParameterError
 from pretouch.groups import Mechanism
-from pretouch.params import DetectionParams
+from pretouch.params import SequentialParams
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
@@ -68,13 +68,13 @@ def features_of(n: int) -> int:
     return PLAIN + n + 1
 
 
-def prior_of(n: int, p: DetectionParams) -> FloatArray:
+def prior_of(n: int, p: SequentialParams) -> FloatArray:
     """Variances (f,) of the weights before anything is learnt [Nm^2]."""
     friction = p.friction_prior_nm**2
     return np.array([p.offset_prior_nm**2, friction, friction, friction, *[p.mass_prior**2] * n, p.payload_prior_kg**2])
 
 
-def residual_init(n: int, p: DetectionParams) -> ResidualModel:
+def residual_init(n: int, p: SequentialParams) -> ResidualModel:
     """Return the model that has learnt nothing: zero mean, wide spread."""
     f, size = features_of(n), block_size(n)
     spread = np.stack([np.full(n, p.velocity_prior_rad_s2**2), np.full(n, p.torque_prior_nm**2)])
@@ -326,7 +326,7 @@ def kept(model: ResidualModel) -> dict[str, FloatArray]:
     return {name: getattr(model, name) for name in KEPT}
 
 
-def resumed(numbers: dict[str, FloatArray], p: DetectionParams) -> ResidualModel:
+def resumed(numbers: dict[str, FloatArray], p: SequentialParams) -> ResidualModel:
     """Return a model with what was kept of an earlier one; one that could not be is a ParameterError.
 
     The covariances must be symmetric and positive definite, the variances and counts not below zero.

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.contact.residual_model import PLAIN, ResidualModel, prior_of
-from pretouch.params import DetectionParams
+from pretouch.params import SequentialParams
 
 _DRIFT = 0.25
 """Part of the prior's standard deviations that offset and friction may drift by while nobody looks: an arm cools."""
 
 
-def rested(model: ResidualModel, pause_s: float, p: DetectionParams) -> ResidualModel:
+def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> ResidualModel:
     """Return what is known after a pause [s]: the mean as it was, its doubt larger, and the spread as it was.
 
     With `memory_s` as while learning, the doubt of offset and friction goes a part of the way to the prior, and that of

@@ -15,7 +15,7 @@ import numpy as np
 
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
-from pretouch.params import DetectionParams
+from pretouch.params import SequentialParams
 from pretouch.types import FloatArray, IntArray
 
 LENGTHS = (1, 2, 4, 8, 16, 32)
@@ -29,7 +29,7 @@ _SINGULAR = 1e-6
 """Part of its trace by which a force's information is made regular: a force along a joint's axis has none."""
 
 
-def alarm_level(p: DetectionParams, period: float) -> float:
+def alarm_level(p: SequentialParams, period: float) -> float:
     """Return ln A for the chosen rate of false alarms, at one sample a period [s]."""
     return max(1.0, math.log(3600.0 / period / p.false_alarms_per_hour) - p.slack_nats)
 

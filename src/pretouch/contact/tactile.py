@@ -16,16 +16,17 @@ which fills while it is and empties more slowly while it is not; a unit whose ac
 neither raises a prior nor keeps free motion from being learnt, and contacts are found as without it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from pretouch.contact.cues import Cues
-from pretouch.params import DetectionParams
+from pretouch.contact.cues import Cue, Cues
+from pretouch.contact.detector import Body, Sample
+from pretouch.params import TouchSensorParams
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import FloatArray, IntArray, TouchReadings, TouchStatus
+from pretouch.types import FloatArray, IntArray, TouchStatus
 from pretouch.values import value
 
 _TOLERANCE_S = 1e-9
@@ -57,9 +58,9 @@ class TouchState:
     """(M,) time for which each was said to be touched, less what was given back [s]."""
 
 
-def touch_settings(model: RobotModel, skin: Skin, p: DetectionParams) -> TouchSettings | None:
-    """Return what is fixed of the units that have a touch sensor; None where none has, or they are not to be used."""
-    if not p.use_touch or p.method != "sequential" or not len(skin.touching):
+def touch_settings(model: RobotModel, skin: Skin, p: TouchSensorParams) -> TouchSettings | None:
+    """Return what is fixed of the units that have a touch sensor; None where none has."""
+    if not len(skin.touching):
         return None
     patches = [(k, touch) for k, unit in enumerate(skin.units) if (touch := unit.touch) is not None]
     unit, link = skin.touching, skin.link[skin.touching]
@@ -72,7 +73,7 @@ def touch_settings(model: RobotModel, skin: Skin, p: DetectionParams) -> TouchSe
     )  # fmt: skip
 
 
-def gain_of(share: FloatArray, p: DetectionParams) -> FloatArray:
+def gain_of(share: FloatArray, p: TouchSensorParams) -> FloatArray:
     """Return G (M,) of units whose patches cover these shares (M,) of their links."""
     false = min(1.0, p.false_touches_per_hour * p.false_touch_s / 3600.0)
     return np.asarray(share / false + 1.0 - share)
@@ -86,39 +87,53 @@ def surface_area(capsules: Capsules, link: int) -> float:
     return area if area > 0.0 else np.inf
 
 
-def touch_init(settings: TouchSettings | None) -> tuple[TouchState, ...]:
-    """Return what is remembered before the first step: one state, none where nothing can be touched."""
-    return () if settings is None else (TouchState(np.zeros(len(settings.unit))),)
+@dataclass(frozen=True)
+class TouchSensors(TouchSensorParams, Cue, name="touch"):
+    """The units' touch sensors: a contact is likelier on the link of a unit that is touched, and there is where."""
+
+    State = TouchState
+    reads = "touch"
+
+    def on(self, body: Body) -> "_TouchSensorsOn":
+        """Return the cue for an arm, its touch sensors looked up."""
+        return _TouchSensorsOn(**vars(self), settings=touch_settings(body.model, body.skin, self))
 
 
-def feel_touch(
-    state: tuple[TouchState, ...], settings: TouchSettings | None, readings: TouchReadings | None, kin: Kinematics,
-    now: float, period: float, p: DetectionParams,
-) -> tuple[Cues | None, tuple[TouchState, ...]]:  # fmt: skip
+@dataclass(frozen=True)
+class _TouchSensorsOn(TouchSensors):
+    """Touch sensors of one arm."""
+
+    settings: TouchSettings | None = field(default=None, compare=False)
+    """None where no unit has one."""
+
+    def init(self, body: Body) -> TouchState | None:
+        return None if self.settings is None else TouchState(np.zeros(len(self.settings.unit)))
+
+    def step(self, state: TouchState | None, body: Body, sample: Sample) -> tuple[Cues | None, TouchState | None]:
+        if self.settings is None or state is None:
+            return None, None
+        return said_by(state, self.settings, sample, body.period, self)
+
+
+def said_by(
+    state: TouchState, settings: TouchSettings, sample: Sample, period: float, p: TouchSensorParams
+) -> tuple[Cues | None, TouchState]:
     """Return what units say of a touch in one step, None where none is believed to be touched.
 
-    Args:
-        state: memory.
-        settings: see `touch_settings`.
-        readings: of all K units, of known shapes (`faults.sound_touch`); None of a skin that gave none.
-        kin: the arm's posture.
-        now: instant of the step [s].
-        period: of control [s].
-        p: parameters.
+    The touch readings of the sample are of all K units, of known shapes (`faults.sound_touch`); None of a skin that
+    gave none. `period` [s] is that of control.
     """
-    if settings is None:
-        return None, state
-    account = (state or touch_init(settings))[0].account
+    account, readings, kin = state.account, sample.touches, sample.kin
     if readings is None:
         said = np.zeros(len(account), np.bool_)
     else:
-        age = now - readings.stamp[settings.unit]
-        fresh = (age <= p.touch_fresh_s) & (age >= -_TOLERANCE_S) & (readings.status[settings.unit] == TouchStatus.OK)
+        age = sample.stamp - readings.stamp[settings.unit]
+        fresh = (age <= p.fresh_s) & (age >= -_TOLERANCE_S) & (readings.status[settings.unit] == TouchStatus.OK)
         said = fresh & readings.contact[settings.unit]
-    believed = np.flatnonzero(said & (account < p.touch_patience_s))
+    believed = np.flatnonzero(said & (account < p.patience_s))
     if said.any() or account.any():
-        filled = np.where(said, account + period, account - p.touch_forgiveness * period)
-        state = (TouchState(np.clip(filled, 0.0, p.touch_patience_s)),)
+        filled = np.where(said, account + period, account - p.forgiveness * period)
+        state = TouchState(np.clip(filled, 0.0, p.patience_s))
     if readings is None or not len(believed):
         return None, state
     link, gain = settings.link[believed], np.ones(len(kin.position))

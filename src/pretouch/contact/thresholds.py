@@ -66,8 +66,6 @@ def thresholds(
 class ThresholdNumbers(NamedTuple):
     """What is taken of `ThresholdParams`."""
 
-    alpha: float
-    lambda_: float
     f_base_n: float
     f_std_n: float
     sigma_max_n: float

@@ -3,6 +3,7 @@
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.params import WindowParams
 from pretouch.types import FloatArray
 from pretouch.values import value
 
@@ -93,17 +94,25 @@ def weighted_value(
     return value
 
 
-def add(state: WindowState, reading: FloatArray, alpha: float, lambda_: float) -> WindowState:
-    """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on."""
-    chunk, at, sums = place(state)
-    add_to(chunk, at, sums, state.count, state.full, reading, alpha, lambda_)
-    return added(state, chunk, sums)
-
-
-def place(state: WindowState) -> tuple[FloatArray, int, FloatArray]:
-    """Return copies of what the next value changes: its chunk, with the index in it, and the sums."""
+def add_force(state: WindowState, reading: FloatArray | None, p: WindowParams) -> WindowState:
+    """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on; None: nothing."""
+    if reading is None:
+        return state
     k, at = divmod(state.next, _CHUNK)
-    return state.chunks[k].copy(), at, state.sums.copy()
+    chunk, size = state.chunks[k].copy(), state.size
+    # Once a turn the sums are taken afresh, so that rounding errors never add up: O(1) on average. That is before the
+    # next value and not after the last one, for what a step says of its window is of the running sums.
+    sums = _afresh(state) if state.count == 1 or (state.count and state.next == 0) else state.sums.copy()
+    add_to(chunk, at, sums, state.count, state.full, reading, p.alpha, p.lambda_)
+    chunks = (*state.chunks[:k], chunk, *state.chunks[k + 1 :])
+    return WindowState(chunks, (state.next + 1) % size, min(state.count + 1, size), size, sums)
+
+
+def _afresh(state: WindowState) -> FloatArray:
+    """Sums (4, 3) of the values of a window, about the newest of them."""
+    origin = state.newest.copy()
+    values = state.ring[: state.count] - origin
+    return np.array([origin, origin, values.sum(axis=0), (values**2).sum(axis=0)])
 
 
 @compiled
@@ -111,7 +120,7 @@ def add_to(
     chunk: FloatArray, at: int, sums: FloatArray, count: int, full: bool, reading: FloatArray, alpha: float,
     lambda_: float,
 ) -> None:  # fmt: skip
-    """Change the chunk, at an index, and the sums (4, 3) as `add` says, for a window of `count` values so far."""
+    """Change the chunk, at an index, and the sums (4, 3) as `add_force` says, for a window of `count` values so far."""
     x = reading
     if full:
         x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), alpha, lambda_)
@@ -120,16 +129,3 @@ def add_to(
         new, old = x[i] - sums[_ORIGIN, i], gone - sums[_ORIGIN, i] if full else 0.0
         sums[_TOTAL, i] += new - old
         sums[_SQUARES, i] += new**2 - old**2
-
-
-def added(state: WindowState, chunk: FloatArray, sums: FloatArray) -> WindowState:
-    """Return the state after one more value, of which the chunk and the sums know already."""
-    k, size = state.next // _CHUNK, state.size
-    chunks = (*state.chunks[:k], chunk, *state.chunks[k + 1 :])
-    after = WindowState(chunks, (state.next + 1) % size, min(state.count + 1, size), size, sums)
-    if after.next == 0 or after.count == 1:
-        # once a turn the sums are taken afresh, so rounding errors never add up; O(1) on average
-        origin = sums[_NEWEST].copy()
-        values = after.ring[: after.count] - origin
-        sums[_ORIGIN], sums[_TOTAL], sums[_SQUARES] = origin, values.sum(axis=0), (values**2).sum(axis=0)
-    return after

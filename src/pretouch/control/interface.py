@@ -2,18 +2,18 @@
 
 from typing import Any
 
-import numpy as np
-
+from pretouch.compiled import Entry
 from pretouch.composition import Part
 from pretouch.control.joint_box import JointLimits
+from pretouch.control.motion_entry import Ended
 from pretouch.params import TaskParams
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState
+from pretouch.types import FloatArray, IntArray, Obstacles, RobotState
 from pretouch.values import value
 
 
 @value
-class Body:
+class MotionBody:
     """What does not change from step to step."""
 
     model: RobotModel
@@ -63,20 +63,35 @@ class Restricted:
     """(n,) least and (n,) largest joint velocities [rad/s]; what the acceleration does not allow comes later."""
 
 
+@value
+class CompiledRows:
+    """Rows that compiled code writes right before it solves: one call a step in place of two."""
+
+    motion: Entry[Ended]
+    """Takes `Step`, `Rows`, `Fixed`, and what belongs to it: writes the rows and ends with `motion_within`."""
+    room: tuple[FloatArray, FloatArray, IntArray]
+    """Fields of `Rows`."""
+    weight: float
+    """As in `Restricted`."""
+    numbers: tuple[Any, ...]
+    """What belongs to it, flattened."""
+
+
 class Restriction(Part, group="pretouch.restrictions"):
     """What keeps the body from what is near. A part of it is a frozen dataclass of its parameters."""
 
-    def on(self, body: Body) -> "Restriction":
+    def on(self, body: MotionBody) -> "Restriction":
         """Return what a controller works with: itself, or something with what does not change computed once."""
         return self
 
-    def init(self, body: Body) -> Any:
+    def init(self, body: MotionBody) -> Any:
         """Return what is remembered before the first step; None for nothing."""
         return None
 
     def step(
-        self, state: Any, body: Body, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
-    ) -> tuple[Restricted, Any]:  # fmt: skip
+        self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
+        request: MotionRequest,
+    ) -> tuple[Restricted | CompiledRows, Any]:  # fmt: skip
         """Return what is allowed in one step, and what to remember.
 
         Args:
@@ -88,20 +103,3 @@ class Restriction(Part, group="pretouch.restrictions"):
             request: what is asked of the arm.
         """
         raise NotImplementedError
-
-
-class _Unrestricted(Restriction):
-    """Allows everything."""
-
-    def __init__(self, n: int) -> None:
-        self._all = Restricted(np.zeros((0, n)), np.zeros(0), np.zeros(0, WHOLE), 0.0)
-
-    def step(
-        self, state: Any, body: Body, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
-    ) -> tuple[Restricted, Any]:  # fmt: skip
-        return self._all, state
-
-
-def restriction_on(part: Restriction | None, body: Body) -> Restriction:
-    """Return a restriction that works for a body; for None one that allows everything."""
-    return _Unrestricted(body.model.n) if part is None else part.on(body)

@@ -6,6 +6,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.control.qp import CostParams, damping, manipulability, mid_joint_velocity
+from pretouch.groups import ObstacleArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _DAMPING = 1e-6
@@ -72,17 +73,6 @@ def cost_with_null_space(
     return H, f
 
 
-class Near(NamedTuple):
-    """What the motion takes of K `Obstacles`."""
-
-    link: IntArray
-    """(K,) link that is closest."""
-    direction: FloatArray
-    """(K, 3) unit vectors from the body to the obstacle."""
-    body_distance: FloatArray
-    """(K,) between them [m]."""
-
-
 class NullSpaceLimits(NamedTuple):
     """How links before the hand move away."""
 
@@ -98,7 +88,7 @@ class NullSpaceLimits(NamedTuple):
 
 @compiled
 def away(
-    last: FloatArray, G: FloatArray, which: IntArray, obstacles: Near, moved_by: BoolArray,
+    last: FloatArray, G: FloatArray, which: IntArray, obstacles: ObstacleArrays, moved_by: BoolArray,
     limits: NullSpaceLimits,
 ) -> FloatArray:  # fmt: skip
     """Joint velocities (n,) [rad/s] that take body points before the hand away from what is near.

@@ -1,16 +1,14 @@
 """Restricting the body's approach to obstacles: eqs. 5-7, as rows G qd <= h of the QP."""
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import ByName, compiled, entry, inlined
-from pretouch.control.interface import Body, MotionRequest, Restricted, Restriction
 from pretouch.groups import ObstacleArrays
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
-from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Number, Obstacles, RobotState
+from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles
 from pretouch.values import value
 
 
@@ -147,52 +145,3 @@ def rows_into(kin: Kinematics, moved_by: BoolArray, obstacles: ObstacleArrays, p
                 )
         found += 1
     return found
-
-
-@dataclass(frozen=True)
-class ApproachRestriction(RestrictionParams, Restriction, name="paper"):
-    """Restricting the body's approach to obstacles, as in the paper (eqs. 5-7)."""
-
-    def on(self, body: Body) -> Restriction:
-        """Return the same with what compiled code takes of the parameters."""
-        return _OnBody(self, body)
-
-    def step(
-        self, state: Any, body: Body, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
-    ) -> tuple[Restricted, Any]:  # fmt: skip
-        """Return the rows of `approach_rows`; nothing is remembered."""
-        return self.on(body).step(state, body, kin, robot, obstacles, request)
-
-
-class _OnBody(Restriction):
-    """An `ApproachRestriction` that works for one body."""
-
-    def __init__(self, params: RestrictionParams, body: Body) -> None:
-        self._moved_by, self._numbers, n = body.model.moved_by, approach_params(params), body.model.n
-        self._weight = 0.0 if params.rows == "hard" else params.slack_weight
-        self._nothing = Restricted(np.zeros((0, n)), np.zeros(0), np.zeros(0, WHOLE), self._weight)
-
-    def step(
-        self, state: Any, body: Body, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
-    ) -> tuple[Restricted, Any]:  # fmt: skip
-        o, count = obstacles, len(obstacles.unit)
-        if count == 0:
-            return self._nothing, state
-        G, h, which = np.empty((count, len(robot.q))), np.empty(count), np.empty(count, WHOLE)
-        found = _rows.flat(
-            *kin, self._moved_by, o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
-            G, h, which, *self._numbers,
-        )  # fmt: skip
-        if found < count:
-            G, h, which = G[:found], h[:found], which[:found]
-        return Restricted(G, h, which, self._weight), state
-
-
-def of_table_i(part: Restriction | None) -> ApproachRestriction:
-    """Return a profile's restriction if it is of eqs. 5-7, else one with the values of Table I."""
-    return part if isinstance(part, ApproachRestriction) else ApproachRestriction()
-
-
-def notice_m(part: Restriction | None) -> float:
-    """Return from which body distance on a restriction allows everything [m]: its own, or Table I's."""
-    return float(getattr(part, "d_notice_m", ApproachRestriction.d_notice_m))

@@ -46,11 +46,11 @@ def coverage_figure(ways: Ways, coverage: Coverage, skin: Skin, new: frozenset[s
         axes.view_init(elev=elevation, azim=azimuth)
         axes.set_title(title, fontsize="medium")
     bar = figure.colorbar(ScalarMappable(scale, colours), ax=panels, shrink=0.8, pad=0.02)
-    bar.set_label("share of the ways to it seen in time")
+    bar.set_label("share of the paths to it seen in time")
     seen = 100 * coverage.arm.ways.value
     figure.suptitle(
-        f"{ways.model.description.name}, {len(skin)} units: {seen:.0f} % of the ways to its surface are seen in time"
-        " (grey: nothing can come, or the base)",
+        f"{ways.model.description.name}, {len(skin)} units: {seen:.0f} % of the paths to its surface are seen in time"
+        " (grey: the base, or no free path)",
         fontsize="medium",
     )
     return figure

@@ -74,7 +74,7 @@ def _of(name: str, surface: Surface, free: FloatArray, seen: FloatArray, points:
     # each point weighs as its area: capsules' points differ a little in what they stand for
     weight = area / area.sum()
     good = s.sum(axis=0) >= COVERED * np.maximum(f.sum(axis=0), 1.0)
-    return LinkShare(name, float(area.sum()), ratio(weight * s, weight * f), _of_points(good, weight))
+    return LinkShare(name, float(area.sum()), ratio(weight * s, weight * f), ratio((weight * good)[None], weight[None]))
 
 
 def ratio(seen: FloatArray, free: FloatArray) -> Share:
@@ -101,7 +101,3 @@ def _spread(parts: FloatArray) -> float:
     """Variance of a sum of independent parts (N,), by their scatter about 0."""
     n = len(parts)
     return float((parts**2).sum()) * (n / (n - 1) if n > 1 else 1.0)
-
-
-def _of_points(good: BoolArray, weight: FloatArray) -> Share:
-    return ratio((weight * good)[None], weight[None])

@@ -40,8 +40,8 @@ class CoverageParams(Checked):
         super().__post_init__()
         if self.first + self.run > self.last:
             raise ParameterError(
-                f"At these speeds a thing has to be seen {self.warning_m:.2f} m before it touches, but ways are"
-                f" {self.way_m:g} m long: give slower speeds, a greater deceleration, or longer ways."
+                f"At these speeds an object must be seen {self.warning_m:.2f} m before contact, but the paths are only"
+                f" {self.way_m:g} m long: give lower speeds, a greater deceleration, or longer paths (way_m)."
             )
 
     @property

@@ -42,8 +42,8 @@ def placement_for(model: RobotModel) -> Placement:
         if all(_followed(model, placement.path(trajectory, 1.0)) for trajectory in ("circle", "line")):
             return placement
     raise ExperimentError(
-        f"{model.description.name} can follow the paper's paths nowhere with its hand as in q_ready: give another"
-        " q_ready in robot.toml, the hand in front of the base and pointing down."
+        f"{model.description.name} cannot follow the paper's paths anywhere with its hand as in q_ready: give another"
+        " q_ready in robot.toml, with the hand in front of the base and pointing down."
     )
 
 

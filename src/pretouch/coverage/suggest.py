@@ -76,7 +76,8 @@ def suggest(ways: Ways, skin: Skin, count: int, places: tuple[SensorUnit, ...] |
     places = candidates(ways, skin) if places is None else places
     if not 1 <= count <= len(places):
         raise SkinError(
-            f"{count} more units are asked for, and {len(places)} places found: ask for 1 to {len(places)}."
+            f"{count} more units were requested, but only {len(places)} positions were found: request 1 to"
+            f" {len(places)}."
         )
     weight = (ways.surface.area[ways.point] * ways.free).ravel()
     weight /= max(float(weight.sum()), 1e-12)

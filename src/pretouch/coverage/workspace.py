@@ -84,7 +84,7 @@ def _anywhere(model: RobotModel, room: Fixtures, count: int, rng: np.random.Gene
         if len(found) == count:
             return np.array(found)
     raise ExperimentError(
-        f"{model.description.name} is clear of itself and the floor in too few postures: name another workspace."
+        f"{model.description.name} is free of itself and the floor in too few postures: choose another workspace."
     )
 
 

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from pretouch.hardware.health import UnitHealth
-from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.health import HealthParams, UnitHealth
 from pretouch.hardware.wire import Reset
 from pretouch.types import RangeStatus
 
@@ -17,10 +16,10 @@ _MEASURED = {s.name for s in (
 """Statuses that say that something is there, or that nothing near is; all others are of a sensor that failed."""
 _MOST_DIGITS = 4
 _ENDS: dict[int, str] = {
-    Reset.POWER_ON: "its power came on: see to its battery and plug",
-    Reset.HARD: "its reset line was pulled: see to its wiring",
-    Reset.WATCHDOG: "its watchdog ended a hang: see to its firmware and bus",
-    Reset.SOFT: "its program began anew: see to its firmware",
+    Reset.POWER_ON: "it was powered on: check its battery and plug",
+    Reset.HARD: "its reset line was pulled: check its wiring",
+    Reset.WATCHDOG: "its watchdog ended a hang: check its firmware and bus",
+    Reset.SOFT: "its program restarted: check its firmware",
 }
 
 Level = Literal["fault", "warning"]
@@ -61,18 +60,18 @@ def _silence(unit: UnitHealth, params: HealthParams) -> str:
     name, state = unit.unit, unit.standing.state
     if state == "greeting":
         return (
-            f"{name} says hello but opens no session: the answers do not reach it; let UDP to it pass the firewall and"
-            " the access point (no client isolation)."
+            f"{name} asks for a session but does not receive the answers: allow UDP to it through the firewall and the"
+            " access point (no client isolation)."
         )
     if state == "never heard":
         return (
-            f"{name} has not been heard: see that it has power and Wi-Fi, and that it was provisioned with this"
-            " host's address and port and with this key."
+            f"{name} has sent nothing so far: check its power and Wi-Fi, and that it was provisioned with this host's"
+            " address and port and with this key."
         )
     if unit.silent_s > params.silent_s:
         return (
-            f"{name} has sent nothing for {unit.silent_s:.1f} s (limit {params.silent_s:g} s):"
-            " see to its power and to its distance from the access point."
+            f"{name} has sent nothing for {unit.silent_s:.1f} s (limit {params.silent_s:g} s): check its power and its"
+            " distance from the access point."
         )
     return ""
 
@@ -81,8 +80,8 @@ def _range_finder(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     if unit.standing.stuck:
         yield Finding(
             unit.unit, "fault", "stuck",
-            f"{unit.unit} repeats {unit.distance_m:.3f} m to the last digit: its range finder hangs; restart the unit,"
-            " and replace the sensor if it comes again.",
+            f"{unit.unit} repeats {unit.distance_m:.3f} m to the last digit, so its range finder hangs: restart the"
+            " unit, and replace the sensor if this happens again.",
         )  # fmt: skip
     failed = {status: count for status, count in unit.statuses.items() if status not in _MEASURED}
     if failed:
@@ -90,8 +89,8 @@ def _range_finder(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
         yield from _beyond(
             unit, "status", 100 * sum(failed.values()) / sum(unit.statuses.values()),
             (100 * params.failed, 100 * params.failed_fault),
-            f" fails in {{value}}% of its readings ({kinds}; limit {{limit}}%): see to its wiring and supply, and"
-            " replace the sensor if it stays.",
+            f" fails in {{value}}% of its readings ({kinds}; limit {{limit}}%): check its wiring and supply, and"
+            " replace the sensor if this continues.",
         )  # fmt: skip
     yield from _beyond(
         unit, "sigma", 1000 * unit.sigma_m, (1000 * params.sigma_m,),
@@ -99,8 +98,8 @@ def _range_finder(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     )  # fmt: skip
     yield from _beyond(
         unit, "noise", 1000 * unit.noise_m, (1000 * params.noise_m,),
-        " scatters by {value} mm from reading to reading (limit {limit} mm): clean its window, and see that nothing"
-        " shiny or moving is before it.",
+        " scatters by {value} mm from reading to reading (limit {limit} mm): clean its window, and remove anything"
+        " shiny or moving in front of it.",
     )  # fmt: skip
 
 
@@ -108,13 +107,13 @@ def _touch_sensor(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     if unit.touched == 1.0 and unit.heard_s >= params.touch_held_s:
         yield Finding(
             unit.unit, "warning", "touch held",
-            f"{unit.unit} has said for {unit.heard_s:.0f} s that it is touched (limit {params.touch_held_s:g} s), and"
-            " is not believed for longer: see that no cable or case presses on it, and calibrate its touch sensor.",
+            f"{unit.unit} has reported a touch for {unit.heard_s:.0f} s (limit {params.touch_held_s:g} s), so its"
+            " touch sensor is ignored: check that no cable or case presses on it, and calibrate it.",
         )  # fmt: skip
     yield from _beyond(
         unit, "touch failed", 100 * unit.touch_failed, (100 * params.touch_failed,),
-        "'s touch sensor fails in {value}% of its readings (limit {limit}%): see to its leads and to the resistor"
-        " across it.",
+        "'s touch sensor fails in {value}% of its readings (limit {limit}%): check its leads and the resistor across"
+        " it.",
     )  # fmt: skip
 
 
@@ -122,37 +121,36 @@ def _rates(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     if _unbroken(unit, params):
         yield from _beyond(
             unit, "rate", unit.rate_hz, (params.rate_hz, params.rate_fault_hz),
-            " gives {value} readings a second (limit {limit}): see to its wiring and supply, and to its radio if"
-            " samples are lost.",
+            " gives {value} readings a second (limit {limit}): check its wiring and supply, and its radio if samples"
+            " are lost.",
             digits=1, below=True,
         )  # fmt: skip
     if unit.range_late >= params.range_late:
         yield Finding(
             unit.unit, "warning", "range late",
-            f"{unit.unit} had nothing measured in time {unit.range_late} times in {params.window_s:g} s (limit"
-            f" {params.range_late}): see to its interrupt line and bus.",
+            f"{unit.unit} had no new range in time {unit.range_late} times in {params.window_s:g} s (limit"
+            f" {params.range_late}): check its interrupt line and bus.",
         )  # fmt: skip
     yield from _beyond(
         unit, "loss", 100 * unit.loss, (100 * params.loss, 100 * params.loss_fault),
-        " loses {value}% of its samples on their way (limit {limit}%): bring the access point nearer, or take a free"
+        " loses {value}% of its samples in transmission (limit {limit}%): move the access point closer, or use a free"
         " channel.",
     )  # fmt: skip
     yield from _beyond(
         unit, "imu rate", unit.imu_rate_hz, (params.imu_rate_hz,),
-        " gives {value} IMU samples a second (limit {limit}): see to the IMU's wiring, and to its rate in the"
-        " firmware.",
+        " gives {value} IMU samples a second (limit {limit}): check the IMU's wiring and its rate in the firmware.",
         below=True,
     )  # fmt: skip
     yield from _beyond(
         unit, "imu loss", 100 * unit.imu_loss, (100 * params.imu_loss,),
         " loses {value}% of its IMU samples before they are sent (limit {limit}%): its loop is too slow for the IMU's"
-        " rate; lower that in the firmware.",
+        " rate; lower the rate in the firmware.",
     )  # fmt: skip
 
 
 def _clock(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     over = [
-        f"{kind} {_told(1000 * value, 1000 * limit)} ms (limit {1000 * limit:g} ms)"
+        f"{kind} {_formatted(1000 * value, 1000 * limit)} ms (limit {1000 * limit:g} ms)"
         for kind, value, limit in (
             ("in the median", unit.latency_s, params.latency_s),
             ("in one of twenty readings", unit.latency_late_s, params.latency_late_s),
@@ -162,28 +160,28 @@ def _clock(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     if over:
         yield Finding(
             unit.unit, "warning", "latency",
-            f"{unit.unit} is heard {' and '.join(over)} after its measurement: bring the access point nearer, and see"
-            " that its power save is off.",
+            f"{unit.unit}'s readings arrive late, {' and '.join(over)}: move the access point closer, and switch its"
+            " power saving off.",
         )  # fmt: skip
     if math.isfinite(unit.standing.bound) and _unbroken(unit, params):
         yield from _beyond(
             unit, "clock", 1000 * unit.standing.bound, (1000 * params.bound_s,),
-            "'s clock is known to {value} ms only (limit {limit} ms): the way to it is slow or one-sided; bring the"
-            " access point nearer.",
+            "'s clock is known only to within {value} ms (limit {limit} ms), because the network to it is slow or"
+            " asymmetric: move the access point closer.",
             digits=1,
         )  # fmt: skip
     if unit.clock_unknown_s >= params.settle_s:
         yield Finding(
             unit.unit, "fault", "clock",
-            f"{unit.unit}'s clock has not been known for {unit.clock_unknown_s:.0f} s (limit {params.settle_s:g} s), so"
-            " that none of its readings counts: it echoes no beacon in time; bring the access point nearer, and see to"
-            " its firmware.",
+            f"{unit.unit}'s clock has been unknown for {unit.clock_unknown_s:.0f} s (limit {params.settle_s:g} s), so"
+            " its readings are not used: it echoes no beacon in time; move the access point closer, and check its"
+            " firmware.",
         )  # fmt: skip
     if unit.clock_jumps:
         yield Finding(
             unit.unit, "warning", "clock jump",
             f"{unit.unit}'s clock jumped {unit.clock_jumps} times in {params.window_s:g} s: its crystal or firmware is"
-            " not sound; replace the board if it comes again.",
+            " faulty; replace the board if this happens again.",
         )  # fmt: skip
 
 
@@ -200,7 +198,7 @@ def _unit_itself(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     )  # fmt: skip
     yield from _beyond(
         unit, "temperature", unit.temperature_c, (params.temperature_c, params.temperature_fault_c),
-        " is at {value} degrees C (limit {limit}): take it from what heats it.",
+        " is at {value} degrees C (limit {limit}): move it away from the heat source.",
     )  # fmt: skip
     yield from _beyond(
         unit, "temperature", unit.temperature_c, (params.temperature_low_c,),
@@ -211,21 +209,21 @@ def _unit_itself(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     if unit.bus_errors >= params.bus_errors or unit.restarts:
         yield Finding(
             name, "warning", "bus",
-            f"{name} had {unit.bus_errors} failed transfers on its bus and {unit.restarts} sensors begun anew in"
-            f" {params.window_s:g} s (limits {params.bus_errors} and 1): see to the plugs and length of its wires.",
+            f"{name} had {unit.bus_errors} failed transfers on its bus and {unit.restarts} sensor restarts in"
+            f" {params.window_s:g} s (limits {params.bus_errors} and 1): check the plugs and the length of its wires.",
         )  # fmt: skip
     if unit.reboots >= params.reboots:
         yield Finding(
             name, "warning", "reboot",
-            f"{name} began anew {unit.reboots} times in {params.window_s:g} s (limit {params.reboots}):"
-            f" {_ENDS.get(unit.standing.reset, 'see to its supply and firmware')}.",
+            f"{name} restarted {unit.reboots} times in {params.window_s:g} s (limit {params.reboots}):"
+            f" {_ENDS.get(unit.standing.reset, 'check its supply and firmware')}.",
         )  # fmt: skip
     firmware = unit.standing.firmware
     if firmware and firmware < params.firmware:
         yield Finding(
             name, "fault", "firmware",
-            f"{name} runs firmware {version(firmware)} (oldest that is served: {version(params.firmware)}): flash it"
-            " anew (docs/how-to/flashing.md).",
+            f"{name} runs firmware {version(firmware)} (oldest supported: {version(params.firmware)}): flash it again"
+            " (docs/how-to/flashing.md).",
         )  # fmt: skip
 
 
@@ -239,11 +237,11 @@ def _beyond(
     """
     passed = [limit for limit in limits if (value < limit if below else value > limit)]
     if passed:
-        told = sentence.format(value=_told(value, passed[-1], digits), limit=f"{passed[-1]:g}")
+        told = sentence.format(value=_formatted(value, passed[-1], digits), limit=f"{passed[-1]:g}")
         yield Finding(unit.unit, "fault" if len(passed) > 1 else "warning", what, unit.unit + told)
 
 
-def _told(value: float, limit: float, digits: int = 0) -> str:
+def _formatted(value: float, limit: float, digits: int = 0) -> str:
     """Return a value with so many digits, or as many more as set it off from its limit."""
     while digits < _MOST_DIGITS and f"{value:.{digits}f}" == f"{limit:.{digits}f}":
         digits += 1

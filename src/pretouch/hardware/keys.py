@@ -33,10 +33,12 @@ class UnitKey:
     def __post_init__(self) -> None:
         if not isinstance(self.id, str) or not self.id or not self.id.isprintable():
             raise HardwareError(
-                f"The name of a unit is {self.id!r}: give it one that can be printed, as it stands in the skin."
+                f"The name of a unit is {self.id!r}: give it a printable name, the one in the skin file."
             )
         if type(self.number) is not int or not 1 <= self.number <= _LAST_NUMBER:
-            raise HardwareError(f"The number of unit {self.id} is {_told(self.number)}: choose 1 to {_LAST_NUMBER}.")
+            raise HardwareError(
+                f"The number of unit {self.id} is {_described(self.number)}: choose 1 to {_LAST_NUMBER}."
+            )
         if not isinstance(self.key, bytes) or len(self.key) != KEY_SIZE:
             size = f"{len(self.key)} bytes" if isinstance(self.key, bytes) else f"of type {type(self.key).__name__}"
             raise HardwareError(f"The key of unit {self.id} is {size}, not {KEY_SIZE} bytes: make one with new_key().")
@@ -46,7 +48,7 @@ class UnitKey:
         return f"UnitKey(id={self.id!r}, number={self.number})"
 
 
-def _told(number: object) -> str:
+def _described(number: object) -> str:
     """What stands in the place of a number: itself only if it is none of a key, which must not get into logs."""
     if not isinstance(number, int):
         return f"of type {type(number).__name__}"
@@ -100,11 +102,11 @@ def load_keys(path: Path) -> Keys:
     except OSError as error:
         raise HardwareError(f"The keys in {path} cannot be read: {error.strerror}.") from None
     except ValueError as error:
-        raise HardwareError(f"There can be no file {str(path)!r}: {error}.") from None
+        raise HardwareError(f"{str(path)!r} cannot be a file name: {error}.") from None
     try:
         tables = tomllib.loads(text.decode())
     except (ValueError, RecursionError) as error:
-        raise HardwareError(f"{path} is no TOML file of keys: {error}.") from None
+        raise HardwareError(f"{path} is not a TOML file of keys: {error}.") from None
     try:
         return Keys(_unit(id, table) for id, table in tables.items())
     except HardwareError as error:
@@ -114,28 +116,30 @@ def load_keys(path: Path) -> Keys:
 def _demand_private(status: os.stat_result, path: Path) -> None:
     if hasattr(os, "geteuid") and status.st_uid != os.geteuid():
         raise HardwareError(
-            f"{path} belongs to user {status.st_uid}, who can get at its keys:"
-            f" make it yours (chown {os.geteuid()} {path})."
+            f"{path} belongs to user {status.st_uid}, who can read its keys: make yourself its owner (chown"
+            f" {os.geteuid()} {path})."
         )
     mode = stat.S_IMODE(status.st_mode)
     if mode & 0o077:
         raise HardwareError(
-            f"{path} has the mode {mode:04o}, so that others can get at its keys:"
-            f" chmod 600 {path}, and make new keys if they may have been read."
+            f"{path} has the mode {mode:04o}, so others can read its keys: run chmod 600 {path}, and make new keys if"
+            " somebody may have read them."
         )
 
 
 def _unit(id: str, table: object) -> UnitKey:
     if not id.isprintable():
-        raise HardwareError(f"The name of a unit is {id!r}: give it one that can be printed.")
+        raise HardwareError(f"The name of a unit is {id!r}: give it a printable name.")
     if not isinstance(table, dict) or set(table) != {"number", "key"}:
         raise HardwareError(f"Unit {id} must have a number and a key, and nothing else.")
     if not isinstance(table["key"], str):
-        raise HardwareError(f"The key of unit {id} is no text: write it as {2 * KEY_SIZE} hexadecimal digits.")
+        raise HardwareError(f"The key of unit {id} is not text: write it as {2 * KEY_SIZE} hexadecimal digits.")
     try:
         key = bytes.fromhex(table["key"])
     except ValueError:
-        raise HardwareError(f"The key of unit {id} is not made of hexadecimal digits.") from None
+        raise HardwareError(
+            f"The key of unit {id} is not hexadecimal: write it as {2 * KEY_SIZE} hexadecimal digits."
+        ) from None
     return UnitKey(id, table["number"], key)
 
 
@@ -158,7 +162,7 @@ def save_keys(keys: Keys, path: Path) -> None:
     except OSError as error:
         raise HardwareError(f"The keys cannot be written to {path}: {error.strerror}.") from None
     except ValueError as error:
-        raise HardwareError(f"There can be no file {str(path)!r}: {error}.") from None
+        raise HardwareError(f"{str(path)!r} cannot be a file name: {error}.") from None
     finally:
         if unfinished is not None:
             os.unlink(unfinished)

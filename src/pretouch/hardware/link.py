@@ -79,7 +79,7 @@ class LinkParams(Checked):
     """Size asked of the system for the queue of arrived datagrams [KiB]; more than half of it is bookkeeping."""
 
 
-class Window:
+class ReplayWindow:
     """Which sequence numbers of a session have been accepted."""
 
     def __init__(self) -> None:
@@ -112,7 +112,7 @@ class Window:
         return WIDTH - self._seen.bit_count()
 
 
-class Allowance:
+class RateLimiter:
     """So many a second, and as many at once."""
 
     def __init__(self, rate: float) -> None:
@@ -133,43 +133,43 @@ class Allowance:
         return True
 
 
-class Answered:
+class AnsweredChallenges:
     """How often challenges were answered without being taken: those of recorded hellos, answered in vain, come last."""
 
     def __init__(self) -> None:
-        self._told: dict[bytes, tuple[int, float]] = {}
+        self._answers: dict[bytes, tuple[int, float]] = {}
 
-    def told(self, challenge: bytes) -> tuple[int, float]:
+    def answers(self, challenge: bytes) -> tuple[int, float]:
         """Return how often a challenge was answered, and when last [s]."""
-        return self._told.get(challenge, (0, -math.inf))
+        return self._answers.get(challenge, (0, -math.inf))
 
-    def worn(self, challenge: bytes) -> bool:
+    def exhausted(self, challenge: bytes) -> bool:
         """Whether a challenge was answered so often in vain that its unit hardly waits for another answer."""
-        return self.told(challenge)[0] >= _IN_VAIN
+        return self.answers(challenge)[0] >= _IN_VAIN
 
     def add(self, challenge: bytes, now: float, times: int = 1) -> None:
         """Count an answer; the challenge answered longest ago makes room."""
-        count = self.told(challenge)[0] + times
-        self._told.pop(challenge, None)
-        self._told[challenge] = count, now
-        if len(self._told) > _CHALLENGES:
-            del self._told[next(iter(self._told))]
+        count = self.answers(challenge)[0] + times
+        self._answers.pop(challenge, None)
+        self._answers[challenge] = count, now
+        if len(self._answers) > _CHALLENGES:
+            del self._answers[next(iter(self._answers))]
 
     def __len__(self) -> int:
-        return len(self._told)
+        return len(self._answers)
 
 
 class Session:
     """One challenge of a unit and one nonce of the receiver."""
 
-    def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float, place: int) -> None:
+    def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float, index: int) -> None:
         self.hello, self.nonce = hello, nonce
-        self.place = place
+        self.index = index
         """Its place in the order in which the unit's sessions were offered."""
         self.offered = self.asked = now
         """When it was offered, and asked for last [s]."""
         self.mac = session_mac(key, hello.challenge, nonce)
-        self.window = Window()
+        self.window = ReplayWindow()
         self.number = 0
         """Of the last beacon."""
         self.sent: dict[int, float] = {}
@@ -192,9 +192,9 @@ class Link:
         self.live: Session | None = None
         self._pending: dict[bytes, Session] = {}
         self._offers = 0
-        self._answers, self._tries = Allowance(params.answers_per_s), Allowance(params.tries_per_s)
-        self._samples = Allowance(params.samples_per_s)
-        self._answered = Answered()
+        self._answers, self._tries = RateLimiter(params.answers_per_s), RateLimiter(params.tries_per_s)
+        self._samples = RateLimiter(params.samples_per_s)
+        self._answered = AnsweredChallenges()
         self.beacon_due = math.inf
         """When the live session's next beacon is to be sent [s]; never while there is none."""
 
@@ -220,10 +220,10 @@ class Link:
         """Offer a session, in the place of the oldest if there are enough; None if others go before."""
         pending = self._pending
         if len(pending) >= self._params.pending_most:
-            worn = next((challenge for challenge in pending if self._answered.worn(challenge)), None)
-            if worn is None and self._answered.worn(hello.challenge):
+            exhausted = next((challenge for challenge in pending if self._answered.exhausted(challenge)), None)
+            if exhausted is None and self._answered.exhausted(hello.challenge):
                 return None
-            del pending[next(iter(pending)) if worn is None else worn]
+            del pending[next(iter(pending)) if exhausted is None else exhausted]
         self._offers += 1
         pending[hello.challenge] = Session(self._key, hello, self._draw(NONCE_SIZE), now, self._offers)
         return pending[hello.challenge]
@@ -260,7 +260,7 @@ class Link:
         """
         given_up = self.live.window.missing() if self.live else 0
         self.live = session
-        self._pending = {c: s for c, s in self._pending.items() if s.place > session.place}
+        self._pending = {c: s for c, s in self._pending.items() if s.index > session.index}
         self._answered.add(session.hello.challenge, now, _IN_VAIN)
         self.beacon_due = session.sent[session.number] + self._params.beacon_period_s
         return given_up
@@ -268,7 +268,7 @@ class Link:
     def beacon(self, now: float) -> bytes:
         """Return the live session's next beacon, to be sent at once; without a live session there is none."""
         if self.live is None:
-            raise RuntimeError("a unit without a session was to get a beacon")
+            raise RuntimeError("no beacon can be sent to a unit without a session")
         self.beacon_due = now + self._params.beacon_period_s
         return self.live.beacon(self._key, now)
 
@@ -294,5 +294,5 @@ class Link:
         left = self._answers.left(now)
         if left >= 0.5 * self._answers.rate:
             return True
-        count, last = self._answered.told(challenge)
+        count, last = self._answered.answers(challenge)
         return left >= 1.0 - _ROUNDING_S and count < _IN_VAIN and now - last >= 1.0

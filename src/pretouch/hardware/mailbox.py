@@ -6,10 +6,44 @@ and whatever order a processor shows the writes in.
 """
 
 import mmap
+import os
 import struct
+import sys
+import tempfile
+import weakref
+from multiprocessing import reduction
+from typing import Any
 from zlib import crc32
 
-from pretouch.hardware.shared import SharedMemory
+
+class SharedMemory:
+    """So many bytes, zero at first, that two processes share. Passed to a spawned process, it is the same memory there.
+
+    It has no name, so it is gone with the last of the two, however they end.
+    """
+
+    def __init__(self, size: int) -> None:
+        if sys.platform == "linux":
+            handle = os.memfd_create("pretouch", os.MFD_CLOEXEC)
+        else:
+            with tempfile.TemporaryFile() as file:
+                handle = os.dup(file.fileno())
+        os.ftruncate(handle, size)
+        self._open(handle, size)
+
+    def _open(self, handle: int, size: int) -> None:
+        self._handle, self.size = handle, size
+        self.bytes = mmap.mmap(handle, size)
+        self.count = memoryview(self.bytes)[:8].cast("Q")
+        """Its first 8 bytes as one number, `count[0]`; struct would write zeros first, for the other process to see."""
+        weakref.finalize(self, os.close, handle)
+
+    def __getstate__(self) -> tuple[Any, int]:
+        return reduction.DupFd(self._handle), self.size
+
+    def __setstate__(self, state: tuple[Any, int]) -> None:
+        self._open(state[0].detach(), state[1])
+
 
 _SLOT = struct.Struct("@QII")
 """Number of the value, from 1; its size; checksum."""
@@ -35,7 +69,7 @@ class Mailbox:
             raise ValueError(f"a value of {len(value)} bytes does not fit into the {self._most} of this mailbox")
         memory = self._memory.bytes
         number = self._memory.count[0] + 1
-        _fill(memory, self._place(number), number, value)
+        _fill(memory, self._offset(number), number, value)
         self._memory.count[0] = number
         return number
 
@@ -49,13 +83,13 @@ class Mailbox:
             number = self._memory.count[0]
             if number == self._last[0]:
                 break
-            value = _read(memory, self._place(number), number, self._most)
+            value = _read(memory, self._offset(number), number, self._most)
             if value is not None:
                 self._last = number, value
                 break
         return self._last
 
-    def _place(self, number: int) -> int:
+    def _offset(self, number: int) -> int:
         return _FIRST + number % _SLOTS * self._stride
 
 
@@ -77,7 +111,7 @@ class Ring:
         if len(value) > self._most:
             raise ValueError(f"a value of {len(value)} bytes does not fit into the {self._most} of this ring")
         self._written += 1
-        _fill(self._memory.bytes, self._place(self._written), self._written, value)
+        _fill(self._memory.bytes, self._offset(self._written), self._written, value)
         self._memory.count[0] = self._written
 
     def take(self) -> list[bytes]:
@@ -85,28 +119,28 @@ class Ring:
         written = self._memory.count[0]
         first = max(self._taken, written - self._slots) + 1
         found = [
-            _read(self._memory.bytes, self._place(number), number, self._most) for number in range(first, written + 1)
+            _read(self._memory.bytes, self._offset(number), number, self._most) for number in range(first, written + 1)
         ]
         self._taken = written
         return [value for value in found if value is not None]
 
-    def _place(self, number: int) -> int:
+    def _offset(self, number: int) -> int:
         return _FIRST + number % self._slots * self._stride
 
 
-def _fill(memory: mmap.mmap, place: int, number: int, value: bytes) -> None:
+def _fill(memory: mmap.mmap, offset: int, number: int, value: bytes) -> None:
     """Write a value and what guards it."""
-    _SLOT.pack_into(memory, place, number, len(value), crc32(value, number & 0xFFFFFFFF))
-    start = place + _SLOT.size
+    _SLOT.pack_into(memory, offset, number, len(value), crc32(value, number & 0xFFFFFFFF))
+    start = offset + _SLOT.size
     memory[start : start + len(value)] = value
 
 
-def _read(memory: mmap.mmap, place: int, number: int, most: int) -> bytes | None:
+def _read(memory: mmap.mmap, offset: int, number: int, most: int) -> bytes | None:
     """Return the value of this number, None if the slot holds another one or is being written."""
-    found, size, checksum = _SLOT.unpack_from(memory, place)
+    found, size, checksum = _SLOT.unpack_from(memory, offset)
     if found != number or size > most:
         return None
-    start = place + _SLOT.size
+    start = offset + _SLOT.size
     value = bytes(memory[start : start + size])
     return value if crc32(value, number & 0xFFFFFFFF) == checksum else None
 

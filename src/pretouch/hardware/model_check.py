@@ -52,7 +52,7 @@ class ModelCheck:
         count = len(skin)
         self._used = np.full(count, -np.inf)
         self._tests: list[deque[tuple[bool, float, float]]] = [deque(maxlen=params.tests) for _ in range(count)]
-        self._near = [_Near() for _ in range(count)]
+        self._near = [_NearReadings() for _ in range(count)]
         self._predicted(model.description.q_ready, np.ones(count, np.bool_))  # compiled before readings wait for it
 
     def take(self, q: FloatArray, readings: RangeReadings) -> None:
@@ -77,7 +77,7 @@ class ModelCheck:
             if covered:
                 self._near[k].take(float(seen[k]), position[k])
             else:
-                self._near[k] = _Near()
+                self._near[k] = _NearReadings()
 
     def _predicted(self, q: FloatArray, wanted: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the sensors are (K, 3), the nearest they can see of the model (K,), and what wanted ones must (K,)."""
@@ -100,18 +100,18 @@ class ModelCheck:
             yield Finding(
                 unit, "fault", "model",
                 f"{unit} reports {what} where the model has the arm or a fixture at {predicted:.2f} m, in"
-                f" {len(missed)} of {len(tests)} readings: see that it sits where the skin file says, that its window"
-                " is free, and that the fixtures are where they are said to be.",
+                f" {len(missed)} of {len(tests)} readings: check its pose in the skin file, its window, and the"
+                " positions of the fixtures.",
             )  # fmt: skip
         if near.count >= params.tests and near.moved >= params.moved_m:
             yield Finding(
                 unit, "fault", "covered",
-                f"{unit} reports {near.distance:.3f} m wherever it goes, over {near.moved:.1f} m, where the model has"
-                " nothing so near: its window is covered or its cover glass dirty; clean it.",
+                f"{unit} reports {near.distance:.3f} m everywhere along {near.moved:.1f} m of its motion, but the"
+                " model has nothing so close: its window is covered or its cover glass is dirty; clean it.",
             )  # fmt: skip
 
 
-class _Near:
+class _NearReadings:
     """For how long, and over how much of the room, a unit has read something near without a break."""
 
     def __init__(self) -> None:

@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pretouch.hardware.findings import Finding, findings
-from pretouch.hardware.health import UnitHealth, UnitWindow
-from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.health import HealthParams, UnitHealth, UnitWindow
 from pretouch.hardware.model_check import ModelCheck
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.traffic import Received
 from pretouch.types import FloatArray
 
-TURN_S = 0.25
+UPDATE_PERIOD_S = 0.25
 """Time between two judgements [s]: as often as a person can read."""
 _WAIT_S = 0.02
 """Time for which the socket is waited for at once [s]."""
@@ -22,13 +21,13 @@ _COMPARE_S = 0.04
 
 
 @dataclass(frozen=True)
-class Turn:
-    """What was heard since the turn before, and how the units are."""
+class MonitorUpdate:
+    """What was received since the previous update, and the health of the units."""
 
     time: float
     """Instant, by the receiver's clock [s]."""
     elapsed: float
-    """Since the first turn began [s]."""
+    """Since watching began [s]."""
     heard: list[Received]
     units: tuple[UnitHealth, ...]
     findings: tuple[Finding, ...]
@@ -47,13 +46,13 @@ class Posture:
 
 def watch(
     receiver: SkinReceiver, params: HealthParams, duration: float = math.inf, posture: Posture | None = None
-) -> Iterator[Turn]:
-    """Yield a turn every `TURN_S`, for a duration [s] by the receiver's monotonic clock; the last one says so."""
+) -> Iterator[MonitorUpdate]:
+    """Yield an update every `UPDATE_PERIOD_S` for a duration [s], by the monotonic clock; the last one is marked."""
     windows = [UnitWindow(unit.id, params.window_s) for unit in receiver.units]
     begun = due = compare_due = time.monotonic()
     over = False
     while not over:
-        due = min(due + TURN_S, begun + duration)
+        due = min(due + UPDATE_PERIOD_S, begun + duration)
         while (left := due - time.monotonic()) > 0:
             receiver.receive(min(left, _WAIT_S))
             if posture is not None and time.monotonic() >= compare_due:
@@ -68,8 +67,8 @@ def watch(
         found = findings(health, params)
         if posture is not None:
             found += posture.check.findings()
-        yield Turn(now, now - begun, heard, health, found, over)
-        due = max(due, time.monotonic() - TURN_S)
+        yield MonitorUpdate(now, now - begun, heard, health, found, over)
+        due = max(due, time.monotonic() - UPDATE_PERIOD_S)
 
 
 def _taken(window: UnitWindow, receiver: SkinReceiver, k: int, now: float, heard: list[Received]) -> UnitHealth:

@@ -18,7 +18,7 @@ from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver import keys_of, touch_readings
-from pretouch.hardware.receiver_process import Outlets, Traffic, serve
+from pretouch.hardware.receiver_process import SharedOutputs, Traffic, serve
 from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch, imu_readings
 from pretouch.hardware.udp import demand_port
 from pretouch.signals import kept_from_children
@@ -55,25 +55,25 @@ class NetworkSkin:
         units = keys_of(ids, keys)
         demand_port(host, port)
         if current_process().daemon:
-            raise HardwareError("A daemonic process may start no receiver: make this one with daemon=False.")
+            raise HardwareError("A daemonic process cannot start a receiver: create this process with daemon=False.")
         self._owner = os.getpid()
         self._params = params or LinkParams()
-        self._outlets = Outlets(tuple(ids), self._params.samples_most)
+        self._outputs = SharedOutputs(tuple(ids), self._params.samples_most)
         none = np.full(len(units), int(RangeStatus.NONE))
         self._nothing = RangeReadings(np.full(len(units), -np.inf), np.zeros(len(units)), none)
-        self._untold = Traffic(tuple(UnitTraffic(unit.id, unit.number) for unit in units), {}, 0)
+        self._no_traffic = Traffic(tuple(UnitTraffic(unit.id, unit.number) for unit in units), {}, 0)
         self._imu: list[Received] = []
         self._samples: list[Received] = []
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
-        arguments = (self._owner, units, (host, port), self._params, priority, self._outlets, theirs)
+        arguments = (self._owner, units, (host, port), self._params, priority, self._outputs, theirs)
         self._process = context.Process(target=serve, args=arguments, daemon=True)
         with kept_from_children({SIGINT}):
             self._process.start()
         theirs.close()
         try:
             with ours:
-                self.address, self.buffer_bytes, self.filtered = _greeted(ours)
+                self.address, self.buffer_bytes, self.filtered = _wait_listening(ours)
         except BaseException:
             self.close()
             raise
@@ -82,7 +82,7 @@ class NetworkSkin:
     def alive(self) -> bool:
         """Whether the receiver's process runs; only the process that started it can tell."""
         if os.getpid() != self._owner:
-            raise HardwareError(f"The receiver belongs to process {self._owner}: ask there whether it lives.")
+            raise HardwareError(f"The receiver belongs to process {self._owner}: query it in that process.")
         return self._process.is_alive()
 
     @property
@@ -105,7 +105,7 @@ class NetworkSkin:
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit, stamped with the earliest instant it can be of."""
-        value = self._outlets.readings()
+        value = self._outputs.readings()
         if value is None:
             return self._nothing
         table = np.frombuffer(value).reshape(3, -1)
@@ -113,7 +113,7 @@ class NetworkSkin:
 
     def touch(self) -> TouchReadings | None:
         """Return the newest touch reading of each unit; None while no unit has told one."""
-        value = self._outlets.touch()
+        value = self._outputs.touch()
         return None if value is None else touch_readings(np.frombuffer(value).reshape(4, -1))
 
     def take_samples(self) -> list[Received]:
@@ -134,25 +134,29 @@ class NetworkSkin:
 
     def traffic(self) -> Traffic:
         """Return what the receiver has counted, not older than 0.6 s while it lives."""
-        return self._outlets.traffic() or self._untold
+        return self._outputs.traffic() or self._no_traffic
 
     def _take(self) -> None:
         """Share what came between the two who take it; what one of them never takes is bounded."""
-        came, most = self._outlets.take_samples(), self._params.samples_most
+        came, most = self._outputs.take_samples(), self._params.samples_most
         self._samples += came
         self._imu += [received for received in came if received.sample.imu_count]
         del self._samples[:-most], self._imu[:-most]
 
 
-def _greeted(started: Connection) -> tuple[tuple[str, int], int, bool]:
+def _wait_listening(started: Connection) -> tuple[tuple[str, int], int, bool]:
     """Wait for the receiver to listen: return its address, length of queue [B], and whether the kernel filters."""
     try:
-        said = started.recv() if started.poll(_START_S) else f"No receiver started within {_START_S:g} s: try again."
-    except EOFError:
-        said = (
-            "The receiver's process ended before it listened: what it printed tells why"
-            ' (a script must start it under `if __name__ == "__main__":`).'
+        answer = (
+            started.recv()
+            if started.poll(_START_S)
+            else (f"The receiver did not start within {_START_S:g} s: try again.")
         )
-    if isinstance(said, str):
-        raise HardwareError(said)
-    return said
+    except EOFError:
+        answer = (
+            "The receiver's process ended before it listened: see what it printed (a script must start it under `if"
+            ' __name__ == "__main__":`).'
+        )
+    if isinstance(answer, str):
+        raise HardwareError(answer)
+    return answer

@@ -62,16 +62,19 @@ class Network:
 
     def __post_init__(self) -> None:
         if not 1 <= _size(self.ssid, "network's name") <= _SSID_MOST or "\0" in self.ssid:
-            raise HardwareError(f"The network's name {self.ssid!r} is none: give 1 to {_SSID_MOST} bytes.")
+            raise HardwareError(f"The network's name {self.ssid!r} is not valid: give 1 to {_SSID_MOST} bytes.")
         size = _size(self.password, "password")
         if (size and not _PASSWORD_LEAST <= size <= _PASSWORD_MOST) or "\0" in self.password:
             raise HardwareError(
-                f"The password has {size} bytes: WPA has {_PASSWORD_LEAST} to {_PASSWORD_MOST}, an open network none."
+                f"The password has {size} bytes: give {_PASSWORD_LEAST} to {_PASSWORD_MOST} for WPA, or leave it empty"
+                " for an open network."
             )
         try:
             address = ipaddress.IPv4Address(self.host)
         except ValueError:
-            raise HardwareError(f"The host {self.host!r} is no IPv4 address: give one as 192.168.1.10.") from None
+            raise HardwareError(
+                f"The host {self.host!r} is not an IPv4 address: give one such as 192.168.1.10."
+            ) from None
         if address.packed[0] in _NO_HOSTS or address.packed[0] >= _FIRST_MULTICAST:
             raise HardwareError(
                 f"A unit cannot send to {self.host}: give the address this machine has in the unit's network."
@@ -80,7 +83,8 @@ class Network:
             raise HardwareError(f"The port is {self.port}: give one from 1 to 65535.")
         if not 0 <= self.battery_full_mv <= _FULL_MOST_MV:
             raise HardwareError(
-                f"The battery fills the converter at {self.battery_full_mv} mV: give 0 to {_FULL_MOST_MV}, as 5000."
+                f"The battery voltage at the converter's full scale is {self.battery_full_mv} mV: give 0 to"
+                f" {_FULL_MOST_MV}, for example 5000."
             )
 
         limits = {"touch_ohm": (0, 1_000_000), "touch_least_mn": (1, 100_000), "touch_mn_per_us": (1, 10_000)}
@@ -122,12 +126,12 @@ def greet(line: Line, timeout: float = GREET_S) -> Peer:
                 return _peer(answer)
     if answers.rubbish:
         raise HardwareError(
-            f"Something answers, but no unit of ours ({_shown(answers.rubbish)}): flash the firmware first, and see"
-            " that nothing else uses the line."
+            f"Something answers that is not a Pretouch unit ({_shown(answers.rubbish)}): flash the firmware first, and"
+            " check that nothing else uses the line."
         )
     raise HardwareError(
-        f"Nothing answers within {timeout:g} s: press the unit's reset button and try again; if it stays mute, flash"
-        " the firmware."
+        f"Nothing answers within {timeout:g} s: press the unit's reset button and try again; if it still does not"
+        " answer, flash the firmware."
     )
 
 
@@ -153,11 +157,11 @@ def provision(line: Line, key: UnitKey, network: Network, timeout: float = ANSWE
         peer = _peer(answer)
         if (peer.unit, peer.fingerprint) != (key.number, fingerprint(key.key)):
             raise HardwareError(
-                f"The unit says it is number {peer.unit} with the key {peer.fingerprint}, and should be {key.number}"
-                f" with {fingerprint(key.key)}: press its reset button and do it again."
+                f"The unit says it is number {peer.unit} with the key {peer.fingerprint}, but should be {key.number}"
+                f" with {fingerprint(key.key)}: press its reset button and try again."
             )
         return peer
-    raise HardwareError(f"The unit does not answer within {timeout:g} s: press its reset button and do it again.")
+    raise HardwareError(f"The unit does not answer within {timeout:g} s: press its reset button and try again.")
 
 
 def differs(peer: Peer, key: UnitKey) -> str:
@@ -225,7 +229,7 @@ def _size(text: str, name: str) -> int:
     try:
         return len(text.encode())
     except UnicodeEncodeError:
-        raise HardwareError(f"The {name} is no Unicode text: give it in UTF-8.") from None
+        raise HardwareError(f"The {name} is not Unicode text: give it in UTF-8.") from None
 
 
 def _shown(data: bytes) -> str:

@@ -15,9 +15,9 @@ import numpy as np
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
-from pretouch.hardware.station import NO_READING, NO_TOUCH, Address, Station
 from pretouch.hardware.traffic import REASONS, ImuBatch, Received, UnitTraffic, imu_batch
 from pretouch.hardware.udp import attach_filter, bind
+from pretouch.hardware.unit_endpoint import NO_READING, NO_TOUCH, Address, UnitEndpoint
 from pretouch.hardware.wire import (
     HELLO_SIZE,
     IMU_MOST,
@@ -42,7 +42,7 @@ _TOUCH = int(Flag.TOUCH)
 _COUNT_AT = PREFIX.size + SAMPLE.size - struct.calcsize("<BBHII")
 """Where a sample says how many."""
 _LEAST = min(HELLO_SIZE, SAMPLE_LEAST)
-_CHORES_S = 0.02
+_BEACON_CHECK_S = 0.02
 """Time between two looks for beacons that are due [s]."""
 _CHECK_EVERY = 256
 """Datagrams after which a flood makes room for the beacons."""
@@ -57,7 +57,7 @@ def keys_of(ids: Sequence[str], keys: Keys) -> tuple[UnitKey, ...]:
     if missing:
         raise HardwareError(f"There is no key for {', '.join(missing)}: add it to the file of keys.")
     if len(set(ids)) != len(ids):
-        raise HardwareError(f"A unit stands twice in {', '.join(ids)}: name each once.")
+        raise HardwareError(f"A unit is named twice in {', '.join(ids)}: name each unit once.")
     return tuple(keys[id] for id in ids)
 
 
@@ -106,12 +106,12 @@ class SkinReceiver:
         """Stamps [s], distances [m] and statuses of the newest readings, (3, K); not to be written to."""
         self.touch_table = np.array([NO_TOUCH]).T.repeat(len(units), axis=1)
         """Stamps [s], contacts, forces [N] and statuses of the newest touch readings, (4, K); as that."""
-        self._stations = [
-            Station(i, unit, self._params, draw, self.table[:, i], self.touch_table[:, i])
+        self._endpoints = [
+            UnitEndpoint(i, unit, self._params, draw, self.table[:, i], self.touch_table[:, i])
             for i, unit in enumerate(units)
         ]
-        self._by_number = {unit.number: station for unit, station in zip(units, self._stations, strict=True)}
-        self.units: tuple[UnitTraffic, ...] = tuple(station.traffic for station in self._stations)
+        self._by_number = {unit.number: endpoint for unit, endpoint in zip(units, self._endpoints, strict=True)}
+        self.units: tuple[UnitTraffic, ...] = tuple(endpoint.traffic for endpoint in self._endpoints)
         self.rejected: dict[str, int] = dict.fromkeys(REASONS, 0)
         """How many datagrams were thrown away, by reason (`traffic.REASONS`)."""
         self.unsent = 0
@@ -121,7 +121,7 @@ class SkinReceiver:
         self._samples: deque[Received] = deque(maxlen=self._params.samples_most)
         self._imu: deque[Received] = deque(maxlen=self._params.samples_most)
         self._deliver = deliver
-        self._clock, self._next_chores = clock, -np.inf
+        self._clock, self._next_beacon_check = clock, -np.inf
         self._buffer = bytearray(2048)
         self._view = memoryview(self._buffer)
         self._socket = bind(host, port, 1024 * self._params.buffer_kib)
@@ -163,24 +163,24 @@ class SkinReceiver:
         """
         if self._socket.fileno() < 0:
             raise HardwareError("The receiver is closed: make another one.")
-        self._chores()
+        self._send_due_beacons()
         accepted, any_came = self._drain()
         if any_came or timeout <= 0:
             return accepted
         end = time.monotonic() + timeout
         while (left := end - time.monotonic()) > 0:
-            if self._poll.poll(1e3 * min(left, _CHORES_S)):
-                self._chores()
+            if self._poll.poll(1e3 * min(left, _BEACON_CHECK_S)):
+                self._send_due_beacons()
                 return self._drain()[0]
-            self._chores()
+            self._send_due_beacons()
         return 0
 
     def forget_times(self) -> None:
         """Know no reading and no unit's clock until the next beacons are echoed: the host's clock stood still."""
         now = self._clock()
-        for station in self._stations:
-            station.forget_time(now)
-        self._next_chores = now
+        for endpoint in self._endpoints:
+            endpoint.forget_time(now)
+        self._next_beacon_check = now
 
     def readings(self) -> RangeReadings:
         """Return the newest reading of each unit, stamped with the earliest instant it can be of."""
@@ -223,7 +223,7 @@ class SkinReceiver:
             elif reason:
                 self.rejected[reason] += 1
             if not k % _CHECK_EVERY:
-                self._chores()
+                self._send_due_beacons()
         self.taken = self._params.drain_most
         return accepted, True
 
@@ -240,16 +240,16 @@ class SkinReceiver:
             return "format"
         elif size != HELLO_SIZE:
             return "size"
-        station = self._by_number.get(number)
-        if station is None:
+        endpoint = self._by_number.get(number)
+        if endpoint is None:
             return "unit"
         if head == _HELLO:
-            answer = station.hello(datagram, now)
+            answer = endpoint.hello(datagram, now)
             if isinstance(answer, str):
                 return answer
             self._send(answer, address)
             return ""
-        received = station.sample(datagram, sequence, address, now)
+        received = endpoint.sample(datagram, sequence, address, now)
         if isinstance(received, str):
             return received
         if self._deliver is not None:
@@ -260,15 +260,15 @@ class SkinReceiver:
             self._imu.append(received)
         return None
 
-    def _chores(self) -> None:
+    def _send_due_beacons(self) -> None:
         """Send the beacons that are due."""
         now = self._clock()
-        if now < self._next_chores:
+        if now < self._next_beacon_check:
             return
-        self._next_chores = now + _CHORES_S
-        for station in self._stations:
-            if station.beacon_due(now) and station.address is not None:
-                self._send(station.beacon(self._clock()), station.address)
+        self._next_beacon_check = now + _BEACON_CHECK_S
+        for endpoint in self._endpoints:
+            if endpoint.beacon_due(now) and endpoint.address is not None:
+                self._send(endpoint.beacon(self._clock()), endpoint.address)
 
     def _send(self, beacon: bytes, address: Address) -> None:
         """Send, or count what cannot be sent: another beacon follows."""

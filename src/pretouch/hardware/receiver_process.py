@@ -25,7 +25,7 @@ _PAUSE_S = 0.008
 cost three times the processor time."""
 _MANY, _SHORT_PAUSE_S = 64, 0.001
 """Datagrams in one look that are a flood, which must not pile up, and the pause then [s]."""
-_TELL_S = 0.5
+_TRAFFIC_PERIOD_S = 0.5
 """Time between two accounts of the traffic [s]."""
 _WAIT_S = 0.05
 """Longest wait for a datagram [s]."""
@@ -49,7 +49,7 @@ class Traffic:
     """Beacons the system did not take."""
 
 
-class Outlets:
+class SharedOutputs:
     """Where a receiver puts what it has; as an argument of a process that is being spawned it is the same there."""
 
     def __init__(self, ids: tuple[str, ...], samples_most: int) -> None:
@@ -107,7 +107,7 @@ def _unpack(record: bytes) -> Received:
     index, arrival, stamp, offset, bound = _RECORD.unpack_from(record)
     sample = sample_of(record[_RECORD.size :])
     if sample is None:
-        raise RuntimeError("a sample that was taken in has another length than it says")
+        raise RuntimeError("the length of a stored sample differs from its header")
     return Received(index, arrival, stamp, offset, bound, sample)
 
 
@@ -135,23 +135,23 @@ class SuspendWatch:
         return told - known > _SUSPENDED_S
 
 
-def _go_first(priority: int | None) -> None:
+def _set_priority(priority: int | None) -> None:
     if priority is None:
         return
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except (AttributeError, OSError) as error:
         raise HardwareError(
-            f"The receiver's process cannot have the real-time priority {priority} ({error}):"
-            " raise the limit `rtprio` (docs/how-to/realtime.md), or leave the priority out."
+            f"The receiver's process could not get the real-time priority {priority} ({error}): raise the limit"
+            " `rtprio` (docs/how-to/realtime.md), or run without a priority."
         ) from None
 
 
-class Service:
+class ReceiverService:
     """A receiver whose readings and samples go to outlets."""
 
     def __init__(
-        self, units: tuple[UnitKey, ...], address: tuple[str, int], params: LinkParams, outlets: Outlets,
+        self, units: tuple[UnitKey, ...], address: tuple[str, int], params: LinkParams, outputs: SharedOutputs,
         suspended: Callable[[], float] = suspended,
     ) -> None:  # fmt: skip
         """Listen; see `SkinReceiver` and `SuspendWatch`."""
@@ -159,9 +159,9 @@ class Service:
         self.receiver = SkinReceiver(
             [unit.id for unit in units], Keys(units), *address, params=params, deliver=self._keep
         )
-        self._outlets, self._watch = outlets, SuspendWatch(suspended)
+        self._outputs, self._watch = outputs, SuspendWatch(suspended)
 
-    def turn(self) -> None:
+    def step(self) -> None:
         """Wait for datagrams if none are there, and give away what they brought."""
         accepted = self.receiver.receive(_WAIT_S)
         if self._watch.noticed():
@@ -169,9 +169,9 @@ class Service:
             self._records.clear()
         elif not accepted:
             return
-        self._outlets.put_readings(self.receiver.table.tobytes())
-        self._outlets.put_touch(self.receiver.touch_table.tobytes())
-        self._outlets.put_samples(self._records)
+        self._outputs.put_readings(self.receiver.table.tobytes())
+        self._outputs.put_touch(self.receiver.touch_table.tobytes())
+        self._outputs.put_samples(self._records)
         self._records.clear()
 
     def _keep(self, received: Received, datagram: memoryview) -> None:
@@ -184,14 +184,14 @@ def serve(
     address: tuple[str, int],
     params: LinkParams,
     priority: int | None,
-    outlets: Outlets,
+    outputs: SharedOutputs,
     started: Connection,
 ) -> None:
     """Receive until the parent is gone, or kills this process; tell it the address, or as a sentence what is wrong."""
     leave_to_parent({SIGINT})
     try:
-        _go_first(priority)
-        service = Service(units, address, params, outlets)
+        _set_priority(priority)
+        service = ReceiverService(units, address, params, outputs)
     except HardwareError as error:
         started.send(str(error))
         return
@@ -201,13 +201,13 @@ def serve(
     with receiver:
         started.send((receiver.address, receiver.buffer_bytes, receiver.filtered))
         started.close()
-        tell_at = -1.0
+        report_at = -1.0
         while True:
-            service.turn()
+            service.step()
             now = time.monotonic()
-            if now >= tell_at:
-                tell_at = now + _TELL_S
-                outlets.put_traffic(Traffic(receiver.units, receiver.rejected, receiver.unsent))
+            if now >= report_at:
+                report_at = now + _TRAFFIC_PERIOD_S
+                outputs.put_traffic(Traffic(receiver.units, receiver.rejected, receiver.unsent))
                 if os.getppid() != parent:
                     return
             if not receiver.behind:

@@ -44,7 +44,7 @@ class SerialLine:
         except (termios.error, OSError) as error:
             os.close(self._handle)
             raise HardwareError(
-                f"{self._device} is no serial line: give the unit's device{_there_are(', one of ')}."
+                f"{self._device} is not a serial line: give the unit's device{_there_are(', one of ')}."
             ) from error
 
     def reset(self) -> None:
@@ -66,7 +66,9 @@ class SerialLine:
         until, left = time.monotonic() + timeout, memoryview(data)
         while left:
             if not select.select([], [self._handle], [], max(0.0, until - time.monotonic()))[1]:
-                raise HardwareError(f"{self._device} takes nothing for {timeout:g} s: unplug the unit and plug it in.")
+                raise HardwareError(
+                    f"{self._device} accepted no data for {timeout:g} s: unplug the unit and plug it in again."
+                )
             try:
                 left = left[os.write(self._handle, left) :]
             except OSError as error:
@@ -96,8 +98,8 @@ class SerialLine:
     def _gone(self, error: OSError | None) -> HardwareError:
         why = f" ({error.strerror})" if error else ""
         return HardwareError(
-            f"{self._device} went away{why}: if the unit has USB of its own, start the command within 3 s after its"
-            " reset; else plug it in again, with a sound cable."
+            f"{self._device} disappeared{why}: if the unit's chip has its own USB, start the command within 3 s after a"
+            " reset; otherwise plug it in again with a good cable."
         )
 
     def __enter__(self) -> Self:
@@ -114,9 +116,12 @@ def _not_opened(device: Path, error: OSError) -> str:
             f"{_there_are(', or give one of ')}."
         )
     if error.errno in (errno.EACCES, errno.EPERM):
-        return f"{device} may not be opened by you: join its group, `sudo usermod -aG dialout $USER`, and log in again."
+        return (
+            f"You have no permission to open {device}: join its group with `sudo usermod -aG dialout $USER`, and log in"
+            " again."
+        )
     if error.errno == errno.EBUSY:
-        return f"{device} is in use by another program: end that, as a serial monitor or flasher."
+        return f"{device} is in use by another program: end it (a serial monitor or flasher)."
     return f"{device} cannot be opened: {error.strerror}: give the unit's serial device{_there_are(', one of ')}."
 
 

@@ -1,4 +1,4 @@
-"""A UDP socket that stands a flood: a long queue, and a filter in the kernel where there is one."""
+"""A UDP socket that withstands a flood: a long queue, and a kernel filter where there is one."""
 
 import ctypes
 import errno
@@ -16,7 +16,9 @@ _SO_RCVBUFFORCE, _SO_ATTACH_FILTER = 33, 26
 def demand_port(host: str, port: int) -> None:
     """Raise a HardwareError for what is no port."""
     if type(port) is not int or not 0 <= port <= 0xFFFF:
-        raise HardwareError(f"There is no port {port!r} at {host}: choose one from 1 to 65535, or 0 for any.")
+        raise HardwareError(
+            f"The port {port!r} for {host} is not valid: choose one from 1 to 65535, or 0 for any free port."
+        )
 
 
 def bind(host: str, port: int, buffer_bytes: int) -> socket.socket:
@@ -28,7 +30,7 @@ def bind(host: str, port: int, buffer_bytes: int) -> socket.socket:
         )[0]
         opened = socket.socket(family, kind, protocol)
     except (OSError, UnicodeError) as error:
-        raise HardwareError(f"There is no address {host}, port {port}, to listen at: {error}.") from None
+        raise HardwareError(f"The address {host}, port {port}, cannot be listened on: {error}.") from None
     try:
         opened.setblocking(False)
         _widen(opened, buffer_bytes)
@@ -37,9 +39,9 @@ def bind(host: str, port: int, buffer_bytes: int) -> socket.socket:
         opened.close()
         if error.errno == errno.EADDRINUSE:
             raise HardwareError(
-                f"Port {port} of {host} is taken: end the program that listens there, or choose another port."
+                f"Port {port} of {host} is in use: end the program that listens there, or choose another port."
             ) from None
-        raise HardwareError(f"Nothing can listen at {host}, port {port}: {error.strerror}.") from None
+        raise HardwareError(f"Listening on {host}, port {port}, failed: {error.strerror}.") from None
     return opened
 
 

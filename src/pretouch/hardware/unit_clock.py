@@ -53,7 +53,7 @@ class UnitClock:
         """Most the true offset can differ from `offset` [s]."""
         return 0.5 * (self.high - self.low)
 
-    def heard(self, made: float, arrival: float, sent: float | None, hold: float) -> bool:
+    def update(self, made: float, arrival: float, sent: float | None, hold: float) -> bool:
         """Take in a sample; return False if it contradicts what was known, which is forgotten then.
 
         Args:
@@ -65,8 +65,8 @@ class UnitClock:
         newest = self._newest = max(self._newest, made)
         _insert(self._highs, made, self._drift * made - (arrival - made))
         if sent is not None:
-            heard = made - hold
-            _insert(self._lows, heard, sent - heard - TICK + self._drift * heard)
+            echoed = made - hold
+            _insert(self._lows, echoed, sent - echoed - TICK + self._drift * echoed)
         self.high = self._drift * newest - self._highs[0][1]
         if not self._lows:
             _expire(self._highs, newest - self._window)

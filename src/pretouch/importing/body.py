@@ -67,7 +67,7 @@ def body_of(arm: Arm, most: int = MOST, cover: bool = False) -> tuple[tuple[Link
     remarks = []
     visual = [link.name for link in arm.source.links if link.visual and not link.collision]
     if visual:
-        remarks.append(f"Without collision geometry, so fitted to what is drawn: {', '.join(visual)}.")
+        remarks.append(f"Without collision geometry, so fitted to the visual geometry: {', '.join(visual)}.")
     shapes = {i: link.collision or link.visual for i, link in enumerate(arm.source.links)}
     # every mesh is read before the first link is fitted: what is wrong with one is said at once
     surfaces = {i: _surface(arm.source.links[i].name, own) for i, own in shapes.items() if own}

@@ -40,12 +40,12 @@ def arm_of(source: Source, ee: str = "") -> Arm:
         end, others = _likeliest_end(source, trunk)
         if grips:
             remarks.append(
-                f"{grips} is taken for a gripper's joint, no joint of the arm; --ee"
-                f" {_moved_by(source, grips)} makes it one."
+                f"{grips} is treated as a gripper's joint, not as a joint of the arm; --ee {_moved_by(source, grips)}"
+                " includes it."
             )
         if others:
-            remarks.append(f"The end-effector is taken to be {source.links[end].name}; --ee chooses another one:"
-                           f" {', '.join(source.links[i].name for i in others)}.")  # fmt: skip
+            remarks.append(f"The end-effector is assumed to be {source.links[end].name}; choose another"
+                           f" one with --ee: {', '.join(source.links[i].name for i in others)}.")  # fmt: skip
     way = source.ancestors(end)
     joints = tuple(joint for i in way for joint in source.links[i].joints)
     _check_chain(source, end, joints)
@@ -53,7 +53,7 @@ def arm_of(source: Source, ee: str = "") -> Arm:
     if fixed:
         remarks.append(
             f"{_counted(fixed)} off the arm {'is' if len(fixed) == 1 else 'are'} fixed at 0, or at the nearest limit:"
-            f" {', '.join(fixed)}. Give fingers that are to be closed otherwise their place in the file."
+            f" {', '.join(fixed)}. To close fingers differently, set their positions in the file."
         )
     return Arm(Source(source.name, links), end, joints, tuple(remarks))
 
@@ -159,11 +159,15 @@ def _check_chain(source: Source, end: int, joints: tuple[SourceJoint, ...]) -> N
         before = next(link.parent for link in source.links if joint in link.joints)
         way_out = f"choose an end-effector before it by --ee, such as {source.links[max(before, 0)].name}, or fix it"
         if joint.kind == "slide":
-            raise RobotModelError(f"The joint {joint.name} slides, only hinges are supported: {way_out} in the file.")
+            raise RobotModelError(
+                f"The joint {joint.name} is prismatic, but only hinge joints are supported: {way_out} in the file."
+            )
         if joint.kind == "other":
-            raise RobotModelError(f"The joint {joint.name} is no hinge, only these are supported: {way_out}.")
+            raise RobotModelError(
+                f"The joint {joint.name} is not a hinge, but only hinge joints are supported: {way_out}."
+            )
         if joint.coupled:
-            raise RobotModelError(f"The joint {joint.name} follows another one, as fingers do: {way_out}.")
+            raise RobotModelError(f"The joint {joint.name} mimics another one, as fingers do: {way_out}.")
         if joint.limits is not None and not joint.limits[0] < joint.limits[1]:
             raise RobotModelError(
                 f"The joint {joint.name} has the range {joint.limits[0]:g} to {joint.limits[1]:g}: give it lower and"

@@ -45,7 +45,7 @@ def write_folder(found: Imported, folder: Path, force: bool = False) -> Path | N
 def check_free(folder: Path, force: bool = False) -> None:
     """Raise RobotModelError if a folder is there, unless it may be put aside."""
     if (folder.exists() or folder.is_symlink()) and not force:
-        raise RobotModelError(f"The folder {folder} is there: give another --out, or --force to put it aside.")
+        raise RobotModelError(f"The folder {folder} exists already: give another --out, or --force to rename it.")
 
 
 def _fill(found: Imported, folder: Path) -> None:

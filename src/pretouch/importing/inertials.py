@@ -44,11 +44,11 @@ def inertials_of(arm: Arm, bodies: tuple[LinkBody, ...]) -> tuple[tuple[Inertial
         remarks.append(f"Implausible masses, correct them in the file: {', '.join(heavy)}.")
     if estimated:
         remarks.append(
-            f"Without mass or inertia, so estimated at {DENSITY:g} kg/m^3: {', '.join(estimated)}. Forces in simulation"
-            " are no better than that: give the links their inertials."
+            f"Without mass or inertia, so estimated at {DENSITY:g} kg/m^3: {', '.join(estimated)}. Simulated forces are"
+            " only as accurate as that: give the links their inertials."
         )
     if mended:
-        remarks.append(f"With an inertia no body can have, so the least one was raised: {', '.join(mended)}.")
+        remarks.append(f"With an impossible inertia, whose smallest moment was raised: {', '.join(mended)}.")
     return tuple(found), tuple(remarks)
 
 

@@ -32,14 +32,14 @@ class MeshFinder:
         """Take the URDF, and folders that hold packages, or are packages themselves."""
         for folder in folders:
             if not folder.is_dir():
-                raise RobotModelError(f"The package path {folder} is no folder: give one that holds ROS packages.")
+                raise RobotModelError(f"The package path {folder} is not a folder: give one that holds ROS packages.")
         self._near = file.resolve().parent
         self._folders = [*folders, self._near, *self._near.parents]
 
     def find(self, uri: str) -> Path:
         """Return the file that a URI names; RobotModelError if there is none."""
         if "\0" in uri or len(uri) > 4000:
-            raise RobotModelError(f"The mesh name {uri[:100]!r} is no file name: correct it.")
+            raise RobotModelError(f"The mesh name {uri[:100]!r} is not a file name: correct it.")
         scheme = next((s for s in _SCHEMES if uri.startswith(s)), None)
         try:
             found = self._in_package(uri.removeprefix(scheme)) if scheme else self._plain(uri)
@@ -51,7 +51,7 @@ class MeshFinder:
                 if scheme
                 else "put it where the URDF says"
             )
-            raise RobotModelError(f"The mesh {uri} is not there: {way_out}.")
+            raise RobotModelError(f"The mesh {uri} was not found: {way_out}.")
         return found
 
     def _plain(self, uri: str) -> Path | None:
@@ -74,13 +74,13 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise RobotModelError(f"The mesh {path} is none that can be read: use {', '.join(SUFFIXES)}.")
+        raise RobotModelError(f"The mesh {path} has an unknown format: use {', '.join(SUFFIXES)}.")
     if suffix == ".dae":
         MESHES.need(f"The mesh {path}, a COLLADA file,")
     try:
         if not path.is_file() or path.stat().st_size > _LARGEST_FILE:
             raise RobotModelError(
-                f"The mesh {path} is no file of at most {_LARGEST_FILE // 10**6} MB: make it coarser."
+                f"The mesh {path} is not a file of at most {_LARGEST_FILE // 10**6} MB: make it coarser."
             )
         data = path.read_bytes()
     except OSError as error:
@@ -105,15 +105,17 @@ def _by_trimesh(data: bytes, kind: str) -> trimesh.Trimesh:
 
 def _check(read: trimesh.Trimesh, path: Path) -> None:
     if not len(read.faces):
-        raise RobotModelError(f"The mesh {path} holds no triangle, or is cut off: give one that is whole.")
+        raise RobotModelError(f"The mesh {path} holds no triangle, or is truncated: give a complete file.")
     if len(read.faces) > _MOST_TRIANGLES:
         raise RobotModelError(
             f"The mesh {path} has {len(read.faces)} triangles: make it coarser, {_MOST_TRIANGLES} at most."
         )
     if not np.all(np.isfinite(read.triangles)):
-        raise RobotModelError(f"The mesh {path} is damaged: a coordinate is no finite number.")
+        raise RobotModelError(f"The mesh {path} is damaged: a coordinate is not finite.")
     if not np.any(read.triangles_cross):
-        raise RobotModelError(f"The mesh {path} has no area, its triangles are lines or points: give one that has.")
+        raise RobotModelError(
+            f"The mesh {path} has no area, because its triangles are lines or points: give one with area."
+        )
 
 
 def _three(words: list[str], line: int) -> list[float]:
@@ -121,7 +123,7 @@ def _three(words: list[str], line: int) -> list[float]:
     try:
         x, y, z = (float(word) for word in words[:3])
     except ValueError:
-        raise ValueError(f"line {line} holds no three numbers") from None
+        raise ValueError(f"line {line} does not hold three numbers") from None
     return [x, y, z]
 
 
@@ -136,10 +138,10 @@ def _obj(data: bytes) -> trimesh.Trimesh:
             try:
                 corners = [int(x.split("/")[0]) for x in rest]
             except ValueError:
-                raise ValueError(f"line {k} names no corners by number") from None
+                raise ValueError(f"line {k} does not number its corners") from None
             corners = [c - 1 if c > 0 else len(vertices) + c for c in corners]
             faces += [(corners[0], *pair) for pair in pairwise(corners[1:])]
     index = np.array(faces, dtype=np.int64).reshape(-1, 3)
     if len(index) and (index.min() < 0 or index.max() >= len(vertices)):
-        raise ValueError("a triangle has a corner that is not there")
+        raise ValueError("a triangle refers to a missing corner")
     return trimesh.Trimesh(np.array(vertices).reshape(-1, 3), index, process=False)

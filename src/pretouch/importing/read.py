@@ -29,7 +29,9 @@ def read_source(file: Path, folders: tuple[Path, ...] = ()) -> Source:
         except RobotModelError as error:
             raise RobotModelError(f"{error} (in {file})") from error
     else:
-        raise RobotModelError(f"The file {file} is a <{root.tag}>: give a URDF (<robot>) or an MJCF (<mujoco>) file.")
+        raise RobotModelError(
+            f"The file {file} starts with <{root.tag}>: give a URDF (<robot>) or an MJCF (<mujoco>) file."
+        )
     if len(source.links) > _MOST_LINKS:
         raise RobotModelError(f"The file {file} has {len(source.links)} links: give at most {_MOST_LINKS}.")
     return source
@@ -38,7 +40,10 @@ def read_source(file: Path, folders: tuple[Path, ...] = ()) -> Source:
 def _root(file: Path) -> ET.Element:
     try:
         if file.stat().st_size > _LARGEST_FILE:
-            raise RobotModelError(f"The file {file} is larger than {_LARGEST_FILE // 10**6} MB: it is no robot.")
+            raise RobotModelError(
+                f"The file {file} is larger than {_LARGEST_FILE // 10**6} MB: give a robot description without embedded"
+                " data."
+            )
         data = file.read_bytes()
     except OSError as error:
         raise RobotModelError(f"The file {file} cannot be read: {error.strerror}: give a URDF or MJCF file.") from error

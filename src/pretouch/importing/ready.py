@@ -48,8 +48,8 @@ class Ready:
             return None
         first, second = self.nearest
         return (
-            f"In the ready posture the capsules of {first} and {second} are {-1000 * self.clear:.0f} mm in each other:"
-            " choose another posture, or smaller capsules in arm.xml."
+            f"In the ready posture the capsules of {first} and {second} overlap by {-1000 * self.clear:.0f} mm: choose"
+            " another posture, or smaller capsules in arm.xml."
         )
 
 
@@ -97,8 +97,8 @@ def proposed(model: RobotModel) -> tuple[Ready, tuple[str, ...]]:
     found = [rated(model, low + u * (high - low), apart) for u in spread(_ANYWHERE, model.n)]
     best = max(found, key=lambda one: (_is_clear(model, one), min(one.clear, _CLEAR), _worth(model, one)))
     return best, (
-        "No posture was found with the hand in front of the base and pointing down, so another one was taken: give"
-        " yours by --ready, or as q_ready in robot.toml.",
+        "No posture was found with the hand in front of the base and pointing down, so another one was used: give"
+        " yours with --ready, or as q_ready in robot.toml.",
     )
 
 

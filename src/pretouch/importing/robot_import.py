@@ -121,8 +121,8 @@ def check_same(arm: Arm, model: RobotModel) -> None:
             )
             if not off < _SAME:
                 raise RobotModelError(
-                    f"The pose of {link.name} in the description differs from the source's by {off:.2g}: the import"
-                    " is faulty, please report it with the file."
+                    f"The pose of {link.name} in the description differs from the source's by {off:.2g}, so the import"
+                    " is faulty: please report it with the file."
                 )
 
 

@@ -76,7 +76,7 @@ class Source:
         _check_names("link", [link.name for link in self.links])
         _check_names("joint", [joint.name for link in self.links for joint in link.joints])
         if any(link.name == WORLD for link in self.links[1:]):
-            raise RobotModelError(f"A link within the tree is called {WORLD!r}, as MuJoCo's own frame: rename it.")
+            raise RobotModelError(f"A link is called {WORLD!r}, like MuJoCo's own frame: rename it.")
 
     def index(self, name: str) -> int:
         """Return the index of a link; an unknown name is a RobotModelError that lists those there are."""

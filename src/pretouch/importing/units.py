@@ -59,7 +59,7 @@ def proposed_skin(model: RobotModel, surfaces: dict[str, SurfaceDistance]) -> tu
             wanted = 1
         else:
             bare.append(model.links[link])
-    remarks = (f"Without room for a unit that sees past the arm: {', '.join(bare)}.",) if bare else ()
+    remarks = (f"Without space for a unit that sees past the arm: {', '.join(bare)}.",) if bare else ()
     return Skin(units, model), remarks
 
 

@@ -6,13 +6,69 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pretouch.errors import RobotModelError
 from pretouch.importing.meshes import MeshFinder
 from pretouch.importing.solids import Block, Cylinder, MeshFile, Rounded, Shape
 from pretouch.importing.source import Inertial, Source, SourceJoint, SourceLink
-from pretouch.importing.urdf_values import inertia_of, number, origin_of, required, vector
 from pretouch.types import FloatArray
+
+_LARGEST = 1e6
+"""Largest number in a file: any larger one is a mistake."""
+
+
+def required(element: Element | None, key: str) -> str:
+    """Return an attribute; RobotModelError if it is missing."""
+    value = element.get(key) if element is not None else None
+    if element is None or value is None:
+        tag = "element" if element is None else f"<{element.tag}>"
+        raise RobotModelError(f"The URDF file has an {tag} without {key!r}: give it one.")
+    return value
+
+
+def number(element: Element, key: str, owner: str, default: float | None = None) -> float:
+    """Return an attribute as a finite number; without a default it must be there."""
+    text = element.get(key)
+    if text is None and default is not None:
+        return default
+    return _finite(required(element, key), element, key, owner)
+
+
+def vector(element: Element, key: str, count: int, owner: str, default: str | None = None) -> FloatArray:
+    """Return an attribute as so many finite numbers."""
+    text = element.get(key, default) if default is not None else required(element, key)
+    words = (text or "").split()
+    if len(words) != count:
+        raise RobotModelError(f"{owner}: {key} of <{element.tag}> is {text!r}: give {count} numbers.")
+    return np.array([_finite(word, element, key, owner) for word in words])
+
+
+def origin_of(element: Element) -> FloatArray:
+    """Return the pose (4, 4) in the element's <origin>; the identity if it has none."""
+    T, origin = np.eye(4), element.find("origin")
+    if origin is not None:
+        owner = element.get("name") or f"<{element.tag}>"
+        T[:3, 3] = vector(origin, "xyz", 3, owner, "0 0 0")
+        T[:3, :3] = Rotation.from_euler("xyz", vector(origin, "rpy", 3, owner, "0 0 0")).as_matrix()
+    return T
+
+
+def inertia_of(element: Element, owner: str) -> FloatArray:
+    """Return the symmetric matrix (3, 3) of an <inertia> [kg m^2]."""
+    xx, xy, xz, yy, yz, zz = (number(element, f"i{key}", owner, 0.0) for key in ("xx", "xy", "xz", "yy", "yz", "zz"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _finite(text: str, element: Element, key: str, owner: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not abs(value) <= _LARGEST:
+        raise RobotModelError(f"{owner}: {key} of <{element.tag}> is {text[:50]!r}: give a finite number.")
+    return value
+
 
 _KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "fixed": "fixed"}
 _OTHERS = ("planar", "floating")
@@ -72,11 +128,11 @@ def _ordered(links: dict[str, Element], joints: dict[str, Element]) -> list[tupl
         children[required(joint.find("parent"), "link")].append(child)
     roots = [name for name in links if name not in joints]
     if links and not roots:
-        raise RobotModelError(f"The links {', '.join(links)} hang on each other in a ring: leave one joint out.")
+        raise RobotModelError(f"The links {', '.join(links)} form a loop: leave one joint out.")
     if not links:
         raise RobotModelError("The robot has no links: give it some.")
     if len(roots) != 1:
-        raise RobotModelError(f"The links hang on {len(roots)} roots ({', '.join(roots)}): join them to one tree.")
+        raise RobotModelError(f"The links have {len(roots)} roots ({', '.join(roots)}): connect them to one tree.")
     order: list[tuple[str, int]] = []
     waiting = [(roots[0], -1)]
     while waiting:
@@ -85,7 +141,7 @@ def _ordered(links: dict[str, Element], joints: dict[str, Element]) -> list[tupl
         waiting += [(child, len(order) - 1) for child in reversed(children[name])]
     if len(order) < len(links):
         lost = sorted(set(links) - {name for name, _ in order})
-        raise RobotModelError(f"The links {', '.join(lost)} hang on each other in a ring: join them to the root.")
+        raise RobotModelError(f"The links {', '.join(lost)} form a loop: connect them to the root.")
     return order
 
 
@@ -102,7 +158,7 @@ def _moving(element: Element) -> tuple[SourceJoint, ...]:
     axis = np.array([1.0, 0.0, 0.0]) if axis_element is None else vector(axis_element, "xyz", 3, name)
     length = float(np.linalg.norm(axis))
     if length < 1e-6:
-        raise RobotModelError(f"The joint {name} has an axis of no length: give it a direction.")
+        raise RobotModelError(f"The joint {name} has an axis of length zero: give it a direction.")
     limit = element.find("limit")
     limits = None
     if limit is not None and kind in ("revolute", "prismatic"):
@@ -166,5 +222,5 @@ def _shape(solid: Element, link: str, T: FloatArray, finder: MeshFinder) -> Shap
         case other:
             raise RobotModelError(f"The link {link} has a shape {other!r}: use box, sphere, cylinder, capsule or mesh.")
     if min(sizes) <= 0:
-        raise RobotModelError(f"The link {link} has a {solid.tag} of no size: give it positive measures.")
+        raise RobotModelError(f"The link {link} has a {solid.tag} of size zero: give it positive dimensions.")
     return shape

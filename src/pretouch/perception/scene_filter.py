@@ -8,7 +8,7 @@ from pretouch.compiled import compiled, entry, inlined
 from pretouch.errors import FixtureError
 from pretouch.groups import CapsuleArrays, Sensors
 from pretouch.perception.closest import bounds, to_axis, to_spheres
-from pretouch.robot.body import Capsules
+from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import Kinematics
 from pretouch.robot.vectors import dot, placed, rotate
 from pretouch.sensing.unit import CONE_ANGLE, cone_rays
@@ -50,7 +50,7 @@ class Fixtures:
 
 def no_fixtures() -> Fixtures:
     """Return an empty surrounding."""
-    return Fixtures(np.zeros((0, 4)), Capsules(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)))
+    return Fixtures(np.zeros((0, 4)), no_capsules())
 
 
 def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
-from pretouch.recording.imu import ImuRows
-from pretouch.recording.joints import JointRows
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.skin_reader import holds_units, read_skin
 from pretouch.recording.standard import IMU
+from pretouch.recording.traces import ImuRows, JointRows
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, LARGEST_COUNT
 from pretouch.sensing.skin import Skin
 from pretouch.traces import ImuTrace, JointTrace
@@ -88,9 +87,8 @@ def read_measured(place: Path) -> Measured:
 def _of_run(recorded: Recorded) -> Measured:
     run = recorded.runs[0]
     joints = JointRows(recorded.place, run.model.joints)
-    for kept in recorded:
-        if kept.inputs is not None:
-            joints.add(kept.inputs.robot.stamp, kept.inputs.robot.q)
+    for robot in recorded.robot_states():
+        joints.add(robot.stamp, robot.q)
     units = {name: MeasuredUnit(imu, None) for name, imu in _imus(recorded.place).items()}
     return Measured(joints.trace(), joints.names, units, run.skin, recorded.complete)
 

@@ -8,6 +8,7 @@ import re
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import make_dataclass
+from enum import Enum
 from functools import cache
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -28,11 +29,15 @@ _STRUCT = {"bool": "?", "byte": "B", "float32": "<f", "float64": "<d"} | {
 _COUNT = struct.Struct("<I")
 _count: Callable[[Any, int], tuple[Any, ...]] = _COUNT.unpack_from
 _FIELD = re.compile(r"([\w/]+)(\[(\d*)\])? +(\w+)")
+_SHAPE = re.compile(r" *\(\w+((?:, \d+)+)\)")
+"""Begins the comment on an array that is kept row by row: (K, 3)."""
 
 Append = Callable[[Any], None]
 """Takes the next bytes, or an array."""
 Writer = Callable[[Append, int, Any], int]
 """Appends a value at a place of the bytes; returns the place behind it."""
+Values = Callable[[Any, dict[str, Any]], list[Any]]
+"""Takes the values of all fields of a message, in order; some are given by name."""
 Reader = Callable[[NDArray[np.uint8], int], tuple[Any, int]]
 """Reads a value at a place of the bytes; returns it, and the place behind it."""
 
@@ -49,24 +54,33 @@ class Field(NamedTuple):
     """A number, `string`, or the type of a message, as `std_msgs/msg/Header`."""
     length: int | None
     """How many; None for one, 0 for a row of any length."""
+    shape: tuple[int, ...] = ()
+    """Of each row of an array with more than one dimension: in a message such an array lies row by row."""
 
 
 def parsed(definition: str, package: str) -> tuple[Field, ...]:
     """Return the fields that a message definition of a package lists. Constants are no fields."""
     found = []
     for line in definition.splitlines():
-        given = _FIELD.fullmatch(line.partition("#")[0].strip())
+        text, _, comment = line.partition("#")
+        given = _FIELD.fullmatch(text.strip())
         if given is None:
             continue
         kind, row, length, name = given.groups()
         if kind not in _NUMPY and kind != "string":
             kind = f"{kind.rpartition('/')[0] or package}/msg/{kind.rpartition('/')[2]}"
-        found.append(Field(name, kind, int(length or 0) if row else None))
+        shape = _SHAPE.match(comment) if row else None
+        sizes = tuple(int(size) for size in shape[1].split(",")[1:]) if shape else ()
+        found.append(Field(name, kind, int(length or 0) if row else None, sizes))
     return tuple(found)
 
 
 class Codec:
-    """Encodes and decodes messages of the types that a source of definitions knows."""
+    """Encodes and decodes messages of the types that a source of definitions knows.
+
+    A message is whatever has its fields as attributes. Where one is None, what is written is empty or zero; a field
+    `has_x` says whether x is there, for objects without such an attribute of their own.
+    """
 
     def __init__(self, fields: Callable[[str], tuple[Field, ...]]) -> None:
         """Take what returns the fields of a type, as `std_msgs/msg/Header`."""
@@ -74,24 +88,31 @@ class Codec:
         self.type = cache(self._type)
         """Class of a type's messages: a dataclass with its fields in order."""
         self._writer, self._reader = cache(self._make_writer), cache(self._make_reader)
+        self._writers = cache(lambda kind: [self._writer_of(field) for field in fields(kind)])
+        self._values = cache(self._make_values)
 
     def prepare(self, kind: str) -> None:
         """Make ready to encode a type: it takes some milliseconds, once."""
         self._writer(kind)
 
-    def encoded(self, kind: str, message: Any) -> bytes:
-        """Return a message as CDR. Raises ValueError for a value that does not fit its field."""
+    def encoded(self, kind: str, message: Any, **given: Any) -> bytes:
+        """Return a message as CDR, some fields `given` in place of its own.
+
+        Raises ValueError for a value that does not fit its field.
+        """
         out: list[Any] = [_HEADER]
         try:
-            self._writer(kind)(out.append, 0, message)
-            return b"".join(out)
+            at, values = 0, self._values(kind, tuple(given))(message, given)
+            for write, value in zip(self._writers(kind), values, strict=True):
+                at = write(out.append, at, value)
+            return _joined(out)
         except (struct.error, BufferError, TypeError) as error:
             raise ValueError(f"no {kind}: {error}") from error
 
     def decoded(self, kind: str, data: bytes) -> Any:
         """Return the message that CDR bytes hold; its arrays are aligned and writable. Raises DecodeError."""
         if data[:2] != _HEADER[:2]:
-            raise DecodeError("its header is not that of little-endian CDR")
+            raise DecodeError("its header is not little-endian CDR")
         try:
             body = np.frombuffer(data, np.uint8, offset=len(_HEADER)).copy()
             message, end = self._reader(kind)(body, 0)
@@ -107,18 +128,29 @@ class Codec:
 
     def _make_writer(self, kind: str) -> Writer:
         """Return what writes the fields of a message one after the other."""
-        fields = self.fields(kind)
-        writers = [self._writer_of(field) for field in fields]
-        values_of = attrgetter(*(field.name for field in fields))
-        if len(fields) == 1:  # of one name attrgetter returns no tuple
-            return lambda append, at, message: writers[0](append, at, values_of(message))
+        writers, values_of = self._writers(kind), self._values(kind, ())
+        blank = {"string": ""} | dict.fromkeys(_STRUCT, 0)
+        nothing = self.type(kind)(*(None if f.length is not None else blank.get(f.kind) for f in self.fields(kind)))
 
         def write(append: Append, at: int, message: Any) -> int:
-            for each, value in zip(writers, values_of(message), strict=True):
+            for each, value in zip(writers, values_of(nothing if message is None else message, {}), strict=True):
                 at = each(append, at, value)
             return at
 
         return write
+
+    def _make_values(self, kind: str, given: tuple[str, ...]) -> Values:
+        """Return what takes the values of a message's fields in order, those of some names from a table."""
+        names = [field.name for field in self.fields(kind)]
+        own = [name for name in names if name not in given]
+        getters = [_flag(name) if name.startswith("has_") else attrgetter(name) for name in own]
+        order = [[*own, *given].index(name) for name in names]
+
+        def values(message: Any, table: dict[str, Any]) -> list[Any]:
+            found = [*[get(message) for get in getters], *table.values()]
+            return [found[i] for i in order] if table else found
+
+        return values
 
     def _writer_of(self, field: Field) -> Writer:
         if field.length is not None and field.kind in _NUMPY:
@@ -159,6 +191,19 @@ class Codec:
         yield from within(kind)
 
 
+def _flag(name: str) -> Callable[[Any], Any]:
+    """Return what tells the field `has_x` of a message; of an object without it, whether x is there."""
+    part = attrgetter(name.removeprefix("has_"))
+    return lambda message: getattr(message, name, part(message) is not None)
+
+
+def _joined(parts: list[Any]) -> bytes:
+    try:
+        return b"".join(parts)
+    except BufferError:  # an array that is part of another one
+        return b"".join([p.tobytes() if isinstance(p, np.ndarray) else p for p in parts])
+
+
 def _aligned(form: str) -> list[struct.Struct]:
     """Return one number's form with the padding before it, by the place of the bytes modulo 8."""
     size = struct.calcsize(form)
@@ -172,8 +217,9 @@ def _one_writer(kind: str) -> Writer | None:
     """Return what writes one number or string; None for other types."""
     if kind == "string":
 
-        def write_text(append: Append, at: int, text: str) -> int:
-            raw = text.encode() + b"\0"
+        def write_text(append: Append, at: int, text: str | Enum) -> int:
+            given = text.value if isinstance(text, Enum) else text
+            raw = given.encode("utf-8", "backslashreplace") + b"\0"
             count, ahead = _COUNTS[at & 7]
             append(count(len(raw)))
             append(raw)
@@ -222,8 +268,11 @@ def _array_writer(dtype: np.dtype[Any], length: int) -> Writer:
     """Return what writes a row of numbers, of a fixed length or of any (0)."""
     size = dtype.itemsize
     paddings = [bytes(-at % size) for at in range(8)]
+    blank = np.zeros(length, dtype)
 
-    def write(append: Append, at: int, array: NDArray[Any]) -> int:
+    def write(append: Append, at: int, array: NDArray[Any] | None) -> int:
+        if array is None:
+            array = blank
         if array.dtype != dtype:
             raise ValueError(f"a row is of {array.dtype}, not {dtype}")
         number = array.size

@@ -1,30 +1,33 @@
-"""What goes into a control step and comes out of it, to messages and back, to the bit."""
+"""What goes into a control step and comes out of it, to messages and back, to the bit.
 
-from typing import Any
+Both ways follow annotations: a message has the names of a class's fields, what is optional has a field `has_x` before
+it, and an array with rows says so in the message's definition. What is given here is what differs from that.
+"""
+
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from operator import attrgetter
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pretouch.errors import RecordingError
-from pretouch.recording.messages import PACKAGE, decoded, encoded, make, plain_text
+from pretouch.recording.messages import PACKAGE, decoded, encoded, fields_of
 from pretouch.recording.truth import Truth
 from pretouch.types import (
     BoolArray,
-    Contact,
     ControlStep,
     FloatArray,
     ImuReadings,
     Inputs,
     IntArray,
-    Mode,
-    Obstacles,
-    QpOutcome,
-    QpSolution,
     RangeReadings,
     RobotState,
     SeenPoints,
     Thresholds,
-    Touched,
     TouchReadings,
 )
 
@@ -32,13 +35,9 @@ INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE
 TOUCH = f"{PACKAGE}/msg/Touch"
 IMU = f"{PACKAGE}/msg/ImuReadings"
 POINTS = f"{PACKAGE}/msg/SeenPoints"
-_ROBOT, _READINGS = f"{PACKAGE}/msg/RobotState", f"{PACKAGE}/msg/RangeReadings"
-_OBSTACLES, _THRESHOLDS = f"{PACKAGE}/msg/Obstacles", f"{PACKAGE}/msg/Thresholds"
-_CONTACT, _QP = f"{PACKAGE}/msg/Contact", f"{PACKAGE}/msg/QpSolution"
-_TOUCHED = f"{PACKAGE}/msg/Touched"
 
-_NONE = np.zeros(0)
-_NO_WHOLE = np.zeros(0, dtype=np.int64)
+_NAMED: dict[type, str] = {ControlStep: "Step", TouchReadings: "Touch"}
+"""Messages that are not named as the classes of which they hold the fields."""
 _NO_PLACES = bytes(20)
 """Lengths of the five empty rows of places that are touched: steps recorded by versions without them end before."""
 _SENSIBLE_S = 1e12
@@ -51,28 +50,54 @@ class UnreadableError(Exception):
     """A part of the inputs fits no message."""
 
 
-def encode_inputs(sequence: int, inputs: Inputs) -> tuple[bytes, bool]:
-    """Return inputs as CDR, and whether all a step goes by is in it; if not, it says what was given instead."""
-    try:
-        fields = (_number(inputs.stamp), _robot(inputs.robot), _readings(inputs.readings), bool(inputs.resume))
-        if inputs.touch is not None:
-            _touch(inputs.touch)  # has a message of its own
-        if inputs.points is not None:
-            _points(inputs.points)
-        return encoded(INPUTS, make(INPUTS, sequence, *fields, "")), True
-    except Exception as error:  # inputs may be anything, with any behaviour
-        nothing = make(_ROBOT, 0.0, _NONE, _NONE, _NONE, _NONE, _NONE, False, _NONE)
-        silent = make(_READINGS, _NONE, _NONE, _NO_WHOLE)
-        text = plain_text(_shown(inputs, error))
-        return encoded(INPUTS, make(INPUTS, sequence, 0.0, nothing, silent, False, text)), False
+@cache
+def hints_of(kind: type) -> tuple[tuple[str, Any], ...]:
+    """Return names and annotations of the fields of a dataclass or named tuple, in order."""
+    hints = get_type_hints(kind)
+    return tuple((name, hints[name]) for name in (getattr(kind, "_fields", None) or [f.name for f in fields(kind)]))
 
 
-def _shown(inputs: object, error: Exception) -> str:
-    """Describe inputs that cannot be kept, in one line of limited length."""
+def optional(hint: Any) -> Any:
+    """Return what an annotation allows beside None; None if it does not allow that."""
+    if get_origin(hint) not in (Union, UnionType):
+        return None
+    (left,) = (inner for inner in get_args(hint) if inner is not NoneType)
+    return left
+
+
+@cache
+def _made_of(kind: type) -> Callable[[Any], Any]:
+    """Return what makes a value of a class from a message."""
+    defined = {field.name: field for field in fields_of(f"{PACKAGE}/msg/{_NAMED.get(kind, kind.__name__)}")}
+    if kind is Thresholds:
+        parts_of = attrgetter(*defined)
+        return lambda message: Thresholds(np.array(parts_of(message)))
+    ways = tuple(_field_of(name, hint, defined[name].shape) for name, hint in hints_of(kind))
+    return lambda message: kind(*[way(message) for way in ways])
+
+
+def _field_of(name: str, hint: Any, shape: tuple[int, ...]) -> Callable[[Any], Any]:
+    """Return what makes a field of a class from a message, where arrays of more dimensions lie row by row."""
+    get, left = attrgetter(name), optional(hint)
+    if left is not None:
+        there, made = attrgetter(f"has_{name}"), _field_of(name, left, shape)
+        return lambda message: made(message) if there(message) else None
+    if shape:
+        return lambda message: get(message).reshape(-1, *shape)
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return lambda message: hint(get(message))
+    if is_dataclass(hint):
+        inner = _made_of(hint)  # type: ignore[arg-type]
+        return lambda message: inner(get(message))
+    return get
+
+
+def _made(kind: type, message: Any) -> Any:
+    """Return a value of a class from a message; one that cannot be is a RecordingError."""
     try:
-        return f"{error}: {inputs!r}"[:_SHOWN]
-    except Exception:  # a repr may do anything
-        return f"{error}: a {type(inputs).__name__}"[:_SHOWN]
+        return _made_of(kind)(message)
+    except ValueError as error:
+        raise RecordingError(f"A {kind.__name__} in the recording cannot be read: {error}") from error
 
 
 def _number(given: Any) -> float:
@@ -98,40 +123,68 @@ def _wholes(given: Any) -> IntArray:
     return array.astype(np.int64)
 
 
-def _robot(robot: RobotState) -> Any:
+def _truths(given: Any) -> BoolArray:
+    array = np.array(given)
+    if array.ndim != 1 or array.dtype.kind not in "biu":
+        raise UnreadableError("contacts are no row of truths")
+    return np.asarray(array != 0)
+
+
+def _torques(given: Any) -> FloatArray | None:
     try:
-        tau_ext = _numbers(robot.tau_ext)
+        return _numbers(given)
     except (UnreadableError, ValueError):
-        tau_ext = _NONE  # such are no torques to a step either
-    wrench = None if robot.wrench is None else _numbers(robot.wrench)
-    return make(
-        _ROBOT, _number(robot.stamp), _numbers(robot.q), _numbers(robot.qd), _numbers(robot.q_commanded),
-        _numbers(robot.qd_commanded), tau_ext, wrench is not None, _NONE if wrench is None else wrench,
-    )  # fmt: skip
+        return None  # such are no torques to a step either
 
 
-def _readings(readings: RangeReadings) -> Any:
-    return make(_READINGS, _numbers(readings.stamp), _numbers(readings.distance), _wholes(readings.status))
-
-
-def _points(points: SeenPoints) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-    """Return points of outside sources as they are kept, if they are such to the controller."""
-    point = np.asarray(points.point)
-    if point.ndim != 2 or point.shape[1] != 3:
+def _points(given: Any) -> FloatArray:
+    points = np.asarray(given)
+    if points.ndim != 2 or points.shape[1] != 3:
         raise UnreadableError("points are no rows of three numbers")
-    return _number(points.heard), _numbers(points.stamp), _numbers(point.reshape(-1)), _numbers(points.sigma)
+    return _numbers(points.reshape(-1)).reshape(-1, 3)
 
 
-def encode_points(sequence: int, points: SeenPoints, same_as: int) -> bytes:
-    """Return points of outside sources as CDR; where they are the same as those of an earlier step, only its number."""
-    kept = _points(points) if same_as == sequence else (0.0, _NONE, _NONE, _NONE)
-    return encoded(POINTS, make(POINTS, sequence, same_as, *kept))
+_USUAL: dict[Any, Callable[[Any], Any]] = {
+    float: _number, FloatArray: _numbers, IntArray: _wholes, BoolArray: _truths,
+    FloatArray | None: lambda given: None if given is None else _numbers(given),
+}  # fmt: skip
+_OTHERWISE: dict[tuple[type, str], Callable[[Any], Any]] = {
+    (RobotState, "tau_ext"): _torques,
+    (SeenPoints, "point"): _points,
+}
 
 
-def decode_points(data: bytes) -> tuple[int, SeenPoints]:
-    """Return the number of the step whose message holds the points, and those in this one."""
-    m = decoded(POINTS, data)
-    return m.same_as, SeenPoints(m.heard, m.stamp, m.point.reshape(-1, 3), m.sigma)
+@cache
+def _ways_to_take(kind: type) -> tuple[tuple[Callable[[Any], Any], Callable[[Any], Any]], ...]:
+    return tuple((_OTHERWISE.get((kind, name)) or _USUAL[hint], attrgetter(name)) for name, hint in hints_of(kind))
+
+
+def _taken(kind: type, given: Any) -> Any:
+    """Return inputs as the controller takes them; raises for what it could not use."""
+    return kind(*[take(get(given)) for take, get in _ways_to_take(kind)])
+
+
+def encode_inputs(sequence: int, inputs: Inputs) -> tuple[bytes, bool]:
+    """Return inputs as CDR, and whether all a step goes by is in it; if not, it says what was given instead."""
+    try:
+        stamp, robot = _number(inputs.stamp), _taken(RobotState, inputs.robot)
+        readings, resume = _taken(RangeReadings, inputs.readings), bool(inputs.resume)
+        for kind, own in ((TouchReadings, inputs.touch), (SeenPoints, inputs.points)):
+            if own is not None:
+                _taken(kind, own)  # has a message of its own
+        given = {"stamp": stamp, "robot": robot, "readings": readings, "resume": resume, "unreadable": ""}
+        return encoded(INPUTS, None, sequence=sequence, **given), True
+    except Exception as error:  # inputs may be anything, with any behaviour
+        given = {"stamp": 0.0, "robot": None, "readings": None, "resume": False, "unreadable": _shown(inputs, error)}
+        return encoded(INPUTS, None, sequence=sequence, **given), False
+
+
+def _shown(inputs: object, error: Exception) -> str:
+    """Describe inputs that cannot be kept, in one line of limited length."""
+    try:
+        return f"{error}: {inputs!r}"[:_SHOWN]
+    except Exception:  # a repr may do anything
+        return f"{error}: a {type(inputs).__name__}"[:_SHOWN]
 
 
 def decode_inputs(data: bytes) -> tuple[int, Inputs | None, str]:
@@ -139,9 +192,33 @@ def decode_inputs(data: bytes) -> tuple[int, Inputs | None, str]:
     m = decoded(INPUTS, data)
     if m.unreadable:
         return m.sequence, None, m.unreadable
-    r, s = m.robot, m.readings
-    robot = RobotState(r.stamp, r.q, r.qd, r.q_commanded, r.qd_commanded, r.tau_ext, r.wrench if r.has_wrench else None)
-    return m.sequence, Inputs(m.stamp, robot, RangeReadings(s.stamp, s.distance, s.status), m.resume), ""
+    robot, readings = _made(RobotState, m.robot), _made(RangeReadings, m.readings)
+    return m.sequence, Inputs(m.stamp, robot, readings, m.resume), ""
+
+
+def encode_touch(sequence: int, inputs: Inputs) -> bytes | None:
+    """Return what units said of a touch as CDR, of inputs that `encode_inputs` found to be whole; None for nothing."""
+    if inputs.touch is None:
+        return None
+    return encoded(TOUCH, _taken(TouchReadings, inputs.touch), sequence=sequence, step_stamp=_number(inputs.stamp))
+
+
+def decode_touch(data: bytes) -> TouchReadings:
+    """Return what units said of a touch."""
+    return _made(TouchReadings, decoded(TOUCH, data))
+
+
+def encode_points(sequence: int, points: SeenPoints, same_as: int) -> bytes:
+    """Return points of outside sources as CDR; where they are the same as those of an earlier step, only its number."""
+    if same_as == sequence:
+        return encoded(POINTS, _taken(SeenPoints, points), sequence=sequence, same_as=same_as)
+    return encoded(POINTS, SeenPoints(0.0, *[None] * 3), sequence=sequence, same_as=same_as)  # type: ignore[arg-type]
+
+
+def decode_points(data: bytes) -> tuple[int, SeenPoints]:
+    """Return the number of the step whose message holds the points, and those in this one."""
+    m = decoded(POINTS, data)
+    return m.same_as, _made(SeenPoints, m)
 
 
 def encode_imu(sequence: int, time: float, imu: ImuReadings) -> bytes | None:
@@ -155,39 +232,17 @@ def encode_imu(sequence: int, time: float, imu: ImuReadings) -> bytes | None:
         return None
     if any(part.shape != (*stamp.shape, 3) for part in parts):
         return None
-    return encoded(IMU, make(IMU, sequence, time, unit.astype(np.int64), stamp, *map(_flat, parts)))
+    return encoded(IMU, ImuReadings(unit.astype(np.int64), stamp, *parts), sequence=sequence, time=time)
 
 
 def decode_imu(data: bytes) -> ImuReadings:
     """Return the IMU samples of a step."""
-    m = decoded(IMU, data)
-    try:
-        return ImuReadings(m.unit, m.stamp, m.acceleration.reshape(-1, 3), m.angular_velocity.reshape(-1, 3))
-    except ValueError as error:
-        raise RecordingError(f"IMU samples in the recording cannot be read: {error}") from error
+    return _made(ImuReadings, decoded(IMU, data))
 
 
 def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = None) -> bytes:
     """Return a step as CDR, with the path's unit tangent (3,) where the path can only be kept so."""
-    o, qp, contact, touched = step.obstacles, step.qp, step.contact, step.touched
-    obstacles = make(
-        _OBSTACLES, o.unit, _flat(o.point), o.ee_distance, _flat(o.body_point), o.link, _flat(o.direction),
-        o.body_distance, o.closing_speed,
-    )  # fmt: skip
-    felt = make(_CONTACT, np.zeros(3), np.zeros(3, np.bool_)) if contact is None else make(
-        _CONTACT, contact.force, contact.axes
-    )  # fmt: skip
-    return encoded(STEP, make(
-        STEP, sequence, step.stamp, step.mode.value, plain_text(step.reason), step.q, step.q_commanded,
-        _row(step.ee_position), _row(step.ee_velocity), _row(step.path_position), step.path_phase,
-        _NONE if tangent is None else tangent, _row(step.desired_velocity), step.speed_scale, step.range_distance,
-        obstacles, _row(step.force), _row(step.filtered_force),
-        make(_THRESHOLDS, *np.ascontiguousarray(step.thresholds.parts)), step.armed, contact is not None, felt,
-        _row(step.reaction_velocity), step.restricted, step.approach_limit,
-        make(_QP, qp.qd, qp.slack, qp.multipliers, qp.outcome.value, plain_text(qp.status)), step.command,
-        step.residual, step.evidence,
-        make(_TOUCHED, touched.link, _flat(touched.point), _flat(touched.force), touched.sigma, touched.probability),
-    ))  # fmt: skip
+    return encoded(STEP, step, sequence=sequence, path_tangent=tangent)
 
 
 def decode_step(data: bytes) -> tuple[int, ControlStep, FloatArray]:
@@ -196,63 +251,16 @@ def decode_step(data: bytes) -> tuple[int, ControlStep, FloatArray]:
         m = decoded(STEP, data)
     except RecordingError:
         m = decoded(STEP, data + _NO_PLACES)
-    try:
-        return m.sequence, _step(m), m.path_tangent
-    except ValueError as error:
-        raise RecordingError(f"A step in the recording cannot be read: {error}") from error
-
-
-def _step(m: Any) -> ControlStep:
-    o, qp, t = m.obstacles, m.qp, m.thresholds
-    parts = np.array((t.upper, t.lower, t.mean, t.sigma, t.obstacle_positive, t.obstacle_negative))
-    return ControlStep(
-        stamp=m.stamp, mode=Mode(m.mode), reason=m.reason, q=m.q, q_commanded=m.q_commanded,
-        ee_position=m.ee_position, ee_velocity=m.ee_velocity, path_position=m.path_position, path_phase=m.path_phase,
-        desired_velocity=m.desired_velocity, speed_scale=m.speed_scale, range_distance=m.range_distance,
-        obstacles=Obstacles(
-            o.unit, o.point.reshape(-1, 3), o.ee_distance, o.body_point.reshape(-1, 3), o.link,
-            o.direction.reshape(-1, 3), o.body_distance, o.closing_speed,
-        ),
-        force=m.force, filtered_force=m.filtered_force, thresholds=Thresholds(parts), armed=m.armed,
-        contact=Contact(m.contact.force, m.contact.axes) if m.has_contact else None,
-        reaction_velocity=m.reaction_velocity, restricted=m.restricted, approach_limit=m.approach_limit,
-        qp=QpSolution(qp.qd, qp.slack, qp.multipliers, QpOutcome(qp.outcome), qp.status), command=m.command,
-        residual=m.residual, evidence=m.evidence,
-        touched=Touched(
-            m.touched.link, m.touched.point.reshape(-1, 3), m.touched.force.reshape(-1, 3), m.touched.sigma,
-            m.touched.probability,
-        ),
-    )  # fmt: skip
-
-
-def encode_touch(sequence: int, inputs: Inputs) -> bytes | None:
-    """Return what units said of a touch as CDR, of inputs that `encode_inputs` found to be whole; None for nothing."""
-    if inputs.touch is None:
-        return None
-    return encoded(TOUCH, make(TOUCH, sequence, _number(inputs.stamp), *_touch(inputs.touch)))
-
-
-def _touch(touch: TouchReadings) -> tuple[FloatArray, BoolArray, FloatArray, IntArray]:
-    contact = np.array(touch.contact)
-    if contact.ndim != 1 or contact.dtype.kind not in "biu":
-        raise UnreadableError("contacts are no row of truths")
-    return _numbers(touch.stamp), contact != 0, _numbers(touch.force), _wholes(touch.status)
-
-
-def decode_touch(data: bytes) -> TouchReadings:
-    """Return what units said of a touch."""
-    m = decoded(TOUCH, data)
-    return TouchReadings(m.stamp, m.contact, m.force, m.status)
+    return m.sequence, _made(ControlStep, m), m.path_tangent
 
 
 def encode_truth(sequence: int, truth: Truth) -> bytes:
     """Return what a simulation knows as CDR."""
     times, links, velocities = zip(*truth.touches, strict=True) if truth.touches else ((), (), ())
-    return encoded(TRUTH, make(
-        TRUTH, sequence, _float64(truth.time), _flat(_float64(truth.force)), _row(_float64(truth.hand)),
-        np.array(times, dtype=np.float64), np.array(links, dtype=np.int64),
-        np.array(velocities, dtype=np.float64).reshape(-1),
-    ))  # fmt: skip
+    return encoded(
+        TRUTH, truth, sequence=sequence, touch_time=np.array(times, dtype=np.float64),
+        touch_link=np.array(links, dtype=np.int64), touch_velocity=np.array(velocities, dtype=np.float64),
+    )  # fmt: skip
 
 
 def decode_truth(data: bytes) -> tuple[int, Truth]:
@@ -261,15 +269,3 @@ def decode_truth(data: bytes) -> tuple[int, Truth]:
     velocities = m.touch_velocity.reshape(-1, 3)
     touches = tuple(zip(m.touch_time.tolist(), m.touch_link.tolist(), velocities, strict=True))
     return m.sequence, Truth(m.time, m.force.reshape(-1, 3), m.hand, touches)
-
-
-def _float64(given: FloatArray) -> FloatArray:
-    return np.asarray(given, dtype=np.float64)
-
-
-def _flat(array: NDArray[Any]) -> NDArray[Any]:
-    return array.reshape(-1)
-
-
-def _row(array: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(array)

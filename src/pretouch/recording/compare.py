@@ -1,13 +1,16 @@
 """What a detector decided cycle by cycle, and what another profile would have decided on the same data."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import RecordingError, RobotStateError
-from pretouch.params import Profile, at_rate
+from pretouch.profiles import Profile, at_rate
+from pretouch.recording.run_record import DetectorRecord
 from pretouch.types import BoolArray, Contact, ControlStep, FloatArray, Mode, RobotState, Thresholds
 from pretouch.values import value
 
@@ -30,26 +33,14 @@ class Found:
     """(3,) axes whose threshold was crossed."""
 
 
-@value
-class Decisions:
-    """What a detector made of the force in S cycles. Forces in N on the robot, base frame."""
+@dataclass(frozen=True, kw_only=True)
+class Decisions(DetectorRecord):
+    """What a detector made of the force in S cycles. Forces on the robot, base frame."""
 
     name: str
     """The profile."""
-    time: FloatArray
-    """(S,) [s]"""
-    force: FloatArray
-    """(S, 3) estimate of each cycle, NaN without one."""
     compared: FloatArray
-    """(S, 3) what was held against the thresholds, NaN without an estimate."""
-    upper: FloatArray
-    """(S, 3) T_u of eq. 9."""
-    lower: FloatArray
-    """(S, 3) T_l of eq. 9."""
-    sigma: FloatArray
-    """(S, 3) standard deviation of the window."""
-    armed: BoolArray
-    """(S,) whether the window was full."""
+    """(S, 3) what was held against the thresholds [N], NaN without an estimate."""
     reacting: BoolArray
     """(S,) whether a reaction was under way, so that contacts are ignored."""
     contacts: tuple[Found, ...]
@@ -78,7 +69,7 @@ class Decided:
 
     def add_step(self, step: ControlStep, profile: Profile) -> None:
         """Take in a controller's step; the profile says which force it compared."""
-        filtered = profile.detection.method == "thresholds" and profile.threshold.compare == "filtered"
+        filtered = isinstance(profile.detect, MovingThresholds) and profile.detect.compare == "filtered"
         compared = step.filtered_force if filtered else step.force
         without = np.isnan(step.force).any()
         self.add(
@@ -89,13 +80,11 @@ class Decided:
     def decisions(self) -> Decisions:
         """Return all that was gathered."""
         count = len(self._time)
-        parts = np.array([row[2] for row in self._rows]).reshape(count, 6, 3)
         flags = np.array(self._flags, dtype=np.bool_).reshape(count, 2)
+        shapes = ((3,), (3,), (6, 3))
+        force, compared, parts = (np.array([r[k] for r in self._rows]).reshape(count, *shapes[k]) for k in range(3))
         return Decisions(
-            name=self._name, time=np.array(self._time),
-            force=np.array([row[0] for row in self._rows]).reshape(count, 3),
-            compared=np.array([row[1] for row in self._rows]).reshape(count, 3),
-            upper=parts[:, 0], lower=parts[:, 1], sigma=parts[:, 3],
+            name=self._name, time=np.array(self._time), force=force, compared=compared, thresholds=parts,
             armed=flags[:, 0], reacting=flags[:, 1], contacts=tuple(self._contacts),
         )  # fmt: skip
 

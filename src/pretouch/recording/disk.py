@@ -29,7 +29,7 @@ _LATE_S = 0.2
 _PATIENCE_S = 10.0
 """Time it then waits at most [s]."""
 _MOST_WAITING = 20_000
-"""Cycles that may wait to be written: a disk that is farther behind does not keep up."""
+"""Cycles that may wait to be written: a disk that is farther behind is too slow."""
 
 
 More = Callable[[], Iterable[Item]]
@@ -93,7 +93,7 @@ class Disk:
     def put(self, items: list[Item], more: More = tuple) -> None:
         """Hand messages over, and what makes more of them, in the thread."""
         if self._queue.qsize() > _MOST_WAITING and not self.trouble:
-            self.trouble = f"The recording {self._place} ended early: the disk does not keep up, take a faster one."
+            self.trouble = f"The recording {self._place} ended early, because the disk is too slow: use a faster one."
         self._since.append(time.monotonic())
         self._queue.put((items, more))
 
@@ -177,8 +177,8 @@ class Disk:
             held, error = "it cannot be opened", another if isinstance(another, OSError) else error
         cause = os.strerror(error.errno) if error and error.errno else str(error or "")
         if error is not None:
-            remedy = "make room, then record again" if error.errno in _FULL else "see to the disk"
-            self.trouble = f"The recording {self._place} ended early ({cause}): {held}; {remedy}."
+            remedy = "free some space, then record again" if error.errno in _FULL else "check the disk"
+            self.trouble = f"The recording {self._place} ended early ({cause}) and {held}: {remedy}."
 
 
 def _indexed(file: BinaryIO, contents: Contents) -> tuple[list[Entry], list[int]]:
@@ -218,7 +218,7 @@ def _opened(place: Path) -> _File:
 def _refused(place: Path, error: OSError) -> RecordingError:
     """Say why a file cannot be made, and the way out."""
     if isinstance(error, FileExistsError):
-        return RecordingError(f"There is something at {place} already: give another name, or move it away.")
+        return RecordingError(f"{place} exists already: give another name, or move it.")
     if not place.parent.is_dir():
-        return RecordingError(f"The folder {place.parent} for the recording is not there: make it first.")
+        return RecordingError(f"The folder {place.parent} for the recording does not exist: create it first.")
     return RecordingError(f"The recording {place} cannot be written: {error.strerror}: give another name or folder.")

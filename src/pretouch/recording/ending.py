@@ -1,10 +1,11 @@
 """The index at the end of an MCAP file, made from its chunks, so that it opens everywhere."""
 
-import struct
 import zlib
 from collections import Counter
 from dataclasses import dataclass
 
+from mcap import records
+from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
 from pretouch.recording.container import MAGIC, Chunk, Contents, messages
@@ -32,46 +33,35 @@ def entry(chunk: Chunk, start: int) -> Entry:
     for message in messages(chunk):
         places.setdefault(message.channel, []).append((message.log_time, message.offset))
     times = [time for rows in places.values() for time, _ in rows] or [0]
-    index, offsets, at = b"", b"", start + len(chunk.record)
+    index, offsets = b"", {}
     for channel, rows in places.items():
-        offsets += struct.pack("<HQ", channel, at + len(index))
-        packed = b"".join(struct.pack("<QQ", *row) for row in rows)
-        index += _record(Opcode.MESSAGE_INDEX, struct.pack("<HI", channel, len(packed)), packed)
-    record = _record(
-        Opcode.CHUNK_INDEX,
-        struct.pack("<QQQQI", min(times), max(times), start, len(chunk.record), len(offsets)),
-        offsets,
-        struct.pack("<Q", len(index)),
-        _text(chunk.compression),
-        struct.pack("<QQ", chunk.compressed_size, len(chunk.content)),
-    )
-    return Entry(index, record, {c: len(rows) for c, rows in places.items()}, min(times), max(times))
+        offsets[channel] = start + len(chunk.record) + len(index)
+        index += _written(records.MessageIndex(channel, rows))
+    record = records.ChunkIndex(
+        len(chunk.record), start, chunk.compression, chunk.compressed_size, message_end_time=max(times),
+        message_index_length=len(index), message_index_offsets=offsets, message_start_time=min(times),
+        uncompressed_size=len(chunk.content),
+    )  # fmt: skip
+    return Entry(index, _written(record), {c: len(rows) for c, rows in places.items()}, min(times), max(times))
 
 
 def in_chunk(chunk: Chunk) -> Chunk:
     """Return a chunk as it is, and a message outside one in a chunk of its own."""
     if chunk.record[0] == Opcode.CHUNK:
         return chunk
-    times = [message.log_time for message in messages(chunk)]
-    content = chunk.content
-    record = _record(
-        Opcode.CHUNK,
-        struct.pack("<QQQI", min(times), max(times), len(content), zlib.crc32(content)),
-        _text(""),
-        struct.pack("<Q", len(content)),
-        content,
-    )
+    times, content = [message.log_time for message in messages(chunk)], chunk.content
+    record = _written(records.Chunk("", content, max(times), min(times), zlib.crc32(content), len(content)))
     return Chunk(chunk.start, record, "", len(content), content, chunk.end)
 
 
 def header(profile: str, library: str) -> bytes:
     """Return the begin of a file."""
-    return MAGIC + _record(Opcode.HEADER, _text(profile), _text(library))
+    return MAGIC + _written(records.Header(profile, library))
 
 
 def ending(contents: Contents, entries: list[Entry], at: int) -> bytes:
     """Return all that follows the last chunk, at an offset of the file: end of the data, index, footer, magic."""
-    data_end = _record(Opcode.DATA_END, struct.pack("<I", 0))
+    data_end = _written(records.DataEnd(0))
     start = at + len(data_end)
     groups = {
         Opcode.SCHEMA: [record for _, record in contents.schemas.values()],
@@ -80,32 +70,28 @@ def ending(contents: Contents, entries: list[Entry], at: int) -> bytes:
         Opcode.CHUNK_INDEX: [e.record for e in entries],
     }
     summary, offsets = b"", b""
-    for opcode, records in groups.items():
-        group = b"".join(records)
-        offsets += _record(Opcode.SUMMARY_OFFSET, struct.pack("<BQQ", opcode, start + len(summary), len(group)))
+    for opcode, of_group in groups.items():
+        group = b"".join(of_group)
+        offsets += _written(records.SummaryOffset(opcode, start + len(summary), len(group)))
         summary += group
-    footer = struct.pack("<BQQQ", Opcode.FOOTER, 20, start, start + len(summary))
-    crc = zlib.crc32(footer, zlib.crc32(summary + offsets))
-    return data_end + summary + offsets + footer + struct.pack("<I", crc) + MAGIC
+    without_crc = _written(records.Footer(start, start + len(summary), 0))[:-4]
+    crc = zlib.crc32(without_crc, zlib.crc32(summary + offsets))
+    return data_end + summary + offsets + _written(records.Footer(start, start + len(summary), crc)) + MAGIC
 
 
 def _statistics(contents: Contents, entries: list[Entry]) -> bytes:
     counts: Counter[int] = Counter()
     for e in entries:
         counts.update(e.counts)
-    return _record(
-        Opcode.STATISTICS,
-        struct.pack("<QHIIII", counts.total(), len(contents.schemas), len(contents.channels), 0, 0, len(entries)),
-        struct.pack("<QQ", min((e.first for e in entries), default=0), max((e.last for e in entries), default=0)),
-        struct.pack("<I", 10 * len(counts)),
-        *(struct.pack("<HQ", *row) for row in counts.items()),
-    )
+    first, last = min((e.first for e in entries), default=0), max((e.last for e in entries), default=0)
+    return _written(records.Statistics(
+        attachment_count=0, channel_count=len(contents.channels), channel_message_counts=counts,
+        chunk_count=len(entries), message_count=counts.total(), message_end_time=last, message_start_time=first,
+        metadata_count=0, schema_count=len(contents.schemas),
+    ))  # fmt: skip
 
 
-def _record(opcode: Opcode, *parts: bytes) -> bytes:
-    return struct.pack("<BQ", opcode, sum(map(len, parts))) + b"".join(parts)
-
-
-def _text(text: str) -> bytes:
-    encoded = text.encode()
-    return struct.pack("<I", len(encoded)) + encoded
+def _written(record: records.McapRecord) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    return bytes(builder.end())  # type: ignore[no-untyped-call]

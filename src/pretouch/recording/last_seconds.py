@@ -152,4 +152,4 @@ class LastSeconds:
             self.written.append(place)
             self.trouble = recording.trouble or self.trouble
         except Exception as error:  # the arm is stopping, and nothing may come between
-            self.trouble = f"The last seconds before a HOLD were not kept: {error}"
+            self.trouble = f"The last seconds before a HOLD were not saved: {error}"

@@ -81,9 +81,9 @@ def make(kind: str, *values: Any) -> Any:
     return _CODEC.type(kind)(*values)
 
 
-def encoded(kind: str, message: Any) -> bytes:
-    """Return a message as CDR."""
-    return _CODEC.encoded(kind, message)
+def encoded(kind: str, message: Any, **given: Any) -> bytes:
+    """Return a message as CDR: whatever has its fields as attributes, some of them `given` in place of its own."""
+    return _CODEC.encoded(kind, message, **given)
 
 
 def decoded(kind: str, data: bytes) -> Any:
@@ -101,8 +101,3 @@ def prepare(*kinds: Iterable[str]) -> None:
     """Make ready to encode types: at the first message, that would keep a control loop waiting."""
     for kind in chain(*kinds):
         _CODEC.prepare(kind)
-
-
-def plain_text(text: str) -> str:
-    """Return a text that UTF-8 can hold."""
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from pretouch.errors import PretouchError, RecordingError
-from pretouch.recording.messages import plain_text
 
 JSON = Any
 """What JSON can hold: None, bool, numbers, text, and lists and dicts with text keys of these."""
@@ -17,10 +16,10 @@ JSON = Any
 def as_json(value: JSON) -> str:
     """Return a value as JSON; one that JSON cannot hold is a RecordingError."""
     try:
-        return plain_text(json.dumps(value, default=_plain))
+        return json.dumps(value, default=_plain)
     except (TypeError, ValueError, RecursionError) as error:
         raise RecordingError(
-            f"What is said about the run cannot be written as JSON ({error}): give plain values."
+            f"The description of the run cannot be written as JSON ({error}): give plain values."
         ) from error
 
 
@@ -40,7 +39,7 @@ def from_json(text: str) -> dict[str, JSON]:
     except (ValueError, RecursionError) as error:
         raise RecordingError(f"The description of the run in the recording is damaged: {error}") from error
     if not isinstance(found, dict):
-        raise RecordingError("The description of the run in the recording is damaged: it is no table of names.")
+        raise RecordingError("The description of the run in the recording is damaged: it is not a table.")
     return found
 
 

@@ -20,12 +20,11 @@ from pretouch.recording.codec import (
 )
 from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
-from pretouch.recording.recorded_path import Tangents
-from pretouch.recording.setting import Run, decode_run
+from pretouch.recording.setting import Run, Tangents, decode_run
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.recording.state_codec import decode_state
 from pretouch.recording.truth import Truth
-from pretouch.types import ControlStep, FloatArray, Inputs
+from pretouch.types import ControlStep, FloatArray, Inputs, RobotState
 from pretouch.values import value
 
 __all__ = ["Kept", "Recorded", "Run", "open_recording"]
@@ -118,6 +117,14 @@ class Recorded:
     def __iter__(self) -> Iterator[Kept]:
         return (self[i] for i in range(len(self)))
 
+    def robot_states(self) -> Iterator[RobotState]:
+        """Yield the robot's state of each step whose inputs were kept."""
+        for number in self._numbers:
+            data = self._raw["/pretouch/inputs"].get(number)
+            inputs = None if data is None else decode_inputs(data)[1]
+            if inputs is not None:
+                yield inputs.robot
+
     def number(self, i: int) -> int:
         """Return the number a step had when it was recorded: where some are missing it is not `i`."""
         return self._numbers[i]
@@ -156,7 +163,7 @@ class Recorded:
 def open_recording(place: Path) -> Recorded:
     """Open a recording, finished or cut off.
 
-    RecordingError for a file that is not there, is no MCAP file, is another program's (`pretouch detect` reads those),
+    RecordingError for a file that is missing, is not an MCAP file, is another program's (`pretouch detect` reads those)
     or is of a later version.
     """
     place = Path(place)
@@ -168,7 +175,7 @@ def open_recording(place: Path) -> Recorded:
             for chunk in scan(file, contents):
                 _take(chunk, contents, raw)
     except OSError as error:
-        reason = "there is none" if isinstance(error, FileNotFoundError) else error.strerror
+        reason = "it does not exist" if isinstance(error, FileNotFoundError) else error.strerror
         raise RecordingError(f"The recording {place} cannot be read: {reason}.") from error
     _check(place, contents, raw)
     return Recorded(place, raw, _missing(place, contents))
@@ -190,17 +197,17 @@ def _check(place: Path, contents: Contents, raw: Raw) -> None:
         kind, schema = contents.schemas.get(number, ("", b""))
         if TOPICS.get(topic) == kind and not is_ours(schema, kind):
             raise RecordingError(
-                f"{place} was recorded by another version of pretouch, whose messages on {topic} are others: open it"
-                " with that version."
+                f"{place} was recorded by another version of pretouch, with different messages on {topic}: open it with"
+                " that version."
             )
     if raw["/pretouch/step"] and raw["/pretouch/run"]:
         return
     if any(kind == UNIT_SAMPLE for _, kind in contents.topics().values()):
-        raise RecordingError(f"{place} holds what sensor units sent, and no control step: {READ_WITH}.")
+        raise RecordingError(f"{place} holds samples of sensor units, but no control step: {READ_WITH}.")
     if contents.library.startswith(LIBRARY.split()[0]) or any(t in TOPICS for t, _, _ in contents.channels.values()):
-        raise RecordingError(f"{place} holds no control step: the run ended before the first was written.")
+        raise RecordingError(f"{place} holds no control step, because the run ended before the first was written.")
     raise RecordingError(
-        f"{place} holds no recording of pretouch: for one of another program use `pretouch detect {place}`."
+        f"{place} is not a recording of pretouch: for one of another program use `pretouch detect {place}`."
     )
 
 
@@ -218,8 +225,8 @@ def _bare(text: str) -> str:
 
 def _no_mcap(place: Path) -> str:
     if place.stat().st_size == 0:
-        return f"{place} is empty: the run ended before anything was written."
-    return f"{place} is no MCAP file: for a recording of another program use `pretouch detect {place}`."
+        return f"{place} is empty, because the run ended before anything was written."
+    return f"{place} is not an MCAP file: for a recording of another program use `pretouch detect {place}`."
 
 
 def _missing(place: Path, contents: Contents) -> str:
@@ -228,7 +235,7 @@ def _missing(place: Path, contents: Contents) -> str:
     if contents.damaged:
         said.append(f"{contents.damaged} damaged part{'s' if contents.damaged > 1 else ''} left out")
     if not contents.complete:
-        said.append("the end is missing, as of a run that was killed")
+        said.append("the end is missing, as after a run that was killed")
     if not said:
         return ""
-    return f"{place}: {' and '.join(said)}; `pretouch recover {place}` makes a file that opens everywhere."
+    return f"{place}: {' and '.join(said)}; `pretouch recover {place}` writes a complete file."

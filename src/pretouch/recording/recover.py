@@ -43,10 +43,10 @@ def recover(place: Path, out: Path | None = None) -> Recovered:
                 out.unlink()
                 raise
     except FileExistsError as error:
-        raise RecordingError(f"There is something at {out} already: give another name, or move it away.") from error
+        raise RecordingError(f"{out} exists already: give another name, or move it.") from error
     except OSError as error:
         raise RecordingError(f"The recovered recording {out} cannot be written: {error.strerror}.") from error
-    return Recovered(out, steps, f"{out} holds what was whole of {place}: {steps} {what}, over {duration:.2f} s.")
+    return Recovered(out, steps, f"{out} holds the intact part of {place}: {steps} {what}, over {duration:.2f} s.")
 
 
 def _held(place: Path) -> tuple[bool, int, str, float]:

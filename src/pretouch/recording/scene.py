@@ -1,7 +1,7 @@
 """What viewers draw of a recording: where the links are, and markers of what the arm senses and follows."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -30,6 +30,21 @@ _GREEN, _RED, _BLUE, _GREY, _BROWN = (
 )  # fmt: skip
 _POINT_M, _LINE_M = 0.03, 0.005
 _PATH_POINTS = 200
+
+
+class _Look(NamedTuple):
+    """What a marker looks like."""
+
+    kind: int
+    size: tuple[float, ...]
+    """(3,) [m]"""
+    color: tuple[float, ...]
+    """(4,) red, green, blue, opacity."""
+
+
+_SENSED = _Look(_SPHERE_LIST, (_POINT_M, _POINT_M, _POINT_M), _GREEN)
+_CLOSEST = _Look(_LINE_LIST, (_LINE_M, 0.0, 0.0), _RED)
+_PATH = _Look(_LINE_STRIP, (_LINE_M, 0.0, 0.0), _BLUE)
 
 
 class Scene:
@@ -79,17 +94,17 @@ class Scene:
         o, at = step.obstacles, header(time, self._model.links[0])
         pairs = np.stack([o.body_point, o.point], axis=1).reshape(-1, 3)
         return encoded(MARKERS, make(MARKERS, [
-            _marker(at, "sensed", 0, _SPHERE_LIST, (_POINT_M,) * 3, _GREEN, points=o.point),
-            _marker(at, "closest", 0, _LINE_LIST, (_LINE_M, 0.0, 0.0), _RED, points=pairs),
+            _marker(at, "sensed", 0, _SENSED, points=o.point),
+            _marker(at, "closest", 0, _CLOSEST, points=pairs),
         ]))  # fmt: skip
 
     def _standing(self, time: int) -> bytes:
         """The path, the arm's capsules in the frames of their links, and boxes around it."""
         base = header(time, self._model.links[0])
-        markers = [_marker(base, "path", 0, _LINE_STRIP, (_LINE_M, 0.0, 0.0), _BLUE, points=self._path)]
+        markers = [_marker(base, "path", 0, _PATH, points=self._path)]
         markers += _capsule_markers(self._model.capsules, self._model.links, time)
         for i, box in enumerate(self._boxes):
-            markers.append(_marker(base, "box", i, _CUBE, tuple(2 * box.half_size), _BROWN, box.center))
+            markers.append(_marker(base, "box", i, _Look(_CUBE, tuple(2 * box.half_size), _BROWN), box.center))
         return encoded(MARKERS, make(MARKERS, markers))
 
 
@@ -102,18 +117,18 @@ def _capsule_markers(capsules: Capsules, links: tuple[str, ...], time: int) -> l
         at, along = header(time, links[link]), b - a
         length = float(np.linalg.norm(along))
         turn = Rotation.align_vectors([along / length], [[0.0, 0.0, 1.0]])[0] if length else Rotation.identity()
-        size = (2 * r, 2 * r)
+        ball, middle = _Look(_SPHERE, (2 * r, 2 * r, 2 * r), _GREY), _Look(_CYLINDER, (2 * r, 2 * r, length), _GREY)
         markers += [
-            _marker(at, "arm", 3 * i, _CYLINDER, (*size, length), _GREY, (a + b) / 2, turn.as_quat()),
-            _marker(at, "arm", 3 * i + 1, _SPHERE, (*size, 2 * r), _GREY, a),
-            _marker(at, "arm", 3 * i + 2, _SPHERE, (*size, 2 * r), _GREY, b),
+            _marker(at, "arm", 3 * i, middle, (a + b) / 2, turn.as_quat()),
+            _marker(at, "arm", 3 * i + 1, ball, a),
+            _marker(at, "arm", 3 * i + 2, ball, b),
         ]
     return markers
 
 
 def _marker(
-    at: Any, group: str, number: int, kind: int, size: Any, color: tuple[float, ...],
-    position: FloatArray | None = None, quaternion: FloatArray | None = None, points: FloatArray | None = None,
+    at: Any, group: str, number: int, look: _Look, position: FloatArray | None = None,
+    quaternion: FloatArray | None = None, points: FloatArray | None = None,
 ) -> Any:  # fmt: skip
     """Make a marker; quaternions are (x, y, z, w), as in ROS."""
     place = [0.0, 0.0, 0.0] if position is None else [float(v) for v in position]
@@ -122,9 +137,9 @@ def _marker(
     nothing = np.zeros(0, dtype=np.uint8)
     empty = make(HEADER, make(TIME, 0, 0), "")
     return make(
-        _MARKER, at, group, number, kind, 0, make(_POSE, make(_POINT, *place), make(QUATERNION, *turn)),
-        make(VECTOR, *(float(v) for v in size)), make(_COLOR, *color), make(_DURATION, 0, 0), True, corners, [], "",
-        make(_IMAGE, empty, "", nothing), [], "", "", make(_MESH, "", nothing), False,
+        _MARKER, at, group, number, look.kind, 0, make(_POSE, make(_POINT, *place), make(QUATERNION, *turn)),
+        make(VECTOR, *(float(v) for v in look.size)), make(_COLOR, *look.color), make(_DURATION, 0, 0), True, corners,
+        [], "", make(_IMAGE, empty, "", nothing), [], "", "", make(_MESH, "", nothing), False,
     )  # fmt: skip
 
 

@@ -16,12 +16,10 @@ from pretouch.composition import as_table
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError, RecordingError
-from pretouch.params import Profile
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.profiles import profile_from
+from pretouch.profiles import Profile, profile_from
 from pretouch.recording.messages import FORMAT, PACKAGE, decoded, encoded, make
 from pretouch.recording.plain import JSON, as_json, from_json, sound
-from pretouch.recording.recorded_path import RecordedPath, Tangents
 from pretouch.recording.versions import versions
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
@@ -29,6 +27,43 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.types import FloatArray
+
+Tangents = dict[float, tuple[FloatArray, FloatArray]]
+"""Point (3,) [m] and unit tangent (3,) of a path, by the arc length [m] of each step that followed it."""
+
+
+class RecordedPath:
+    """A path that is exact at each arc length that was followed, and elsewhere drawn through samples."""
+
+    def __init__(self, samples: FloatArray, length: float, closed: bool, followed: Callable[[], Tangents]) -> None:
+        """Take samples (S, 3) [m] at equal arc lengths, and where to find what was followed, once it is needed."""
+        self.length, self.closed = length, closed
+        self._samples, self._find = samples, followed
+
+    @cached_property
+    def _followed(self) -> Tangents:
+        return self._find()
+
+    def point(self, phase: float) -> FloatArray:
+        """Return the position (3,) [m] at an arc length [m]."""
+        found = self._followed.get(phase)
+        return self._interpolated(phase) if found is None else found[0]
+
+    def tangent(self, phase: float) -> FloatArray:
+        """Return the unit tangent (3,) at an arc length [m]; zero where samples on either side coincide."""
+        found = self._followed.get(phase)
+        if found is not None:
+            return found[1]
+        step = self.length / (len(self._samples) - 1)
+        along = self._interpolated(phase + step / 2) - self._interpolated(phase - step / 2)
+        size = float(np.linalg.norm(along))
+        return along / size if size else along
+
+    def _interpolated(self, phase: float) -> FloatArray:
+        s = phase % self.length if self.closed else min(max(phase, 0.0), self.length)
+        places = np.linspace(0.0, self.length, len(self._samples))
+        return np.array([np.interp(s, places, self._samples[:, i]) for i in range(3)])
+
 
 RUN = f"{PACKAGE}/msg/Run"
 
@@ -78,8 +113,8 @@ class Run:
         """Make the controller again, on the model, skin, fixtures and path of this run."""
         if self.unlike:
             raise RecordingError(
-                f"The recorded profile differs in {', '.join(self.unlike)} from what this version knows: recompute it"
-                f" with the version that made it, {self.versions.get('pretouch', 'unknown')}."
+                f"The recorded profile differs from this version in {', '.join(self.unlike)}: recompute it with the"
+                f" version that made it, {self.versions.get('pretouch', 'unknown')}."
             )
         return sound(lambda: Controller(self.model, self.skin, self.fixtures, self.path, self.profile))
 
@@ -104,7 +139,8 @@ def decode_run(data: bytes, tangents: Callable[[int], Tangents]) -> Run:
     m = decoded(RUN, data)
     if m.format > FORMAT:
         raise RecordingError(
-            f"The recording has format {m.format}, this version of pretouch knows {FORMAT}: open it with a later one."
+            f"The recording has format {m.format}, but this version of pretouch reads up to {FORMAT}: open it with a"
+            " later version."
         )
     profile, unlike = sound(lambda: profile_from(from_json(m.profile)))
     return Run(
@@ -129,9 +165,7 @@ def _mjcf(arm: RobotDescription) -> str:
     try:
         return arm.mjcf.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(
-            f"The MJCF file {arm.mjcf} cannot be read, to keep it in the recording: {error}"
-        ) from error
+        raise RecordingError(f"The MJCF file {arm.mjcf} cannot be copied into the recording: {error}") from error
 
 
 def _model(m: Any) -> RobotModel:

@@ -10,12 +10,11 @@ import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
-from pretouch.recording.imu import ImuRows, no_imu
-from pretouch.recording.joints import JointRows
 from pretouch.recording.messages import TOPICS, decoded
 from pretouch.recording.reader import is_ours
 from pretouch.recording.skin_recording import UNIT_SAMPLE
 from pretouch.recording.standard import IMU, JOINT_STATE
+from pretouch.recording.traces import ImuRows, JointRows, no_imu
 from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
@@ -93,7 +92,7 @@ def read_skin(place: Path) -> SkinTrace:
             else:
                 joints.add_message(decoded(kind, data))
     except OSError as error:
-        reason = "there is none" if isinstance(error, FileNotFoundError) else error.strerror
+        reason = "it does not exist" if isinstance(error, FileNotFoundError) else error.strerror
         raise RecordingError(f"The recording {place} cannot be read: {reason}.") from error
     if not samples:
         raise RecordingError(
@@ -119,7 +118,9 @@ def _messages(place: Path, contents: Contents) -> Iterator[tuple[str, bytes]]:
     """Yield type and CDR of all messages to read in the whole chunks of a file."""
     with place.open("rb") as file:
         if not begins_as_mcap(file):
-            raise RecordingError(f"{place} is no MCAP file: give a recording made by `pretouch skin monitor --record`.")
+            raise RecordingError(
+                f"{place} is not an MCAP file: give a recording made by `pretouch skin monitor --record`."
+            )
         for chunk in scan(file, contents):
             kinds = {i: kind for i, (_, kind) in contents.topics().items() if kind in (UNIT_SAMPLE, IMU, JOINT_STATE)}
             _check(place, contents)
@@ -133,8 +134,8 @@ def _check(place: Path, contents: Contents) -> None:
     """Refuse samples of another definition than ours."""
     if any(kind == UNIT_SAMPLE and not is_ours(schema, kind) for kind, schema in contents.schemas.values()):
         raise RecordingError(
-            f"{place} was recorded by another version of pretouch, whose samples of units are others: open it with"
-            " that version."
+            f"{place} was recorded by another version of pretouch, with different samples of units: open it with that"
+            " version."
         )
 
 

@@ -12,9 +12,9 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pretouch.recording.disk import Disk
-from pretouch.recording.joints import check_joints, joint_items
-from pretouch.recording.messages import PACKAGE, Item, encoded, fields_of, make, plain_text, prepare
+from pretouch.recording.messages import PACKAGE, Item, encoded, fields_of, make, prepare
 from pretouch.recording.standard import IMU, JOINT_STATE, RANGE, header, imu_items, nanoseconds, range_item, topic_name
+from pretouch.recording.traces import check_joints, joint_items
 from pretouch.types import FloatArray
 
 UNIT_SAMPLE = f"{PACKAGE}/msg/UnitSample"
@@ -118,7 +118,7 @@ class SkinRecording:
 
     def _sample_items(self, unit: str, time: int, heard: Arrived, new: bool) -> Iterator[Item]:
         sample = heard.sample
-        ours = plain_text(unit), heard.arrival, heard.stamp, heard.offset, heard.bound
+        ours = unit, heard.arrival, heard.stamp, heard.offset, heard.bound
         given = (getattr(sample, name) for name in self._fields)
         message = make(UNIT_SAMPLE, *ours, *given, np.frombuffer(sample.imu + sample.touch, dtype=np.uint8))
         name = f"/skin/{topic_name(unit)}/sample"
@@ -148,7 +148,7 @@ class SkinRecording:
 def _health_items(time: int, rows: Sequence[Diagnosis]) -> Iterator[Item]:
     statuses = [
         make(
-            _STATUS, int(row.level), plain_text(row.unit), plain_text(row.message), plain_text(row.unit),
+            _STATUS, int(row.level), row.unit, row.message, row.unit,
             [make(_KEY_VALUE, key, value) for key, value in row.values.items()],
         )
         for row in rows

@@ -8,27 +8,21 @@ from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
 from functools import cache
-from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_origin
 
 import numpy as np
 
 from pretouch.composition import Part
 from pretouch.controller import ControllerState
 from pretouch.errors import PretouchError, RecordingError
-from pretouch.recording.messages import PACKAGE, decoded, encoded, make, plain_text
+from pretouch.recording.codec import hints_of, optional
+from pretouch.recording.messages import PACKAGE, decoded, encoded, make
 from pretouch.types import IntArray
 
 STATE = f"{PACKAGE}/msg/State"
 
 _UNREAD = "watch.robot.tau_ext"
 """Made an array of numbers by each step; what a caller puts there may be anything, and is kept only if it is one."""
-
-
-@cache
-def _hints(kind: type) -> tuple[tuple[str, Any], ...]:
-    hints = get_type_hints(kind)
-    return tuple((name, hints[name]) for name in (getattr(kind, "_fields", None) or [f.name for f in fields(kind)]))
 
 
 def _is_made_of_fields(hint: Any) -> bool:
@@ -53,7 +47,7 @@ class _Parts:
         self.shape: list[str] = []
         self.numbers: list[Any] = []
         self.wholes: list[int] = []
-        self.texts: list[str] = []
+        self.texts: list[str | Enum] = []
 
     def add(self, name: str, kind: str, shape: str = "") -> None:
         self.name.append(name)
@@ -79,7 +73,7 @@ def _take(parts: _Parts, name: str, hint: Any, value: Any) -> None:
     if kind == "state":
         parts.add(name, kind, _owner(hint))
     if kind in ("parts", "state"):
-        for field, inner in _hints(hint):
+        for field, inner in hints_of(hint):
             _take(parts, f"{name}.{field}" if name else field, inner, getattr(value, field))
     elif kind == "tuple":
         parts.add(name, kind, str(len(value)))
@@ -95,7 +89,7 @@ def _take(parts: _Parts, name: str, hint: Any, value: Any) -> None:
         elif kind in ("int", "bool"):
             parts.wholes.append(int(value))
         elif kind == "text":
-            parts.texts.append(plain_text(value.value if isinstance(value, Enum) else value))
+            parts.texts.append(value)
 
 
 def _readable(value: Any) -> Any:
@@ -110,10 +104,10 @@ def _kind(hint: Any, value: Any) -> tuple[Any, str]:
         if value is None or _is_made_of_fields(type(value)):
             return type(value), "none" if value is None else "state"
         hint = np.ndarray if isinstance(value, np.ndarray) else type(value)
-    if get_origin(hint) in (Union, UnionType):
+    if (left := optional(hint)) is not None:
         if value is None:
             return hint, "none"
-        hint = _without_none(hint)
+        hint = left
     if _is_made_of_fields(hint):
         return hint, "parts"
     if get_origin(hint) is tuple:
@@ -152,11 +146,6 @@ def _state_of(owner: str) -> type:
         return Part.interfaces[group].called(name).State
     except (KeyError, PretouchError) as error:
         raise RecordingError(f"The part {owner} of the recorded profile is not installed: {error}") from error
-
-
-def _without_none(hint: Any) -> Any:
-    (left,) = (inner for inner in get_args(hint) if inner is not NoneType)
-    return left
 
 
 def _inner(hint: Any, count: int) -> Iterator[Any]:
@@ -225,22 +214,21 @@ def decode_state(data: bytes) -> tuple[bool, ControllerState]:
         return message.anew, _give(_Reading(message), "", ControllerState)
     except (ValueError, KeyError, IndexError, StopIteration) as error:
         raise RecordingError(
-            f"The controller's state in the recording is that of another version ({error}): open it with the version"
-            " that made it."
+            f"The controller's state in the recording is from another version ({error}): open it with the version that"
+            " made it."
         ) from error
 
 
 def _give(parts: _Reading, name: str, hint: Any) -> Any:
     """Return the next value, annotated with a type."""
-    optional = get_origin(hint) in (Union, UnionType)
-    if optional or hint is object:
+    if hint is object or (left := optional(hint)) is not None:
         if parts.none(name):
             return None
-        hint = parts.of_part(name) if hint is object else _without_none(hint)
+        hint = parts.of_part(name) if hint is object else left
     if _is_made_of_fields(hint):
         kind = hint if isinstance(hint, type) else type(hint)
         given, may_lack = {}, _with_default(kind)
-        for field, inner in _hints(kind):
+        for field, inner in hints_of(kind):
             whole = f"{name}.{field}" if name else field
             if field not in may_lack or parts.holds(whole):  # what an older version did not know is as it began
                 given[field] = _give(parts, whole, inner)

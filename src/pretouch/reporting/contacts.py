@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.reporting.course import MODES, Course
+from pretouch.recording.run_record import MODES
+from pretouch.reporting.course import Course
 from pretouch.reporting.numbers import durations
 from pretouch.reporting.touches import TRANSIENT_S, Touch
 from pretouch.types import BoolArray, FloatArray, Mode
@@ -73,8 +74,9 @@ def detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
         force, late = course.force[during], course.time[during] >= begun + TRANSIENT_S
         found.append(
             Detection(
-                time=time, run=int(course.run[i]), force=contact.force, axes=contact.axes, filtered=course.filtered[i],
-                raw=course.force[i], peak=_farthest(force), peak_norm=_norm(force), held_norm=_norm(force[late]),
+                time=time, run=int(course.run[i]), force=contact.force, axes=contact.axes,
+                filtered=course.filtered_force[i], raw=course.force[i],
+                peak=_farthest(force), peak_norm=_norm(force), held_norm=_norm(force[late]),
                 reaction_speed=speed, reaction_s=float(lasted[i:end].sum()), touch=touch,
                 delay=time - begun if first else None,
             )

@@ -6,19 +6,18 @@ from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from pretouch.reporting.course import MODES, NO_READING, OUTCOMES, Course, Truth
+from pretouch.recording.run_record import Columns, TrueForces, columns_of, contacts_of
+from pretouch.reporting.course import NO_READING, OUTCOMES, Course
 from pretouch.robot.model import RobotModel
-from pretouch.types import Contact, FloatArray, Inputs, IntArray, RangeReadings
+from pretouch.types import FloatArray, Inputs, IntArray, RangeReadings
 
 if TYPE_CHECKING:
     from pretouch.recording.reader import Kept, Recorded, Run
 
 _BATCH = 4096
 """Cycles that are held as objects at a time."""
-
-Block = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -41,13 +40,13 @@ class _Layout:
 def gather(recorded: "Recorded") -> Course:
     """Read all cycles of a recording."""
     layout = _Layout.of(recorded.runs)
-    blocks, reasons, contacts, truths = [_empty(layout)], [], [], []
+    blocks, reasons, contacts, truths = [], [], [], []
     done = 0
     for batch in _batches(recorded):
         run = recorded.runs[batch[0].run]
         blocks.append(_block(batch, run, layout))
         reasons += [kept.step.reason for kept in batch]
-        contacts += _contacts(batch, done)
+        contacts += contacts_of([kept.step for kept in batch], done)
         truths.append(_truth(batch, run))
         done += len(batch)
     joined = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
@@ -64,61 +63,24 @@ def _batches(recorded: "Recorded") -> Iterator[list["Kept"]]:
             yield batch
 
 
-def _contacts(batch: list["Kept"], before: int) -> list[tuple[int, Contact, float]]:
-    return [
-        (before + i, kept.step.contact, float(np.linalg.norm(kept.step.reaction_velocity)))
-        for i, kept in enumerate(batch)
-        if kept.step.contact is not None
-    ]
-
-
-def _empty(layout: _Layout) -> Block:
-    """Arrays of no cycles, of the right widths and types."""
-    u, n = len(layout.units), layout.joints
-    widths = {
-        "ee_position": 3, "path_position": 3, "force": 3, "filtered": 3, "upper": 3, "lower": 3, "sigma": 3,
-        "nearest_point": 3, "body_distance": u, "range_distance": u, "reading_stamp": u, "reading_distance": u,
-        "link_distance": len(layout.links), "q_margin": n, "q_margin_measured": n, "command": n, "speed_limit": n,
-    }  # fmt: skip
-    block: Block = {name: np.empty((0, width)) for name, width in widths.items()}
-    block |= {
-        name: np.empty(0)
-        for name in ("time", "speed", "speed_scale", "ee_distance", "slack", "robot_stamp", "evidence")
-    }
-    block |= {name: np.empty(0, np.int64) for name in ("run", "mode", "restricted", "outcome")}
-    block |= {name: np.empty(0, np.bool_) for name in ("armed", "given", "force_missing")}
-    return block | {"reading_status": np.empty((0, u), np.int64)}
-
-
-def _block(batch: list["Kept"], run: "Run", layout: _Layout) -> Block:
+def _block(batch: list["Kept"], run: "Run", layout: _Layout) -> Columns:
     """Arrays of a batch of one run."""
     steps = [kept.step for kept in batch]
     place = np.array([layout.units.index(unit) for unit in run.skin.ids], dtype=np.int64)
     q, q_commanded = np.array([s.q for s in steps]), np.array([s.q_commanded for s in steps])
     command = np.array([s.command for s in steps])
-    parts = np.array([s.thresholds.parts for s in steps])
     joints = {
         "q_margin": _margin(q_commanded, run.model),
         "q_margin_measured": _margin(q, run.model),
         "command": command,
         "speed_limit": _speed_limit(q_commanded, command, run.model),
     }
+    found = columns_of(steps)
+    spread = {name: _spread(found[name], place, len(layout.units)) for name in ("range_distance", "sensed_point")}
     return {
-        "time": np.array([s.stamp for s in steps]),
+        **found,
+        **spread,
         "run": np.full(len(batch), batch[0].run),
-        "mode": np.array([MODES.index(s.mode) for s in steps]),
-        "ee_position": np.array([s.ee_position for s in steps]),
-        "path_position": np.array([s.path_position for s in steps]),
-        "speed": np.linalg.norm([s.ee_velocity for s in steps], axis=1),
-        "speed_scale": np.array([s.speed_scale for s in steps], dtype=np.float64),
-        "force": np.array([s.force for s in steps]),
-        "filtered": np.array([s.filtered_force for s in steps]),
-        "upper": parts[:, 0],
-        "lower": parts[:, 1],
-        "sigma": parts[:, 3],
-        "evidence": np.array([s.evidence for s in steps], dtype=np.float64),
-        "armed": np.array([s.armed for s in steps]),
-        "range_distance": _spread([s.range_distance for s in steps], place, len(layout.units)),
         "restricted": np.array([len(s.restricted) for s in steps]),
         "outcome": np.array([OUTCOMES.index(s.qp.outcome) for s in steps]),
         "slack": np.array([np.max(s.qp.slack, initial=0.0) for s in steps]),
@@ -128,7 +90,7 @@ def _block(batch: list["Kept"], run: "Run", layout: _Layout) -> Block:
     }
 
 
-def _near(batch: list["Kept"], run: "Run", layout: _Layout, place: IntArray) -> Block:
+def _near(batch: list["Kept"], run: "Run", layout: _Layout, place: IntArray) -> Columns:
     """What was sensed, as the least distance of each step by unit and by link, and the nearest point."""
     seen = [kept.step.obstacles for kept in batch]
     row = np.repeat(np.arange(len(seen)), [len(o.unit) for o in seen])
@@ -150,7 +112,7 @@ def _near(batch: list["Kept"], run: "Run", layout: _Layout, place: IntArray) -> 
     return {"body_distance": by_unit, "link_distance": by_link, "ee_distance": nearest, "nearest_point": where}
 
 
-def _given(inputs: Sequence[Inputs | None], place: IntArray, units: int) -> Block:
+def _given(inputs: Sequence[Inputs | None], place: IntArray, units: int) -> Columns:
     """What the steps were given; inputs that a controller could not use may hold anything."""
     nothing = np.full(len(place), np.nan)
     none = np.full(len(place), NO_READING)
@@ -174,10 +136,11 @@ def _readings(inputs: Inputs | None, count: int) -> RangeReadings | None:
     return inputs.readings if fit else None
 
 
-def _spread(rows: Sequence[NDArray[Any]], place: IntArray, width: int, nothing: Any = np.nan) -> NDArray[Any]:
-    """Rows (S, K) of a skin's units, each unit in the column of its name."""
-    spread = np.full((len(rows), width), nothing)
-    spread[:, place] = np.array(rows).reshape(len(rows), len(place))
+def _spread(rows: ArrayLike, place: IntArray, width: int, nothing: Any = np.nan) -> NDArray[Any]:
+    """Rows (S, K, ...) of a skin's units, each unit in the column of its name."""
+    given = np.asarray(rows)
+    spread = np.full((len(given), width, *given.shape[2:]), nothing)
+    spread[:, place] = given
     return spread
 
 
@@ -202,21 +165,21 @@ def _speed_limit(q: FloatArray, command: FloatArray, model: RobotModel) -> Float
     return np.minimum(limit, np.maximum(falling, 0.0))
 
 
-def _truth(batch: list["Kept"], run: "Run") -> Truth | None:
+def _truth(batch: list["Kept"], run: "Run") -> TrueForces | None:
     """What is known of the true forces during a batch, None if nothing is."""
     known = [kept.truth for kept in batch if kept.truth is not None]
     if not known:
         return None
     touches = [(time, run.model.links[link], velocity) for truth in known for time, link, velocity in truth.touches]
     force = np.concatenate([truth.force for truth in known]).reshape(-1, 3)
-    return Truth(np.concatenate([truth.time for truth in known]), force, tuple(touches))
+    return TrueForces(np.concatenate([truth.time for truth in known]), force, tuple(touches))
 
 
-def _joined(truths: list[Truth | None]) -> Truth | None:
+def _joined(truths: list[TrueForces | None]) -> TrueForces | None:
     known = [truth for truth in truths if truth is not None]
     if not known:
         return None
-    return Truth(
+    return TrueForces(
         np.concatenate([truth.time for truth in known]),
         np.concatenate([truth.force for truth in known]),
         tuple(touch for truth in known for touch in truth.touches),

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.reporting.course import MODES, Course
+from pretouch.recording.run_record import MODES
+from pretouch.reporting.course import Course
 from pretouch.reporting.numbers import Spread, spread
 from pretouch.types import Mode
 

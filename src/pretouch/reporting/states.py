@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.reporting.course import MODES, OUTCOMES, Course
+from pretouch.recording.run_record import MODES
+from pretouch.reporting.course import OUTCOMES, Course
 from pretouch.reporting.numbers import Spread, durations, spread
 from pretouch.types import Mode, QpOutcome
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.reporting.course import Truth
+from pretouch.recording.run_record import TrueForces
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over, spans
 from pretouch.types import FloatArray
@@ -37,7 +37,7 @@ class Touch:
     """(3,) velocity of the touching point before the contact [m/s], NaN where that is not known."""
 
 
-def touches_of(truth: Truth | None) -> list[Touch]:
+def touches_of(truth: TrueForces | None) -> list[Touch]:
     """All true touches in order; none where nothing is known, or what is said to be known cannot be."""
     if truth is None or len(truth.time) < 2 or not np.all(np.isfinite(truth.time)):
         return []
@@ -79,7 +79,7 @@ def _largest(mean: FloatArray, first: int, past: int) -> float:
     return float(mean[max(first, 0) : past].max(initial=0.0))
 
 
-def _beginning(truth: Truth, after: float, start: float) -> tuple[str, FloatArray]:
+def _beginning(truth: TrueForces, after: float, start: float) -> tuple[str, FloatArray]:
     """Link and velocity of the last contact that began after one instant and by another [s]."""
     known = [(link, velocity) for time, link, velocity in truth.touches if after < time <= start + 1e-9]
     return known[-1] if known else ("", np.full(3, np.nan))

@@ -38,11 +38,16 @@ class Capsules:
         return Capsules(self.link[keep], self.a[keep], self.b[keep], self.radius[keep])
 
 
+def no_capsules() -> Capsules:
+    """Return none."""
+    return Capsules(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+
+
 def capsules_of(model: mujoco.MjModel) -> Capsules:
     """Read the capsule geoms of an MJCF model; a link's index is its MuJoCo body id."""
     other = [model.geom(g).name for g in range(model.ngeom) if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_CAPSULE]
     if other:
-        raise RobotModelError(f"The geoms {', '.join(other)} are no capsules: describe the body by capsules only.")
+        raise RobotModelError(f"The geoms {', '.join(other)} are not capsules: describe the body by capsules only.")
     half = np.zeros((model.ngeom, 3))
     for g in range(model.ngeom):
         axis = np.zeros(3)

@@ -42,8 +42,8 @@ class SpeedEnvelope:
             raise RobotModelError(f"Speed envelope: slope is {self.slope}: all must be positive.")
         if np.any(self.q_upper - self.q_lower <= 2 * self.offset**2 / self.slope):
             raise RobotModelError(
-                f"Speed envelope: between q_lower {self.q_lower} and q_upper {self.q_upper} a joint may move nowhere"
-                " both ways: give each q_upper above its q_lower."
+                f"Speed envelope: between q_lower {self.q_lower} and q_upper {self.q_upper} a joint cannot move in both"
+                " directions: give each q_upper above its q_lower."
             )
 
     def moved_in(self, margin: float) -> "SpeedEnvelope":
@@ -87,7 +87,7 @@ class RobotDescription:
                 f"{self.name}: the speed envelope is for {len(self.envelope.offset)} joints: give {n} of each number."
             )
         if not self.mjcf.is_file():
-            raise RobotModelError(f"{self.name}: there is no MJCF file at {self.mjcf}.")
+            raise RobotModelError(f"{self.name}: the MJCF file {self.mjcf} does not exist: check its name.")
 
 
 def panda() -> RobotDescription:

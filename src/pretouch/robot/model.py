@@ -110,7 +110,7 @@ class RobotModel:
         for j in range(self._model.njnt):
             joint = self._model.joint(j).name
             if self._model.jnt_type[j] != mujoco.mjtJoint.mjJNT_HINGE:
-                raise RobotModelError(f"{name}: joint {joint} is no hinge: only hinge joints are supported.")
+                raise RobotModelError(f"{name}: joint {joint} is not a hinge: only hinge joints are supported.")
             if not self._model.jnt_limited[j]:
                 raise RobotModelError(f"{name}: joint {joint} has no range: give it its position limits.")
 

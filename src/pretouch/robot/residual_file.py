@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from pretouch.atomic_write import atomic_write
 from pretouch.errors import RobotModelError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch.whole_file import write_whole
 
 FORMAT = 1
 _LARGEST = 1e6
 """Largest number in a file: any larger one is a mistake."""
 _LATEST = 253_402_300_800.0
 """The year 10 000 [s since 1970]."""
-_ANEW = "let the arm learn its free motion anew"
+_ANEW = "let the arm learn its free motion again"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +46,9 @@ def save_residual(path: Path, model: RobotModel, residual: Residual) -> None:
         "since": residual.since, "saved": residual.saved, "array": arrays,
     })  # fmt: skip
     try:
-        write_whole(path, text)
+        atomic_write(path, text)
     except OSError as error:
-        raise RobotModelError(f"What was learnt cannot be written to {path}: {error.strerror}.") from error
+        raise RobotModelError(f"The free-motion file {path} cannot be written: {error.strerror}.") from error
 
 
 def load_residual(path: Path, model: RobotModel, shapes: dict[str, tuple[int, ...]]) -> Residual:
@@ -64,7 +64,7 @@ def load_residual(path: Path, model: RobotModel, shapes: dict[str, tuple[int, ..
             raise RobotModelError(f"{path} has {key} = {data.get(key)!r}, but {ours!r} is needed: {_ANEW}.")
     robot, since, saved = data.get("robot"), _instant(data.get("since")), _instant(data.get("saved"))
     if not isinstance(robot, str) or since is None or saved is None:
-        raise RobotModelError(f"{path} does not say of which robot it is, and since when: {_ANEW}.")
+        raise RobotModelError(f"{path} does not name its robot and start time: {_ANEW}.")
     found = data.get("array")
     return Residual({name: _array(path, found, name, shape) for name, shape in shapes.items()}, robot, since, saved)
 
@@ -79,5 +79,5 @@ def _array(path: Path, found: Any, name: str, shape: tuple[int, ...]) -> FloatAr
     if not isinstance(entry, dict) or entry.get("shape") != list(shape) or not isinstance(values, list):
         raise RobotModelError(f"{path}: {name} is not of the shape {shape}: {_ANEW}.")
     if len(values) != np.prod(shape) or not all(type(v) in (int, float) and abs(v) <= _LARGEST for v in values):
-        raise RobotModelError(f"{path}: {name} holds something else than {np.prod(shape)} finite numbers: {_ANEW}.")
+        raise RobotModelError(f"{path}: {name} must be {np.prod(shape)} finite numbers: {_ANEW}.")
     return np.array(values, dtype=np.float64).reshape(shape)

@@ -10,6 +10,7 @@ import numpy as np
 import tomli_w
 from scipy.spatial.transform import Rotation
 
+from pretouch.atomic_write import atomic_write
 from pretouch.errors import SkinError
 from pretouch.groups import SkinArrays
 from pretouch.robot.model import RobotModel
@@ -22,7 +23,6 @@ from pretouch.sensing.unit import (
     TouchPatch,
 )
 from pretouch.types import FloatArray, IntArray
-from pretouch.whole_file import write_whole
 
 _FAR = 0.5
 """Distance from its link beyond which a unit cannot be mounted on it [m]: millimetres taken for metres, most likely."""
@@ -101,7 +101,7 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
         raise SkinError(f"The skin file {path} is not valid TOML: {error}.") from error
     entries = data.get("unit")
     if not isinstance(entries, list) or not entries:
-        raise SkinError(f"The skin file {path} names no unit: give at least one [[unit]] with id, link and pose.")
+        raise SkinError(f"The skin file {path} has no unit: give at least one [[unit]] with id, link and pose.")
     try:
         return Skin([_unit_from(entry) for entry in entries], model)
     except SkinError as error:
@@ -115,7 +115,7 @@ def save_skin(skin: Skin, path: Path) -> None:
     it leads to is replaced.
     """
     try:
-        write_whole(path, tomli_w.dumps({"unit": [_entry(unit) for unit in skin.units]}))
+        atomic_write(path, tomli_w.dumps({"unit": [_entry(unit) for unit in skin.units]}))
     except OSError as error:
         raise SkinError(f"The skin cannot be written to {path}: {error.strerror}.") from error
 

@@ -89,8 +89,8 @@ class SensorUnit:
         R = T[:3, :3]
         if np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0:
             raise SkinError(
-                f"Unit {self.id}: its orientation is no proper rotation (determinant {np.linalg.det(R):.6f},"
-                f" R R^T off by {np.abs(R @ R.T - np.eye(3)).max():.2g}): give a right-handed rotation."
+                f"Unit {self.id}: its orientation is not a proper rotation (determinant {np.linalg.det(R):.6f}, R R^T"
+                f" off by {np.abs(R @ R.T - np.eye(3)).max():.2g}): give a right-handed rotation."
             )
         if np.abs(T[3] - [0.0, 0.0, 0.0, 1.0]).max() > 0:
             raise SkinError(f"Unit {self.id}: the last row of its pose is {T[3].tolist()}: it must be 0 0 0 1.")

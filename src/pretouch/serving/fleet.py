@@ -10,7 +10,7 @@ import numpy as np
 from pretouch.checks import Checked, NonNegative
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys
-from pretouch.serving.network import NetworkParams, Way
+from pretouch.serving.network import Channel, NetworkParams
 from pretouch.serving.unit import SimulatedUnit, UnitParams
 from pretouch.sim.imu import ImuParams, ImuSample
 from pretouch.sim.range_finder import RangeSample
@@ -48,7 +48,7 @@ class Fleet:
         """
         missing = [name for name in ids if name not in keys]
         if missing:
-            raise HardwareError(f"There is no key for unit {', '.join(missing)}: make keys for all units of the skin.")
+            raise HardwareError(f"No key for unit {', '.join(missing)}: create keys for all units of the skin.")
         family, self._found = _resolved(address)
         self.receiver = address
         """Name or address, and port, of the receiver."""
@@ -60,8 +60,8 @@ class Fleet:
             for name, (own, _, _) in zip(ids, rngs, strict=True)
         )
         """In the order of the skin."""
-        self._up = [Way[bytes](params.network.up, rng) for _, rng, _ in rngs]
-        self._down = [Way[bytes](params.network.down, rng) for _, _, rng in rngs]
+        self._up = [Channel[bytes](params.network.up, rng) for _, rng, _ in rngs]
+        self._down = [Channel[bytes](params.network.down, rng) for _, _, rng in rngs]
         self._sockets = [socket.socket(family, socket.SOCK_DGRAM) for _ in ids]
         for one in self._sockets:
             one.setblocking(False)
@@ -87,13 +87,13 @@ class Fleet:
 
         `clock` gives the time [s]. It is asked once, after the sockets: no beacon is heard before it was sent.
         """
-        before, heard = self.sent, [_heard(one) for one in self._sockets]
+        before, arrived = self.sent, [_heard(one) for one in self._sockets]
         now = clock()
-        for unit, came, down, up, one in zip(self.units, heard, self._down, self._up, self._sockets, strict=True):
+        for unit, came, down, up, one in zip(self.units, arrived, self._down, self._up, self._sockets, strict=True):
             for datagram in came:
                 down.put(datagram, now)
             for datagram in down.take(now):
-                unit.heard(datagram, now)
+                unit.receive_beacon(datagram, now)
             for datagram in unit.tick(now):
                 up.put(datagram, now)
             for datagram in up.take(now):
@@ -121,7 +121,7 @@ def _resolved(address: tuple[str, int]) -> tuple[int, tuple[object, ...]]:
     """Family and address of a receiver by its name and port."""
     host, port = address
     if not host:
-        raise HardwareError("No receiver is given: give its name or address.")
+        raise HardwareError("The receiver's address is empty: give its name or address.")
     if not 1 <= port <= _LAST_PORT:
         raise HardwareError(f"The receiver's port is {port}: give one from 1 to {_LAST_PORT}.")
     try:
@@ -133,11 +133,11 @@ def _resolved(address: tuple[str, int]) -> tuple[int, tuple[object, ...]]:
 
 def _heard(one: socket.socket) -> list[bytes]:
     """All datagrams that wait at a socket."""
-    heard = []
+    arrived = []
     while True:
         try:
-            heard.append(one.recv(_LARGEST))
+            arrived.append(one.recv(_LARGEST))
         except BlockingIOError:
-            return heard
+            return arrived
         except ConnectionError:  # nobody listens at the receiver's port; it may begin to
             continue

@@ -1,6 +1,5 @@
 """A network that loses, delays, overtakes and doubles datagrams, as a wireless one does. No socket, no clock."""
 
-import heapq
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Generic, TypeVar
 
@@ -8,20 +7,21 @@ import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.errors import ParameterError
+from pretouch.sim.under_way import UnderWay
 
 Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
-class WayParams(Checked):
-    """What becomes of datagrams on their way in one direction. By default none is lost, and all are late."""
+class ChannelParams(Checked):
+    """Loss and delay of datagrams in one direction. By default none is lost, and all are late."""
 
     loss: Annotated[float, Check(low=0.0, high=1.0)] = 0.0
     """Probability that a datagram is lost."""
     loss_run: NonNegative = 0.0
     """Mean number of datagrams of one unit lost in a row; 0: each is lost or not by itself, 1 / (1 - loss) in a row."""
     delay_s: NonNegative = 0.008
-    """Least time on the way [s]."""
+    """Least delay [s]."""
     jitter_s: NonNegative = 0.004
     """Mean of what is added to it [s], distributed as gamma."""
     jitter_shape: Positive = 1.0
@@ -36,26 +36,25 @@ class WayParams(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         if 0 < self.loss_run < 1:
-            raise ParameterError(f"WayParams.loss_run is {self.loss_run}: it must be 0, or at least 1.")
+            raise ParameterError(f"ChannelParams.loss_run is {self.loss_run}: it must be 0, or at least 1.")
         least = self.loss / (1.0 - self.loss) if self.loss < 1 else 0.0
         if 0 < self.loss_run < least:
             raise ParameterError(
-                f"WayParams.loss_run is {self.loss_run}: a loss of {self.loss:g} has longer runs, give at least"
-                f" {least:.3g}."
+                f"ChannelParams.loss_run is {self.loss_run}: give at least {least:.3g} for a loss of {self.loss:g}."
             )
 
 
-def _down() -> WayParams:
-    return WayParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)
+def _down() -> ChannelParams:
+    return ChannelParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)
 
 
 @dataclass(frozen=True)
 class NetworkParams(Checked):
     """The network between the units of a skin and their receiver."""
 
-    up: WayParams = field(default_factory=WayParams)
+    up: ChannelParams = field(default_factory=ChannelParams)
     """From units to receiver: latency and jitter as of `sim.range_finder.RangeFinderParams`."""
-    down: WayParams = field(default_factory=_down)
+    down: ChannelParams = field(default_factory=_down)
     """From receiver to units: a quiet access point, with power saving of the units off."""
 
 
@@ -67,17 +66,16 @@ def network(
     `jitter` is the mean of what is added to the least delay upwards [s]; None for the default.
     """
     plain = NetworkParams()
-    up, down = (replace(way, loss=loss, overtaken=overtaken, doubled=doubled) for way in (plain.up, plain.down))
+    up, down = (replace(channel, loss=loss, overtaken=overtaken, doubled=doubled) for channel in (plain.up, plain.down))
     return NetworkParams(up if jitter is None else replace(up, jitter_s=jitter), down)
 
 
-class Way(Generic[Item]):
+class Channel(Generic[Item]):
     """One direction of the network for the datagrams of one unit; the same random numbers give the same course."""
 
-    def __init__(self, params: WayParams, rng: np.random.Generator) -> None:
+    def __init__(self, params: ChannelParams, rng: np.random.Generator) -> None:
         self._params, self._rng = params, rng
-        self._arriving: list[tuple[float, int, Item]] = []
-        self._count = 0
+        self._sent = UnderWay[Item]()
         self._losing = False
         self.lost = 0
         """How many were lost so far."""
@@ -88,15 +86,11 @@ class Way(Generic[Item]):
             self.lost += 1
             return
         for _ in range(1 + int(self._rng.random() < self._params.doubled)):
-            heapq.heappush(self._arriving, (now + self._delay(), self._count, item))
-            self._count += 1
+            self._sent.send(now + self._delay(), item)
 
     def take(self, now: float) -> list[Item]:
         """Return what has arrived by a time [s] and was not taken yet, in the order of arrival."""
-        taken = []
-        while self._arriving and self._arriving[0][0] <= now:
-            taken.append(heapq.heappop(self._arriving)[2])
-        return taken
+        return list(self._sent.arrived(now))
 
     def _loses(self) -> bool:
         """Whether this one is lost; in runs, by the chain of two states that has this loss and this mean run."""

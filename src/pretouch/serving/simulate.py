@@ -34,7 +34,7 @@ _AFTER_S = 0.5
 """Time the arm stands after a motion [s]: what was measured until then has arrived."""
 
 
-class Visitor:
+class VisitingHand:
     """A hand that every 15 s comes to 0.3 m before the robot's hand, stays with it for 5 s, and goes."""
 
     away = (1.2, 0.0, 0.8)
@@ -49,8 +49,8 @@ class Visitor:
         return HandGoal(before if here else np.array(self.away), 20.0)
 
 
-class _Teller:
-    """Says each second how it goes."""
+class _StatusPrinter:
+    """Prints the status each second."""
 
     def __init__(self, fleet: Fleet, clock: RealTime, say: Callable[[str], None]) -> None:
         self._fleet, self._clock, self._say = fleet, clock, say
@@ -58,12 +58,12 @@ class _Teller:
         self._answered, self._named = 0.0, False
 
     def record(self, cycle: Cycle) -> None:
-        """Say it of a controller's arm."""
+        """Print the status of an arm under the controller."""
         step = cycle.step
-        self.tell(f"{step.mode.value:5}  {np.linalg.norm(step.ee_velocity):.2f} m/s")
+        self.print_status(f"{step.mode.value:5}  {np.linalg.norm(step.ee_velocity):.2f} m/s")
 
-    def tell(self, doing: str) -> None:
-        """Say it of an arm that does something."""
+    def print_status(self, doing: str) -> None:
+        """Print the status of an arm and its units."""
         if self._clock.now >= self._next:
             self._next += _SAY_S
             self._say(self._line(doing))
@@ -78,7 +78,7 @@ class _Teller:
             self._named = True
             host, port = self._fleet.receiver
             self._say(
-                f"Nobody answers at {host}:{port}: start `pretouch skin monitor` there with the same keys, or check"
+                f"No answer from {host}:{port}: start `pretouch skin monitor` there with the same keys, or check"
                 " address and firewall."
             )
 
@@ -92,7 +92,7 @@ class _Teller:
             f"{len(fleet.ids) - len(silent)} of {len(fleet.ids)} units in session",
         ]
         if silent:
-            parts.append(f"not {', '.join(silent)}")
+            parts.append(f"without session: {', '.join(silent)}")
         if fleet.lost:
             parts.append(f"{fleet.lost} could not be sent")
         if self._clock.left_out:
@@ -107,17 +107,17 @@ def run(options: SimulateOptions, done: Callable[[], bool], say: Callable[[str],
     HardwareError.
     """
     model, profile = options.model, options.profile
-    scene = SceneSpec(hand=HandSpec(start=Visitor.away)) if options.hand else SceneSpec()
+    scene = SceneSpec(hand=HandSpec(start=VisitingHand.away)) if options.hand else SceneSpec()
     begin = brought_to(model, options.path.point(0.0))
     with SimulatedArm(options, begin, profile.task.control_period_s, scene) as arm:
         if options.hand:
-            Hand(arm.plant, Visitor(model.ee))
+            Hand(arm.plant, VisitingHand(model.ee))
         # it draws the same numbers as the units that send: what is sent is what the arm's own controller has
         felt = RangeFinders(arm.plant, options.skin, RangeFinderParams(), options.seed)
         controller = Controller(model, options.skin, fixtures(scene), options.path, profile)
         arm.begin()
-        teller, end = _Teller(arm.fleet, arm.clock, say), options.duration_s or np.inf
-        turn_on(controller, arm, felt, arm, teller, lambda _: done() or arm.clock.now >= end)
+        printer, end = _StatusPrinter(arm.fleet, arm.clock, say), options.duration_s or np.inf
+        turn_on(controller, arm, felt, arm, printer, lambda _: done() or arm.clock.now >= end)
 
 
 def run_motion(
@@ -138,14 +138,14 @@ def run_motion(
     params = PerformParams()
     with SimulatedArm(options, plan.start, params.period_s, late=CATCH_UP_S) as arm:
         arm.begin()
-        teller = _Teller(arm.fleet, arm.clock, say)
-        _await_units(arm, keep, done, teller)
+        printer = _StatusPrinter(arm.fleet, arm.clock, say)
+        _await_units(arm, keep, done, printer)
         if done():
             return
 
         def moved(_tick: float) -> None:
             keep(_stamped(arm))
-            teller.tell("moves")
+            printer.print_status("moves")
 
         stopped = perform(arm, arm, options.model, plan, params, moved).stopped
         if stopped:
@@ -157,7 +157,7 @@ def run_motion(
 
 
 def _await_units(
-    arm: SimulatedArm, keep: Callable[[RobotState], None], done: Callable[[], bool], teller: _Teller
+    arm: SimulatedArm, keep: Callable[[RobotState], None], done: Callable[[], bool], printer: _StatusPrinter
 ) -> None:
     """Let the arm stand until all units were heard for a while without a break."""
     since = now = arm.tick()
@@ -167,7 +167,7 @@ def _await_units(
             keep(_stamped(arm))
         else:
             since = now
-        teller.tell("stands")
+        printer.print_status("stands")
 
 
 def _stamped(arm: SimulatedArm) -> RobotState:

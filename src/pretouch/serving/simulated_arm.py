@@ -7,7 +7,7 @@ from pretouch.checks import Checked, NonNegative
 from pretouch.control.path import Circle, Path
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import Keys
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import Fleet, FleetParams
@@ -59,13 +59,13 @@ class SimulateOptions(Checked):
     seed: int = 0
     """Decides all that is random."""
     duration_s: NonNegative = 0.0
-    """How long [s]; 0: until it is stopped."""
+    """Duration [s]; 0: until it is stopped."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         unknown = sorted((self.silenced | self.stuck) - set(self.skin.ids))
         if unknown:
-            raise HardwareError(f"There is no unit {', '.join(unknown)}: choose from {', '.join(self.skin.ids)}.")
+            raise HardwareError(f"Unknown unit {', '.join(unknown)}: choose from {', '.join(self.skin.ids)}.")
         if self.seed < 0:
             raise ParameterError(f"SimulateOptions.seed is {self.seed}: it must be at least 0.")
 

@@ -164,7 +164,7 @@ class SimulatedUnit:
             self._fifo_first += 1
             self._fifo_lost = True
 
-    def heard(self, datagram: bytes, now: float) -> None:
+    def receive_beacon(self, datagram: bytes, now: float) -> None:
         """Take in what came from the network at a time [s]."""
         if self.silent or now < self._up:
             return

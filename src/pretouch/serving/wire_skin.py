@@ -87,8 +87,8 @@ class WireSkin:
             self.receiver.receive(timeout=_PATIENCE_S)
             if self._came() == came:
                 raise HardwareError(
-                    f"Of {self._taken_in} datagrams {came} came through this machine's loopback:"
-                    " let nothing drop UDP datagrams to 127.0.0.1."
+                    f"Only {came} of {self._taken_in} datagrams arrived through this machine's loopback interface:"
+                    " check that no firewall drops UDP datagrams to 127.0.0.1."
                 )
 
     def _came(self) -> int:

@@ -5,8 +5,8 @@ from importlib.metadata import version
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.client import Kind
-from pretouch.hardware.franka.sentences import check_ready
-from pretouch.session.remembered import Identity
+from pretouch.hardware.franka.errors import check_ready
+from pretouch.session.confirmations import Identity
 from pretouch.types import FloatArray, RobotState
 
 _NAMES: dict[Kind, str] = {"panda": "Panda", "fr3": "FR3"}
@@ -42,7 +42,7 @@ class FrankaSessionArm:
         try:
             check_ready(state, self._address)
         except RobotError as error:
-            return (str(error), "With --recover it does.") if state.mode == _REFLEX else (str(error),)
+            return (str(error), "Run with --recover.") if state.mode == _REFLEX else (str(error),)
         return ()
 
     @property

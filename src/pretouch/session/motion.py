@@ -10,7 +10,6 @@ import numpy as np
 from pretouch import realtime
 from pretouch.calibration.motion.perform import PerformParams, perform
 from pretouch.calibration.motion.plan import Plan
-from pretouch.contact.residual_model import ResidualModel
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock, Recorder
@@ -26,19 +25,19 @@ class Ending:
 
     stopped: str = ""
     """Why it ended early, as a sentence; '' if it did not."""
-    unrest: str = ""
+    rest_unknown: str = ""
     """Why the arm may not be at rest, as a sentence; '' if it is."""
 
     @property
     def early(self) -> bool:
         """Whether it did not end as asked."""
-        return bool(self.stopped or self.unrest)
+        return bool(self.stopped or self.rest_unknown)
 
     def sentences(self) -> tuple[str, ...]:
         """Say it."""
         rest = "The arm is at rest."
-        if self.unrest:
-            rest = f"Whether the arm is at rest is not known: {self.unrest} Look at it, and press the user stop."
+        if self.rest_unknown:
+            rest = f"The arm may not be at rest: {self.rest_unknown} Check it, and press the user stop."
         return (rest, f"The run ended early: {self.stopped}") if self.stopped else (rest,)
 
 
@@ -65,32 +64,13 @@ def go(arm: Arm, controller: Controller, way: Plan, ending: Ending) -> None:
         done = perform(arm, MonotonicClock(period), controller.model, way, params, look)
         return done.stopped or ""
 
-    _moved(arm, move, ending)
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """What the loop asks of the machine."""
-
-    priority: int | None = None
-    """See `realtime.real_time`."""
-    cpu: int | None = None
-    """See `realtime.real_time`."""
+    _run_motion(arm, move, ending)
 
 
 def follow(
-    arm: Arm,
-    skin: Skin,
-    controller: Controller,
-    clock: MonotonicClock,
-    recorder: Recorder,
-    done: Callable[[ControlStep], bool],
-    resume: Callable[[], bool],
-    wishes: Wishes,
-    tell: Callable[[str], None],
-    ending: Ending,
-    learnt: ResidualModel | None = None,
-) -> None:
+    controller: Controller, arm: Arm, skin: Skin, clock: MonotonicClock, recorder: Recorder,
+    done: Callable[[ControlStep], bool], options: realtime.Options, ending: Ending,
+) -> None:  # fmt: skip
     """Turn the controller until `done` says so, a signal comes, or something fails. The arguments are `realtime.run`'s.
 
     Everything is compiled before the arm takes commands. A signal is raised after the arm has come to rest.
@@ -98,32 +78,29 @@ def follow(
     realtime.warm_up(controller, arm.read())
 
     def move(came: list[int]) -> str:
-        realtime.run(
-            controller, arm, skin, clock, recorder, lambda step: bool(came) or done(step), resume,
-            priority=wishes.priority, cpu=wishes.cpu, tell=tell, learnt=learnt,
-        )  # fmt: skip
+        realtime.run(controller, arm, skin, clock, recorder, lambda step: bool(came) or done(step), options)
         return ""
 
-    _moved(arm, move, ending)
+    _run_motion(arm, move, ending)
 
 
-def _moved(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> None:
+def _run_motion(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> None:
     """Let an arm take commands while `move` gives them; it is handed the signals that came, and says why it stopped."""
     with noted_in_motion() as came:
         try:
             arm.begin()
             ending.stopped = move(came)
         except Exception as error:
-            ending.stopped = named(error)
+            ending.stopped = error_text(error)
         finally:
             try:
                 arm.end()
             except Exception as error:
-                ending.stopped = ending.stopped or named(error)
-                ending.unrest = "" if _stands(arm) else named(error)
+                ending.stopped = ending.stopped or error_text(error)
+                ending.rest_unknown = "" if _is_at_rest(arm) else error_text(error)
 
 
-def _stands(arm: Arm) -> bool:
+def _is_at_rest(arm: Arm) -> bool:
     """Whether an arm whose motion could not be ended is seen to stand, as after a stop of its own."""
     begin = time.monotonic()
     while time.monotonic() < begin + _STAND_S:
@@ -135,6 +112,6 @@ def _stands(arm: Arm) -> bool:
     return False
 
 
-def named(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """Say what an error says, and of one that is not ours, what it is."""
     return str(error) if isinstance(error, PretouchError) else f"{type(error).__name__}: {error}"

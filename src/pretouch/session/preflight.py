@@ -1,15 +1,31 @@
 """What must be so before an arm is moved: each check is a few lines, and says what to do if it fails."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
+from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.controller import Controller
-from pretouch.session.finding import Finding
-from pretouch.session.standing import Standing
+from pretouch.session.standstill import Standstill
 from pretouch.types import FloatArray
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing to know before the arm moves."""
+
+    what: str
+    """A word for programs, as `rest` or `bias`."""
+    sentence: str
+    refused: bool = True
+    """Whether the arm is not to be moved as long as it is so."""
+
+
+def refusals(findings: Iterable[Finding]) -> tuple[str, ...]:
+    """Return the sentences of those that forbid a run."""
+    return tuple(finding.sentence for finding in findings if finding.refused)
 
 
 @dataclass(frozen=True)
@@ -31,7 +47,7 @@ class PreflightParams(Checked):
     1.7 N an axis with nothing attached (franka_ros, issue 404)."""
     disturbance_share: Fraction = 0.5
     """Largest deviation from that mean, averaged over 0.1 s, as a share of F_b: more, and somebody touches the arm."""
-    unfelt: Fraction = 0.1
+    missing_share: Fraction = 0.1
     """Largest share of states without a force estimate."""
     floor_clearance_m: NonNegative = 0.05
     """Distance that the path keeps from what is below the arm [m]."""
@@ -41,7 +57,7 @@ _PLACES = 200
 """Places of the path whose height is looked at."""
 
 
-def check(controller: Controller, seen: Standing, floor: float, params: PreflightParams) -> tuple[Finding, ...]:
+def check(controller: Controller, seen: Standstill, floor: float, params: PreflightParams) -> tuple[Finding, ...]:
     """Return what there is to know of an arm that was watched, for a controller that is to move it.
 
     Args:
@@ -66,49 +82,49 @@ def _limits(controller: Controller, q: FloatArray, params: PreflightParams) -> I
         if room[joint] < least:
             yield Finding("limits", f"{where} (at least {least:g} rad): guide the arm away from it.")
         else:
-            yield Finding("limits", f"{where}: it can hardly move that way.", refused=False)
+            yield Finding("limits", f"{where}: it can hardly move in that direction.", refused=False)
 
 
-def _rest(controller: Controller, seen: Standing, params: PreflightParams) -> Iterator[Finding]:
+def _rest(controller: Controller, seen: Standstill, params: PreflightParams) -> Iterator[Finding]:
     moved = np.ptp(seen.q, axis=0)
     joint = int(np.argmax(moved))
     if moved[joint] > params.drift_rad:
         yield Finding(
             "rest",
-            f"The arm does not stand still: {controller.model.joints[joint]} moved by {moved[joint]:.3f} rad (limit"
-            f" {params.drift_rad:g} rad): let it come to rest, and nobody guide it.",
+            f"The arm does not stand still, {controller.model.joints[joint]} moved by {moved[joint]:.3f} rad (limit"
+            f" {params.drift_rad:g} rad): let it come to rest, and do not guide it.",
         )
 
 
-def _force(controller: Controller, seen: Standing, params: PreflightParams) -> Iterator[Finding]:
-    threshold = controller.profile.threshold
-    if seen.unfelt > params.unfelt:
+def _force(controller: Controller, seen: Standstill, params: PreflightParams) -> Iterator[Finding]:
+    threshold = thresholds_of(controller.profile.detect)
+    if seen.missing_share > params.missing_share:
         yield Finding(
             "no force",
-            f"The robot gives no force estimate in {100 * seen.unfelt:.0f}% of its states: it is near a singularity;"
-            " guide it to another posture.",
+            f"The robot gives no force estimate in {100 * seen.missing_share:.0f}% of its states, because it is near a"
+            " singularity: guide it to another posture.",
         )
-    if seen.unfelt == 1.0:
+    if seen.missing_share == 1.0:
         return
     force, most = seen.rest_wrench[:3], params.bias_share * threshold.f_base_n
     if np.abs(force).max() > most:
         yield Finding(
             "bias",
-            f"At rest the robot believes to feel {_vector(force)} N, more than {most:g} N on an axis: tell it the mass"
-            " of its hand and of what that holds, and see that nothing touches the arm.",
+            f"At rest the robot measures a force of {_vector(force)} N (limit {most:g} N on an axis): set the mass of"
+            " its hand and load, and check that nothing touches the arm.",
         )
     if seen.noise.max() > threshold.sigma_max_n:
         yield Finding(
             "noise",
-            f"The force at rest has a standard deviation of {seen.noise.max():.1f} N (limit"
-            f" {threshold.sigma_max_n:g} N): see that nothing shakes the arm, and that its mounting is firm.",
+            f"The force at rest has a standard deviation of {seen.noise.max():.1f} N (limit {threshold.sigma_max_n:g}"
+            " N): check that nothing shakes the arm, and that its mounting is firm.",
         )
     most = params.disturbance_share * threshold.f_base_n
     if seen.disturbance > most:
         yield Finding(
             "touched",
-            f"While it stood, the force changed by {seen.disturbance:.1f} N (limit {most:g} N): let nobody touch the"
-            " arm yet.",
+            f"During the checks the force changed by {seen.disturbance:.1f} N (limit {most:g} N): do not touch the arm"
+            " yet.",
         )
 
 
@@ -118,9 +134,9 @@ def _floor(controller: Controller, floor: float, params: PreflightParams) -> Ite
     if lowest < floor + params.floor_clearance_m:
         yield Finding(
             "floor",
-            f"The path comes down to z = {lowest:.2f} m, and the floor is at {floor:.2f} m (to be kept:"
-            f" {params.floor_clearance_m:g} m): say with --floor how high what is below the arm really is, or choose"
-            " another path.",
+            f"The path comes down to z = {lowest:.2f} m, too close to the floor at {floor:.2f} m (clearance"
+            f" {params.floor_clearance_m:g} m): give the real height of the floor with --floor, or choose another"
+            " path.",
         )
 
 

@@ -1,4 +1,4 @@
-"""The guided push: a person pushes the standing arm, and what the robot believes to feel must be that push.
+"""The guided push: a person pushes the standing arm, and the force that the robot measures must be that push.
 
 Some stacks report the force on the robot, others the force by it, and the difference does not show until the arm moves
 towards whoever pushes it. So it is shown before: pushes along the three axes of the base tell the sign, and that the
@@ -18,7 +18,7 @@ from pretouch.errors import RobotError
 from pretouch.faults import sound_robot
 from pretouch.ports import Clock, Robot
 from pretouch.robot.model import RobotModel
-from pretouch.session.standing import MEAN_S, Standing
+from pretouch.session.standstill import MEAN_S, Standstill
 from pretouch.types import FloatArray, RobotState
 
 
@@ -70,11 +70,11 @@ class Verdict(Enum):
     """The joint torques do not fit the force."""
 
 
-class Judge:
-    """Judges one push, state by state."""
+class PushEvaluator:
+    """Evaluates one push, state by state."""
 
-    def __init__(self, model: RobotModel, rest: Standing, direction: Direction, params: PushParams) -> None:
-        """Take the arm, what it felt at rest, and where it is pushed."""
+    def __init__(self, model: RobotModel, rest: Standstill, direction: Direction, params: PushParams) -> None:
+        """Take the arm, what it measured at rest, and where it is pushed."""
         self._model, self._axis, self._params = model, np.array(direction.axis), params
         self._rest_wrench, self._rest_torque = rest.rest_wrench, rest.rest_torque
         self._least = max(params.force_n, params.noise_sigmas * float(rest.noise.max()))
@@ -105,9 +105,9 @@ class Judge:
             return None
         _, wrenches, torques = zip(*self._push, strict=True)
         self._push.clear()
-        return self._judged(state.q, np.mean(wrenches, axis=0), np.mean(torques, axis=0))
+        return self._verdict(state.q, np.mean(wrenches, axis=0), np.mean(torques, axis=0))
 
-    def _judged(self, q: FloatArray, wrench: FloatArray, torque: FloatArray) -> Verdict:
+    def _verdict(self, q: FloatArray, wrench: FloatArray, torque: FloatArray) -> Verdict:
         if np.all(np.isfinite(torque)):  # an arm on ROS 2 tells none
             made = self._model.ee_jacobian(self._model.kinematics(q)).T @ wrench
             agreement = _cosine(made, torque)
@@ -126,24 +126,24 @@ def _cosine(a: FloatArray, b: FloatArray) -> float:
     return float(a @ b) / size if size > 0 else 0.0
 
 
-_SAID = {
-    Verdict.SIDEWAYS: "The push felt goes {force} N, not along the axis asked for: push straight along it.",
-    Verdict.DOUBTFUL: "The joint torques do not fit the force of {force} N: push at the hand alone, not at the arm.",
+_RETRY_HINTS = {
+    Verdict.SIDEWAYS: "The measured push is {force} N, not along the requested axis: push straight along it.",
+    Verdict.DOUBTFUL: "The joint torques do not match the force of {force} N: push only at the hand, not at the arm.",
 }
 
-_WRONG = {
+_SIGN_ERRORS = {
     Verdict.OPPOSITE: (
-        "The force the robot reports is opposite to the pushes: it is the force by the robot, not on it, and the arm"
-        " would move against whoever touches it: correct the sign setting."
+        "The reported force is opposite to the pushes: it is the force by the robot, not on it, and the arm would move"
+        " towards whoever touches it. Correct the sign setting."
     ),
     Verdict.CONTRADICTORY: (
-        "The robot's force and its joint torques contradict each other: one of the two is by the arm, the other on it:"
-        " correct the sign of one in its driver."
+        "The robot's force and its joint torques contradict each other: one is by the arm, the other on it. Correct the"
+        " sign of one of them in its driver."
     ),
 }
-_TURNED = (
-    "Of the pushes some were felt as they were and others were not: the force is not given in the base frame, or a push"
-    " was not where it was asked for: check the settings of frame and sign, and push again."
+_INCONSISTENT = (
+    "Some pushes were measured in the requested direction and others were not: either the force is not given in the"
+    " base frame, or a push went elsewhere. Check the settings of frame and sign, and push again."
 )
 
 
@@ -159,7 +159,7 @@ class GuidedPush:
     say: Callable[[str], None]
     params: PushParams = PushParams()
 
-    def confirm(self, rest: Standing) -> None:
+    def confirm(self, rest: Standstill) -> None:
         """Return once force sign and frame are confirmed; raise RobotError where they are wrong, or stay unclear.
 
         Args:
@@ -167,40 +167,40 @@ class GuidedPush:
         """
         verdicts = []
         for direction in DIRECTIONS:
-            judge = Judge(self.model, rest, direction, self.params)
+            evaluator = PushEvaluator(self.model, rest, direction, self.params)
             self.ask(direction)
-            verdicts.append(self._wait(judge, direction))
-            self.say(f"Felt: {_vector(judge.force)} N. Let go.")
-            self._released(judge)
+            verdicts.append(self._wait(evaluator, direction))
+            self.say(f"Measured: {_vector(evaluator.force)} N. Let go.")
+            self._wait_for_release(evaluator)
         wrong = set(verdicts) - {Verdict.AS_ASKED}
         if wrong:
             same = len(set(verdicts)) == 1
-            raise RobotError(f"{_WRONG[wrong.pop()] if same else _TURNED} The arm is not moved.")
+            raise RobotError(f"{_SIGN_ERRORS[wrong.pop()] if same else _INCONSISTENT} The arm is not moved.")
 
-    def _wait(self, judge: Judge, direction: Direction) -> Verdict:
+    def _wait(self, evaluator: PushEvaluator, direction: Direction) -> Verdict:
         """Wait for a push that is clear."""
         for state in self._states(self.params.timeout_s):
-            verdict = judge.take(state)
-            if verdict in _SAID:
-                self.say(_SAID[verdict].format(force=_vector(judge.force)))
+            verdict = evaluator.take(state)
+            if verdict in _RETRY_HINTS:
+                self.say(_RETRY_HINTS[verdict].format(force=_vector(evaluator.force)))
             elif verdict is not None:
                 return verdict
         raise RobotError(
-            f"No clear push towards {direction.words} came within {self.params.timeout_s:g} s: the arm is not moved."
-            " Start again when somebody stands by."
+            f"No clear push towards {direction.words} was measured within {self.params.timeout_s:g} s, so the arm is"
+            " not moved: start again when somebody is there to push."
         )
 
-    def _released(self, judge: Judge) -> None:
+    def _wait_for_release(self, evaluator: PushEvaluator) -> None:
         """Wait until nobody pushes."""
         since = None
         for state in self._states(self.params.timeout_s):
-            judge.take(state)
-            since = None if judge.pushed else state.stamp if since is None else since
+            evaluator.take(state)
+            since = None if evaluator.pushed else state.stamp if since is None else since
             if since is not None and state.stamp - since >= self.params.release_s:
                 return
         raise RobotError(
-            f"The push did not end within {self.params.timeout_s:g} s: see what presses against the arm; it is not"
-            " moved."
+            f"The push did not end within {self.params.timeout_s:g} s, so the arm is not moved: check what presses"
+            " against it."
         )
 
     def _states(self, seconds: float) -> Iterator[RobotState]:
@@ -210,7 +210,7 @@ class GuidedPush:
         while now - begin < seconds:
             state, wrong = sound_robot(self.robot.read(), self.model.description.qd_max)
             if state is None:
-                raise RobotError(f"The robot's state cannot be used: {wrong}: check the connection to the arm.")
+                raise RobotError(f"The robot's state cannot be used ({wrong}): check the connection to the arm.")
             if state.stamp > last:
                 last = state.stamp
                 yield state

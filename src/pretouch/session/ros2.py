@@ -6,7 +6,7 @@ from pretouch.errors import RobotError
 from pretouch.hardware.ros2.network import domain_of
 from pretouch.hardware.ros2.params import ArmParams, NodeParams
 from pretouch.hardware.ros2.robot import Ros2Robot
-from pretouch.session.remembered import Identity
+from pretouch.session.confirmations import Identity
 from pretouch.types import FloatArray, RobotState
 
 
@@ -31,7 +31,7 @@ class Ros2SessionArm:
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point."""
         if not self._begun:
-            raise RobotError("No commands are given yet: begin first.")
+            raise RobotError("The arm takes no commands yet: begin first.")
         self._robot.command(qd)
 
     def unfit(self) -> tuple[str, ...]:

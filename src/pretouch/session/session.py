@@ -9,9 +9,8 @@ from pretouch.errors import RobotError
 from pretouch.loop import MonotonicClock
 from pretouch.ports import Skin
 from pretouch.session.arm import Arm
-from pretouch.session.finding import Finding, refusals
-from pretouch.session.preflight import PreflightParams, check
-from pretouch.session.standing import Standing, watch
+from pretouch.session.preflight import Finding, PreflightParams, check, refusals
+from pretouch.session.standstill import Standstill, watch
 from pretouch.session.start import check_start
 from pretouch.session.units import UnitCheck, Units
 from pretouch.types import FloatArray, RangeReadings
@@ -44,7 +43,7 @@ class Session:
     """Height of what is below the arm, base frame [m]."""
     clock: MonotonicClock
 
-    def preflight(self, params: PreflightParams, approach: bool) -> tuple[Standing, tuple[Finding, ...]]:
+    def preflight(self, params: PreflightParams, approach: bool) -> tuple[Standstill, tuple[Finding, ...]]:
         """Watch arm and units for some seconds; return what was seen of the arm, and what there is to know.
 
         Units that are not heard, and states that cannot be used, are an error at once.
@@ -65,7 +64,7 @@ class Session:
             found += check_start(c, seen.newest.q)
         return seen, (*found, *(units.findings() if units else ()))
 
-    def recheck(self, checked: Standing, params: PreflightParams, approach: bool) -> FloatArray:
+    def recheck(self, checked: Standstill, params: PreflightParams, approach: bool) -> FloatArray:
         """Return where the arm is by now (n,) [rad]; RobotError if that is not where it was checked, or may not move.
 
         Args:
@@ -79,8 +78,8 @@ class Session:
         joint = int(np.argmax(moved))
         if not moved[joint] <= params.drift_rad:
             raise RobotError(
-                f"The arm was moved since it was checked, {self.controller.model.joints[joint]} by {moved[joint]:.3f}"
-                f" rad (limit {params.drift_rad:g} rad): start again."
+                f"The arm moved after the checks, {self.controller.model.joints[joint]} by {moved[joint]:.3f} rad"
+                f" (limit {params.drift_rad:g} rad): start again."
             )
         refused = () if approach else refusals(check_start(self.controller, q))
         if refused:

@@ -1,4 +1,4 @@
-"""A person at the terminal while the arm moves: told of things without the loop waiting, and heard pressing Enter."""
+"""The terminal while the arm moves: printing without delaying the loop, the Enter key, and questions."""
 
 import os
 import select
@@ -10,11 +10,13 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
 
+from pretouch.errors import RobotError
+
 _CLOSE_S = 1.0
 """How long a terminal that takes nothing is waited for at the end [s]."""
 
 
-class Narrator:
+class BackgroundPrinter:
     """Says sentences from a thread of its own: a terminal that is stopped must not stop an arm's loop."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
@@ -75,3 +77,16 @@ def _standard_input() -> int | None:
         return sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):  # none, or one of a test's
         return None
+
+
+def say(sentence: str) -> None:
+    """Print it at once."""
+    print(sentence, flush=True)
+
+
+def require_yes(question: str, otherwise: str) -> None:
+    """Have a person say yes; a RobotError with `otherwise` if none does."""
+    if not sys.stdin.isatty():
+        raise RobotError("There is no terminal to ask for permission to move the arm: give --yes.")
+    if input(f"{question} [y/N] ").strip().lower() not in ("y", "yes"):
+        raise RobotError(f"{otherwise}: answer y to allow it.")

@@ -9,8 +9,7 @@ import numpy as np
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.findings import findings
-from pretouch.hardware.health import UnitWindow
-from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.health import HealthParams, UnitWindow
 from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
 from pretouch.hardware.receiver_process import Traffic
 from pretouch.hardware.traffic import Received, UnitTraffic
@@ -18,7 +17,7 @@ from pretouch.perception.scene_filter import Fixtures
 from pretouch.ports import Clock, Robot
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.session.finding import Finding
+from pretouch.session.preflight import Finding
 from pretouch.types import RangeReadings
 
 _TAKE_S = 0.1
@@ -82,7 +81,7 @@ class UnitCheck:
     def take(self, now: float) -> None:
         """Take in what came until a tick [s]."""
         if not self._units.alive:
-            raise HardwareError("The receiver of the units has ended: what it printed tells why.")
+            raise HardwareError("The receiver of the units has ended: see what it printed.")
         if now - self._taken < _TAKE_S:
             return
         self._taken = now
@@ -110,6 +109,6 @@ class UnitCheck:
 def _missing(names: Sequence[str], address: tuple[str, int]) -> str:
     host, port = address
     return (
-        f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not heard at {host}:{port}: see what"
-        " `pretouch skin monitor` says of them; --skin names the units of the arm."
+        f"No data from {', '.join(names)} at {host}:{port}: check with `pretouch skin monitor`, or name the arm's units"
+        " with --skin."
     )

@@ -1,16 +1,13 @@
 """A person's hand: a mass on a spring whose far end follows a script, with no more force than the script allows."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
-
-ARM_STIFFNESS_N_M = 2000.0
-"""Stiffness of a person's arm behind the hand, unless another is given [N/m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +26,14 @@ class PersonArm:
 
     speed_max: float = 0.8
     """Limit of the goal's speed [m/s], so that the hand cannot jump into the robot."""
-    stiffness: float = ARM_STIFFNESS_N_M
+    stiffness: float = 2000.0
     """[N/m]"""
     damping: float = 60.0
     """[N s/m]"""
+
+
+USUAL_ARM = PersonArm()
+"""Of a person of whom nothing else is said."""
 
 
 class HandScript(Protocol):
@@ -46,20 +47,10 @@ class HandScript(Protocol):
 class Hand:
     """Drives the hand of a scene by a script. Its speed is limited, so it cannot jump into the arm."""
 
-    def __init__(
-        self,
-        plant: Plant,
-        script: HandScript,
-        speed_max: float = 0.8,
-        stiffness: float = ARM_STIFFNESS_N_M,
-        damping: float = 60.0,
-    ) -> None:
-        """Attach to a plant whose scene has a hand.
-
-        `speed_max` [m/s] limits the goal, `stiffness` [N/m] and `damping` [N s/m] are the person's arm.
-        """
-        self._plant, self._script, self._speed = plant, script, speed_max
-        self._k, self._d = stiffness, damping
+    def __init__(self, plant: Plant, script: HandScript, arm: PersonArm = USUAL_ARM) -> None:
+        """Attach to a plant whose scene has a hand; `arm` is what moves it."""
+        self._plant, self._script = plant, script
+        self._moved_by = plant.params.period_s, arm.speed_max, arm.stiffness, arm.damping
         body = plant.mj_model.body("hand")
         dof, data = int(plant.mj_model.body_dofadr[body.id]), plant.mj_data
         # views into the simulation's memory, taken once
@@ -82,25 +73,39 @@ class Hand:
     def _drive(self, time: float) -> None:
         position = self.position
         goal = self._script.goal(time, position, self._plant)
-        self._goal, self._force[:] = _spring(
-            self._goal, goal.position, self._speed, position, self._velocity, self._k, self._d, goal.force_max,
-            self._plant.params.period_s,
-        )  # fmt: skip
+        self._goal, self._force[:] = _spring.flat(
+            self._goal, goal.position, goal.force_max, position, self._velocity, *self._moved_by
+        )
 
 
-@compiled
+class _Goal(NamedTuple):
+    """As of `HandGoal`."""
+
+    position: FloatArray
+    force_max: float
+
+
+class _Arm(NamedTuple):
+    """As of `PersonArm`."""
+
+    speed_max: float
+    stiffness: float
+    damping: float
+
+
+@entry
 def _spring(
-    last: FloatArray, goal: FloatArray, speed: float, x: FloatArray, v: FloatArray, k: float, d: float,
-    force_max: float, dt: float,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Move the spring's far end towards the goal, and return it with the force (3,) [N] on the hand.
+    last: FloatArray, goal: _Goal, x: FloatArray, v: FloatArray, dt: float, arm: _Arm
+) -> tuple[FloatArray, FloatArray]:
+    """Move the spring's far end (3,) [m], which was at `last` a step before, and return it with the force on the hand.
 
-    The far end is never farther ahead than the largest force stretches the spring, so a person who lets go pulls
-    back at once.
+    The force is (3,) [N]; x [m] and v [m/s] (3,) are the hand's position and velocity.
     """
-    at = last + _shortened(goal - last, speed * dt)
-    at = x + _shortened(at - x, force_max / k)
-    return at, _shortened(k * (at - x) + d * ((at - last) / dt - v), force_max)
+    at = last + _shortened(goal.position - last, arm.speed_max * dt)
+    # never farther ahead than the largest force stretches the spring: a person who lets go pulls back at once
+    at = x + _shortened(at - x, goal.force_max / arm.stiffness)
+    force = arm.stiffness * (at - x) + arm.damping * ((at - last) / dt - v)
+    return at, _shortened(force, goal.force_max)
 
 
 @compiled

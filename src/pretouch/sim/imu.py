@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry, flattened
 from pretouch.robot.link_motion import cross
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
@@ -74,6 +74,51 @@ class ImuSample(NamedTuple):
     """(6,) gyroscope x, y, z, accelerometer x, y, z, in the unit's sensor frame, each of 16 bits."""
 
 
+class _Bodies(NamedTuple):
+    """MuJoCo's bodies, in the simulation's memory; all in the base frame."""
+
+    position: FloatArray  # (L, 3) origins [m]
+    rotation: FloatArray  # (L, 9) rows of the rotation matrices
+    center: FloatArray  # (L, 3) centre of mass of each body and all that hangs on it [m]
+    velocity: FloatArray  # (L, 6) angular [rad/s], then linear [m/s], of the body's point at its tree's centre
+    acceleration: FloatArray  # (L, 6) likewise [rad/s^2, m/s^2]; see `_true`
+
+
+class _Mounting(NamedTuple):
+    """Where K sensors sit."""
+
+    link: IntArray  # (K,)
+    root: IntArray  # (K,) first body of the tree that the link is in: `center` is that of its tree
+    T_link_sensor: FloatArray  # (K, 4, 4)
+
+
+class _Sensors(NamedTuple):
+    """How K sensors err; gyroscope first."""
+
+    rate: FloatArray  # (K,) [Hz]
+    mix: FloatArray  # (K, 2, 3, 3) from true to sensed values
+    bias: FloatArray  # (K, 6) [rad/s, m/s^2]
+    noise: FloatArray  # (K, 6) standard deviation of a sample [rad/s, m/s^2]
+    lsb: FloatArray  # (6,) a count [rad/s, m/s^2]
+    follow: FloatArray  # (6,) share of the way to the true value that the low-pass goes in one physics step
+    dt: float  # physics step [s]
+
+
+class _Memory(NamedTuple):
+    """What K sensors keep from one physics step to the next."""
+
+    filtered: FloatArray  # (K, 6) what the low-pass gives [rad/s, m/s^2], NaN before the first step
+    due: FloatArray  # (K,) when the next sample is taken [s]
+
+
+class _Taken(NamedTuple):
+    """Room for the M samples of a step."""
+
+    unit: IntArray  # (M,)
+    time: FloatArray  # (M,) [s]
+    counts: IntArray  # (M, 6)
+
+
 class Imus:
     """All inertial sensors of a skin on a simulated arm: `send` is handed each sample as it is taken.
 
@@ -89,24 +134,26 @@ class Imus:
         rng, count, dt = np.random.default_rng([seed, 5]), len(skin), plant.params.period_s
         self.rate: FloatArray = params.rate_hz * (1.0 + params.rate_error * rng.uniform(-1, 1, count))
         """(K,) true rate of each sensor [Hz]."""
-        self._due = rng.uniform(0, 1, count) / self.rate
-        self._mix, self._bias = _errors(params, count, rng)
+        due = rng.uniform(0, 1, count) / self.rate
+        mix, bias = _errors(params, count, rng)
         self._rng, self._draws, self._drawn = rng, np.zeros((0, 6)), 0
         density = np.repeat((1e-3 * params.angular_rate_noise_mdps, 1e-6 * params.acceleration_noise_ug), 3) * _SI
-        self._noise = density * np.sqrt(self.rate[:, None] / 2.0)
-        self._lsb = imu_counts(params)
+        noise = density * np.sqrt(self.rate[:, None] / 2.0)
         bandwidth = np.repeat((params.angular_rate_bandwidth_hz, params.acceleration_bandwidth_hz), 3)
-        self._follow = 1.0 - np.exp(-2 * np.pi * bandwidth * dt)
+        follow = 1.0 - np.exp(-2 * np.pi * bandwidth * dt)
         most = count * (int(dt * self.rate.max(initial=0.0)) + 2)
-        self._unit, self._time = np.zeros(most, np.int64), np.zeros(most)
-        self._counts = np.zeros((most, 6), np.int64)
-        self._link, self._T = skin.link, skin.T_link_sensor
-        self._center = plant.mj_model.body_rootid[skin.link].astype(np.int64)
+        self._taken = _Taken(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, 6), np.int64))
+        root = plant.mj_model.body_rootid[skin.link].astype(np.int64)
         data = plant.mj_data
         # views into the simulation's memory, taken once
-        self._motion = data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc
+        self._given = flattened(
+            _Bodies(data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc),
+            _Mounting(skin.link, root, skin.T_link_sensor),
+            _Sensors(self.rate, mix, bias, noise, imu_counts(params), follow, dt),
+            _Memory(np.full((count, 6), np.nan), due),
+            self._taken,
+        )
         self._qvel, self._last_qvel = data.qvel, data.qvel.copy()
-        self._felt = np.full((count, 6), np.nan)
         self._shaking = np.zeros((2, count, 3))
         self._shaken_by = np.random.default_rng([seed, 9])
         self._resonance = _resonance(params, dt) if params.vibration_m_s2 > 0.0 else None
@@ -114,7 +161,7 @@ class Imus:
 
     def _sample(self, time: float) -> None:
         """Take the samples due by one step before `time`: what MuJoCo derives from a state is one step behind it."""
-        plant, most = self._plant, len(self._unit)
+        plant, room, most = self._plant, self._taken, len(self._taken.unit)
         if self._drawn + most > len(self._draws):
             self._draws, self._drawn = self._rng.standard_normal((max(_DRAWS, most), 6)), 0
         dt, qvel = plant.params.period_s, self._qvel.copy()
@@ -123,14 +170,10 @@ class Imus:
         mujoco.mj_comVel(plant.mj_model, plant.mj_data)
         mujoco.mj_rnePostConstraint(plant.mj_model, plant.mj_data)
         self._qvel[:] = self._last_qvel = qvel
-        taken = _take(
-            *self._motion, self._center, self._link, self._T, self._shaken(), self._felt, self._follow, time - dt, dt,
-            self._due, self.rate, self._mix, self._bias, self._noise, self._draws[self._drawn :], self._lsb,
-            self._unit, self._time, self._counts,
-        )  # fmt: skip
+        taken = _take.flat(time - dt, self._shaken(), self._draws[self._drawn :], *self._given)
         self._drawn += taken
         for i in range(taken):
-            self._send(ImuSample(int(self._unit[i]), float(self._time[i]), self._counts[i].copy()))
+            self._send(ImuSample(int(room.unit[i]), float(room.time[i]), room.counts[i].copy()))
 
     def _shaken(self) -> FloatArray:
         """Return the vibration (K, 3) [m/s^2] at the accelerometers, one step after the last call."""
@@ -167,43 +210,46 @@ def _resonance(params: ImuParams, dt: float) -> tuple[float, float, float]:
     return float(keep), float(back), float(params.vibration_m_s2 / np.sqrt(variance))
 
 
-@compiled
+@entry
 def _take(
-    xpos: FloatArray, xmat: FloatArray, center: FloatArray, cvel: FloatArray, cacc: FloatArray, root: IntArray,
-    link: IntArray, T_link_sensor: FloatArray, shaken: FloatArray, felt: FloatArray, follow: FloatArray, now: float,
-    dt: float, due: FloatArray, rate: FloatArray, mix: FloatArray, bias: FloatArray, noise: FloatArray,
-    draws: FloatArray, lsb: FloatArray, unit: IntArray, time: FloatArray, counts: IntArray,
+    now: float, shaken: FloatArray, draws: FloatArray, bodies: _Bodies, mounting: _Mounting, sensors: _Sensors,
+    memory: _Memory, taken: _Taken,
 ) -> int:  # fmt: skip
-    """Follow the motion to `now`, `dt` after the last call [s], and take what samples are due; return how many.
+    """Follow the motion to `now`, one physics step after the last call [s], and take what samples are due.
 
-    Changes `felt` (K, 6), the filtered signals at `now`, and `due` (K,); writes the last line of arguments.
+    Advances `memory`, writes `taken`, and returns how many samples that are. `shaken` is the vibration (K, 3) [m/s^2]
+    in sensor frames, `draws` (D, 6) are normal, a row for each sample.
     """
-    taken, sensed, before = 0, np.zeros(6), np.zeros(6)
-    for k in range(len(link)):
-        body = link[k]
+    dt, filtered, due = sensors.dt, memory.filtered, memory.due
+    count, sensed, before = 0, np.zeros(6), np.zeros(6)
+    for k in range(len(due)):
+        body = mounting.link[k]
         true = _true(
-            xpos[body], xmat[body], center[root[k]], cvel[body], cacc[body], T_link_sensor[k]
+            bodies.position[body], bodies.rotation[body], bodies.center[mounting.root[k]], bodies.velocity[body],
+            bodies.acceleration[body], mounting.T_link_sensor[k],
         )  # fmt: skip
         for i in range(3):
             true[3 + i] += shaken[k, i]
         for i in range(6):
-            begun = not np.isnan(felt[k, i])
-            before[i] = felt[k, i] if begun else true[i]
-            felt[k, i] = before[i] + follow[i] * (true[i] - before[i])
+            begun = not np.isnan(filtered[k, i])
+            before[i] = filtered[k, i] if begun else true[i]
+            filtered[k, i] = before[i] + sensors.follow[i] * (true[i] - before[i])
         while due[k] <= now:
+            # a sample falls between two physics steps: the filtered signal is taken as straight between them
             part = 1.0 - (now - due[k]) / dt
             for i in range(6):
-                sensed[i] = before[i] + part * (felt[k, i] - before[i])
+                sensed[i] = before[i] + part * (filtered[k, i] - before[i])
             for i in range(6):
                 kind = i // 3
-                value = bias[k, i] + noise[k, i] * draws[taken, i]
+                value = sensors.bias[k, i] + sensors.noise[k, i] * draws[count, i]
                 for j in range(3):
-                    value += mix[k, kind, i % 3, j] * sensed[3 * kind + j]
-                counts[taken, i] = int(min(max(np.round(value / lsb[i]), -32768.0), 32767.0))
-            unit[taken], time[taken] = k, due[k]
-            taken += 1
-            due[k] += 1.0 / rate[k]
-    return taken
+                    value += sensors.mix[k, kind, i % 3, j] * sensed[3 * kind + j]
+                # beyond full scale the counts stay at the ends of 16 bits
+                taken.counts[count, i] = int(min(max(np.round(value / sensors.lsb[i]), -32768.0), 32767.0))
+            taken.unit[count], taken.time[count] = k, due[k]
+            count += 1
+            due[k] += 1.0 / sensors.rate[k]
+    return count
 
 
 @compiled
@@ -225,6 +271,8 @@ def _true(
                 R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
     w, alpha = cvel[:3], cacc[:3]
     velocity = cvel[3:] + cross(w, arm)
+    # a spatial acceleration is how the velocity changes at a point fixed in space; a point that moves with the body has
+    # w x v on top (Featherstone 2008, section 2.11)
     acceleration = cacc[3:] + cross(alpha, arm) + cross(w, velocity)
     own = np.zeros(6)
     for i in range(3):

@@ -8,12 +8,14 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import flattened
 from pretouch.contact.observer import ObserverState, observe, observer_init, wrench_from_torques
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
+from pretouch.sim.drive import Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import ArmError, SceneSpec, build, stiffen
+from pretouch.sim.under_way import ROUNDING_S
 from pretouch.types import FloatArray, RobotState
 
 TOUCH_N = 1.0
@@ -69,9 +71,6 @@ class Plant:
         self._know(params)
         self.mj_model = build(model, scene, self.error)
         self.mj_data = mujoco.MjData(self.mj_model)
-        self._k = np.array(params.stiffness_nm_rad)
-        self._friction = np.array([params.friction_f1_nm, params.friction_f2_s_rad, params.friction_f3_rad_s])
-        self._ripple = np.array([params.ripple_nm, params.ripple_cycles, self._ripple_phase])
         self._arm_geoms = {g for g in range(self.mj_model.ngeom) if self._on_arm(g)}
         self._before_step: list[Callable[[float], None]] = []
         self._reset(q)
@@ -84,8 +83,8 @@ class Plant:
             self._ripple_phase = np.array(params.ripple_phases_rad)
         if params.mass_factors:
             self.error = replace(self.error, mass_factor=np.array(params.mass_factors))
-        if params.payloads_kg:
-            self.error = replace(self.error, payload=params.payloads_kg[0])
+        if params.payload_kg is not None:
+            self.error = replace(self.error, payload=params.payload_kg)
 
     @property
     def offset_nm(self) -> FloatArray:
@@ -99,27 +98,26 @@ class Plant:
     def _reset(self, q: FloatArray) -> None:
         n, data = self._n, self.mj_data
         # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
-        self._q, self._qd, self._qdd = data.qpos[:n], data.qvel[:n], data.qacc[:n]
-        self._applied = data.qfrc_applied[:n]
+        joints = Joints(data.qpos[:n], data.qvel[:n], data.qfrc_applied[:n])
+        self._q, self._qd, self._qdd = joints.q, joints.qd, data.qacc[:n]
         self.link_position, self.link_rotation = data.xpos, data.xmat.reshape(-1, 3, 3)
         """(L', 3) origins [m] and (L', 3, 3) orientations of the links, then of whatever else moves; base frame."""
         self._q[:] = q
         mujoco.mj_forward(self.mj_model, data)
         mass, bias = self.model.mass_matrix_and_bias(q, np.zeros(n), np.zeros(n))
-        inertia = np.diag(mass) + self.params.armature_kg_m2
-        self._d = 2.0 * self.params.damping_ratio * np.sqrt(self._k * inertia)
-        self._q_d, self._qd_set, self._qd_d = q.copy(), np.zeros(n), np.zeros(n)
+        inertia, stiffness = np.diag(mass) + self.params.armature_kg_m2, np.array(self.params.stiffness_nm_rad)
+        damping = 2.0 * self.params.damping_ratio * np.sqrt(stiffness * inertia)
         # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
-        self._q_d += (data.qfrc_bias[:n] - bias) / self._k
+        self._q_d, self._qd_set = q + (data.qfrc_bias[:n] - bias) / stiffness, np.zeros(n)
+        self._group(joints, Impedance(stiffness, damping, self.model.description.tau_max))
         self._q_meas, self._qd_meas = q.copy(), np.zeros(n)
-        self._noise = np.zeros(n)
         self._bias = bias
         self._observer: ObserverState = observer_init(mass, self._qd_meas)
         self.time = 0.0
         dt = self.params.period_s
         self._states: deque[_Past] = deque(maxlen=1 + round(self.params.state_delay_s / dt))
         self._late_commands: deque[tuple[float, FloatArray]] = deque()
-        self._remember()
+        self._states.append(self._now())
         self.true_force = _NO_FORCE
         """(3,) sum of the contact forces on the arm by everything else, base frame [N], at the last physics step."""
         self.true_log: list[tuple[float, FloatArray]] = []
@@ -127,6 +125,23 @@ class Plant:
         self.touches: list[Touch] = []
         """Each beginning of a contact since then."""
         mujoco.mj_forward(self.mj_model, data)
+
+    def _group(self, joints: Joints, impedance: Impedance) -> None:
+        """Put together what `drive` and `sensed` are given at each step."""
+        p, n = self.params, self._n
+        keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
+        follow = 1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s))
+        generator = MotionGenerator(self._q_d, np.zeros(n), p.period_s, follow)
+        f1, f2, f3 = np.array([p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s])
+        ripple, cycles = np.array([p.ripple_nm, p.ripple_cycles])
+        sensors = TorqueSensors(
+            self._offset, ripple, cycles, self._ripple_phase, np.zeros(n), keep, p.armature_kg_m2,
+            p.friction_compensated,
+        )  # fmt: skip
+        self._driven = flattened(joints, generator, impedance, Friction(f1, f2, f3))
+        self._sensing = flattened(sensors)
+        # what is added to coloured noise at each step, so that its variance stays that of the sensor
+        self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
 
     def before_each_step(self, call: Callable[[float], None]) -> None:
         """Have `call(time)` run before each physics step: hands and sensors are driven so."""
@@ -171,48 +186,38 @@ class Plant:
     def _now(self) -> _Past:
         return self.time, self._q_meas, self._qd_meas, self._q_d.copy(), self._qd_set.copy(), self._observer.residual
 
-    def _remember(self) -> None:
-        if self.params.state_delay_s:
-            self._states.append(self._now())
-
     def _take_late_commands(self) -> None:
         """Let what was commanded long enough ago be the set-point."""
-        while self._late_commands and self._late_commands[0][0] <= self.time + 1e-9:
+        while self._late_commands and self._late_commands[0][0] <= self.time + ROUNDING_S:
             self._qd_set = self._late_commands.popleft()[1]
 
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""
         p, n, dt = self.params, self._n, self.params.period_s
         steps = round(duration / dt)
-        keep = np.exp(-2 * np.pi * p.torque_noise_hz * dt)
-        follow = 1.0 - np.exp(-2 * np.pi * p.set_point_hz * dt)
         draws = self._rng.standard_normal((steps, 2, n))
         velocity_noise = p.velocity_noise_rad_s * draws[:, 0]
-        torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2) * draws[:, 1]
-        tau_max = self.model.description.tau_max
+        torque_noise = self._torque_noise * draws[:, 1]
+        model, data, driving, sensing = self.mj_model, self.mj_data, drive.flat, sensed.flat
         for i in range(steps):
             for call in self._before_step:
                 call(self.time)
-            self._take_late_commands()
-            tau, friction = _drive(
-                self._q, self._qd, self._q_d, self._qd_d, self._qd_set, dt, follow, self._bias, self._k, self._d,
-                tau_max, self._friction, self._applied,
-            )  # fmt: skip
+            if self._late_commands:
+                self._take_late_commands()
+            tau, lost = driving(self._qd_set, self._bias, *self._driven)
             before = self._qd.copy()
-            mujoco.mj_step(self.mj_model, self.mj_data)
+            mujoco.mj_step(model, data)
             # the state after the step goes with the torques that led to it
             q, qd = self._q.copy(), self._qd + velocity_noise[i]
-            sensed = _sensed(
-                tau, self._qdd, p.armature_kg_m2, q, self._offset, self._ripple, self._noise, keep, torque_noise[i],
-                friction, p.friction_compensated,
-            )  # fmt: skip
+            told = sensing(tau, lost, torque_noise[i], q, self._qdd, *self._sensing)
             mass, self._bias = self.model.mass_matrix_and_bias(q, qd, np.empty(n))
-            self._observer = observe(self._observer, mass, self._bias, qd, sensed, p.observer_gain_1_s, dt)
+            self._observer = observe(self._observer, mass, self._bias, qd, told, p.observer_gain_1_s, dt)
             self.time += dt
             self._q_meas, self._qd_meas = q, qd
-            self._remember()
+            if p.state_delay_s:
+                self._states.append(self._now())
             touched = self.true_force is not _NO_FORCE
-            self.true_force = self._contact_force() if self.mj_data.ncon else _NO_FORCE
+            self.true_force = self._contact_force() if data.ncon else _NO_FORCE
             self.true_log.append((self.time, self.true_force))
             if self.true_force is not _NO_FORCE and not touched:
                 self.touches.append(self._touch(before))
@@ -250,38 +255,6 @@ class Plant:
         if int(contact.geom2) in self._arm_geoms:
             return contact, 1
         return contact, -1 if int(contact.geom1) in self._arm_geoms else 0
-
-
-@compiled
-def _drive(
-    q: FloatArray, qd: FloatArray, q_d: FloatArray, qd_d: FloatArray, qd_set: FloatArray, dt: float, follow: float,
-    bias: FloatArray, k: FloatArray, d: FloatArray, tau_max: FloatArray, friction: FloatArray, applied: FloatArray,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Advance the motion generator (q_d, qd_d), apply motor torques less friction, and return both (n,) [Nm]."""
-    tau, lost = np.empty(len(q)), np.empty(len(q))
-    for i in range(len(q)):
-        q_d[i] += qd_set[i] * dt
-        qd_d[i] += follow * (qd_set[i] - qd_d[i])
-        wanted = k[i] * (q_d[i] - q[i]) + d[i] * (qd_d[i] - qd[i]) + bias[i]
-        tau[i] = min(max(wanted, -tau_max[i]), tau_max[i])
-        f1, f2, f3 = friction[0, i], friction[1, i], friction[2, i]
-        lost[i] = f1 / (1 + np.exp(-f2 * (qd[i] + f3))) - f1 / (1 + np.exp(-f2 * f3))
-        applied[i] = tau[i] - lost[i]
-    return tau, lost
-
-
-@compiled
-def _sensed(
-    tau: FloatArray, qdd: FloatArray, armature: float, q: FloatArray, offset: FloatArray, ripple: FloatArray,
-    noise: FloatArray, keep: float, drive: FloatArray, friction: FloatArray, compensated: float,
-) -> FloatArray:  # fmt: skip
-    """Joint torques (n,) [Nm] as the link-side sensors report them, known friction already taken off."""
-    sensed = np.empty(len(q))
-    for i in range(len(q)):
-        noise[i] = keep * noise[i] + drive[i]
-        rippled = ripple[0, i] * np.sin(ripple[1, i] * q[i] + ripple[2, i])
-        sensed[i] = tau[i] - armature * qdd[i] + offset[i] + rippled + noise[i] - compensated * friction[i]
-    return sensed
 
 
 class PlantClock:

@@ -67,8 +67,8 @@ class PlantParams(Checked):
     """Phase of each joint's ripple, of one known arm [rad]; none: drawn."""
     mass_factors: Joints = ()
     """Factor on mass and inertia of each link, of one known arm, in the order of `RobotModel.links`; none: drawn."""
-    payloads_kg: Joints = ()
-    """The unknown mass at the TCP of one known arm, one value [kg]; none: drawn up to `payload_max_kg`."""
+    payload_kg: float | None = None
+    """The unknown mass at the TCP of one known arm [kg]; None: drawn up to `payload_max_kg`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,7 +76,10 @@ class PlantParams(Checked):
             values = getattr(self, name)
             if not all(math.isfinite(value) for value in values):
                 raise ParameterError(f"PlantParams.{name} is {values}: give finite numbers.")
-        for name in ("mass_factors", "payloads_kg", "stiffness_nm_rad", "torque_noise_nm"):
+        problem = None if self.payload_kg is None else Check(low=0.0).problem(self.payload_kg)
+        if problem:
+            raise ParameterError(f"PlantParams.payload_kg is {self.payload_kg}: it {problem}.")
+        for name in ("mass_factors", "stiffness_nm_rad", "torque_noise_nm"):
             if any(value < 0.0 for value in getattr(self, name)):
                 raise ParameterError(f"PlantParams.{name} is {getattr(self, name)}: none may be below 0.")
 
@@ -88,7 +91,7 @@ class PlantParams(Checked):
                 raise ParameterError(
                     f"PlantParams.{name} has {count} values, the arm {n} joints: take plant_params_of(description)."
                 )
-        wanted = {"offsets_nm": n, "ripple_phases_rad": n, "payloads_kg": 1, "mass_factors": links}
+        wanted = {"offsets_nm": n, "ripple_phases_rad": n, "mass_factors": links}
         for name, number in wanted.items():
             count = len(getattr(self, name))
             if count and number is not None and count != number:
@@ -100,7 +103,7 @@ class PlantParams(Checked):
 
 _SCALED = ("friction_f1_nm", "torque_noise_nm", "torque_offset_nm", "ripple_nm")
 """Torques: they grow with the size of a drive."""
-_KNOWN = ("offsets_nm", "ripple_phases_rad", "mass_factors", "payloads_kg")
+_KNOWN = ("offsets_nm", "ripple_phases_rad", "mass_factors")
 """Of one known arm, or empty."""
 _KEPT = ("stiffness_nm_rad", "friction_f2_s_rad", "friction_f3_rad_s", "ripple_cycles")
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.sim.hand import ARM_STIFFNESS_N_M, HandGoal, point_on_arm
+from pretouch.sim.hand import USUAL_ARM, HandGoal, point_on_arm
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.types import FloatArray
 
@@ -124,7 +124,7 @@ class Holder(Pusher):
             return planned
         palm = point_on_arm(plant, self._link, PALM)
         # ahead by what stretches the person's arm to the planned force; what it takes to stay on the line comes on top
-        ahead = (hand - palm) @ self._direction + planned.force_max / ARM_STIFFNESS_N_M
+        ahead = (hand - palm) @ self._direction + planned.force_max / USUAL_ARM.stiffness
         return HandGoal(palm + ahead * self._direction, _FREE_N)
 
 

@@ -22,6 +22,8 @@ _STREAM = 51
 _WAYS = ("value", "uniform", "log_uniform", "normal")
 _OTHER = ("times", "each", "source", "standard_error")
 _MISPLACED = ("position_mm", "orientation_deg")
+_RENAMED = {"plant.payloads_kg": "write plant.payload_kg, value = 0.5 in place of value = [0.5]"}
+"""Fields of earlier versions, and what takes their place."""
 
 Params = TypeVar("Params", PlantParams, RangeFinderParams)
 
@@ -109,11 +111,11 @@ def world_set(name: str) -> WorldSet:
         table = tomllib.loads(data.decode("utf-8"))
     except OSError as error:
         raise ParameterError(
-            f"The world {name!r} is none of {', '.join(SETS)}, and no file of that name can be read"
+            f"The world {name!r} is not one of {', '.join(SETS)}, and no file of that name can be read"
             f" ({error.strerror}): choose one of these, or give a TOML file (docs/how-to/sim-to-real.md)."
         ) from error
     except ValueError as error:
-        raise ParameterError(f"The world file {place} is no TOML file ({error}): correct it.") from error
+        raise ParameterError(f"The world file {place} is not valid TOML ({error}): correct it.") from error
     found = WorldSet(name, str(table.get("about", "")), tuple(_spreads(place, table)), sha256(data).hexdigest())
     drawn(found, 0)  # what can never be drawn is said before an hour of trials
     return found
@@ -130,10 +132,14 @@ def _spreads(place: Path, table: dict[str, Any]) -> list[Spread]:
         if part == "about":
             continue
         if part not in known or not isinstance(entries, dict):
-            raise ParameterError(f"{place} has {part!r}: its tables are about, {', '.join(known)}.")
+            raise ParameterError(f"{place} has an unknown table {part!r}: use about, {', '.join(known)}.")
         for name, entry in entries.items():
+            if f"{part}.{name}" in _RENAMED:
+                raise ParameterError(f"{place} has {part}.{name}: {_RENAMED[f'{part}.{name}']}.")
             if name not in known[part]:
-                raise ParameterError(f"{place} has {part}.{name}: choose from {', '.join(known[part])}.")
+                raise ParameterError(
+                    f"{place} has an unknown field {part}.{name}: choose from {', '.join(known[part])}."
+                )
             found.append(_spread(place, f"{part}.{name}", entry))
     return found
 
@@ -193,9 +199,13 @@ def _value(spread: Spread, seed: int, usual: Any) -> Any:
             return tuple(float(n) for n in spread.numbers)
         numbers = np.broadcast_to(spread.draw(seed, len(usual) if spread.each else 1), len(usual))
         return tuple(float(n) for n in (numbers * np.array(usual) if spread.times else numbers))
+    if usual is None and spread.times:
+        raise ParameterError(f"{spread.field} has no usual value that it could be a factor on: leave out times.")
     if spread.way == "value":
-        if isinstance(usual, float) and not _number(spread.numbers):
+        if not isinstance(usual, float | None):
+            return spread.numbers
+        if not _number(spread.numbers):
             raise ParameterError(f"{spread.field} is {spread.numbers!r}: give a number.")
-        return float(spread.numbers) if isinstance(usual, float) else spread.numbers
+        return float(spread.numbers)
     number = float(spread.draw(seed, 1)[0])
     return number * float(usual) if spread.times else number

@@ -1,6 +1,5 @@
 """Model of the VL53L1X time-of-flight sensors of a skin, seen through the simulated room."""
 
-import heapq
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
@@ -9,11 +8,12 @@ import mujoco
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry
 from pretouch.errors import ParameterError
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MIN_DISTANCE, cone_rays
 from pretouch.sim.plant import Plant
+from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, RangeReadings, RangeStatus
 
 
@@ -122,11 +122,12 @@ class RangeFinders:
         self._calibration = _flat_wall(self._rays[:, 2])
         rays = len(self._rays)
         self._geom, self._hit, self._normal = np.zeros(rays, np.int32), np.zeros(rays), np.zeros(3 * rays)
+        self._normals, self._errors = self._normal.reshape(-1, 3), _errors(params)
         self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
         count = len(skin)
         self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
         self._due: list[float] = self._rng.uniform(0, params.period_s, count).tolist()
-        self._arriving: list[tuple[float, int, float, float, int]] = []
+        self._sent = UnderWay[tuple[int, float, float, int]]()
         self._stamp = np.full(count, -np.inf)
         self._distance = np.zeros(count)
         self._status = np.full(count, RangeStatus.NONE, dtype=np.int64)
@@ -144,13 +145,14 @@ class RangeFinders:
         """Err in another way from the next measurement on; what was settled when they were mounted has to stay."""
         for name in ("mode", "rings", "offset_max_m"):
             if getattr(params, name) != getattr(self._params, name):
-                raise ParameterError(f"RangeFinderParams.{name} cannot change while the sensors run: mount them anew.")
-        self._params = params
+                raise ParameterError(
+                    f"RangeFinderParams.{name} cannot change while the sensors run: create them again."
+                )
+        self._params, self._errors = params, _errors(params)
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""
-        while self._arriving and self._arriving[0][0] <= self._plant.time + 1e-9:
-            _, unit, stamp, distance, status = heapq.heappop(self._arriving)
+        for unit, stamp, distance, status in self._sent.arrived(self._plant.time + ROUNDING_S):
             if stamp > self._stamp[unit]:
                 self._stamp[unit], self._distance[unit], self._status[unit] = stamp, distance, status
         return RangeReadings(self._stamp.copy(), self._distance.copy(), self._status.copy())
@@ -171,20 +173,19 @@ class RangeFinders:
             if self._send:
                 self._send(RangeSample(unit, time, distance, status, sigma, *_light(strength, self._light)))
             elif not lost:
-                heapq.heappush(self._arriving, (arrival, unit, time, distance, status))
+                self._sent.send(arrival, (unit, time, distance, status))
         self._next_due = min(self._due)
 
     def _measure(self, unit: int) -> tuple[float, int, float, float]:
-        p, link = self._params, int(self._skin.link[unit])
+        link = int(self._skin.link[unit])
         origin, rays = _beams(self._xpos[link], self._xmat[link], self._skin.T_link_sensor[unit], self._rays)
         mujoco.mj_multiRay(
             self._plant.mj_model, self._plant.mj_data, origin, rays.reshape(-1), None, True, link,
             self._geom, self._hit, self._normal, len(rays), self._mode.distance_max_m,
         )  # fmt: skip
-        return _reading(
-            self._hit, rays, self._normal.reshape(-1, 3), p.reflectance, p.reflectance_limit,
-            self._mode.distance_max_m, p.merge_m, p.slant_power, self._calibration, p.noise_floor_m, p.noise_rate,
-            p.sigma_limit_m, self._offset[unit], self._rng.standard_normal(),
+        return _reading.flat(
+            self._hit, rays, self._normals, self._mode.distance_max_m, self._calibration, self._offset[unit],
+            self._rng.standard_normal(), *self._errors,
         )  # fmt: skip
 
 
@@ -241,32 +242,57 @@ _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
 )
 
 
-@compiled
+class _Returns(NamedTuple):
+    """What N rays met."""
+
+    distance: FloatArray  # (N,) [m], negative of a ray that met nothing
+    rays: FloatArray  # (N, 3) unit vectors of the rays, base frame
+    normal: FloatArray  # (N, 3) outward normals where they met something, base frame
+
+
+class _Errors(NamedTuple):
+    """As of `RangeFinderParams`."""
+
+    reflectance: float
+    reflectance_limit: float
+    slant_power: float
+    merge_m: float
+    noise_floor_m: float
+    noise_rate: float
+    sigma_limit_m: float
+
+
+def _errors(params: RangeFinderParams) -> _Errors:
+    return _Errors(*(getattr(params, name) for name in _Errors._fields))
+
+
+@entry
 def _reading(
-    distance: FloatArray, rays: FloatArray, normal: FloatArray, reflectance: float, reflectance_limit: float,
-    distance_max: float, merge: float, slant_power: float, calibration: float, noise_floor: float, noise_rate: float,
-    sigma_limit: float, offset: float, draw: float,
-) -> tuple[float, int, float, float]:  # fmt: skip
+    returns: _Returns, distance_max: float, calibration: float, offset: float, draw: float, errors: _Errors
+) -> tuple[float, int, float, float]:
     """One reading [m], its status, its standard deviation [m], and the strength of what it shows.
 
-    From the returns of a bundle; a ray without a hit has a negative distance.
-
     The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
-    distance and the cosine of incidence, relative to a target that is just detected at `distance_max`. A ray that
-    leaves a body began inside it: what presses on the sensor is at distance 0, not where the ray comes out.
+    distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
+    `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
+    `calibration` is that of `_flat_wall`, `offset` the sensor's constant error [m], `draw` normal.
     """
+    distance, rays, normal = returns.distance, returns.rays, returns.normal
+    brightness = errors.reflectance / errors.reflectance_limit
     count = len(distance)
     strength = np.zeros(count)
     for i in range(count):
         if 0.0 <= distance[i] <= distance_max:
+            # a ray that leaves a body began inside it: what presses on the sensor is at 0, not where the ray comes out
             outwards = rays[i, 0] * normal[i, 0] + rays[i, 1] * normal[i, 1] + rays[i, 2] * normal[i, 2]
             slant = abs(outwards)
             if outwards > 0:
                 distance[i] = 0.0
-            if slant_power != 1.0:
-                slant = slant**slant_power
-            ratio = distance_max / max(distance[i], 0.01)
-            strength[i] = reflectance / reflectance_limit * slant * ratio * ratio / count
+            if errors.slant_power != 1.0:
+                slant = slant**errors.slant_power
+            ratio = distance_max / max(distance[i], 0.01)  # 10 mm: no return is infinitely strong
+            strength[i] = brightness * slant * ratio * ratio / count
+    # groups of returns by distance, nearest first: a weak group hides nothing that is behind it
     start = 0.0
     while True:
         nearest = np.inf
@@ -277,17 +303,18 @@ def _reading(
             return 0.0, _SIGNAL, 0.0, strength.sum()
         total, mean = 0.0, 0.0
         for i in range(count):
-            if nearest <= distance[i] <= nearest + merge:
+            if nearest <= distance[i] <= nearest + errors.merge_m:
                 total += strength[i]
                 mean += strength[i] * distance[i]
         if total >= 1.0:
             break
-        start = nearest + merge
+        start = nearest + errors.merge_m
     mean *= calibration / total
-    full = reflectance / reflectance_limit * (distance_max / max(mean, 0.01)) ** 2
-    sigma = noise_floor + noise_rate * mean * np.sqrt(max(1.0, full / total))
+    # shot noise: with a share of the light that a target filling the cone would return, 1 / sqrt(share) times the noise
+    full = brightness * (distance_max / max(mean, 0.01)) ** 2
+    sigma = errors.noise_floor_m + errors.noise_rate * mean * np.sqrt(max(1.0, full / total))
     measured = max(0.0, mean + offset + sigma * draw)
-    if sigma > sigma_limit:
+    if sigma > errors.sigma_limit_m:
         return measured, _SIGMA, sigma, total
     if measured < MIN_DISTANCE:
         return measured, _MIN_RANGE, sigma, total

@@ -42,7 +42,7 @@ class HandSpec:
 
 @dataclass(frozen=True)
 class GhostSpec:
-    """A ball that the units see and that touches nothing, moved by `pretouch.sim.ghost`."""
+    """A ball that the units see and that touches nothing, moved by whoever builds the scene."""
 
     radius: float
     """[m]"""

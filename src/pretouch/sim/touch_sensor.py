@@ -1,6 +1,5 @@
 """Touch sensors of a simulated skin: force-sensing resistors under the cases of units, with the faults they have."""
 
-import heapq
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,6 +11,7 @@ from pretouch.ports import Skin as SkinPort
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
 from pretouch.sim.plant import Plant, PointForce
+from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, RangeReadings, TouchReadings, TouchStatus
 
 
@@ -112,7 +112,7 @@ class TouchSensors:
         self._next_false = self._draw_next(np.zeros(count))
         self._passed, self._before, self._on = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
         self._time = plant.time
-        self._arriving: list[tuple[float, int, float, bool, float]] = []
+        self._sent = UnderWay[tuple[int, float, bool, float]]()
         self._stamp, self._contact = np.full(len(skin), -np.inf), np.zeros(len(skin), np.bool_)
         self._force = np.full(len(skin), np.nan)
         self._status = np.full(len(skin), int(TouchStatus.NONE), dtype=np.int64)
@@ -124,8 +124,7 @@ class TouchSensors:
 
     def touch(self) -> TouchReadings:
         """Return the newest reading of each unit that has arrived by now."""
-        while self._arriving and self._arriving[0][0] <= self._plant.time + 1e-9:
-            _, unit, stamp, contact, force = heapq.heappop(self._arriving)
+        for unit, stamp, contact, force in self._sent.arrived(self._plant.time + ROUNDING_S):
             if stamp > self._stamp[unit]:
                 self._stamp[unit], self._contact[unit], self._force[unit] = stamp, contact, force
                 self._status[unit] = TouchStatus.OK
@@ -182,7 +181,7 @@ class TouchSensors:
         if self._send:
             self._send(TouchSample(unit, time, bool(self._on[i]), told))
         elif not lost:
-            heapq.heappush(self._arriving, (arrival, unit, time, bool(self._on[i]), told))
+            self._sent.send(arrival, (unit, time, bool(self._on[i]), told))
 
 
 class FeelingSkin:

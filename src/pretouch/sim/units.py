@@ -1,6 +1,6 @@
 """Simulated units whole: range finders and IMUs, both as late as units send them."""
 
-import heapq
+from itertools import chain
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from pretouch.sensing.skin import Skin
 from pretouch.sim.imu import ImuParams, Imus, ImuSample, imu_counts
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import ImuReadings, RangeReadings
 
 DATAGRAM_S = 0.02
@@ -30,16 +31,14 @@ class SentImus:
         self._rng, self._lsb = np.random.default_rng([seed, 14]), imu_counts(imu)
         self._due: list[float] = self._rng.uniform(0.0, datagram_s, len(skin)).tolist()
         self._waiting: list[list[ImuSample]] = [[] for _ in skin.units]
-        self._arriving: list[tuple[float, int, list[ImuSample]]] = []
+        self._sent = UnderWay[list[ImuSample]]()
         Imus(plant, skin, imu, seed, lambda sample: self._waiting[sample.unit].append(sample))
         plant.before_each_step(self._send)
 
     def imu(self) -> ImuReadings:
         """Return the samples that have arrived since the last call."""
-        came: list[ImuSample] = []
-        while self._arriving and self._arriving[0][0] <= self._plant.time + 1e-9:
-            came += heapq.heappop(self._arriving)[2]
-        came.sort(key=lambda sample: sample.time)
+        arrived = self._sent.arrived(self._plant.time + ROUNDING_S)
+        came = sorted(chain.from_iterable(arrived), key=lambda sample: sample.time)
         values = np.array([sample.counts for sample in came], dtype=np.float64).reshape(-1, 6) * self._lsb
         unit = np.array([sample.unit for sample in came], dtype=np.int64)
         stamp = np.array([sample.time for sample in came], dtype=np.float64)
@@ -55,7 +54,7 @@ class SentImus:
             late, lost = p.latency_s + self._rng.exponential(p.jitter_s), self._rng.random() < p.dropout
             taken, self._waiting[unit] = self._waiting[unit], []
             if taken and not lost:
-                heapq.heappush(self._arriving, (time + late, unit, taken))
+                self._sent.send(time + late, taken)
 
 
 class UnitsWithImus:

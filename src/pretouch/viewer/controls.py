@@ -10,14 +10,13 @@ import numpy as np
 
 from pretouch.composition import differences
 from pretouch.errors import RecordingError
-from pretouch.params import Profile
-from pretouch.profiles import profile, profile_names, restriction_mode, restriction_modes, with_restriction
+from pretouch.profiles import PROFILES, Profile, restriction_mode, restriction_modes, with_restriction
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
-from pretouch.viewer.commands import Commands
+from pretouch.viewer.action_queue import ActionQueue
 from pretouch.viewer.gui import SETTLE_S, TYPED_S, add_button, add_view_boxes, put, when_changed
 from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs
-from pretouch.viewer.settings import ObjectName, PathName
+from pretouch.viewer.room import ObjectName, PathName
 from pretouch.viewer.simulation import LiveSimulation
 from pretouch.viewer.unit_panel import UnitPanel
 
@@ -31,7 +30,7 @@ _CLOCK = 0.1, 1.0
 
 
 @dataclass
-class Running:
+class ClockState:
     """How time passes."""
 
     paused: bool = False
@@ -41,21 +40,21 @@ class Running:
     """Control cycles that are to pass one by one, paused or not."""
 
 
-def named(changed: Profile, base: str) -> Profile:
+def with_name(profile: Profile, base: str) -> Profile:
     """Name a profile by the one it was made from and what is different, as `pretouch.profiles.profile` reads it."""
-    mine, theirs = (replace(p, name="") for p in (changed, profile(base)))
-    return replace(changed, name=":".join([base, *differences(mine, theirs)]))
+    mine, theirs = (replace(p, name="") for p in (profile, PROFILES[base]))
+    return replace(profile, name=":".join([base, *differences(mine, theirs)]))
 
 
 class Controls:
     """All controls of a live page, in tabs. Methods without underscore are called by the loop."""
 
-    def __init__(self, gui: "GuiApi", simulation: LiveSimulation, commands: Commands) -> None:
-        self._gui, self._simulation, self._commands = gui, simulation, commands
-        self.running = Running()
+    def __init__(self, gui: "GuiApi", simulation: LiveSimulation, commands: ActionQueue) -> None:
+        self._gui, self._simulation, self._actions = gui, simulation, commands
+        self.running = ClockState()
         self._shown: list[tuple[Any, str, Callable[[], object]]] = []
         self._base = simulation.settings.profile.name.partition(":")[0]
-        if self._base not in profile_names():
+        if self._base not in PROFILES:
             self._base = "paper"
         self.on_view: Callable[[str, bool], None] = lambda name, visible: None
         """Told which part of the scene to show or hide."""
@@ -80,8 +79,8 @@ class Controls:
         self._button("Single step", self._single_step, color="gray", hint="One control cycle; pauses.")
         clock = gui.add_slider("Clock speed", *_CLOCK, 0.1, 1.0, hint="Simulated over real time.")
         self._number(clock, self._set_clock, "clock speed", lambda: running.speed)
-        self._resume = self._button("Resume", simulation.resume, hint="Leave a hold that waits for a person.")
-        self._button("Reset", simulation.reset, color="gray", hint="Begin again at time 0 with all as it is set.")
+        self._resume = self._button("Resume", simulation.resume, hint="Leave a hold that waits for you.")
+        self._button("Reset", simulation.reset, color="gray", hint="Restart at time 0 with the current settings.")
         self._record = self._button("Record", partial(toggle_recording, simulation), color=palette.AVOIDING)
         with gui.add_folder("Hand"):
             self._hand = [
@@ -89,30 +88,30 @@ class Controls:
                 for axis, low, high in (("x", -1.0, 1.4), ("y", -1.2, 1.2), ("z", -0.15, 1.4))
             ]
             for slider in self._hand:
-                when_changed(slider, self._commands, lambda _: self._move_hand(), "hand", quiet=True)
+                when_changed(slider, self._actions, lambda _: self._move_hand(), "hand", quiet=True)
 
     def _controller_tab(self) -> None:
         gui, docs = self._gui, field_docs()
-        base = gui.add_dropdown("Profile", profile_names())
-        self._choice(base, self._choose_profile, "profile", lambda: self._base)
+        profile = gui.add_dropdown("Profile", tuple(PROFILES))
+        self._choice(profile, self._choose_profile, "profile", lambda: self._base)
         speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=docs["TaskParams", "speed_m_s"])
-        self._number(speed, self._choose_speed, "path speed", lambda: self._mine.task.speed_m_s)
+        self._number(speed, self._choose_speed, "path speed", lambda: self._profile.task.speed_m_s)
         mode = gui.add_dropdown("Restrictions", restriction_modes(), hint=docs["Profile", "approach"])
-        self._choice(mode, self._choose_restrictions, "restrictions", lambda: restriction_mode(self._mine))
+        self._choice(mode, self._choose_restrictions, "restrictions", lambda: restriction_mode(self._profile))
         with gui.add_folder("Table I", expand_by_default=False):
             for entry in TABLE_1:
                 # as text: of a field for numbers that is emptied, viser tells nobody
-                field = gui.add_text(entry.label, entry.text(self._mine), hint=entry.hint())
+                field = gui.add_text(entry.label, entry.text(self._profile), hint=entry.hint())
                 self._typed(field, partial(self._change_entry, entry), entry.symbol, partial(self._text_of, entry))
-            self._button("Reset parameters", self._reset_parameters, hint="To those of the profile.")
+            self._button("Reset parameters", self._reset_parameters, hint="Back to those of the profile.")
 
     def _world_tab(self) -> None:
         gui, simulation = self._gui, self._simulation
         path = gui.add_dropdown("Path", get_args(PathName))
         self._choice(path, simulation.set_path, "path", lambda: simulation.settings.path)
-        thing = gui.add_dropdown("Object", get_args(ObjectName), hint="Begins again at time 0.")
+        thing = gui.add_dropdown("Object", get_args(ObjectName), hint="Restarts at time 0.")
         self._choice(thing, self._choose_object, "object", lambda: simulation.settings.object)
-        hint = "Of hand and object, as soon as nothing touches."
+        hint = "Of hand and object; changes as soon as nothing touches."
         stiffness = gui.add_slider("Stiffness [kN/m]", 3.0, 150.0, 1.0, 75.0, hint=hint)
         self._number(stiffness, self._set_stiffness, "stiffness", lambda: simulation.settings.stiffness / 1000.0)
         with gui.add_folder("Sensor units"):
@@ -123,60 +122,62 @@ class Controls:
 
     def _fault_controls(self) -> None:
         gui, simulation = self._gui, self._simulation
-        self._units = {unit: gui.add_checkbox(unit, True, hint="Off: is silent.") for unit in simulation.skin.ids}
+        self._units = {
+            unit: gui.add_checkbox(unit, True, hint=("Off: the unit is silent.")) for unit in simulation.skin.ids
+        }
         for unit, box in self._units.items():
-            self._choice(box, self._set_faults, "faults", partial(self._sends, unit))
+            self._choice(box, self._set_faults, "faults", partial(self._is_enabled, unit))
         self._noise = gui.add_slider("Noise factor", 0.0, 20.0, 0.5, 1.0)
         self._number(self._noise, self._set_faults, "faults", lambda: simulation.settings.faults.noise_factor)
         self._latency = gui.add_slider("More latency [s]", 0.0, 0.5, 0.01, 0.0)
         self._number(self._latency, self._set_faults, "faults", lambda: simulation.settings.faults.latency_s)
 
-    def _choice(self, handle: Any, act: Callable[[Any], object], kind: str, holds: Callable[[], object]) -> None:
-        """Have a control act at once; `holds` says what it is to show."""
-        when_changed(handle, self._commands, act, kind)
-        self._shown.append((handle, kind, holds))
+    def _choice(self, handle: Any, act: Callable[[Any], object], kind: str, current: Callable[[], object]) -> None:
+        """Have a control act at once; `current` says what it is to show."""
+        when_changed(handle, self._actions, act, kind)
+        self._shown.append((handle, kind, current))
 
-    def _number(self, handle: Any, act: Callable[[Any], object], kind: str, holds: Callable[[], object]) -> None:
-        """Have a control act when nobody types in it any more; `holds` says what it is to show."""
-        when_changed(handle, self._commands, act, kind, SETTLE_S)
-        self._shown.append((handle, kind, holds))
+    def _number(self, handle: Any, act: Callable[[Any], object], kind: str, current: Callable[[], object]) -> None:
+        """Have a control act when nobody types in it any more; `current` says what it is to show."""
+        when_changed(handle, self._actions, act, kind, SETTLE_S)
+        self._shown.append((handle, kind, current))
 
-    def _typed(self, handle: Any, act: Callable[[Any], object], name: str, holds: Callable[[], object]) -> None:
+    def _typed(self, handle: Any, act: Callable[[Any], object], name: str, current: Callable[[], object]) -> None:
         """Have a text act when nobody types in it any more, and leave standing for a while what was refused."""
-        when_changed(handle, self._commands, act, f"parameter {name}", SETTLE_S)
-        when_changed(handle, self._commands, lambda _: None, f"typed {name}", TYPED_S, quiet=True)
-        self._shown.append((handle, f"typed {name}", holds))
+        when_changed(handle, self._actions, act, f"parameter {name}", SETTLE_S)
+        when_changed(handle, self._actions, lambda _: None, f"typed {name}", TYPED_S, quiet=True)
+        self._shown.append((handle, f"typed {name}", current))
 
     def _button(self, label: str, act: Callable[[], object], **more: Any) -> Any:
-        return add_button(self._gui, self._commands, label, act, **more)
+        return add_button(self._gui, self._actions, label, act, **more)
 
     # what they do
 
     @property
-    def _mine(self) -> Profile:
+    def _profile(self) -> Profile:
         return self._simulation.settings.profile
 
-    def _change(self, changed: Profile) -> None:
-        self._simulation.set_profile(named(changed, self._base))
+    def _change(self, profile: Profile) -> None:
+        self._simulation.set_profile(with_name(profile, self._base))
 
     def _change_entry(self, entry: TableEntry, text: str) -> None:
         if text.strip():  # else what holds comes back
-            self._change(entry.write_text(self._mine, text))
+            self._change(entry.write_text(self._profile, text))
 
     def _choose_profile(self, base: str) -> None:
-        chosen = profile(base)
-        chosen = replace(chosen, task=replace(chosen.task, speed_m_s=self._mine.task.speed_m_s))
-        self._simulation.set_profile(named(chosen, base))
+        chosen = PROFILES[base]
+        profile = replace(chosen, task=replace(chosen.task, speed_m_s=self._profile.task.speed_m_s))
+        self._simulation.set_profile(with_name(profile, base))
         self._base = base
 
     def _choose_speed(self, speed: float) -> None:
-        self._change(replace(self._mine, task=replace(self._mine.task, speed_m_s=float(speed))))
+        self._change(replace(self._profile, task=replace(self._profile.task, speed_m_s=float(speed))))
 
     def _choose_restrictions(self, mode: str) -> None:
-        self._change(with_restriction(self._mine, mode))
+        self._change(with_restriction(self._profile, mode))
 
     def _text_of(self, entry: TableEntry) -> str:
-        return entry.text(self._mine)
+        return entry.text(self._profile)
 
     def _choose_object(self, name: ObjectName) -> None:
         self._simulation.reset(object=name)
@@ -184,7 +185,7 @@ class Controls:
     def _set_stiffness(self, stiffness: float) -> None:
         self._simulation.set_stiffness(1000.0 * stiffness)
 
-    def _sends(self, unit: str) -> bool:
+    def _is_enabled(self, unit: str) -> bool:
         return unit not in self._simulation.settings.faults.silenced
 
     def _reset_parameters(self) -> None:
@@ -209,9 +210,9 @@ class Controls:
 
     def refresh(self) -> None:
         """Have all controls show what holds, but for those that somebody types in: what was refused goes back."""
-        for handle, kind, holds in self._shown:
-            if not self._commands.waits(kind):
-                put(handle, holds())
+        for handle, kind, current in self._shown:
+            if not self._actions.is_waiting(kind):
+                put(handle, current())
         self._pause.label = "Go on" if self.running.paused else "Pause"
         self._record.label = "Stop recording" if self._simulation.recording else "Record"
 
@@ -245,7 +246,7 @@ def toggle_recording(simulation: LiveSimulation) -> None:
     try:
         RECORDINGS.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RecordingError(f"The folder {RECORDINGS} cannot be made: {error.strerror}.") from error
+        raise RecordingError(f"The folder {RECORDINGS} cannot be created: {error.strerror}.") from error
     place = _fresh_place(RECORDINGS)
     simulation.start_recording(place)
     simulation.notice = f"Recording to {place}."

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.surroundings import KnownBox
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

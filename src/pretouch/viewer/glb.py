@@ -24,7 +24,7 @@ class ColouredMesh:
 
     def __init__(self, mesh: Mesh) -> None:
         if not len(mesh.faces):
-            raise ViewerError("A mesh without a face cannot be drawn: give the link a body.")
+            raise ViewerError("A mesh without faces cannot be drawn: give the link a body.")
         middle = (mesh.vertices.max(axis=0) + mesh.vertices.min(axis=0)) / 2
         size = float(np.abs(mesh.vertices - middle).max()) or 1.0
         fits = len(mesh.vertices) <= 0xFFFF

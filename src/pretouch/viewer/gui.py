@@ -1,10 +1,10 @@
-"""How a control of a page reaches the loop: what a person does becomes an action in the queue."""
+"""Controls of a page: each puts an action into the queue of the loop."""
 
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from pretouch.viewer.commands import Commands
+from pretouch.viewer.action_queue import ActionQueue
 from pretouch.viewer.plots import History, Plots
 from pretouch.viewer.scene import PARTS
 
@@ -22,7 +22,7 @@ LEFT_PX, RIGHT_PX = 310, 330
 """Widths of the panels of plots and of controls [px]."""
 
 
-def dress(server: "ViserServer") -> None:
+def style_page(server: "ViserServer") -> None:
     """Give a page its colours, and put its controls to the right."""
     server.gui.configure_theme(brand_color=(49, 104, 196), show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
@@ -41,13 +41,13 @@ def add_plots(server: "ViserServer", history: History, units: tuple[str, ...], o
 
 def when_changed(
     handle: Any,
-    commands: Commands,
+    commands: ActionQueue,
     act: Callable[[Any], object],
     kind: str = "",
     settle: float = 0.0,
     quiet: bool = False,
 ) -> None:
-    """Queue an action on the value a person gives a control, as `Commands.put` does; not on those the program sets."""
+    """Queue an action on each value that a person sets; values set by the program queue nothing."""
 
     @handle.on_update
     async def _(event: Any) -> None:
@@ -56,7 +56,7 @@ def when_changed(
             commands.put(lambda: act(value), kind, settle, quiet)
 
 
-def add_button(gui: "GuiApi", commands: Commands, label: str, act: Callable[[], object], **more: Any) -> Any:
+def add_button(gui: "GuiApi", commands: ActionQueue, label: str, act: Callable[[], object], **more: Any) -> Any:
     """Add a button that queues an action; `more` goes to viser's `add_button`, but `icon` is a name."""
     from viser import Icon
 
@@ -70,7 +70,7 @@ def add_button(gui: "GuiApi", commands: Commands, label: str, act: Callable[[], 
     return button
 
 
-def add_view_boxes(gui: "GuiApi", commands: Commands, show: Callable[[str, bool], None]) -> None:
+def add_view_boxes(gui: "GuiApi", commands: ActionQueue, show: Callable[[str, bool], None]) -> None:
     """Add a box for each part of the scene that can be hidden."""
     for name in PARTS:
         box = gui.add_checkbox(name.capitalize(), True)
@@ -78,5 +78,5 @@ def add_view_boxes(gui: "GuiApi", commands: Commands, show: Callable[[str, bool]
 
 
 def put(handle: Any, value: object) -> None:
-    """Have a control show a value; mypy takes viser's property for read-only."""
+    """Show a value in a control; mypy takes viser's property for read-only."""
     handle.value = value

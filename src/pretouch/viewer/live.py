@@ -8,9 +8,9 @@ import numpy as np
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock
 from pretouch.types import ControlStep, FloatArray
-from pretouch.viewer.commands import Action, Commands
+from pretouch.viewer.action_queue import Action, ActionQueue
 from pretouch.viewer.controls import Controls
-from pretouch.viewer.gui import PERIOD_S, add_plots, dress
+from pretouch.viewer.gui import PERIOD_S, add_plots, style_page
 from pretouch.viewer.pacing import Pace
 from pretouch.viewer.plots import History
 from pretouch.viewer.scene import Scene
@@ -34,14 +34,14 @@ class LivePage:
         self._server, self._simulation, self._say = server, simulation, say
         self._world, self._time = simulation.world, simulation.time
         self.pace = Pace()
-        self._commands = Commands()
+        self._actions = ActionQueue()
         self._pointed: FloatArray | None = None
-        self._deaf = False
-        """Whether nothing more can come of real units."""
-        dress(server)
+        self._receiver_ended = False
+        """Whether the receiver of the real units has ended."""
+        style_page(server)
         self._status = Status(server.gui)
         server.gui.add_html(legend())
-        self.controls = Controls(server.gui, simulation, self._commands)
+        self.controls = Controls(server.gui, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
         self._status.notice = self._scene.said
         self.controls.on_view = self._scene.show
@@ -55,8 +55,8 @@ class LivePage:
         return self._status.notice
 
     def ask(self, action: Action, kind: str = "", settle: float = 0.0, quiet: bool = False) -> None:
-        """Have something done between two ticks, from any thread, as `Commands.put` does."""
-        self._commands.put(action, kind, settle, quiet)
+        """Have something done between two ticks, from any thread, as `ActionQueue.put` does."""
+        self._actions.put(action, kind, settle, quiet)
 
     def _drag(self, target: FloatArray) -> None:
         self.ask(lambda: self._move_hand(target), "hand", quiet=True)
@@ -66,8 +66,8 @@ class LivePage:
         self.controls.show_hand(target)  # also while the arm is paused
 
     def turn(self, now: float) -> None:
-        """Do what people asked for, let time pass, and draw; `now` is the time of the machine [s]."""
-        self._obey(now)
+        """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
+        self._run_actions(now)
         running, recording = self.controls.running, self._simulation.recording
         before = self._simulation.time
         steps = self._pass_time()
@@ -79,8 +79,8 @@ class LivePage:
         if recording and recording.trouble:
             self._say(recording.trouble)
         real = self._simulation.real
-        if real and not self._deaf and not real.source.alive:
-            self._deaf = True
+        if real and not self._receiver_ended and not real.source.alive:
+            self._receiver_ended = True
             self._simulation.notice = "The receiver of the sensor units has ended: start the page again."
             self._say(self._simulation.notice)
         if self._simulation.notice:
@@ -99,8 +99,8 @@ class LivePage:
             return [simulation.single_step() for _ in range(single)]
         return [] if running.paused else simulation.advance(running.speed * PERIOD_S)
 
-    def _obey(self, now: float) -> None:
-        actions = self._commands.take(now)
+    def _run_actions(self, now: float) -> None:
+        actions = self._actions.take(now)
         for action in actions:
             if not action.quiet:
                 self._status.notice = ""

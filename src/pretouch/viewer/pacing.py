@@ -80,6 +80,6 @@ class Pace:
         if not self.slow:
             return ""
         return (
-            f"This machine is too slow for real time: the clock runs at {100 * self._slow_share:.0f} % of the speed"
-            " asked for, the physics is not simplified."
+            f"This machine is too slow for real time: the clock runs at {100 * self._slow_share:.0f} % of the chosen"
+            " speed, with the same physics."
         )

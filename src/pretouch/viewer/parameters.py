@@ -2,14 +2,15 @@
 
 import ast
 import inspect
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from pathlib import Path
+from itertools import pairwise
 from types import MappingProxyType
 
+from pretouch.composition import at, changed, leaves
 from pretouch.errors import ParameterError
-from pretouch.params import Profile
+from pretouch.profiles import PROFILES, Profile
 
 
 def written(value: float) -> str:
@@ -19,45 +20,31 @@ def written(value: float) -> str:
 
 @dataclass(frozen=True)
 class TableEntry:
-    """One row of Table I: the fields it sets, one for each use in the paper."""
+    """One row of Table I: the parameters it sets, one for each use in the paper."""
 
     symbol: str
     unit: str
-    fields: tuple[tuple[str, str], ...]
-    """(group of the profile, field) of each."""
+    paths: tuple[str, ...]
+    """Where each stands in a profile."""
 
-    def read(self, profile: Profile) -> float | None:
-        """Return its value in a profile; None where no part of that has it."""
-        found = self._held(profile)
-        return float(getattr(getattr(profile, found[0][0]), found[0][1])) if found else None
-
-    def _held(self, profile: Profile) -> list[tuple[str, str]]:
-        """Return those of the fields that the parts of a profile have."""
-        return [(group, name) for group, name in self.fields if hasattr(getattr(profile, group), name)]
-
-    def write(self, profile: Profile, value: float) -> Profile:
-        """Return the profile with another value; a ParameterError says what is wrong with it."""
-        groups: dict[str, dict[str, float | int]] = {}
-        held = self._held(profile)
-        if not held:
-            raise ParameterError(f"{self.symbol} is a parameter of no part of this profile: choose a part that has it.")
-        for group, name in held:
-            kind = type(getattr(getattr(profile, group), name))
-            groups.setdefault(group, {})[name] = int(value) if kind is int and value % 1 == 0 else value
-        return replace(profile, **{g: replace(getattr(profile, g), **new) for g, new in groups.items()})
+    def text(self, profile: Profile) -> str:
+        """Write its value in a profile; '' in one that has no such part."""
+        values = dict(leaves(profile))
+        return next((written(float(str(values[path]))) for path in self.paths if path in values), "")
 
     def write_text(self, profile: Profile, text: str) -> Profile:
         """Return the profile with a value that was typed; a ParameterError says what is wrong with it."""
         try:
             value = float(text)
         except ValueError as error:
-            raise ParameterError(f"{self.symbol} is {text!r}: give a number such as {self.text(profile)}.") from error
-        return self.write(profile, value)
-
-    def text(self, profile: Profile) -> str:
-        """Write its value in a profile, nothing where there is none."""
-        value = self.read(profile)
-        return "" if value is None else written(value)
+            usual = self.text(PROFILES["paper"])
+            raise ParameterError(f"{self.symbol} is {text!r}: give a number such as {usual}.") from error
+        known = dict(leaves(profile))
+        changes = {path: written(value) for path in self.paths if path in known}
+        if not changes:
+            raise ParameterError(f"{self.symbol} is no parameter of this profile: choose one with that part, as paper.")
+        made: Profile = changed(profile, changes)
+        return made
 
     @property
     def label(self) -> str:
@@ -66,42 +53,61 @@ class TableEntry:
 
     def hint(self) -> str:
         """What it does, from the documentation of its fields."""
-        usual = Profile()
-        owners = [(owner.__name__, name) for g, name in self.fields for owner in type(getattr(usual, g)).__mro__]
-        return " ".join(field_docs().get(owner, "") for owner in owners).strip()
+        said = []
+        for path in self.paths:
+            group, _, name = path.rpartition(".")
+            said.append(field_docs()[type(at(PROFILES["paper"], group)).__name__, name])
+        return " ".join(said)
 
 
 TABLE_1: tuple[TableEntry, ...] = (
-    TableEntry("d_max", "m", (("slow", "d_max_m"), ("threshold", "d_max_m"))),
-    TableEntry("d_min", "m", (("threshold", "d_min_m"),)),
-    TableEntry("l_max", "cycles", (("task", "restore_cycles"),)),
-    TableEntry("V_max", "m/s", (("approach", "v_max_m_s"),)),
-    TableEntry("d_repulse", "m", (("approach", "d_repulse_m"),)),
-    TableEntry("d_crit", "m", (("approach", "d_crit_m"),)),
-    TableEntry("d_notice", "m", (("approach", "d_notice_m"),)),
-    TableEntry("alpha", "", (("threshold", "alpha"),)),
-    TableEntry("beta", "", (("approach", "beta"),)),
-    TableEntry("lambda", "", (("threshold", "lambda_"),)),
-    TableEntry("F_std", "N", (("threshold", "f_std_n"),)),
-    TableEntry("F_d", "N", (("threshold", "f_d_n"),)),
-    TableEntry("F_b", "N", (("threshold", "f_base_n"),)),
-    TableEntry("sigma_max", "N", (("threshold", "sigma_max_n"),)),
+    TableEntry("d_max", "m", ("slow.d_max_m", "detect.d_max_m")),
+    TableEntry("d_min", "m", ("detect.d_min_m",)),
+    TableEntry("l_max", "cycles", ("task.restore_cycles",)),
+    TableEntry("V_max", "m/s", ("approach.v_max_m_s",)),
+    TableEntry("d_repulse", "m", ("approach.d_repulse_m",)),
+    TableEntry("d_crit", "m", ("approach.d_crit_m",)),
+    TableEntry("d_notice", "m", ("approach.d_notice_m",)),
+    TableEntry("alpha", "", ("window.alpha",)),
+    TableEntry("beta", "", ("approach.beta",)),
+    TableEntry("lambda", "", ("window.lambda_",)),
+    TableEntry("F_std", "N", ("detect.f_std_n",)),
+    TableEntry("F_d", "N", ("detect.f_d_n",)),
+    TableEntry("F_b", "N", ("detect.f_base_n",)),
+    TableEntry("sigma_max", "N", ("detect.sigma_max_n",)),
 )
 
 
 @cache
 def field_docs() -> Mapping[tuple[str, str], str]:
-    """What the source says of each field of the parameters, by (class, field), on one line."""
+    """What the source says of each field of the parameters, by (class, field), on one line; inherited ones too."""
     docs: dict[tuple[str, str], str] = {}
-    groups = [type(getattr(Profile(), f.name)) for f in fields(Profile) if f.name != "name"]
-    owners = {owner for group in groups for owner in group.__mro__ if is_dataclass(owner)}
-    sources = {inspect.getsourcefile(owner) for owner in (*owners, Profile)}
-    nodes = [node for path in sources if path for node in ast.parse(Path(path).read_text(encoding="utf-8")).body]
-    for node in nodes:
-        if not isinstance(node, ast.ClassDef):
-            continue
-        for field, text in zip(node.body, node.body[1:], strict=False):
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr):
-                said = ast.literal_eval(text.value)
-                docs[node.name, field.target.id] = " ".join(str(said).split())
+    kinds: set[type] = {type(group) for profile in PROFILES.values() for group in groups_of(profile)}
+    for kind in kinds | {Profile}:
+        for base in reversed(kind.__mro__):
+            docs |= {(kind.__name__, field): said for field, said in _told(base).items()}
     return MappingProxyType(docs)
+
+
+def groups_of(params: object) -> Iterator[object]:
+    """All sets of parameters that one holds, parts and those of parts included."""
+    for item in fields(params) if is_dataclass(params) else ():
+        value = getattr(params, item.name)
+        for group in value if isinstance(value, tuple) else (value,):
+            if is_dataclass(group):
+                yield group
+                yield from groups_of(group)
+
+
+@cache
+def _told(kind: type) -> Mapping[str, str]:
+    """What the source of a class says of the fields that it adds."""
+    if not is_dataclass(kind):
+        return {}
+    (node,) = ast.parse(inspect.getsource(kind)).body
+    body = node.body if isinstance(node, ast.ClassDef) else []
+    return {
+        field.target.id: " ".join(str(ast.literal_eval(text.value)).split())
+        for field, text in pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr)
+    }

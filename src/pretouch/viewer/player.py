@@ -64,7 +64,7 @@ class Player:
 
 
 @dataclass(frozen=True)
-class Happening:
+class TimelineEvent:
     """A contact, or a change of mode, of the recording or of what it is compared with."""
 
     index: int
@@ -72,28 +72,28 @@ class Happening:
     what: str
 
 
-class Happenings:
-    """What happened in a recording, found bit by bit: to look at each step of a long one takes a while."""
+class Timeline:
+    """Events of a recording, found a few steps at a time: searching a long one takes a while."""
 
     def __init__(self, step: Callable[[int], ControlStep], count: int, known: Mapping[int, str] | None = None) -> None:
-        """Take what returns a step, how many there are, and what else is `known` to have happened in some."""
+        """Take what returns a step, how many there are, and events `known` otherwise, by step."""
         self._step, self._count, self._known = step, count, known or {}
         self._looked = 0
         self._mode: Mode | None = None
-        self.found: list[Happening] = []
+        self.found: list[TimelineEvent] = []
 
     @property
     def done(self) -> bool:
-        """Whether all steps have been looked at."""
+        """Whether all steps have been searched."""
         return self._looked == self._count
 
     @property
     def share(self) -> float:
-        """Share of the steps that have been looked at."""
+        """Share of the steps that have been searched."""
         return self._looked / self._count
 
-    def look(self, steps: int) -> None:
-        """Look at some more steps."""
+    def search(self, steps: int) -> None:
+        """Search some more steps."""
         for i in range(self._looked, min(self._looked + steps, self._count)):
             step = self._step(i)
             what = [self._known[i]] if i in self._known else []
@@ -102,15 +102,15 @@ class Happenings:
             elif self._mode is not None and step.mode is not self._mode:
                 what.insert(0, f"{self._mode.name} to {step.mode.name}")
             if what:
-                self.found.append(Happening(i, "; ".join(what)))
+                self.found.append(TimelineEvent(i, "; ".join(what)))
             self._mode, self._looked = step.mode, i + 1
 
-    def after(self, index: int) -> Happening | None:
+    def after(self, index: int) -> TimelineEvent | None:
         """The next one after a step."""
         at = bisect_right([h.index for h in self.found], index)
         return self.found[at] if at < len(self.found) else None
 
-    def before(self, index: int) -> Happening | None:
+    def before(self, index: int) -> TimelineEvent | None:
         """The last one before a step."""
         at = bisect_left([h.index for h in self.found], index)
         return self.found[at - 1] if at else None

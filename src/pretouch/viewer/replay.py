@@ -1,23 +1,23 @@
 """The page of a recording: the live view with a slider over time."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
+from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.errors import RecordingError
 from pretouch.loop import MonotonicClock
 from pretouch.recording.codec import decode_step
+from pretouch.recording.compare import Comparison, Found
 from pretouch.recording.reader import Kept, Recorded, Run
 from pretouch.recording.surroundings import surroundings
 from pretouch.types import FloatArray
-from pretouch.viewer.commands import Commands
-from pretouch.viewer.compared import compared, found_by_other
+from pretouch.viewer.action_queue import ActionQueue
 from pretouch.viewer.frame import Frame, World
-from pretouch.viewer.gui import PERIOD_S, add_button, add_plots, add_view_boxes, dress, put, when_changed
-from pretouch.viewer.player import Happening, Happenings, Player
+from pretouch.viewer.gui import PERIOD_S, add_button, add_plots, add_view_boxes, put, style_page, when_changed
+from pretouch.viewer.player import Player, Timeline, TimelineEvent
 from pretouch.viewer.plots import SPAN_S, History
 from pretouch.viewer.scene import Scene
 from pretouch.viewer.server import ServeOptions, served, url_of
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from pretouch.recording.compare import Comparison
 
-_LOOKED_S, _LOOKED_PLAYING_S = 0.015, 0.005
-"""Time spent on looking for happenings between two updates, at rest and while it plays [s]."""
+_SEARCH_S, _SEARCH_PLAYING_S = 0.015, 0.005
+"""Time spent on searching for events between two updates, at rest and while it plays [s]."""
 _AT_ONCE = 8
 _STRIDE = 4
 """Of the steps before a place jumped to, each how manieth is drawn."""
@@ -72,16 +72,16 @@ class ReplayPage:
         self._server, self._recorded, self._comparison = server, recorded, comparison
         stamps = recorded.stamps()
         self.player = Player(stamps)
-        self._commands = Commands()
-        found = found_by_other(comparison, stamps) if comparison else {}
-        self.happenings = Happenings(lambda i: decode_step(recorded.step_data(i))[1], len(recorded), found)
+        self._actions = ActionQueue()
+        found = contacts_of_other(comparison, stamps) if comparison else {}
+        self.timeline = Timeline(lambda i: decode_step(recorded.step_data(i))[1], len(recorded), found)
         self._run, self._drawn = 0, -1
         self._world = cache(lambda run: world_of(recorded.runs[run]))
         world = self._world(0)
-        dress(server)
+        style_page(server)
         self._status = Status(server.gui)
         self._status.notice = recorded.said
-        server.gui.add_html(legend() + (compared(comparison, stamps[0]) if comparison else ""))
+        server.gui.add_html(legend() + (comparison_html(comparison, stamps[0]) if comparison else ""))
         self._controls(server)
         self._scene = Scene(server, world)
         other = comparison.other.name if comparison else ""
@@ -89,14 +89,14 @@ class ReplayPage:
         self._plots = add_plots(server, self.history, world.skin.ids, other)
 
     def _controls(self, server: "ViserServer") -> None:
-        gui, player, commands = server.gui, self.player, self._commands
+        gui, player, commands = server.gui, self.player, self._actions
         self._slider = gui.add_slider("Time since the start [s]", 0.0, max(player.duration, 0.01), 0.01, 0.0)
         when_changed(self._slider, commands, lambda chosen: player.seek(float(chosen)), "seek")
         buttons: tuple[tuple[str, Callable[[], None], str], ...] = (
             ("Step on", lambda: player.step(1), "PLAYER_TRACK_NEXT"),
             ("Step back", lambda: player.step(-1), "PLAYER_TRACK_PREV"),
-            ("Next event", lambda: self._jump(self.happenings.after(player.index)), "CHEVRON_RIGHT"),
-            ("Previous event", lambda: self._jump(self.happenings.before(player.index)), "CHEVRON_LEFT"),
+            ("Next event", lambda: self._jump(self.timeline.after(player.index)), "CHEVRON_RIGHT"),
+            ("Previous event", lambda: self._jump(self.timeline.before(player.index)), "CHEVRON_LEFT"),
         )
         self._play = add_button(gui, commands, "Play", player.play, icon="PLAYER_PLAY")
         for label, act, icon in buttons:
@@ -106,43 +106,43 @@ class ReplayPage:
         with gui.add_folder("View"):
             add_view_boxes(gui, commands, lambda name, visible: self._scene.show(name, visible))
 
-    def _jump(self, happening: Happening | None) -> None:
-        """Pause at a happening."""
+    def _jump(self, event: TimelineEvent | None) -> None:
+        """Pause at an event."""
         self.player.playing = False
-        if happening is None:
-            left = "" if self.happenings.done else f" yet: {100 * self.happenings.share:.0f} % has been looked at"
-            self._status.notice = f"There is no other contact or change of mode{left}."
+        if event is None:
+            left = "" if self.timeline.done else f" so far ({100 * self.timeline.share:.0f} % searched)"
+            self._status.notice = f"No other contact or change of mode was found{left}."
             return
-        self.player.seek_index(happening.index)
-        self._status.notice = f"{happening.what} at {self.player.time:.2f} s."
+        self.player.seek_index(event.index)
+        self._status.notice = f"{event.what} at {self.player.time:.2f} s."
 
     def turn(self, now: float, elapsed: float) -> None:
-        """Do what people asked for, play on by some real time [s], and draw; `now` is the time of the machine [s]."""
-        for action in self._commands.take():
+        """Run queued actions, play on by some real time [s], and draw; `now` is the time of the machine [s]."""
+        for action in self._actions.take():
             if not action.quiet:
                 self._status.notice = ""
             action()
         self.player.advance(elapsed)
-        self._look()
+        self._search_events()
         if self._server.get_clients():
             self.draw(now)
 
-    def _look(self) -> None:
-        """Look for happenings, as long as that keeps nobody waiting."""
-        end = time.perf_counter() + (_LOOKED_PLAYING_S if self.player.playing else _LOOKED_S)
-        while not self.happenings.done and time.perf_counter() < end:
-            self.happenings.look(_AT_ONCE)
+    def _search_events(self) -> None:
+        """Search for events, for a time that nobody notices."""
+        end = time.perf_counter() + (_SEARCH_PLAYING_S if self.player.playing else _SEARCH_S)
+        while not self.timeline.done and time.perf_counter() < end:
+            self.timeline.search(_AT_ONCE)
 
     def draw(self, now: float) -> Kept:
         """Draw the step at the player's time, and return it."""
-        kept = self._come_to(self.player.index)
+        kept = self._advance_history(self.player.index)
         with self._server.atomic():
             self._scene.draw(frame_of(kept), now)
             self._plots.draw(now)
             self._show(kept, now)
         return kept
 
-    def _come_to(self, index: int) -> Kept:
+    def _advance_history(self, index: int) -> Kept:
         """Take the steps up to one into trail and plots: those since the last, or, after a jump, the last seconds."""
         recorded, follows = self._recorded, 0 <= self._drawn <= index <= self._drawn + 10 * _MOST
         if not follows:
@@ -194,10 +194,8 @@ def serve_replay(
 ) -> None:
     """Show a recording as a page until told to stop, with another profile's thresholds if they are given.
 
-    A ViewerError says that the port is taken or the extra is missing, a RecordingError that there is nothing to show.
+    A ViewerError says that the port is taken or the extra is missing.
     """
-    if not len(recorded):
-        raise RecordingError(f"{recorded.place} holds no control step: there is nothing to show.")
     with served(options, recorded.place.name) as server:
         page = ReplayPage(server, recorded, comparison)
         say(f"The recording is at {url_of(options)} (Ctrl-C ends it).")
@@ -207,3 +205,34 @@ def serve_replay(
             now = clock.tick()
             page.turn(now, now - before)
             before = now
+
+
+_NAMED = 5
+"""Contacts named in a sentence."""
+
+
+def comparison_html(comparison: Comparison, start: float) -> str:
+    """Say which contacts were recorded, and which another profile finds on the same data."""
+    mine, other = comparison.recorded, comparison.other
+    said = (
+        f"As recorded, {mine.name}: {_named(mine.contacts, start)}. On the same data {other.name} finds"
+        f" {_named(other.contacts, start)}."
+    )
+    return f"<div id='compared' style='padding:0 12px 10px;font-size:12px;line-height:1.4'>{escape(said)}</div>"
+
+
+def contacts_of_other(comparison: Comparison, stamps: FloatArray) -> dict[int, str]:
+    """Say at which steps another profile finds contacts."""
+    other = comparison.other
+    at = np.searchsorted(stamps, [found.time - 1e-9 for found in other.contacts]).tolist()
+    sizes = [np.linalg.norm(found.force) for found in other.contacts]
+    return {i: f"Contact of {size:.1f} N found by {other.name}" for i, size in zip(at, sizes, strict=True)}
+
+
+def _named(contacts: Sequence[Found], start: float) -> str:
+    """Name contacts, in time since the start [s]."""
+    if not contacts:
+        return "no contact"
+    shown = ", ".join(f"{np.linalg.norm(c.force):.1f} N at {c.time - start:.2f} s" for c in contacts[:_NAMED])
+    more = len(contacts) - _NAMED
+    return f"contacts of {shown}" + (f" and {more} more" if more > 0 else "")

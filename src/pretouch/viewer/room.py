@@ -1,26 +1,76 @@
 """The simulated room of a live session: arm, sensor units, object and a person's hand."""
 
-from dataclasses import replace
-from typing import cast
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal, cast
 
 import numpy as np
 
+from pretouch.checks import Check, Checked
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.control.posture import brought_to
 from pretouch.errors import ParameterError
 from pretouch.ports import Skin as UnitPort
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.board import Side, board_beside
-from pretouch.sim.hand import Hand
+from pretouch.sim.hand import Hand, PersonArm
 from pretouch.sim.plant import Plant, PlantClock
-from pretouch.sim.range_finder import RangeFinders
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
 from pretouch.types import FloatArray
 from pretouch.viewer.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
 from pretouch.viewer.real_units import RealUnits
-from pretouch.viewer.settings import Faults, LiveSettings
+
+PathName = Literal["circle", "line"]
+"""The paper's two paths; the line is run there and back."""
+
+ObjectName = Literal["none", "board -y", "board +y"]
+"""What stands in the arm's way: nothing, or the static experiment's board on one side."""
+
+Stiffness = Annotated[float, Check(low=3_000.0, high=150_000.0)]
+"""Of a contact with the arm [N/m]. On a softer one a hand that pushes hard sinks through a thin link; a stiffer one of
+a hand of 0.6 kg swings too quickly for physics in steps of 1 ms."""
+
+
+@dataclass(frozen=True)
+class Faults(Checked):
+    """What is wrong with the sensor units."""
+
+    silenced: frozenset[str] = frozenset()
+    """Ids of the units that no longer send."""
+    noise_factor: Annotated[float, Check(low=0.0, high=20.0)] = 1.0
+    """Factor on the standard deviation of the readings."""
+    latency_s: Annotated[float, Check(low=0.0, high=1.0)] = 0.0
+    """Time by which readings arrive later than they do anyway [s]."""
+
+
+@dataclass(frozen=True)
+class LiveSettings(Checked):
+    """What a live session begins with, and begins again with at a reset."""
+
+    profile: Profile = field(default_factory=lambda: PROFILES["paper"])
+    """Parameters of the controller, restrictions and speed included."""
+    path: PathName = "circle"
+    """Path of the end-effector."""
+    object: ObjectName = "none"
+    """What stands in its way."""
+    stiffness: Stiffness = HandSpec.stiffness
+    """Stiffness of what the arm can touch, the person's hand and the object [N/m]."""
+    faults: Faults = field(default_factory=Faults)
+    """What is wrong with the sensor units."""
+    seed: Annotated[int, Check(low=0)] = 0
+    """Decides the arm's errors and all noise."""
+    plant: PlantParams = field(default_factory=PlantParams)
+    """The kind of simulated arm."""
+    ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    """How simulated units err without faults."""
+    hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
+    """Where the person's hand begins [m], base frame: in view, and clear of both paths; moved aside if that is inside
+    something."""
+
 
 _SETTLE_S = 0.2
 """Time the arm stands before the controller starts [s]: the observer's transient is over."""
@@ -60,37 +110,37 @@ class Room:
         if self._simulated and len(skin.touching):
             felt = TouchSensors(self.plant, skin, TouchSensorParams(), settings.seed)
             self.units = FeelingSkin(self._simulated, felt)
-        self.hand = Hand(self.plant, self.mouse, speed_max=HAND_SPEED_M_S)
+        self.hand = Hand(self.plant, self.mouse, PersonArm(speed_max=HAND_SPEED_M_S))
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._wanted = settings.stiffness
-        self._skin, self._sound = skin, settings.ranging
+        self._skin, self._nominal = skin, settings.ranging
         self._moving = np.flatnonzero(model.moved_by.any(axis=1))
-        self.fail(settings.faults)
+        self.set_faults(settings.faults)
         self.plant.advance(_SETTLE_S)
         if real:
             real.begin(lambda: self.plant.time)
 
-    def fail(self, faults: Faults) -> None:
-        """Have the units err so, from the next measurement on; an id that no unit has is a ParameterError.
+    def set_faults(self, faults: Faults) -> None:
+        """Apply faults to the units from the next measurement on; an unknown id is a ParameterError.
 
         So is any fault of real units.
         """
         if self._simulated is None:
             if faults != Faults():
-                raise ParameterError("The units are real ones: unplug or cover one to see what the arm does.")
+                raise ParameterError("These units are real: unplug or cover one to see what the arm does.")
             return
         unknown = sorted(faults.silenced - set(self._skin.ids))
         if unknown:
             known = ", ".join(self._skin.ids)
-            raise ParameterError(f"There is no unit {', '.join(unknown)} to be silenced: choose from {known}.")
-        sound = self._sound
+            raise ParameterError(f"Unknown unit {', '.join(unknown)}: choose from {known}.")
+        sound = self._nominal
         self._simulated.silenced = {i for i, name in enumerate(self._skin.ids) if name in faults.silenced}
         self._simulated.change(replace(
             sound, noise_floor_m=sound.noise_floor_m * faults.noise_factor,
             noise_rate=sound.noise_rate * faults.noise_factor, latency_s=sound.latency_s + faults.latency_s,
         ))  # fmt: skip
 
-    def stiffen(self, stiffness: float) -> None:
+    def set_stiffness(self, stiffness: float) -> None:
         """Give hand and object another stiffness [N/m], as soon as nothing touches."""
         self._wanted = stiffness
 

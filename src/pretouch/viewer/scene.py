@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.robot.model import Kinematics
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer import palette
@@ -141,7 +142,9 @@ class Scene:
         step, world = frame.step, self._world
         kin = world.model.kinematics(step.q)
         self._arm.place(kin)
-        self._arm.paint(in_levels(expectation(step.obstacles, len(world.skin), world.profile.threshold)), now)
+        self._arm.paint(
+            in_levels(expectation(step.obstacles, len(world.skin), thresholds_of(world.profile.detect))), now
+        )
         perception = world.profile.perception
         self.units.draw(step, kin, frame.late(perception.silent_after_s), perception.enabled)
         self.trail.draw(now)

@@ -63,7 +63,7 @@ def check_port(options: ServeOptions) -> None:
 
 def _busy(options: ServeOptions, free: int | None) -> ViewerError:
     way_out = f"--port {free} is free" if free else "choose another with --port"
-    return ViewerError(f"Port {options.port} on {options.host} is taken, perhaps by another page: {way_out}.")
+    return ViewerError(f"Port {options.port} on {options.host} is in use, perhaps by another page: {way_out}.")
 
 
 def _free(host: str, port: int) -> bool:
@@ -74,10 +74,12 @@ def _free(host: str, port: int) -> bool:
             tried.bind(address)
             return True
     except PermissionError as error:
-        raise ViewerError(f"Port {port} is not allowed to this user: choose one from 1024 on with --port.") from error
+        raise ViewerError(f"This user may not open port {port}: choose one from 1024 on with --port.") from error
     except OSError as error:
         if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
-            raise ViewerError(f"The host {host!r} is no address of this machine: leave it out, or give one.") from error
+            raise ViewerError(
+                f"The host {host!r} is not an address of this machine: leave it out, or give one."
+            ) from error
         return False
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, turn
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.recording.surroundings import surroundings
 from pretouch.recording.truth import truth_of
 from pretouch.robot.description import panda
@@ -20,8 +20,7 @@ from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.scene import described, fixtures
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.frame import Frame, World
-from pretouch.viewer.room import Room, live_path
-from pretouch.viewer.settings import Faults, LiveSettings, PathName
+from pretouch.viewer.room import Faults, LiveSettings, PathName, Room, live_path
 
 if TYPE_CHECKING:
     from pretouch.recording.writer import Closed, Recording
@@ -71,8 +70,8 @@ class LiveSimulation:
         self.controller = Controller(self.model, self.skin, fixtures(room.scene), path, settings.profile)
         self._room, self._state = room, self.controller.init(room.plant.read())
         self._boxes = surroundings({"scene": described(room.scene)}).boxes
-        self._resume, self._owed = False, 0.0
-        self._look()
+        self._resume, self._remainder = False, 0.0
+        self._update_world()
         self.single_step()
 
     @property
@@ -95,9 +94,9 @@ class LiveSimulation:
     def advance(self, duration: float) -> list[ControlStep]:
         """Let a duration [s] pass in whole control cycles and return their steps; the rest of it counts next time."""
         period = self.controller.limits.period
-        self._owed += duration
-        cycles = max(0, int(self._owed / period + 1e-9))
-        self._owed -= cycles * period
+        self._remainder += duration
+        cycles = max(0, int(self._remainder / period + 1e-9))
+        self._remainder -= cycles * period
         return [self.single_step() for _ in range(cycles)]
 
     def single_step(self) -> ControlStep:
@@ -129,26 +128,27 @@ class LiveSimulation:
         period = self.controller.limits.period
         if profile.task.control_period_s != period:
             raise ParameterError(
-                f"The control period is {profile.task.control_period_s:g} s: it stays {period:g} s until a reset."
+                f"The control period is {profile.task.control_period_s:g} s, but can change only by a reset: it stays"
+                f" {period:g} s."
             )
-        self._go_on(replace(self.settings, profile=profile))
+        self._replace_controller(replace(self.settings, profile=profile))
 
     def set_path(self, name: str) -> None:
         """Go on along another path, 'circle' or 'line', from where it is nearest."""
         if name != self.settings.path:
-            self._go_on(replace(self.settings, path=cast(PathName, name)))
+            self._replace_controller(replace(self.settings, path=cast(PathName, name)))
 
     def set_stiffness(self, stiffness: float) -> None:
         """Give the person's hand and the object another stiffness [N/m], as soon as nothing touches."""
         self.settings = replace(self.settings, stiffness=stiffness)
-        self._room.stiffen(stiffness)
+        self._room.set_stiffness(stiffness)
 
     def set_faults(
         self, silenced: frozenset[str] = frozenset(), noise_factor: float = 1.0, latency_s: float = 0.0
     ) -> None:
         """Have the units of these ids silent, all noisier by a factor, and all later by some time [s]."""
         faults = Faults(frozenset(silenced), noise_factor, latency_s)
-        self._room.fail(faults)
+        self._room.set_faults(faults)
         self.settings = replace(self.settings, faults=faults)
 
     def resume(self) -> None:
@@ -174,7 +174,7 @@ class LiveSimulation:
         recording, self.recording = self.recording, None
         return recording.close() if recording else None
 
-    def _go_on(self, settings: LiveSettings) -> None:
+    def _replace_controller(self, settings: LiveSettings) -> None:
         """Let a controller with other settings take over."""
         path = self.controller.path if settings.path == self.settings.path else live_path(settings)
         after = Controller(self.model, self.skin, self.controller.fixtures, path, settings.profile)
@@ -182,9 +182,9 @@ class LiveSimulation:
         self.controller, self.settings = after, settings
         if self.recording:
             self.recording.change(after)
-        self._look()
+        self._update_world()
 
-    def _look(self) -> None:
+    def _update_world(self) -> None:
         scene = self._room.scene
         self.world = World(
             self.model, self.skin, self.controller.path, self.controller.profile, self._boxes,

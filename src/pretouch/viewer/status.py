@@ -48,15 +48,15 @@ def _page(mode: Mode, reason: str, rates: str, warning: str, notice: str) -> str
         f"<span id='mode' style='color:{colour};font-weight:700;letter-spacing:.06em'>{mode.name}</span>"
         f"<div id='reason' style='min-height:2.8em;line-height:1.4'>{escape(reason)}</div></div>",
         f"<div id='rates' style='opacity:.65;margin-top:6px;font-variant-numeric:tabular-nums'>{escape(rates)}</div>",
-        _told("notice", notice, palette.PATH),
-        _told("warning", warning, palette.HOLDING),
+        _banner("notice", notice, palette.PATH),
+        _banner("warning", warning, palette.HOLDING),
     ]
     # of fixed height, so that the controls below do not move under a person's mouse
     box = f"box-sizing:border-box;height:{_HEIGHT_PX}px;overflow:auto;padding:6px 12px;font-size:13px"
     return f"{_STICKY}<div id='status' style='{box}'>{''.join(lines)}</div>"
 
 
-def _told(name: str, said: str, tint: palette.Colour) -> str:
+def _banner(name: str, said: str, tint: palette.Colour) -> str:
     """A sentence on its own ground, or nothing."""
     if not said:
         return ""
@@ -68,12 +68,12 @@ def _told(name: str, said: str, tint: palette.Colour) -> str:
 
 def legend() -> str:
     """What the colours in space mean."""
-    going = [
+    paths = [
         ("path", palette.PATH), ("followed", palette.FOLLOWING), ("avoiding", palette.AVOIDING),
         ("recovering", palette.RECOVERING), ("reacting", palette.REACTING), ("holding", palette.HOLDING),
         ("force estimate", palette.FORCE), ("true force", palette.TRUE_FORCE),
     ]  # fmt: skip
-    marks = "".join(_mark(name, colour, 14, 4, 2) for name, colour in going)
+    marks = "".join(_mark(name, colour, 14, 4, 2) for name, colour in paths)
     marks += _mark("sensed", palette.SENSED, 9, 9, 5) + _mark("closest pair", palette.PAIR, 14, 2, 0)
     marks += _mark("silent unit", palette.UNIT_SILENT, 8, 8, 1)
     ramp = ",".join(palette.css(colour) for colour in palette.EXPECTED)

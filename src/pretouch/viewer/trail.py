@@ -24,7 +24,7 @@ BLOCKS = 16
 _PERIOD_S = 0.1
 
 
-class Going(Enum):
+class Activity(Enum):
     """How the arm goes along its path."""
 
     FOLLOWING = palette.FOLLOWING
@@ -36,15 +36,15 @@ class Going(Enum):
     HOLDING = palette.HOLDING
 
 
-def going(step: ControlStep) -> Going:
+def activity(step: ControlStep) -> Activity:
     """Tell how the arm goes in a step."""
     if step.mode is Mode.REACT:
-        return Going.REACTING
+        return Activity.REACTING
     if step.mode is Mode.HOLD:
-        return Going.HOLDING
+        return Activity.HOLDING
     if np.linalg.norm(step.ee_position - step.path_position) < OFF_PATH_M:
-        return Going.FOLLOWING
-    return Going.AVOIDING if binding(step).any() else Going.RECOVERING
+        return Activity.FOLLOWING
+    return Activity.AVOIDING if binding(step).any() else Activity.RECOVERING
 
 
 def binding(step: ControlStep) -> BoolArray:
@@ -100,7 +100,7 @@ class Trail:
             self._points, self._colours = [], []
             self._full += 1
         self._points.append(np.stack([self._last, here]))
-        self._colours.append(going(step).value)
+        self._colours.append(activity(step).value)
         self._last = here
 
     def draw(self, now: float) -> None:

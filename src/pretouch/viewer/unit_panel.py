@@ -5,8 +5,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from pretouch.hardware.findings import Finding, findings
-from pretouch.hardware.health import UnitHealth, UnitWindow
-from pretouch.hardware.health_params import HealthParams
+from pretouch.hardware.health import HealthParams, UnitHealth, UnitWindow
 from pretouch.viewer import palette
 from pretouch.viewer.real_units import UnitSource
 

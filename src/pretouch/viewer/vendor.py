@@ -1,5 +1,6 @@
 """The vendor's surfaces of an arm, made coarse enough for a page; from the extra `meshes`, if it is installed."""
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
@@ -24,21 +25,29 @@ _FINGER_HEIGHT_M = 0.0584
 def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
     """Surfaces by link index, link frame, and a sentence: none and why, or all and ''."""
     if model.description.name != "panda":
-        return {}, f"The arm is drawn by its capsules: there are no surfaces for {model.description.name}."
+        return {}, f"The arm is drawn by its capsules, because there are no surfaces for {model.description.name}."
     folder = _folder()
     if folder is None or MESHES.missing():
-        return {}, f"The arm is drawn by its capsules: for the vendor's surfaces, run {MESHES.command}"
+        return {}, f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
 
-    def read(name: str) -> tuple[FloatArray, IntArray]:
-        mesh = trimesh.load_scene(folder / f"{name}.dae").to_mesh()
-        vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=_EDGE_M)
-        return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+    return {i: _surface(folder, link) for i, link in enumerate(model.links) if _has_one(link)}, ""
 
-    found = {i: coarse(*read(link.removeprefix("panda_"))) for i, link in enumerate(model.links) if _has_one(link)}
-    hand, finger = model.links.index("panda_hand"), read("finger")
-    found[hand] = _joined(found[hand], *(coarse(finger[0] @ turn + (0, 0, _FINGER_HEIGHT_M), finger[1])
-                                         for turn in (np.eye(3), np.diag([-1.0, -1.0, 1.0]))))  # fmt: skip
-    return found, ""
+
+@cache
+def _surface(folder: Path, link: str) -> Mesh:
+    """Make the surface of a link, once in a process: that takes half a second."""
+    mesh = coarse(*_read(folder / f"{link.removeprefix('panda_')}.dae"))
+    if link != "panda_hand":
+        return mesh
+    vertices, faces = _read(folder / "finger.dae")
+    turns = np.eye(3), np.diag([-1.0, -1.0, 1.0])
+    return _joined(mesh, *(coarse(vertices @ turn + (0, 0, _FINGER_HEIGHT_M), faces) for turn in turns))
+
+
+def _read(file: Path) -> tuple[FloatArray, IntArray]:
+    mesh = trimesh.load_scene(file).to_mesh()
+    vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=_EDGE_M)
+    return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
 
 
 def coarse(vertices: FloatArray, faces: IntArray, cell: float = CELL_M) -> Mesh:

@@ -1,1 +1,1 @@
-"""Published ways to do what parts of the product do, as parts of a profile: for comparison only."""
+"""What Pretouch is compared with, as parts of a profile by entry points, as anybody else's."""

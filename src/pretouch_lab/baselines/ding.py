@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pretouch.checks import NonNegative, Positive
-from pretouch.control.interface import Body, MotionRequest, Restricted, Restriction
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.errors import ParameterError
-from pretouch.params import ThresholdParams
 from pretouch.profiles import profile
 from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, Obstacles, RobotState
@@ -57,7 +57,8 @@ class Ding(Restriction, name="ding"):
             )
 
     def step(
-        self, state: None, body: Body, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
+        self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
+        request: MotionRequest,
     ) -> tuple[Restricted, None]:  # fmt: skip
         """Return rows for the points that are near, and the one of all."""
         near = zip(obstacles.link, obstacles.body_point, obstacles.direction, strict=True)
@@ -95,6 +96,6 @@ def ding_rows(rows: FloatArray, distance: FloatArray, params: Ding) -> Restricte
 
 
 DING = replace(
-    profile("paper"), name="ding", slow=None, approach=Ding(), threshold=ThresholdParams(f_d_n=0.0)
+    profile("paper"), name="ding", slow=None, approach=Ding(), detect=MovingThresholds(f_d_n=0.0)
 )  # fmt: skip
 """The profile `ding`: contacts are detected as without proximity, and nothing else slows the arm."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pretouch.checks import NonNegative, Positive
-from pretouch.control.interface import Body, MotionRequest, Restricted, Restriction
-from pretouch.params import ThresholdParams
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.profiles import profile
 from pretouch.robot.model import Kinematics
 from pretouch.types import WHOLE, FloatArray, Obstacles, RobotState
@@ -37,7 +37,8 @@ class Flacco(Restriction, name="flacco"):
     0.1 is about half the width of the Panda's."""
 
     def step(
-        self, state: None, body: Body, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest
+        self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
+        request: MotionRequest,
     ) -> tuple[Restricted, None]:  # fmt: skip
         """Return a velocity to add and limits of the joint velocities; there are no rows."""
         model, near = body.model, zip(obstacles.link, obstacles.body_point, obstacles.direction, strict=True)
@@ -95,6 +96,6 @@ def slowed_joints(
 
 
 FLACCO = replace(
-    profile("paper"), name="flacco", slow=None, approach=Flacco(), threshold=ThresholdParams(f_d_n=0.0)
+    profile("paper"), name="flacco", slow=None, approach=Flacco(), detect=MovingThresholds(f_d_n=0.0)
 )  # fmt: skip
 """The profile `flacco`: contacts are detected as without proximity, and nothing else slows the arm."""

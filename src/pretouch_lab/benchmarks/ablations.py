@@ -13,28 +13,31 @@ OFF = {
     "perception.keep_while_silent": "no",
     "perception.outside_points": "0",
     "task.mid_joint_projected": "no",
-    "reduction.enabled": "yes",
-    "restriction.mode": "off",
-    "anticipation.effective_mass": "no",
-    "anticipation.closing_speed": "no",
-    "anticipation.tangential": "no",
-    "anticipation.null_space": "no",
-    "detection.method": "thresholds",
-    "detection.freeze_while_reacting": "no",
-    "detection.use_proximity": "no",
-    "detection.use_touch": "no",
-    "detection.learn": "no",
-    "detection.widen_at_turns": "no",
-    "detection.localise": "no",
-    "reaction.method": "decay",
-    "reaction.clamps": "no",
-    "reaction.pinches": "no",
-    "reaction.gives_up": "no",
-    "reaction.soft_hold": "no",
-    "reaction.static_friction_nm": "0",
-    "reaction.lag_s": "0",
+    "slow": "on",
+    "approach": "none",
+    "approach.effective_mass": "none",
+    "approach.closing_deadband_m_s": "none",
+    "approach.tangential": "none",
+    "null_space": "none",
+    "detect": "thresholds",
+    "window.freeze_while_reacting": "no",
+    "detect.proximity": "none",
+    "detect.cues": "none",
+    "detect.learn": "never",
+    "detect.widen_at_turns": "no",
+    "detect.localise": "none",
+    "react": "decay",
+    "react.clamp": "none",
+    "react.pinch": "none",
+    "react.give_up": "none",
+    "react.soft_hold": "no",
+    "react.static_friction_nm": "0",
+    "react.lag_s": "0",
 }
-"""What each switch of `pretouch` is when it is off, as `GROUP.FIELD`: the paper's value, or the part without effect."""
+"""What each switch of `pretouch` is when it is off, as `PATH`: the paper's value, or the part without effect."""
+
+_DETECTION = ("window", "detect")
+"""Parts of the profile that streams show."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class Ablation:
     """`pretouch` with one switch off."""
 
     switch: str
-    """`GROUP.FIELD`."""
+    """Path of a part or parameter."""
 
     @property
     def name(self) -> str:
@@ -51,10 +54,10 @@ class Ablation:
 
     @property
     def profile_text(self) -> str:
-        """As `pretouch.params.profile` reads it."""
+        """As `pretouch.profiles.profile` reads it."""
         return f"{BASE}:{self.switch}={OFF[self.switch]}"
 
 
 def ablations(*, of_detection: bool) -> tuple[Ablation, ...]:
     """Return the switches of detection, which streams show, or all others, which need the closed loop."""
-    return tuple(Ablation(switch) for switch in OFF if switch.startswith("detection.") is of_detection)
+    return tuple(Ablation(switch) for switch in OFF if (switch.partition(".")[0] in _DETECTION) is of_detection)

@@ -14,8 +14,8 @@ import numpy as np
 from pretouch.controller import STAGES, Controller, ControllerState
 from pretouch.errors import ExperimentError
 from pretouch.loop import MonotonicClock
-from pretouch.params import Profile, at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import Profile, at_rate, profile
 from pretouch.realtime import real_time, warm_up
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -124,7 +124,7 @@ class _Timed:
 def _settled(controller: Controller, work: Workload) -> ControllerState:
     """Turn the controller until the arm moves; return its state."""
     state = controller.init(work.inputs().robot)
-    for _ in range(controller.profile.threshold.window_samples + _SETTLE):
+    for _ in range(controller.profile.window.samples + _SETTLE):
         step, state = controller.step(state, work.inputs())
         work.move(step.command)
     return state

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from pretouch import __version__
+from pretouch.atomic_write import atomic_replacement, write_json
 from pretouch.errors import ExperimentError
 from pretouch.types import FloatArray
-from pretouch.whole_file import replaced_whole, write_json
 from pretouch_lab.benchmarks.scenario_files import checksums
 from pretouch_lab.results_file import failure_said
 from pretouch_lab.workers import interrupt_held_back, workers
@@ -100,7 +100,7 @@ def run_tasks(tasks: list[Task], out: Path, progress: Callable[[float], None], p
 
 def write_arrays(arrays: dict[str, FloatArray], path: Path) -> None:
     """Write arrays to an .npz file, whole or not at all."""
-    with replaced_whole(path) as unfinished, unfinished.open("wb") as file:
+    with atomic_replacement(path) as unfinished, unfinished.open("wb") as file:
         np.savez(file, **arrays)  # type: ignore[arg-type]  # names of arrays, not `allow_pickle`
 
 

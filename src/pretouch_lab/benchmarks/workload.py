@@ -8,7 +8,7 @@ import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.errors import ExperimentError
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import CONE_ANGLE, SensorUnit

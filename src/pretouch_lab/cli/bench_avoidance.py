@@ -60,9 +60,9 @@ def bench_avoidance(command: Avoidance) -> None:
 def _report(request: "Request", out: Path, json_file: Path, docs: Path | None) -> None:
     from rich.console import Console
 
+    from pretouch.atomic_write import write_json
     from pretouch.cli.tables import show
     from pretouch.cli.writing import unwritable_said
-    from pretouch.whole_file import write_json
     from pretouch_lab.benchmarks.avoidance.figures import figures
     from pretouch_lab.benchmarks.avoidance.page import publish
     from pretouch_lab.benchmarks.avoidance.run import rows_of

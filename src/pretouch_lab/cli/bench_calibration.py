@@ -43,12 +43,12 @@ def bench_calibration(command: Calibration) -> None:
         TimeRemainingColumn,
     )
 
+    from pretouch.atomic_write import write_json
     from pretouch.calibration.motion.planner import plan_motion
     from pretouch.cli.arms import arm_model
     from pretouch.cli.calibrate.motion import plan_params
     from pretouch.cli.tables import show
     from pretouch.cli.writing import check_writable, unwritable_said
-    from pretouch.whole_file import write_json
     from pretouch_lab.studies.calibration.study import study
     from pretouch_lab.studies.calibration.table import tables
 

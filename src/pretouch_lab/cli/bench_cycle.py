@@ -7,10 +7,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from pretouch.atomic_write import write_json
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError
 from pretouch.realtime import check_wishes
-from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.cycle import CycleRequest, about, measure
 from pretouch_lab.benchmarks.workload import LARGEST_SKIN
 

@@ -30,8 +30,8 @@ class Detection(BenchOptions):
 
 def bench_detection(command: Detection) -> None:
     """Run what is missing, and show, write and draw what came out."""
+    from pretouch.atomic_write import write_json
     from pretouch.cli.writing import check_writable, unwritable_said
-    from pretouch.whole_file import write_json
     from pretouch_lab.benchmarks.detection.campaign import NAME, Bench, run_bench
     from pretouch_lab.benchmarks.detection.published import summary_of
     from pretouch_lab.benchmarks.documents import DOCUMENT, around

@@ -29,9 +29,9 @@ def bench_localization(command: Localization) -> None:
     """Run what is missing, and show and write what came out."""
     from rich.console import Console
 
+    from pretouch.atomic_write import write_json
     from pretouch.cli.tables import show
     from pretouch.cli.writing import check_writable, unwritable_said
-    from pretouch.whole_file import write_json
     from pretouch_lab.benchmarks.documents import around
     from pretouch_lab.benchmarks.localization.campaign import NAME, Bench, run_bench
     from pretouch_lab.benchmarks.localization.published import DOCUMENT, publish

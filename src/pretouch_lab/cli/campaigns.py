@@ -9,10 +9,10 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from pretouch.atomic_write import write_json
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.whole_file import write_json
 from pretouch_lab.campaign import (
     Request,
     finished,

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError
-from pretouch.params import profile as find_profile
+from pretouch.profiles import profile as find_profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin

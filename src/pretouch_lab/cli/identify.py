@@ -44,10 +44,10 @@ class Identify:
 
 def identify_arm(command: Identify) -> None:
     """Read, identify, show, and write what is asked for."""
+    from pretouch.atomic_write import atomic_write
     from pretouch.cli.writing import check_writable, unwritable_said
     from pretouch.errors import RecordingError
     from pretouch.sim.plant_params import plant_params_of
-    from pretouch.whole_file import write_whole
     from pretouch_lab.identification.arm_file import arm_toml
     from pretouch_lab.identification.free_motion import read_free_motion
     from pretouch_lab.identification.identify import identify
@@ -63,7 +63,7 @@ def identify_arm(command: Identify) -> None:
     found = identify(samples, model, usual_of(plant_params_of(model.description)))
     if json_file:
         with unwritable_said("file", json_file):
-            write_whole(json_file, json.dumps(_numbers(found, model, command.file), indent=1, allow_nan=False) + "\n")
+            atomic_write(json_file, json.dumps(_numbers(found, model, command.file), indent=1, allow_nan=False) + "\n")
     if figure:
         image = BytesIO()
         _figure(found, model, command.file).savefig(image, format=figure.suffix[1:], dpi=120)
@@ -71,7 +71,7 @@ def identify_arm(command: Identify) -> None:
             figure.write_bytes(image.getvalue())
     if out:
         with unwritable_said("file", out):
-            write_whole(out, arm_toml(found, model, Path(command.file).name))
+            atomic_write(out, arm_toml(found, model, Path(command.file).name))
     _show(found, model, said)
     for what, place in (("Arm", out), ("Figure", figure), ("Numbers", json_file)):
         if place:

@@ -102,7 +102,7 @@ def sweep(command: Sweep) -> None:
 def defined(command: Sweep) -> "list[Defined]":
     """Return the sweeps a command asks for. Raises an error of this package."""
     from pretouch.cli.words import words
-    from pretouch_lab.sweep.definition import SENSITIVITY, load_sweeps, sensitivity, smaller, sweep_of
+    from pretouch_lab.sweep.definition import SENSITIVITY, Asked, load_sweeps, sensitivity, smaller, sweep_of
     from pretouch_lab.sweep.registry import MEASURES, REMOVED
 
     if command.processes < 0:
@@ -111,13 +111,11 @@ def defined(command: Sweep) -> "list[Defined]":
         raise ExperimentError("The numbers of samples and arms have to be positive: leave them out for the defaults.")
     if command.what in MEASURES or command.what in REMOVED:
         given = {key: value for key in ("design", "samples", "arms") if (value := getattr(command, key))}
-        return [
-            sweep_of(
-                command.what, _pairs("vary", command.vary), fix=_pairs("fix", command.fix),
-                profile_text=command.profile, metrics=words(command.metrics), ranks=words(command.ranks),
-                name=command.name, seeds=command.seeds, **given,
-            )
-        ]  # fmt: skip
+        asked = Asked(
+            command.what, _pairs("vary", command.vary), _pairs("fix", command.fix), command.profile,
+            metrics=words(command.metrics), ranks=words(command.ranks), name=command.name, **given,
+        )  # fmt: skip
+        return [sweep_of(asked, command.seeds)]
     for option in _OWN:
         if getattr(command, option):
             raise ExperimentError(f"--{option} goes with an experiment, not with {command.what}: change a copy of it.")

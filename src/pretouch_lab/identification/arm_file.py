@@ -60,8 +60,7 @@ def _masses(found: Identified, model: RobotModel, known: BoolArray) -> list[str]
     payload = float(found.fit.numbers[first + n])
     return [
         *_field("mass_factors", factors, errors, np.ones(len(factors), np.bool_)), *said,
-        "", "[plant.payloads_kg]", f"value = [{max(payload, 0.0):.6g}]",
-        f"standard_error = [{found.fit.errors[first + n]:.3g}]",
+        *_number("payload_kg", max(payload, 0.0), float(found.fit.errors[first + n])),
     ]  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from scipy.signal import lfilter
 
 from pretouch.contact.residual_model import PLAIN, features
 from pretouch.robot.model import RobotModel
+from pretouch.traces import on_grid
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 from pretouch_lab.identification.motion import GRID_S, Motion
@@ -46,17 +47,17 @@ def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Colum
     """Work out all that does not depend on what is to be found."""
     s = found.samples
     spans = [slice(a, b) for a, b in found.segments]
-    kick, noise, calm = np.zeros(s.q.shape), np.zeros(s.q.shape), np.zeros(len(s.time), np.bool_)
+    kick, noise, calm = np.zeros(s.q.shape), np.zeros(s.q.shape), np.zeros(len(s.stamp), np.bool_)
     fine, positions, speeds, carried, masses = [], [], [], [], []
     for span, motion in zip(spans, motions, strict=True):
-        time, path = s.time[span], motion.between()
+        time, path = s.stamp[span], motion.between()
         M = np.array([model.mass_matrix(q) for q in motion.q])
         masses.append(M)
         rows = zip(motion.q, motion.qd, motion.qdd, strict=True)
         carried.append(np.array([features(model, model.kinematics(q), *of)[:, PLAIN:] for q, *of in rows]))
         calm[span] = _calm(motion, time)
         if s.qd is not None:
-            growth = at_samples(time, motion.at, GRID_S, motion.qdd)
+            growth = on_grid(time, motion.at[0], GRID_S, motion.qdd)
             noise[span] = _noise(s.qd[span], path(time, 1), growth, calm[span])
         at = np.arange(time[0], time[-1] + 0.5 * _FINE_S, _FINE_S)
         fine.append(at)
@@ -66,7 +67,7 @@ def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Colum
         # part of what differs is the derivatives' own noise: on average this share is the velocities'
         share = np.maximum(1.0 - (motions[0].speed_noise / joint_scale(noise[calm])) ** 2, 0.0)
         for span, motion, M in zip(spans, motions, masses, strict=True):
-            kick[span] = np.einsum("tij,tj->ti", at_samples(s.time[span], motion.at, GRID_S, M), share * noise[span])
+            kick[span] = np.einsum("tij,tj->ti", on_grid(s.stamp[span], motion.at[0], GRID_S, M), share * noise[span])
     square = (np.concatenate(masses) ** 2).mean(axis=0)
     return Columns(
         tuple(motions), tuple(fine), tuple(positions), tuple(speeds), tuple(carried), kick, noise, square, calm
@@ -102,11 +103,11 @@ def low_passed(found: Usable, columns: Columns, gain: float, fine_values: list[F
     """Low-pass values (F, ...) of each segment as the observer does, and return them at the samples (N, ...)."""
     part = gain * _FINE_S / (1.0 + gain * _FINE_S)
     s = found.samples
-    result = np.zeros((len(s.time), *fine_values[0].shape[1:]))
+    result = np.zeros((len(s.stamp), *fine_values[0].shape[1:]))
     for (a, b), at, values in zip(found.segments, columns.fine, fine_values, strict=True):
         start = ((1.0 - part) * values[0])[None]
         smooth, _ = lfilter([part], [1.0, part - 1.0], values, axis=0, zi=start)
-        result[a:b] = at_samples(s.time[a:b], at, _FINE_S, smooth)
+        result[a:b] = on_grid(s.stamp[a:b], at[0], _FINE_S, smooth)
     return result
 
 
@@ -117,16 +118,8 @@ def carried_late(found: Usable, columns: Columns, gain: float) -> FloatArray:
     part, kept = half / (1.0 + half), (1.0 - half) / (1.0 + half)
     for (a, b), motion, values in zip(found.segments, columns.motion, columns.carried, strict=True):
         smooth, _ = lfilter([part, part], [1.0, -kept], values, axis=0, zi=((1.0 - part) * values[0])[None])
-        late[a:b] = at_samples(s.time[a:b], motion.at, GRID_S, smooth)
+        late[a:b] = on_grid(s.stamp[a:b], motion.at[0], GRID_S, smooth)
     return late
-
-
-def at_samples(time: FloatArray, at: FloatArray, spacing: float, values: FloatArray) -> FloatArray:
-    """Values (N, ...) at stamps (N,) [s] of what is known (G, ...) at instants (G,), linearly between them."""
-    place = np.clip((time - at[0]) / spacing, 0.0, len(at) - 1.000001)
-    left = place.astype(np.int64)
-    share = (place - left).reshape(-1, *[1] * (values.ndim - 1))
-    return (1.0 - share) * values[left] + share * values[np.minimum(left + 1, len(at) - 1)]
 
 
 def friction_parts(speed: FloatArray, steepness: FloatArray, asymmetry: FloatArray) -> tuple[FloatArray, ...]:

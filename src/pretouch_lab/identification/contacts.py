@@ -18,19 +18,19 @@ def free_samples(found: Usable, fitted: Fit, p: IdentifyParams) -> tuple[BoolArr
     s = found.samples
     left = s.tau - fitted.expected
     means = smoothed(found, left, p.contact_s)
-    inside = np.zeros(len(s.time), np.bool_)
+    inside = np.zeros(len(s.stamp), np.bool_)
     for a, b in found.segments:
         inside[a:b] = True
     off = np.abs(means - np.median(means[inside], axis=0))
     far: BoolArray = np.any(off > p.contact_sigmas * joint_scale(means[inside]), axis=1)
     used, spans = inside.copy(), []
     for a, b in found.segments:
-        times = s.time[a:b][far[a:b]]
+        times = s.stamp[a:b][far[a:b]]
         for group in np.split(times, np.flatnonzero(np.diff(times) > 2.0 * p.contact_margin_s) + 1):
             if len(group):
                 begin, end = group[0] - p.contact_margin_s, group[-1] + p.contact_margin_s
                 spans.append((float(begin), float(end)))
-                used &= (s.time < begin) | (s.time > end)
+                used &= (s.stamp < begin) | (s.stamp > end)
     share = 1.0 - float(used.sum()) / max(int(inside.sum()), 1)
     if share > p.contact_share:
         raise CalibrationError(

@@ -140,7 +140,7 @@ def design(
 
 def _block_scores(found: Usable, X: FloatArray, score: FloatArray, block_s: float) -> FloatArray:
     """Scores (B, p) of blocks."""
-    time = found.samples.time
+    time = found.samples.stamp
     block = ((time - time[0]) / block_s).astype(np.int64)
     each = np.einsum("ijp,ij->ip", X, score)
     total = np.zeros((int(block.max()) + 1, X.shape[2]))

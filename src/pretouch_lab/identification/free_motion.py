@@ -8,8 +8,9 @@ import numpy as np
 
 from pretouch.contact.observer import observe, observer_init
 from pretouch.errors import RecordingError
-from pretouch.foreign.csv import listed, read_rows, read_table, relative_time
-from pretouch.foreign.samples import OUT_OF_RANGE_RAD
+from pretouch.imported_data.csv import listed, read_header, read_table
+from pretouch.imported_data.samples import TABLES
+from pretouch.imported_data.source import check_reach
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -21,7 +22,6 @@ Sign = Literal["on-robot", "by-robot"]
 _COLUMN = re.compile(r"(q|qd|tau_ext|tau)(\d{1,2})_(rad|rad_s|deg|deg_s|nm)")
 _UNITS = {"q": {"rad": 1.0, "deg": np.pi / 180}, "qd": {"rad_s": 1.0, "deg_s": np.pi / 180}}
 _TIMES = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6, "time_ns": 1e-9}
-_TABLES = (".csv", ".tsv", ".txt")
 _LEAST_OBSERVED_HZ = 400.0
 """Rate at which measured torques have to come for an observer to be run over them [Hz]."""
 
@@ -41,33 +41,29 @@ def read_free_motion(
     Raises:
         RecordingError: for what cannot be read, and for what is not clear, with the way out.
     """
-    if place.suffix.lower() in _TABLES:
+    if place.suffix.lower() in TABLES:
         arm = model or RobotModel(panda())
         samples, said = _of_csv(place, arm, -1.0 if sign == "by-robot" else 1.0, gain)
     else:
         recorded = open_recording(place)
-        arm, kept = recorded.runs[0].model, [cycle.inputs.robot for cycle in recorded if cycle.inputs is not None]
+        arm, kept = recorded.runs[0].model, list(recorded.robot_states())
         if model is not None and model.description.name != arm.description.name:
             raise RecordingError(
                 f"{place} is of {arm.description.name}, and --arm is {model.description.name}: leave out --arm."
             )
         if not kept:
             raise RecordingError(f"{place} holds no state of the robot: give another recording.")
-        time = np.array([r.stamp for r in kept])
-        first = np.append(True, np.diff(time) > 0.0)  # a state that was told twice counts once
-        samples = ArmSamples(
-            time[first], np.array([r.q for r in kept])[first], np.array([r.qd for r in kept])[first],
-            np.array([r.tau_ext for r in kept])[first],
-        )  # fmt: skip
+        states = ([r.stamp for r in kept], [r.q for r in kept], [r.qd for r in kept], [r.tau_ext for r in kept])
+        told = ArmSamples(*(np.array(column) for column in states))
+        samples = told.at(np.append(True, np.diff(told.stamp) > 0.0))  # a state that was told twice counts once
         said = f"{place}: states of {arm.description.name} as the controller had them"
-    _check_reach(place, samples, arm)
+    if samples.q.shape[1] == arm.n:  # `identify` says it otherwise
+        check_reach(place, samples.q, arm)
     return samples, arm, said
 
 
 def _of_csv(place: Path, model: RobotModel, sign: float, gain: float) -> tuple[ArmSamples, str]:
-    rows = read_rows(place)
-    header = next(rows, None)
-    names = [] if header is None else [name.strip().lstrip("#").strip() for name in header[1]]
+    rows, names = read_header(place, "time_s,q1_rad,tau_ext1_Nm and so on")
     lower = [name.lower() for name in names]
     times = [i for i, name in enumerate(lower) if name in _TIMES]
     if len(times) != 1:
@@ -92,9 +88,7 @@ def _of_csv(place: Path, model: RobotModel, sign: float, gain: float) -> tuple[A
     places = [(times[0], _TIMES[lower[times[0]]])]
     for what in ("q", torque, *(["qd"] if "qd" in at else [])):
         places += [at[what][j] for j in range(1, model.n + 1)]
-    table = read_table(place, rows, names, [i for i, _ in places]) * np.array([factor for _, factor in places])
-    relative_time(place, table[:, 0])
-    table = table[np.isfinite(table[:, 0])]
+    table, _, _ = read_table(place, rows, names, dict(places))
     n = model.n
     q, tau, qd = table[:, 1 : 1 + n], table[:, 1 + n : 1 + 2 * n], table[:, 1 + 2 * n :]
     speeds = qd if "qd" in at else None
@@ -126,15 +120,3 @@ def _observed(
         state = observe(state, mass, bias, qd[i], tau[i], gain, period)
         found[i] = state.residual
     return found
-
-
-def _check_reach(place: Path, samples: ArmSamples, model: RobotModel) -> None:
-    if samples.q.shape[1] != model.n:
-        return  # `identify` says it
-    beyond = (samples.q < model.q_min - OUT_OF_RANGE_RAD) | (samples.q > model.q_max + OUT_OF_RANGE_RAD)
-    if beyond.any():
-        i, j = np.argwhere(beyond)[0]
-        raise RecordingError(
-            f"{model.joints[j]} in {place} is at {samples.q[i, j]:.4g} rad, out of its range of {model.q_min[j]:.2f} to"
-            f" {model.q_max[j]:.2f} rad: check the unit and the arm."
-        )

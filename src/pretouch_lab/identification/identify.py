@@ -90,7 +90,8 @@ def identify(samples: ArmSamples, model: RobotModel, usual: Usual, p: IdentifyPa
         )
     _check_arm(fitted, model)
     if spans:
-        listed = ", ".join(f"{a - found.samples.time[0]:.1f} to {b - found.samples.time[0]:.1f}" for a, b in spans[:8])
+        first = found.samples.stamp[0]
+        listed = ", ".join(f"{a - first:.1f} to {b - first:.1f}" for a, b in spans[:8])
         notes.append(
             f"{len(spans)} spans look like contacts and are left out (seconds from the first sample): {listed}"
             f"{' and more' if len(spans) > 8 else ''}."
@@ -98,7 +99,7 @@ def identify(samples: ArmSamples, model: RobotModel, usual: Usual, p: IdentifyPa
     noise = noise_of(found, columns, fitted, used, usual, p)
     s = found.samples
     return Identified(
-        fitted, noise, s.time, s.q, s.tau, used, spans, tuple(notes), seconds, p, usual
+        fitted, noise, s.stamp, s.q, s.tau, used, spans, tuple(notes), seconds, p, usual
     )  # fmt: skip
 
 

@@ -1,12 +1,12 @@
 """What an arm said of itself in free motion, and which spans of it can be used."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from pretouch.errors import CalibrationError
-from pretouch.types import BoolArray, FloatArray
+from pretouch.traces import JointTrace
+from pretouch.types import FloatArray
 from pretouch.values import value
 
 LEAST_S = 20.0
@@ -21,17 +21,13 @@ _LOWEST_HZ = 40.0
 
 
 @value
-class ArmSamples:
-    """N samples of an arm with n joints, by time."""
+class ArmSamples(JointTrace):
+    """What an arm with n joints said of its motion and of the torques on it, by time. T samples."""
 
-    time: FloatArray
-    """(N,) [s]."""
-    q: FloatArray
-    """(N, n) joint positions [rad]."""
     qd: FloatArray | None
-    """(N, n) measured joint velocities [rad/s] of the same instants; None where there are none."""
+    """(T, n) measured joint velocities [rad/s] of the same instants; None where there are none."""
     tau: FloatArray
-    """(N, n) external torques on the robot by its environment as estimated [Nm]."""
+    """(T, n) external torques on the robot by its environment as estimated [Nm]."""
 
 
 @value
@@ -46,7 +42,7 @@ class Usable:
     @property
     def period(self) -> float:
         """Median time between two samples [s]."""
-        return float(np.median(np.diff(self.samples.time)))
+        return float(np.median(np.diff(self.samples.stamp)))
 
 
 def usable(samples: ArmSamples) -> Usable:
@@ -56,18 +52,18 @@ def usable(samples: ArmSamples) -> Usable:
     """
     notes = []
     columns = [samples.q, samples.tau] + ([] if samples.qd is None else [samples.qd])
-    good = np.isfinite(samples.time) & np.all([np.isfinite(c).all(axis=1) for c in columns], axis=0)
+    good = np.isfinite(samples.stamp) & np.all([np.isfinite(c).all(axis=1) for c in columns], axis=0)
     if not good.all():
         notes.append(f"{int((~good).sum())} of {len(good)} samples are not finite numbers and left out.")
-    found = taken(samples, good)
-    if len(found.time) < 2:
+    found = samples.at(good)
+    if len(found.stamp) < 2:
         raise CalibrationError("There are no two samples with numbers for all joints: give another recording.")
-    if (np.diff(found.time) <= 0.0).any():
-        order = np.append(np.diff(np.maximum.accumulate(found.time)) > 0.0, True)
+    if (np.diff(found.stamp) <= 0.0).any():
+        order = np.append(np.diff(np.maximum.accumulate(found.stamp)) > 0.0, True)
         notes.append(f"{int((~order).sum())} samples do not come after the one before them, and are left out.")
-        found = taken(found, order)
+        found = found.at(order)
     found = _told_once(found, notes)
-    rate = 1.0 / float(np.median(np.diff(found.time)))
+    rate = 1.0 / float(np.median(np.diff(found.stamp)))
     if rate < _LOWEST_HZ:
         raise CalibrationError(
             f"The samples come at {rate:.3g} Hz: what an observer says changes within 20 ms, so record at"
@@ -76,10 +72,10 @@ def usable(samples: ArmSamples) -> Usable:
     every = int(np.ceil(rate / _HIGHEST_HZ - 0.05))  # stamps are not exact
     if every > 1:
         notes.append(f"Of {rate:.4g} samples a second every {every}. is used.")
-        found = taken(found, np.arange(len(found.time)) % every == 0)
-    period = float(np.median(np.diff(found.time)))
-    breaks = np.flatnonzero(np.diff(found.time) > max(_GAP_PERIODS * period, _BRIDGED_S)) + 1
-    edges = [0, *breaks.tolist(), len(found.time)]
+        found = found.at(np.arange(len(found.stamp)) % every == 0)
+    period = float(np.median(np.diff(found.stamp)))
+    breaks = np.flatnonzero(np.diff(found.stamp) > max(_GAP_PERIODS * period, _BRIDGED_S)) + 1
+    edges = [0, *breaks.tolist(), len(found.stamp)]
     segments = tuple((a, b) for a, b in pairwise(edges) if (b - a) * period >= 1.0)
     if len(segments) > 1:
         notes.append(f"There are {len(edges) - 2} gaps; each stretch of 1 s or more is used by itself.")
@@ -94,13 +90,7 @@ def _told_once(found: ArmSamples, notes: list[str]) -> ArmSamples:
     if new.all() or np.ptp(found.q, axis=0).max() < LEAST_MOVED_RAD:
         return found
     notes.append(f"{int((~new).sum())} of {len(new)} samples repeat the one before them, and are left out.")
-    return taken(found, new)
-
-
-def taken(samples: ArmSamples, which: BoolArray) -> ArmSamples:
-    """Return some of the samples."""
-    qd = None if samples.qd is None else samples.qd[which]
-    return replace(samples, time=samples.time[which], q=samples.q[which], qd=qd, tau=samples.tau[which])
+    return found.at(new)
 
 
 def joint_scale(left: FloatArray) -> FloatArray:

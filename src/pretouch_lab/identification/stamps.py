@@ -30,7 +30,7 @@ def moved(found: Usable) -> tuple[Usable, list[Motion]]:
     """Estimate the motion of each segment; returns the samples as well, with better stamps if theirs are uneven."""
     s, notes, off_s = found.samples, list(found.notes), 0.0
     spans = [slice(a, b) for a, b in found.segments]
-    positions, stamps = [s.q[span] for span in spans], [s.time[span] for span in spans]
+    positions, stamps = [s.q[span] for span in spans], [s.stamp[span] for span in spans]
     motions = motions_of(stamps, positions)
     for _ in range(_ROUNDS):
         if motions[0].half_s == HALVES_S[0]:
@@ -51,10 +51,10 @@ def moved(found: Usable) -> tuple[Usable, list[Motion]]:
             f"The positions' noise is {motions[0].noise.max():.2g} rad: speeds are of fits over"
             f" {2.0 * motions[0].half_s:.2g} s."
         )
-    time = s.time.copy()
+    time = s.stamp.copy()
     for span, stamp in zip(spans, stamps, strict=True):
         time[span] = stamp
-    return replace(found, samples=replace(s, time=time), notes=tuple(notes)), motions
+    return replace(found, samples=replace(s, stamp=time), notes=tuple(notes)), motions
 
 
 def _stamp_errors(

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import profile
 from pretouch.perception.closest import closest_points
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.paper_scenes import dynamic_pushes
 from pretouch.sim.pushes import Push, Pusher
 from pretouch.sim.scene import HandSpec, SceneSpec

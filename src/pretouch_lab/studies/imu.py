@@ -1,6 +1,7 @@
 """What the units' accelerometers add: delay, contacts missed, false alarms and the touched link, with and without."""
 
-from pretouch.params import profile
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.profiles import profile
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Row
 from pretouch_lab.studies.impacts.judged import judged
@@ -20,7 +21,7 @@ FREE_S = 120.0
 
 def cells(grid: Grid) -> list[Cell]:
     """A cell for each way of the samples, of each profile with the sequential test, or of `pretouch`."""
-    tested = [name for name in grid.profiles if profile(name).detection.method == "sequential"]
+    tested = [name for name in grid.profiles if isinstance(profile(name).detect, SequentialTest)]
     return [Cell(NAME, name, {"way": way}) for name in tested or ["pretouch"] for way in WAYS]
 
 

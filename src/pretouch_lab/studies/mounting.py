@@ -4,9 +4,9 @@ from itertools import product
 
 import numpy as np
 
-from pretouch.params import profile
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import expected_range
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.sim.misplacement import Misplacement, misplaced

@@ -5,10 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pretouch.contact.cues import Cues
-from pretouch.contact.tactile import feel_touch, touch_init, touch_settings
-from pretouch.params import profile
-from pretouch.robot.model import Kinematics
+from pretouch.profiles import profile
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
@@ -20,7 +17,7 @@ from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, model, path_of, p
 from pretouch_lab.benchmarks.detection.contacts import Toucher, Touching, place_on, start_posture
 from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.detection.judge import matched
-from pretouch_lab.benchmarks.detection.replay import Said, replay
+from pretouch_lab.benchmarks.detection.replay import replay
 from pretouch_lab.benchmarks.detection.stream import Stream
 from pretouch_lab.benchmarks.localization.judge import said_of
 from pretouch_lab.cell import Cell, Context
@@ -44,7 +41,7 @@ from pretouch_lab.studies.tactile_kinds import (
     WARM_UP_S,
 )
 
-DETECTORS = dict(zip(SIDES, ("pretouch:detection.use_touch=no", "pretouch"), strict=True))
+DETECTORS = dict(zip(SIDES, ("pretouch:detect.cues=none", "pretouch"), strict=True))
 """Profiles that are given the same stream and the same touches."""
 FALSE_PER_HOUR = 600.0
 """Rate of false touches of each unit where there are no contacts [1/h]: often enough to be counted, and for the unit's
@@ -160,28 +157,13 @@ def recorded(skin: Skin, place: str, seen: bool, seed: int, free_s: float = FREE
     return Course(stream, said, touches)
 
 
-def cues_of(course: Course, skin: Skin, profile_text: str) -> Said:
-    """Return what a profile's controller makes of the touches of a course, to be asked step by step."""
-    found = profile(profile_text)
-    settings = touch_settings(model(), skin, found.detection)
-    state = touch_init(settings)
-
-    def said(step: int, kin: Kinematics) -> Cues | None:
-        nonlocal state
-        now, period = float(course.stream.stamp[step]), found.task.control_period_s
-        cues, state = feel_touch(state, settings, course.touch[step], kin, now, period, found.detection)
-        return cues
-
-    return said
-
-
 def played(cell: Cell, seed: int, context: Context, free_s: float = FREE_S) -> tuple[Row, None]:
     """Run one trial; return its row of results."""
     place = str(cell.where["place"])
     skin = inner_skin(context.skin) if place == INNER else feeling(context.skin)
     course = recorded(skin, place, cell.where["hand"] == "seen", seed, free_s)
     made = {
-        name: replay(course.stream, Contender(name, text, "scale"), model(), cues_of(course, skin, text))
+        name: replay(course.stream, Contender(name, text, "scale"), model(), course.touch.__getitem__, skin)
         for name, text in DETECTORS.items()
     }
     row: Row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}

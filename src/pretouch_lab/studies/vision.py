@@ -6,10 +6,9 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle, Path
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sim.depth_camera import looking
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.pushes import Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -19,6 +18,7 @@ from pretouch_lab.benchmarks.avoidance.measures import contact
 from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape, nearest
 from pretouch_lab.benchmarks.avoidance.truth import Truth
 from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.depth_camera import looking
 from pretouch_lab.experiment import Experiment, Row
 from pretouch_lab.groups import cells_of
 from pretouch_lab.metrics import rounded

@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import network
 from pretouch.sim.paper_scenes import static_path, static_scene

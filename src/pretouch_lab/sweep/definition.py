@@ -4,13 +4,13 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.scenario_files import SeedRange
 from pretouch_lab.sweep.measures import Measure
 from pretouch_lab.sweep.registry import MEASURES, measure
@@ -21,7 +21,28 @@ Design = Literal["grid", "lhs", "sobol"]
 SENSITIVITY = "sensitivity"
 """The sweeps of docs/explanation/sensitivity.md."""
 _SEED_RANGES: dict[SeedRange, tuple[int, int]] = {"published": (0, 999), "development": (1000, 1999)}
-_KEYS = ("name", "experiment", "profile", "design", "samples", "arms", "metrics", "ranks", "vary", "fix", "text")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A sweep as text has it: options of the command, or a [[sweep]] of a file, whose keys these are."""
+
+    experiment: str
+    vary: Mapping[str, str]
+    """Range of each parameter that is varied, as `space.dimension` reads it."""
+    fix: Mapping[str, str] = field(default_factory=dict)
+    """Value of each one that is something else throughout."""
+    profile: str = ""
+    """None: the experiment's own."""
+    design: str = "sobol"
+    samples: int = 64
+    arms: int = 16
+    metrics: tuple[str, ...] = ()
+    """None: all."""
+    ranks: tuple[str, ...] = ()
+    name: str = ""
+    """None: the experiment's."""
+    text: str = ""
 
 
 @dataclass(frozen=True)
@@ -32,7 +53,7 @@ class Sweep:
     """Of its folder."""
     experiment: str
     profile: str
-    """As `pretouch.params.profile` reads it."""
+    """As `pretouch.profiles.profile` reads it."""
     vary: tuple[Dimension, ...]
     fixed: Values
     design: Design
@@ -70,46 +91,48 @@ class Sweep:
         return found
 
 
-def sweep_of(
-    experiment: str, vary: Mapping[str, str], *, fix: Mapping[str, str] | None = None, profile_text: str = "",
-    design: str = "sobol", samples: int = 64, arms: int = 16, metrics: tuple[str, ...] = (), name: str = "",
-    seeds: SeedRange = "development", text: str = "", ranks: tuple[str, ...] = (),
-) -> Sweep:  # fmt: skip
+def sweep_of(asked: Asked, seeds: SeedRange = "development") -> Sweep:
     """Read and check a sweep whose ranges are given as text. Raises an error of this package."""
-    what = measure(experiment)
-    base_text = profile_text or what.profile
+    what, vary, fix = measure(asked.experiment), asked.vary, asked.fix
+    base_text, name = asked.profile or what.profile, asked.name or asked.experiment
     base = profile(base_text)
-    if design not in get_args(Design):
-        raise ExperimentError(f"The design {design!r} is unknown: choose from {', '.join(get_args(Design))}.")
+    if asked.design not in get_args(Design):
+        raise ExperimentError(f"The design {asked.design!r} is unknown: choose from {', '.join(get_args(Design))}.")
     if not vary:
         raise ExperimentError("Nothing is varied: give --vary NAME=LOW:HIGH, threshold.f_base_n=5:15 for one.")
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name or experiment):
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
         raise ExperimentError(f"The name {name!r} would be a bad one for a folder: use letters, digits and dashes.")
-    for one in (*vary, *(fix or {})):
+    for one in (*vary, *fix):
         current(one, base, what.scene)
         what.check(one)
-    both = [one for one in vary if one in (fix or {})]
+    both = [one for one in vary if one in fix]
     if both:
         raise ExperimentError(f"The parameter {both[0]} is both varied and fixed: do one of them.")
     dimensions = tuple(dimension(one, text, current(one, base, what.scene)) for one, text in vary.items())
-    fixed = {one: read_value(one, text, current(one, base, what.scene)) for one, text in (fix or {}).items()}
-    unknown = [one for one in (*metrics, *ranks) if one not in what.metrics]
+    fixed = {one: read_value(one, text, current(one, base, what.scene)) for one, text in fix.items()}
+    unknown = [one for one in (*asked.metrics, *asked.ranks) if one not in what.metrics]
     if unknown:
-        raise ExperimentError(f"{experiment} does not measure {unknown[0]!r}: choose from {', '.join(what.metrics)}.")
-    if samples < 2 or (design == "sobol" and samples & (samples - 1)):
-        least = 1 << max(1, samples.bit_length())
-        kind = "a power of two" if design == "sobol" else "2 or more"
-        raise ExperimentError(f"The number of samples is {samples}: give {kind}, {least} for one.")
-    low, high = _SEED_RANGES[seeds]
-    if not 1 <= arms <= high - low + 1:
-        raise ExperimentError(f"The number of arms is {arms}: give 1 to {high - low + 1}.")
-    chosen = metrics or tuple(what.metrics)
+        known = ", ".join(what.metrics)
+        raise ExperimentError(f"{asked.experiment} does not measure {unknown[0]!r}: choose from {known}.")
+    _check_counts(asked, seeds)
     found = Sweep(
-        name or experiment, experiment, base_text, dimensions, fixed, design, samples, arms, chosen, seeds, text,  # type: ignore[arg-type]
-        ranks,
+        name, asked.experiment, base_text, dimensions, fixed, cast(Design, asked.design), asked.samples, asked.arms,
+        asked.metrics or tuple(what.metrics), seeds, asked.text, asked.ranks,
     )  # fmt: skip
     _check_ends(found)
     return found
+
+
+def _check_counts(asked: Asked, seeds: SeedRange) -> None:
+    """Refuse a number of samples or arms that there cannot be."""
+    samples, sobol = asked.samples, asked.design == "sobol"
+    if samples < 2 or (sobol and samples & (samples - 1)):
+        least = 1 << max(1, samples.bit_length())
+        kind = "a power of two" if sobol else "2 or more"
+        raise ExperimentError(f"The number of samples is {samples}: give {kind}, {least} for one.")
+    low, high = _SEED_RANGES[seeds]
+    if not 1 <= asked.arms <= high - low + 1:
+        raise ExperimentError(f"The number of arms is {asked.arms}: give 1 to {high - low + 1}.")
 
 
 def _check_ends(sweep: Sweep) -> None:
@@ -150,32 +173,32 @@ def _from(entry: Any, number: int, path: Path, seeds: SeedRange) -> Sweep:
     where = f"sweep {number} of {path}"
     if not isinstance(entry, dict):
         raise ExperimentError(f"The {where} is {entry!r}: write it as a [[sweep]] table.")
-    unknown = sorted(set(entry) - set(_KEYS))
+    keys = [key.name for key in fields(Asked)]
+    unknown = sorted(set(entry) - set(keys))
     if unknown:
-        raise ExperimentError(f"The {where} has the unknown key {unknown[0]}: use {', '.join(_KEYS)}.")
-    texts = {key: entry.get(key, "") for key in ("name", "experiment", "profile", "design", "text")}
-    counts = {key: entry[key] for key in ("samples", "arms") if key in entry}
-    tables = {key: entry.get(key, {}) for key in ("vary", "fix")}
-    listed = {key: entry.get(key, []) for key in ("metrics", "ranks")}
-    for kind, what, given in ((str, "text", texts), (int, "a whole number", counts), (dict, "a table", tables)):
-        for key, value in given.items():
-            if not isinstance(value, kind) or isinstance(value, bool):
-                raise ExperimentError(f"The {where} has {key} = {value!r}: give {what}.")
-    for key, names in listed.items():
-        if not isinstance(names, list) or not all(isinstance(one, str) for one in names):
-            raise ExperimentError(f"The {where} has {key} = {names!r}: give a list of names.")
-    for key, table in tables.items():
-        for name, value in table.items():
+        raise ExperimentError(f"The {where} has the unknown key {unknown[0]}: use {', '.join(keys)}.")
+    for key, given in entry.items():
+        kind, what = _TOLD.get(key, (str, "text"))
+        if not isinstance(given, kind) or isinstance(given, bool):
+            raise ExperimentError(f"The {where} has {key} = {given!r}: give {what}.")
+        if isinstance(given, list) and not all(isinstance(one, str) for one in given):
+            raise ExperimentError(f"The {where} has {key} = {given!r}: give {what}.")
+        for name, value in given.items() if isinstance(given, dict) else ():
             if not isinstance(value, str):
                 raise ExperimentError(f'The {where} has {key} {name} = {value!r}: give text, "5:15" or "yes".')
+    told: dict[str, Any] = {"experiment": "", "vary": {}}
+    told |= {key: tuple(given) if isinstance(given, list) else given for key, given in entry.items() if given != ""}
     try:
-        return sweep_of(
-            texts["experiment"], tables["vary"], fix=tables["fix"], profile_text=texts["profile"],
-            design=texts["design"] or "sobol", metrics=tuple(listed["metrics"]), name=texts["name"], seeds=seeds,
-            text=texts["text"], ranks=tuple(listed["ranks"]), **counts,
-        )  # fmt: skip
+        return sweep_of(Asked(**told), seeds)
     except PretouchError as error:
         raise ExperimentError(f"{error} (in {where})") from error
+
+
+_TOLD: dict[str, tuple[type, str]] = {
+    "samples": (int, "a whole number"), "arms": (int, "a whole number"), "vary": (dict, "a table"),
+    "fix": (dict, "a table"), "metrics": (list, "a list of names"), "ranks": (list, "a list of names"),
+}  # fmt: skip
+"""What a key is told by, where it is not text."""
 
 
 def sensitivity(seeds: SeedRange) -> list[Sweep]:

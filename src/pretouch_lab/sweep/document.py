@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from pretouch import __version__
+from pretouch.atomic_write import write_json
 from pretouch.text_table import TextTable, markdown
-from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.documents import put, shown
 from pretouch_lab.experiment import Picture
 from pretouch_lab.sweep.indices import indices

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from pretouch.checks import Checked, Positive
-from pretouch.control.restriction import ApproachRestriction
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.errors import ExperimentError
-from pretouch.params import Profile
-from pretouch.profiles import RENAMED
+from pretouch.profiles import Profile
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.experiment import Row
@@ -44,7 +43,7 @@ class Measure:
 
     def check(self, name: str) -> None:
         """Refuse a parameter of the profile that cannot change anything here."""
-        group = RENAMED.get(name, name).partition(".")[0]
+        group = name.partition(".")[0]
         of_profile = group in Profile.__dataclass_fields__
         if self.groups is not None and of_profile and not {group, name} & set(self.groups):
             of = f"take one of {', '.join(self.groups)}, or" if self.groups else "take one of scene, or"

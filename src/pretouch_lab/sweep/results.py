@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from pretouch import __version__
+from pretouch.atomic_write import atomic_replacement
 from pretouch.types import FloatArray
-from pretouch.whole_file import replaced_whole
 from pretouch_lab.sweep.design import SEED
 from pretouch_lab.sweep.run import Run
 from pretouch_lab.sweep.store import unwritable
@@ -49,7 +49,7 @@ def write_table(run: Run, path: Path) -> None:
     arrays = {name: pa.array(values, types.get(name)) for name, values in columns.items()}
     table = pa.table(arrays).replace_schema_metadata({"pretouch": about})
     try:
-        with replaced_whole(path) as unfinished:
+        with atomic_replacement(path) as unfinished:
             parquet.write_table(table, unfinished)
     except OSError as error:
         raise unwritable(path, error) from error

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from pretouch.atomic_write import write_json
 from pretouch.extras import Extra
-from pretouch.whole_file import write_json
 from pretouch_lab.sweep.cluster import run_on_cluster
 from pretouch_lab.sweep.definition import Sweep
 from pretouch_lab.sweep.design import Point, points

@@ -6,17 +6,14 @@ range finders, `skin.units` for so many units spread over the arm, and `scene.FI
 of what the experiment plays.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from numbers import Real
 from typing import Any
 
 from pretouch.checks import Checked
-from pretouch.composition import changed
-from pretouch.errors import ExperimentError
-from pretouch.params import Profile, profile
-from pretouch.profiles import REMOVED, RENAMED, SWITCHES
+from pretouch.errors import ExperimentError, ParameterError
+from pretouch.profiles import Profile, profile, value_of
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import WorldSet, drawn, world_set
@@ -40,7 +37,7 @@ class Setting:
     """One cell's parameters."""
 
     profile_text: str
-    """As `pretouch.params.profile` reads it."""
+    """As `pretouch.profiles.profile` reads it."""
     plant: PlantParams
     sensing: RangeFinderParams
     units: int
@@ -78,39 +75,33 @@ def plants() -> tuple[str, ...]:
 
 def current(name: str, base: Profile, scene: Checked) -> Value:
     """Return a parameter's value where nothing changes it; an ExperimentError for a parameter there is not."""
+    group, _, field = name.partition(".")
     if name == UNITS:
         return 0
     if name == KIND:
         return "nominal"
     if name == WORLD:
         return USUAL_WORLD
-    if name in REMOVED:
-        raise ExperimentError(f"The parameter {name!r} is gone: {REMOVED[name]}")
-    if name in SWITCHES:
-        return next(text for text, changes in SWITCHES[name].items() if changed(base, changes) == base)
-    group, dot, field = RENAMED.get(name, name).rpartition(".")
     groups: dict[str, Any] = {"plant": PlantParams(), "sensing": RangeFinderParams(), "scene": scene}
-    groups |= dict(_groups(base))
-    if not dot or group not in groups:
-        listed = ", ".join([*groups, "skin"])
-        raise ExperimentError(f"The parameter {name!r} is unknown: write GROUP.FIELD with a group of {listed}.")
-    known = [f.name for f in fields(groups[group])]
-    if field not in known:
-        also = ["kind", "world"] if group == "plant" else []
-        raise ExperimentError(f"The parameter {name!r} is unknown: {group} has {', '.join([*known, *also])}.")
-    value = getattr(groups[group], field)
+    if group not in groups:
+        value = _of_profile(name, base, (*groups, "skin"))
+    elif not hasattr(groups[group], field):
+        known = [f.name for f in fields(groups[group])] + (["kind", "world"] if group == "plant" else [])
+        raise ExperimentError(f"The parameter {name!r} is unknown: {group} has {', '.join(known)}.")
+    else:
+        value = getattr(groups[group], field)
     if not isinstance(value, Real | str):
-        raise ExperimentError(f"The parameter {name} holds one value a joint: sweep one that holds a single value.")
+        held = "no usual value" if value is None else "one value a joint"
+        raise ExperimentError(f"The parameter {name} holds {held}: sweep one that holds a single value.")
     return value  # type: ignore[return-value]  # a bool is a Real
 
 
-def _groups(params: Any, where: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield each group of parameters of a profile that it has, groups in groups too, with its path."""
-    for f in fields(params):
-        group, path = getattr(params, f.name), f"{where}.{f.name}".lstrip(".")
-        if is_dataclass(group):
-            yield path, group
-            yield from _groups(group, path)
+def _of_profile(name: str, base: Profile, others: tuple[str, ...]) -> object:
+    try:
+        return value_of(base, name)
+    except ParameterError as error:
+        also = f"Beside those of the profile there are parameters of {', '.join(others)}."
+        raise ExperimentError(f"{error} {also}") from error
 
 
 def built(profile_text: str, scene: Checked, values: Values, seed: int) -> Setting:

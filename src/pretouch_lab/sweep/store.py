@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
-from pretouch.whole_file import write_json
 from pretouch_lab.sweep.measures import Measure
 from pretouch_lab.sweep.work import Cell, Job
 

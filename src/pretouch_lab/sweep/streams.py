@@ -6,6 +6,7 @@ from typing import Annotated, Literal, cast
 import numpy as np
 
 from pretouch.checks import Check, Checked, NonNegative
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch_lab.benchmarks.detection.arm import Sensing, model
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_stream, touches_of
 from pretouch_lab.benchmarks.detection.contenders import Contender
@@ -17,7 +18,7 @@ from pretouch_lab.sweep.measures import Measure, Numbers
 from pretouch_lab.sweep.setting import Setting
 
 _HAND_RADIUS_M = 0.05
-_DETECTION = ("threshold", "detection")
+_DETECTION = ("window", "detect")
 _REPLAY_S = 0.0015
 """Processor time of a replayed second [s]."""
 
@@ -51,7 +52,7 @@ def _sensing(setting: Setting) -> Sensing:
 
 
 def _detector(setting: Setting) -> Contender:
-    by_force = setting.profile.detection.method == "thresholds"
+    by_force = not setting.profile.detect.by_torques
     return Contender("swept", setting.profile_text, "f_base_n" if by_force else "scale")
 
 
@@ -66,9 +67,10 @@ def _free(setting: Setting, stream: Stream) -> Numbers:
     scene, detector = cast(FreeScene, setting.scene), _detector(setting)
     made = replay(stream, detector, model())
     counted = made.stamp >= scene.warm_up_s
-    alarms = int(counted[begun(made.alarm, setting.profile.reaction.decay_cycles)].sum())
+    busy = DecayingVelocity.of(setting.profile.react, PERIOD_S).decay_cycles
+    alarms = int(counted[begun(made.alarm, busy)].sum())
     most = float(made.statistic[counted].max(initial=-np.inf))
-    margin = setting.profile.threshold.f_base_n - most if detector.sweep == "f_base_n" and np.isfinite(most) else None
+    margin = detector.default - most if detector.sweep == "f_base_n" and np.isfinite(most) else None
     hours = float(counted.sum()) * PERIOD_S / 3600
     return {"false_alarms_per_hour": alarms / hours, "alarms": float(alarms), "least_margin_n": margin}
 
@@ -111,7 +113,7 @@ ON_STREAMS = (
             "false_alarms_per_hour": "false alarms an hour [1/h]", "alarms": "false alarms counted",
             "least_margin_n": "what the force missed of a threshold, at the least [N]; negative with an alarm",
         },
-        _free, lambda s: _REPLAY_S * _free_s(s), (*_DETECTION, "reaction.decay_cycles"),
+        _free, lambda s: _REPLAY_S * _free_s(s), (*_DETECTION, "react.decay_cycles"),
         _free_stream, lambda s: (0.04 + 0.0006 * _units(s)) * _free_s(s),
     ),
     Measure(

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from pretouch.control.path import Path, line
+from pretouch.control.approach_restriction import ApproachRestriction, of_table_i
+from pretouch.control.path import line
 from pretouch.control.qp import solve, task_cost
-from pretouch.control.restriction import ApproachRestriction, approach_rows, of_table_i
+from pretouch.control.restriction import approach_rows
 from pretouch.control.task import task
-from pretouch.params import Profile, profile
 from pretouch.perception.closest import no_obstacles
 from pretouch.perception.obstacles import sensor_poses
+from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import cone_rays
@@ -128,12 +129,14 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     loss = Loss(context.skin, begin, begin + float(cell.where["readings"]) * _PERIOD_S)
     scene, sign = static_scene("line", side, _STIFFNESS_N_M, seed), 1.0 if side == "+y" else -1.0
     board = scene.boxes[0]
+    start = abs(board.center[1]) - board.half_size[1] - _HAND_HALF_WIDTH_M - gap
     setup = Setup(
         model=context.model,
         skin=context.skin,
         profile=context.profile(cell),
         scene=scene,
-        path=_path(sign, abs(board.center[1]) - board.half_size[1] - _HAND_HALF_WIDTH_M - gap),
+        # the line of the static experiment, begun on the board's side of the plane y = 0
+        path=line((0.4, start * sign, 0.5), (0.4, 0.5 * sign, 0.5)),
         seed=seed,
         world=context.world,
         recording=context.recording,
@@ -151,11 +154,6 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         **results(record, loss, sign, setup.profile, context.model),
     }
     return row, record
-
-
-def _path(sign: float, start: float) -> Path:
-    """Return the line of the static experiment from a distance [m] on the board's side of the plane y = 0."""
-    return line((0.4, start * sign, 0.5), (0.4, 0.5 * sign, 0.5))
 
 
 def results(record: Record, loss: Loss, sign: float, params: Profile, model: RobotModel) -> Row:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pretouch.recording.run_record import RunRecord
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import TOUCH_N
 from pretouch.text_table import TextTable, tabulated
@@ -17,7 +18,6 @@ from pretouch_lab.groups import cells_of
 from pretouch_lab.metrics import peak, rounded
 from pretouch_lab.paper import static
 from pretouch_lab.tables import median, plain, share
-from pretouch_lab.trace import Trace
 from pretouch_lab.trial import Record, Setup, play
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def tables(part: Row) -> list[TextTable]:
 
 
 def _draw(sources: Sources) -> list[Picture]:
-    shown: dict[str, Trace] = {}
+    shown: dict[str, RunRecord] = {}
     place = ""
     for cell in sources.summary["cells"]:
         where = {key: cell[key] for key in _KEYS if key != "profile"}
@@ -137,7 +137,7 @@ def _draw(sources: Sources) -> list[Picture]:
     return [Picture("endless", "True force of an object that stays on the path", _figure(shown, place))]
 
 
-def _figure(traces: dict[str, Trace], place: str) -> "Figure":
+def _figure(traces: dict[str, RunRecord], place: str) -> "Figure":
     """True force over the whole trial, with the detections, for each profile at one place."""
     from matplotlib.figure import Figure
 

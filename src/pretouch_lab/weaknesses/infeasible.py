@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.control.approach_restriction import of_table_i
 from pretouch.control.joint_box import joint_box, joint_limits
 from pretouch.control.qp import solve, task_cost
 from pretouch.control.reduction import speed_scale
-from pretouch.control.restriction import ApproachRows, approach_rows, of_table_i
-from pretouch.params import Profile, profile
+from pretouch.control.restriction import ApproachRows, approach_rows
 from pretouch.perception.closest import closest_points
+from pretouch.profiles import Profile, profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.control.path import Circle
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.plant import TOUCH_N
 from pretouch.sim.pushes import FACES, Holder, Push, Pusher, against
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -27,7 +28,7 @@ DEFAULT_RESTRICTIONS = "slack"
 
 HELD_S = (0.3, 1.0, 2.0, 3.0, 4.0)
 """How long each push lasts [s]."""
-DECAYS = ("", ":reaction.decay_cycles=50", ":reaction.decay_cycles=25")
+DECAYS = ("", ":react.decay_cycles=50", ":react.decay_cycles=25")
 """Changes of a profile: as it is (a reaction of 2 s in `paper`), a reaction of 0.5 s, and one of 0.25 s."""
 
 _PUSHES = 3
@@ -47,13 +48,14 @@ WATCHED_S = 3.0
 
 
 def cells(grid: Grid) -> list[Cell]:
-    """A cell for each length of the push and each decay of the reaction, of each profile that senses."""
+    """A cell for each length of the push and each decay of a reaction that decays, of each profile that senses."""
     controllers = [
         (name, mode) for name, mode in grid.controllers(DEFAULT_RESTRICTIONS) if profile(name).perception.enabled
     ]
     return [
         Cell(NAME, name + change, {"held_s": held, "restrictions": mode})
         for held, (name, mode), change in product(HELD_S, controllers, DECAYS)
+        if not change or isinstance(profile(name).react, DecayingVelocity)
     ]
 
 
@@ -183,12 +185,13 @@ def _pooled(pushed: list[Row]) -> Row:
 def _decay_s(name: str) -> float:
     """How long a reaction of a profile lasts [s]."""
     found = profile(name)
-    return found.reaction.decay_cycles * found.task.control_period_s
+    period = found.task.control_period_s
+    return DecayingVelocity.of(found.react, period).decay_cycles * period
 
 
 def _base(name: str) -> str:
     """Return the profile without the change of its decay."""
-    return name.split(":reaction.decay_cycles=")[0]
+    return name.split(":react.decay_cycles=")[0]
 
 
 def tables(part: Row) -> list[TextTable]:

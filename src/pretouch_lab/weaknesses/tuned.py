@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.control.approach_restriction import of_table_i
 from pretouch.control.path import Path, line
-from pretouch.control.restriction import of_table_i
-from pretouch.params import profile
-from pretouch.profiles import restriction_mode
+from pretouch.profiles import profile, restriction_mode
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import HandGoal, HandScript, point_on_arm
 from pretouch.sim.paper_scenes import static_path, static_scene

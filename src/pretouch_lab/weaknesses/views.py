@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle, Path, WayPoints
-from pretouch.params import Profile, profile
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
+from pretouch.profiles import Profile, profile
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.scene import SceneSpec, fixtures

@@ -132,11 +132,11 @@ def test_a_push_stops_the_simulated_arm(panda_model: RobotModel):
         (lambda s: replace(s, tau_ext=0.0), r"^The robot's external torques have the shape \(\), not \(7,\): check"),
         (lambda s: replace(s, tau_ext=np.zeros(1)), r"external torques have the shape \(1,\), not \(7,\)"),
         (lambda s: replace(s, tau_ext=None), r"external torques have the shape \(\), not \(7,\)"),
-        (lambda s: replace(s, tau_ext="none"), "^The robot's external torques are no array of numbers: check"),
+        (lambda s: replace(s, tau_ext="none"), "^The robot's external torques are not an array of numbers: check"),
         (lambda s: replace(s, stamp=s.stamp + 0.5), r"newest state is 0.500 s in the future"),
         (
             lambda s: replace(s, q_commanded=s.q + 0.04 * np.eye(7)[3]),
-            r"joint4 is 0.040 rad from where it is commanded",
+            r"joint4 is 0.040 rad from its commanded position",
         ),
         (lambda s: None, "state cannot be used: it is None"),
     ],
@@ -194,7 +194,7 @@ def test_a_state_is_compared_with_the_plan_at_its_own_instant(arm: Arm, late: fl
 def test_a_tick_that_is_no_instant_is_not_the_end_of_the_plan(arm: Arm, tick: float):
     clock = Clockwork(arm, lambda count: tick if count == 300 else None)
     done = perform(arm, clock, arm.model, plan_for(arm.model))
-    assert done.stopped == f"The clock ticked at {tick} s: see what became of it."
+    assert done.stopped == f"The clock ticked at {tick} s: check the clock."
     assert len(done.joints.stamp) == 298
     arm.assert_rested_within_limits()
 
@@ -270,11 +270,14 @@ def test_ctrl_c_brings_it_to_rest_first(arm: Arm):
 @pytest.mark.parametrize(
     ("tell", "words"),
     [
-        (lambda s: replace(s, q=s.q + 0.1 * np.eye(7)[5]), "joint6 is 0.100 rad off, .* move the arm there first"),
+        (lambda s: replace(s, q=s.q + 0.1 * np.eye(7)[5]), "joint6 is 0.100 rad off .* move the arm there first"),
         (lambda s: replace(s, qd_commanded=np.full(7, 0.1)), r"is moving, panda_joint1 at 0.100 rad/s"),
         (lambda s: replace(s, qd=-0.5 * np.eye(7)[2]), r"is moving, panda_joint3 at 0.500 rad/s"),
         (lambda s: replace(s, stamp=s.stamp - 100.0), r"newest state is 100.000 s old"),
-        (lambda s: replace(s, q_commanded=s.q - 0.3 * np.eye(7)[1]), r"joint2 is 0.300 rad from where it is commanded"),
+        (
+            lambda s: replace(s, q_commanded=s.q - 0.3 * np.eye(7)[1]),
+            r"joint2 is 0.300 rad from its commanded position",
+        ),
         (lambda s: replace(s, tau_ext=np.zeros(1)), r"external torques have the shape \(1,\)"),
         (lambda s: replace(s, q=s.q[:3]), "state cannot be used"),
     ],

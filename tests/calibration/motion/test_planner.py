@@ -87,7 +87,7 @@ def test_a_swing_that_loses_its_room_when_it_is_prolonged_is_not_left_out(monkey
 
     monkeypatch.setattr(planner._Planner, "_pattern", cramped)
     with pytest.raises(
-        CalibrationError, match=r"no room for swings of [\d.]+ s in 1 of 1 postures: ask for another variant"
+        CalibrationError, match=r"Swings of [\d.]+ s do not fit in 1 of 1 postures: choose another variant"
     ):
         plan_motion(model("panda"), QUICK)
 
@@ -187,14 +187,14 @@ def test_a_way_through_the_arm_itself_is_refused(panda_model: RobotModel):
     ("params", "start", "words"),
     [
         (PlanParams(duration_s=20.0), None, r"20 s is too short: .* takes \d+ s; give it that time"),
-        (PlanParams(margin_rad=1.6), None, r"leaves nothing of the range of .*joint4.* choose a smaller margin_rad"),
+        (PlanParams(margin_rad=1.6), None, r"uses up the whole range of .*joint4.* choose a smaller margin_rad"),
         (PlanParams(clearance_m=0.09), None, r"No motion can begin at .* come within .* of each other"),
         (PlanParams(floor_m=0.5), None, r"No motion can begin at .*the arm and the floor"),
         (PlanParams(), [0.0, 0.0, 0.0, -3.0, 0.0, 0.0, 0.0], "No motion can begin at"),
         (PlanParams(), [0.0, 0.0], "give 7 finite joint positions"),
         (PlanParams(), [np.nan] * 7, "give 7 finite joint positions"),
-        (PlanParams(), [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 2.85], "joint7 comes nearer to its limit than 0.1 rad"),
-        (PlanParams(speed_m_s=0.01), None, r"\d can be reached, and 6 are asked: .* or a higher speed"),
+        (PlanParams(), [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 2.85], "joint7 comes closer to its limit than 0.1 rad"),
+        (PlanParams(speed_m_s=0.01), None, r"\d can be reached, but 6 are needed: .* or a higher speed"),
     ],
 )
 def test_an_impossible_request_says_why(panda_model: RobotModel, params: PlanParams, start, words: str):

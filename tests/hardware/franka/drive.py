@@ -15,16 +15,15 @@ from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.client import Client, connect
 from pretouch.hardware.franka.collision import collision_behavior
+from pretouch.hardware.franka.errors import MotionAborted
 from pretouch.hardware.franka.limiter import SetPointLimiter
 from pretouch.hardware.franka.limits import LimiterParams, motion_limits
-from pretouch.hardware.franka.lockstep import run_in_lockstep
-from pretouch.hardware.franka.lockstep_skin import LockstepSkin
-from pretouch.hardware.franka.sentences import MotionAborted
+from pretouch.hardware.franka.lockstep import LockstepSkin, run_in_lockstep
 from pretouch.hardware.franka.state import FrankaState, packed
 from pretouch.hardware.keys import load_keys
 from pretouch.loop import Cycle
-from pretouch.params import profile
 from pretouch.perception.scene_filter import Fixtures
+from pretouch.profiles import profile
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin

@@ -76,7 +76,7 @@ class Served:
         return self.speed() < 0.003
 
     def clients_gone(self) -> int:
-        return self.said().count("has gone")
+        return self.said().count("disconnected")
 
     def close(self) -> None:
         self.process.send_signal(signal.SIGTERM)

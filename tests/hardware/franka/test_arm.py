@@ -16,8 +16,8 @@ import pytest
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import collision_behavior
-from pretouch.hardware.franka.params import FrankaParams
-from pretouch.params import profile
+from pretouch.hardware.franka.limits import FrankaParams
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.signals import OF_TERMINAL
 from tests.hardware.franka.served import Served, child, wait_for
@@ -72,7 +72,7 @@ def test_the_arm_follows_commands_and_ends_at_rest_and_the_terminals_signals_are
 ) -> None:
     with FrankaArm(served.address, served.kind, model, behavior=collision_behavior(profile("paper"), model)) as arm:
         idle = arm.read()
-        assert abs(time.monotonic() - idle.stamp) < 0.2
+        assert abs(time.monotonic() - idle.stamp) < 1.0
         assert idle.wrench is not None
         arm.begin()
         for number in OF_TERMINAL:
@@ -93,7 +93,7 @@ def test_the_arm_follows_commands_and_ends_at_rest_and_the_terminals_signals_are
 
 
 @one_kind
-@pytest.mark.parametrize(("speed", "words"), [(np.nan, "no number"), (3.0 * np.pi, "its limit")])
+@pytest.mark.parametrize(("speed", "words"), [(np.nan, "not finite"), (3.0 * np.pi, "limit ")])
 def test_a_set_point_that_is_none_brings_the_arm_to_rest(
     served: Served, model: RobotModel, speed: float, words: str
 ) -> None:
@@ -152,7 +152,7 @@ def test_a_program_that_was_frozen_for_long_does_not_move_the_arm_again(served: 
         process.send_signal(signal.SIGCONT)
         assert process.wait(20.0) == 1
         assert process.stdout
-        assert "its motion ended: no set-point came for 1 s" in process.stdout.read()
+        assert "its motion ended, because no set-point came for 1 s" in process.stdout.read()
         assert served.rests()
     assert "Motion ended" not in served.said()
 
@@ -181,7 +181,7 @@ def test_when_the_process_is_killed_the_arm_stops_by_itself_and_nobody_says_that
         arm.begin()
         keep(arm, 0.3, served.moves)
         os.kill(arm.pid, signal.SIGKILL)
-        with pytest.raises(RobotError, match=r"has ended: the arm stops by itself; look whether it stands"):
+        with pytest.raises(RobotError, match=r"has ended, and the arm stops by itself: check that it stands"):
             keep(arm, 0.3, lambda: False)
         wait_for(served.rests, "rest")
         for ask in (arm.state, arm.read, arm.begin, arm.end):
@@ -199,7 +199,9 @@ def test_when_the_process_is_stopped_the_arm_stops_by_itself_and_the_caller_is_t
         arm.begin()
         keep(arm, 0.3, served.moves)
         os.kill(arm.pid, signal.SIGSTOP)
-        with pytest.raises(RobotError, match=r"No state has come from the arm at .* for \d+\.\d s: it stops by itself"):
+        with pytest.raises(
+            RobotError, match=r"No state has come from the arm at .* for \d+\.\d s; without commands it stops by itself"
+        ):
             keep(arm, 0.3, lambda: False)
         wait_for(served.rests, "rest")
         for ask in (arm.state, arm.read, arm.begin):

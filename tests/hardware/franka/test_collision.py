@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 
 from pretouch.contact.cues import no_cues
-from pretouch.contact.felt import sequential_init, take_sample
+from pretouch.contact.detector import Body
+from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_step
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.collision import (
     CollisionParams,
     check,
     collision_behavior,
-    felt_from_n,
     largest_threshold,
     longest_levers,
 )
-from pretouch.params import PROFILES, profile
+from pretouch.profiles import PROFILES, profile
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
 from pretouch.types import Obstacles, RobotState
 
 
@@ -57,7 +58,9 @@ def test_a_higher_threshold_of_ours_raises_the_arms(panda_model: RobotModel) -> 
 
 def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel) -> None:
     good = collision_behavior(profile("paper"), panda_model)
-    with pytest.raises(ParameterError, match=r"report a contact from 15 N, but ours is felt from up to 18 N: give"):
+    with pytest.raises(
+        ParameterError, match=r"report a contact from 15 N on, but our detection may need up to 18 N: set"
+    ):
         check(replace(good, lower_force=np.full(6, 15.0)), profile("paper"), panda_model)
     with pytest.raises(ParameterError, match=r"upper_torque\[0\] is 5: it must be greater than the lower"):
         check(replace(good, upper_torque=np.full(7, 5.0)), profile("paper"), panda_model)
@@ -69,17 +72,23 @@ def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel) -> N
 
 def evidence(model: RobotModel, force: np.ndarray) -> float:
     """Evidence of one sample with a force (3,) [N] on the end-effector of an arm that has learnt nothing, and moves."""
-    q, speed, p = model.description.q_ready, np.full(7, 0.3), PROFILES["pretouch"].detection
+    q, speed, p = model.description.q_ready, np.full(7, 0.3), PROFILES["pretouch"].detect
     kin, none, rows, whole = model.kinematics(q), np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
     state = sequential_init(model, p)
     state = replace(state, model=replace(state.model, speed=speed))
     robot = RobotState(0.0, q, speed, q, speed, model.ee_jacobian(kin)[:3].T @ force, None)
     free = Obstacles(whole, rows, none, rows, whole, rows, none, none)
-    return take_sample(state, model, kin, robot, free, False, False, 0.01, p, no_cues(len(model.links)))[0].evidence
+    seen = Observation(kin, robot, free, no_cues(len(model.links)))
+    return sequential_step(state, model, seen, False, False, 0.01, p)[0].log_likelihood_ratio
+
+
+def missed(model: RobotModel) -> float:
+    ours = PROFILES["pretouch"]
+    return ours.detect.largest_missed_n(Body(model, Skin((), model), ours.task.control_period_s), ours.task.speed_m_s)
 
 
 def test_what_the_sequential_detector_may_miss_is_what_it_misses(panda_model: RobotModel) -> None:
-    most = felt_from_n(PROFILES["pretouch"], panda_model)
+    most = missed(panda_model)
     assert 30.0 < most < 45.0
     for axis in np.vstack([np.eye(3), -np.eye(3)]):
         assert evidence(panda_model, 1.02 * most * axis) >= 1.0
@@ -89,7 +98,7 @@ def test_what_the_sequential_detector_may_miss_is_what_it_misses(panda_model: Ro
 def test_ours_stops_by_itself_later_than_it_is_felt_and_before_it_hurts(panda_model: RobotModel) -> None:
     ours = PROFILES["pretouch"]
     behavior = collision_behavior(ours, panda_model)
-    felt = felt_from_n(ours, panda_model)
+    felt = missed(panda_model)
     assert np.all(behavior.lower_force[:3] >= felt + 10.0)
     assert np.all(behavior.upper_force[:3] >= felt + 20.0)
     face_n, bias_n = 65.0, CollisionParams().bias_n
@@ -97,7 +106,7 @@ def test_ours_stops_by_itself_later_than_it_is_felt_and_before_it_hurts(panda_mo
 
 
 def test_an_arm_that_is_pushed_yields_in_any_direction_before_it_stops_by_itself(panda_model: RobotModel) -> None:
-    p, q = PROFILES["pretouch"].reaction, panda_model.description.q_ready
+    p, q = PROFILES["pretouch"].react, panda_model.description.q_ready
     J = panda_model.ee_jacobian(panda_model.kinematics(q))[:3]
     band = p.dead_band_nm + p.dead_band_fraction * panda_model.description.tau_max
     draw, force = np.random.default_rng(1), collision_behavior(PROFILES["pretouch"], panda_model).upper_force[0]

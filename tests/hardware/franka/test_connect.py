@@ -11,10 +11,10 @@ import time
 import pytest
 
 from pretouch.errors import MissingExtraError, RobotError
-from pretouch.hardware.franka import arm, client, sentences
+from pretouch.hardware.franka import arm, client, errors
 from pretouch.hardware.franka.arm import FrankaArm
+from pretouch.hardware.franka.arm_lock import ArmLock
 from pretouch.hardware.franka.client import connect, reachable
-from pretouch.hardware.franka.only_one import OnlyOne
 from pretouch.hardware.franka.state import MODES
 from pretouch.robot.model import RobotModel
 from tests.hardware.franka.made import state
@@ -24,8 +24,8 @@ from tests.hardware.franka.served import loopback
 @pytest.mark.parametrize(
     ("address", "what"),
     [
-        ("127.0.99.99", "nobody listens on port 1337 there"),
-        ("a..b", "there is no machine of that name"),
+        ("127.0.99.99", "nothing listens on port 1337 there"),
+        ("a..b", "there is no host of that name"),
     ],
 )
 def test_a_wrong_address_is_said_at_once(address: str, what: str) -> None:
@@ -40,7 +40,7 @@ def test_a_name_that_nobody_has_is_said(monkeypatch: pytest.MonkeyPatch) -> None
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     monkeypatch.setattr(client.socket, "create_connection", unknown)
-    with pytest.raises(RobotError, match="No Franka arm at no-such-arm: there is no machine of that name; check"):
+    with pytest.raises(RobotError, match="No Franka arm at no-such-arm: there is no host of that name; check"):
         reachable("no-such-arm")
 
 
@@ -55,7 +55,7 @@ def test_an_arm_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Monke
 
 
 def test_the_sentence_comes_from_the_process_too(panda_model: RobotModel) -> None:
-    with pytest.raises(RobotError, match=r"^No Franka arm at 127\.0\.99\.99: nobody listens .* FCI in Desk\.$"):
+    with pytest.raises(RobotError, match=r"^No Franka arm at 127\.0\.99\.99: nothing listens .* FCI in Desk\.$"):
         FrankaArm("127.0.99.99", "panda", panda_model)
 
 
@@ -75,29 +75,29 @@ def test_a_kernel_without_real_time_is_refused_where_it_is_demanded(monkeypatch:
 
 @pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "idle"])
 def test_each_mode_in_which_the_arm_does_not_move_has_a_way_out(mode: str) -> None:
-    with pytest.raises(RobotError, match=f'^The arm at robot is in mode "{mode}" after joint_reflex: .*\\.$'):
-        sentences.check_ready(state(mode=mode, errors=("joint_reflex",)), "robot")
-    sentences.check_ready(state(mode="idle"), "robot")
+    with pytest.raises(RobotError, match=f'^The arm at robot is in mode "{mode}" after joint_reflex; .*\\.$'):
+        errors.check_ready(state(mode=mode, errors=("joint_reflex",)), "robot")
+    errors.check_ready(state(mode="idle"), "robot")
 
 
 def test_a_process_that_holds_an_arm_is_named_and_lets_go_when_it_is_killed() -> None:
     address = loopback()
-    holds = f"OnlyOne({address!r}); print(1, flush=True); input()"
-    script = f"from pretouch.hardware.franka.only_one import OnlyOne; held = {holds}"
+    holds = f"ArmLock({address!r}); print(1, flush=True); input()"
+    script = f"from pretouch.hardware.franka.arm_lock import ArmLock; held = {holds}"
     with subprocess.Popen(
         [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout
         assert process.stdout.readline() == "1\n"
         with pytest.raises(RobotError, match=f"The arm at {address} is in use by process {process.pid} on"):
-            OnlyOne(address)
+            ArmLock(address)
         for _ in range(300):  # more than wait at a door that nobody opens
             with pytest.raises(RobotError, match=f"The arm at {address} is in use by "):
-                OnlyOne(address)
+                ArmLock(address)
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
-    OnlyOne(address).release()
-    OnlyOne(address).release()
+    ArmLock(address).release()
+    ArmLock(address).release()
 
 
 def test_a_machine_that_takes_the_connection_and_is_silent_is_given_up(
@@ -107,8 +107,8 @@ def test_a_machine_that_takes_the_connection_and_is_silent_is_given_up(
     address, began = loopback(), time.monotonic()
     with (
         socket.create_server((address, client.PORT)),
-        pytest.raises(RobotError, match=f"What is at {address} takes connections, and does not answer as an arm"),
+        pytest.raises(RobotError, match=f"The host at {address} accepts connections, but does not answer as an arm"),
     ):
         FrankaArm(address, "panda", panda_model)
     assert time.monotonic() - began < 10.0
-    OnlyOne(address).release()
+    ArmLock(address).release()

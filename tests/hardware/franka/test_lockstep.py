@@ -11,13 +11,13 @@ import pytest
 
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.hardware.franka.client import OnState
+from pretouch.hardware.franka.client import StateCallback
 from pretouch.hardware.franka.limits import motion_limits
 from pretouch.hardware.franka.lockstep import run_in_lockstep
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.hardware.keys import save_keys
 from pretouch.loop import Cycle
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
@@ -71,7 +71,7 @@ def test_a_contact_above_the_arms_own_threshold_is_its_reflex_and_it_recovers(se
     assert "cartesian_reflex" in result["trouble"]
     assert result["mode"] == "reflex"
     assert result["refused"].endswith(
-        'is in mode "reflex" after cartesian_reflex: clear what it touches, then let it recover.'
+        'is in mode "reflex" after cartesian_reflex: free it from what it touches, then let it recover.'
     )
     assert result["last_errors"] == result["errors"]
     # pushed towards +y, the arm pushes its environment towards -y
@@ -124,7 +124,7 @@ class CheckingClient:
     def read(self) -> FrankaState:
         return self.arm.state()
 
-    def control(self, on_state: OnState) -> None:
+    def control(self, on_state: StateCallback) -> None:
         finished, self.moving = False, True
         while not finished:
             self.states += 1

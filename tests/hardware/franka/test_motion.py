@@ -5,10 +5,9 @@ import time
 import numpy as np
 import pytest
 
-from pretouch.hardware.franka.limits import motion_limits
-from pretouch.hardware.franka.motion import Motion
-from pretouch.hardware.franka.orders import Boxes, Order, Wish
-from pretouch.hardware.franka.params import FrankaParams
+from pretouch.hardware.franka.limits import FrankaParams, motion_limits
+from pretouch.hardware.franka.mailboxes import Command, Mailboxes, Request
+from pretouch.hardware.franka.motion import VelocityMotion
 from pretouch.hardware.franka.report import Communication
 from pretouch.robot.model import RobotModel
 from tests.hardware.franka.made import CheckingArm, middle
@@ -19,14 +18,14 @@ class Bench:
 
     def __init__(self, model: RobotModel) -> None:
         limits = motion_limits(model, "panda")
-        self.boxes, self.communication, self.over = Boxes(), Communication(), False
+        self.mailboxes, self.communication, self.over = Mailboxes(), Communication(), False
         self.arm = CheckingArm(limits, middle(limits))
-        self.motion = Motion(1, limits, FrankaParams(), self.boxes, self.communication, lambda: self.over)
+        self.motion = VelocityMotion(1, limits, FrankaParams(), self.mailboxes, self.communication, lambda: self.over)
         self.finished = False
 
-    def order(self, qd: float, age: float = -1000.0, wish: Wish = Wish.MOVE) -> None:
+    def command(self, qd: float, age: float = -1000.0, request: Request = Request.MOVE) -> None:
         """Have all joints wanted to move so fast [rad/s]; one from the future stays fresh."""
-        self.boxes.order(Order(1, wish, time.monotonic() - age, [qd] * 7))
+        self.mailboxes.send_command(Command(1, request, time.monotonic() - age, [qd] * 7))
 
     def run(self, states: int) -> None:
         for _ in range(states):
@@ -44,44 +43,44 @@ class Bench:
 @pytest.fixture
 def bench(panda_model: RobotModel) -> Bench:
     made = Bench(panda_model)
-    made.order(0.2)
+    made.command(0.2)
     made.run(300)
     assert made.speed == pytest.approx(0.2)
     return made
 
 
 def test_stale_set_points_bring_it_to_rest_in_the_motion_and_fresh_ones_move_it_again(bench: Bench) -> None:
-    bench.order(0.2, age=0.1)
+    bench.command(0.2, age=0.1)
     bench.run(500)
     assert bench.speed < 1e-9
     assert not bench.finished
     assert bench.communication.report().stale == 1
-    bench.order(0.1)
+    bench.command(0.1)
     bench.run(300)
     assert bench.speed == pytest.approx(0.1)
     assert bench.motion.trouble == ""
 
 
 def test_without_set_points_for_long_the_motion_ends_and_fresh_ones_do_not_count(bench: Bench) -> None:
-    bench.order(0.2, age=FrankaParams().end_after_s + 0.01)
+    bench.command(0.2, age=FrankaParams().end_after_s + 0.01)
     bench.run(1)
-    bench.order(0.2)
+    bench.command(0.2)
     bench.run(1000)
     assert bench.finished
-    assert "its motion ended: no set-point came for 1 s" in bench.motion.trouble
+    assert "its motion ended, because no set-point came for 1 s" in bench.motion.trouble
 
 
-def test_orders_of_another_request_end_it(bench: Bench) -> None:
-    bench.boxes.order(Order(2, Wish.MOVE, time.monotonic() + 1000.0, [0.2] * 7))
+def test_commands_of_another_request_end_it(bench: Bench) -> None:
+    bench.mailboxes.send_command(Command(2, Request.MOVE, time.monotonic() + 1000.0, [0.2] * 7))
     bench.run(1000)
     assert bench.finished
-    told = bench.boxes.told()
-    assert told is not None
-    assert told.answered == 1
+    feedback = bench.mailboxes.newest_feedback()
+    assert feedback is not None
+    assert feedback.answered == 1
 
 
 def test_a_set_point_that_is_old_but_not_stale_still_counts(bench: Bench) -> None:
-    bench.order(0.1, age=FrankaParams().stale_after_s - 0.03)
+    bench.command(0.1, age=FrankaParams().stale_after_s - 0.03)
     bench.run(1)
     assert bench.communication.report().stale == 0
 
@@ -90,20 +89,20 @@ def test_a_set_point_that_is_old_but_not_stale_still_counts(bench: Bench) -> Non
 def test_a_set_point_that_is_none_ends_the_motion_at_rest_and_later_ones_do_not_count(
     bench: Bench, wrong: float
 ) -> None:
-    bench.order(wrong)
+    bench.command(wrong)
     bench.run(1)
-    bench.order(0.2)
+    bench.command(0.2)
     bench.run(1000)
     assert bench.finished
-    assert bench.motion.trouble.startswith("The arm was brought to rest: joint 1 was to move at ")
-    told = bench.boxes.told()
-    assert told is not None
-    assert told.trouble == bench.motion.trouble
+    assert bench.motion.trouble.startswith("The arm was brought to rest, because joint 1 was to move at ")
+    feedback = bench.mailboxes.newest_feedback()
+    assert feedback is not None
+    assert feedback.trouble == bench.motion.trouble
 
 
-@pytest.mark.parametrize("wish", [Wish.WAIT, Wish.END, Wish.QUIT])
-def test_it_ends_at_rest_when_asked_to(bench: Bench, wish: Wish) -> None:
-    bench.order(0.0, wish=wish)
+@pytest.mark.parametrize("asked_for", [Request.WAIT, Request.END, Request.QUIT])
+def test_it_ends_at_rest_when_asked_to(bench: Bench, asked_for: Request) -> None:
+    bench.command(0.0, request=asked_for)
     bench.run(1000)
     assert bench.finished
     assert bench.motion.trouble == ""
@@ -116,7 +115,7 @@ def test_it_ends_at_rest_when_the_program_has_died(bench: Bench) -> None:
 
 
 def test_it_does_not_end_before_the_arm_says_that_it_rests(bench: Bench) -> None:
-    bench.order(0.0, wish=Wish.END)
+    bench.command(0.0, request=Request.END)
     bench.run(60)
     assert not bench.finished
     assert bench.speed > 1e-4

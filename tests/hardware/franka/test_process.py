@@ -1,4 +1,4 @@
-"""What the process does with its orders, over an arm that does as it is told; a script gives the orders."""
+"""What the process does with its commands, over an arm that does as it is told; a script sends the commands."""
 
 import os
 import signal
@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RobotError
-from pretouch.hardware.franka.client import OnState
-from pretouch.hardware.franka.limits import motion_limits
-from pretouch.hardware.franka.orders import Boxes, Order, Told, Wish
-from pretouch.hardware.franka.params import FrankaParams
-from pretouch.hardware.franka.process import ArmServer, Task
+from pretouch.hardware.franka.client import StateCallback
+from pretouch.hardware.franka.limits import FrankaParams, motion_limits
+from pretouch.hardware.franka.mailboxes import Command, Feedback, Mailboxes, Request
+from pretouch.hardware.franka.process import ArmServer, ProcessSettings
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.robot.model import RobotModel
 from tests.hardware.franka.made import CheckingArm, middle
@@ -31,7 +30,7 @@ class ScriptedClient:
         self._script(self._states)
         return self._arm.state()
 
-    def control(self, on_state: OnState) -> None:
+    def control(self, on_state: StateCallback) -> None:
         self.did.append("motion")
         finished = False
         while not finished:
@@ -47,7 +46,7 @@ class Program:
     """Gives orders by the number of the state."""
 
     def __init__(self, model: RobotModel) -> None:
-        self.boxes, self.steps = Boxes(), {}
+        self.mailboxes, self.steps = Mailboxes(), {}
         self.limits = motion_limits(model, "panda")
         self.arm = CheckingArm(self.limits, middle(self.limits))
         self.client = ScriptedClient(self.arm, self._at)
@@ -55,23 +54,25 @@ class Program:
     def _at(self, number: int) -> None:
         self.steps.get(number, lambda: None)()
 
-    def order(self, at: int, request: int, wish: Wish, speed: float = 0.0) -> None:
+    def command(self, at: int, number: int, request: Request, speed: float = 0.0) -> None:
         """From the state with a number on, want this."""
-        self.steps[at] = lambda: self.boxes.order(Order(request, wish, time.monotonic() + 1000.0, [speed] * 7))
+        self.steps[at] = lambda: self.mailboxes.send_command(
+            Command(number, request, time.monotonic() + 1000.0, [speed] * 7)
+        )
 
-    def look(self, at: int) -> list[Told | None]:
-        """Note what was told before the state with a number."""
-        told: list[Told | None] = []
-        self.steps[at] = lambda: told.append(self.boxes.told())
-        return told
+    def look(self, at: int) -> list[Feedback | None]:
+        """Note the feedback before the state with a number."""
+        feedback: list[Feedback | None] = []
+        self.steps[at] = lambda: feedback.append(self.mailboxes.newest_feedback())
+        return feedback
 
-    def run(self) -> Told:
-        """Serve until the order to quit; return what was told at last."""
-        task = Task("robot", "panda", self.limits, None, FrankaParams(), None, os.getppid())
-        ArmServer(self.client, task, self.boxes).serve()  # type: ignore[arg-type]
-        told = self.boxes.told()
-        assert told is not None
-        return told
+    def run(self) -> Feedback:
+        """Serve until the command to quit; return the last feedback."""
+        task = ProcessSettings("robot", "panda", self.limits, None, FrankaParams(), None, os.getppid())
+        ArmServer(self.client, task, self.mailboxes).serve()  # type: ignore[arg-type]
+        feedback = self.mailboxes.newest_feedback()
+        assert feedback is not None
+        return feedback
 
 
 @pytest.fixture
@@ -81,45 +82,48 @@ def program(panda_model: RobotModel) -> Iterator[Program]:
     signal.signal(signal.SIGTERM, before)
 
 
-@pytest.mark.parametrize("wish", [Wish.MOVE, Wish.RECOVER])
-def test_what_is_asked_in_a_motion_ends_it_at_rest_and_is_not_done_later(program: Program, wish: Wish) -> None:
-    program.order(3, 1, Wish.MOVE, 0.2)
+@pytest.mark.parametrize("asked_for", [Request.MOVE, Request.RECOVER])
+def test_what_is_asked_in_a_motion_ends_it_at_rest_and_is_not_done_later(program: Program, asked_for: Request) -> None:
+    program.command(3, 1, Request.MOVE, 0.2)
     in_motion = program.look(99)
-    program.order(100, 2, wish, 0.2)
+    program.command(100, 2, asked_for, 0.2)
     asked = program.look(101)
-    program.order(2000, 3, Wish.QUIT)
+    program.command(2000, 3, Request.QUIT)
     last = program.run()
     assert program.client.did == ["motion"]
     assert np.abs(program.arm.qd).max() < 1e-4
-    assert [told and (told.answered, told.moving) for told in (*in_motion, *asked)] == [(1, True), (1, True)]
+    assert [feedback and (feedback.answered, feedback.moving) for feedback in (*in_motion, *asked)] == [
+        (1, True),
+        (1, True),
+    ]
     assert (last.answered, last.moving) == (2, False)
 
 
 def test_a_request_that_is_taken_back_does_not_begin_a_motion(program: Program) -> None:
-    program.order(3, 1, Wish.WAIT)
-    program.order(100, 2, Wish.QUIT)
+    program.command(3, 1, Request.WAIT)
+    program.command(100, 2, Request.QUIT)
     assert program.run().answered == 1
     assert program.client.did == []
 
 
 def test_motions_and_a_recovery_are_done_in_turn_and_trouble_is_told_once(program: Program) -> None:
-    program.order(3, 1, Wish.MOVE, 0.1)
-    program.order(100, 1, Wish.END)
-    program.order(1000, 2, Wish.RECOVER)
+    program.command(3, 1, Request.MOVE, 0.1)
+    program.command(100, 1, Request.END)
+    program.command(1000, 2, Request.RECOVER)
     recovered = program.look(1002)
-    program.order(1010, 3, Wish.MOVE, 0.1)
-    program.order(1100, 3, Wish.END)
-    program.order(2000, 4, Wish.QUIT)
+    program.command(1010, 3, Request.MOVE, 0.1)
+    program.command(1100, 3, Request.END)
+    program.command(2000, 4, Request.QUIT)
     assert program.run().trouble == ""
     assert program.client.did == ["motion", "recovery", "motion"]
-    assert [told and told.trouble for told in recovered] == ["there is nothing to recover from"]
+    assert [feedback and feedback.trouble for feedback in recovered] == ["there is nothing to recover from"]
 
 
 def test_an_arm_that_is_lost_in_motion_is_told_as_it_was_last_seen(program: Program) -> None:
     def fail() -> None:
         raise RobotError("the line is dead")
 
-    program.order(3, 1, Wish.MOVE, 0.2)
+    program.command(3, 1, Request.MOVE, 0.2)
     before = program.look(100)
     program.steps[101] = program.steps[102] = fail
     last = program.run()

@@ -20,8 +20,8 @@ from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.serving.wire_skin import made_keys
+from pretouch.session.confirmations import ConfirmedRobots
 from pretouch.session.franka import identity
-from pretouch.session.remembered import Remembered
 from pretouch.types import Mode
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
@@ -94,7 +94,7 @@ def children(run):
 
 def confirmed(kind, where, folder):
     """Note that a robot's force sign was confirmed."""
-    Remembered(folder / "state" / "pretouch").keep(identity(kind, where))
+    ConfirmedRobots(folder / "state" / "pretouch").keep(identity(kind, where))
 
 
 def said_until(process, sign):
@@ -175,7 +175,7 @@ def test_pushes_confirm_the_sign_once_and_the_run_begins_and_ends_at_rest(tmp_pa
     steps = [kept.step for kept in open_recording(tmp_path / "a.mcap")]
     assert np.abs(steps[0].command).max() < 0.02
     assert np.linalg.norm(steps[-1].ee_velocity) > 0.1
-    assert Remembered(tmp_path / "state" / "pretouch").knows(identity("panda", where))
+    assert ConfirmedRobots(tmp_path / "state" / "pretouch").is_confirmed(identity("panda", where))
 
 
 def test_pushes_felt_the_other_way_round_refuse_before_anything_moves(tmp_path):
@@ -189,7 +189,7 @@ def test_pushes_felt_the_other_way_round_refuse_before_anything_moves(tmp_path):
         assert run.returncode == 2, out
         assert "opposite to the pushes" in out
         assert "Motion" not in server.said()
-    assert not Remembered(tmp_path / "state" / "pretouch").knows(identity("panda", where))
+    assert not ConfirmedRobots(tmp_path / "state" / "pretouch").is_confirmed(identity("panda", where))
 
 
 @pytest.mark.parametrize("kind", ["panda", "fr3"])
@@ -219,7 +219,7 @@ def test_the_process_that_speaks_with_the_arm_dying_is_said(tmp_path):
         out, _ = run.communicate(timeout=60)
         assert run.returncode == 1, out
         assert "The run ended early: The process that moves the arm" in out
-        assert "Whether the arm is at rest is not known" in out
+        assert "The arm may not be at rest" in out
 
 
 def test_an_arm_whose_computer_dies_in_motion_is_not_said_to_stand(tmp_path):
@@ -231,7 +231,7 @@ def test_an_arm_whose_computer_dies_in_motion_is_not_said_to_stand(tmp_path):
         os.kill(server.process.pid, signal.SIGKILL)
         out, _ = run.communicate(timeout=60)
         assert run.returncode == 1, out
-        assert "Whether the arm is at rest is not known" in out
+        assert "The arm may not be at rest" in out
         assert "The arm is at rest." not in out
 
 
@@ -249,7 +249,7 @@ def test_an_arm_of_which_no_state_comes_ends_the_run(tmp_path, frozen):
         out, _ = run.communicate(timeout=60)
         took = time.monotonic() - begun
     assert run.returncode == 1, out
-    assert "Whether the arm is at rest is not known" in out
+    assert "The arm may not be at rest" in out
     assert took < 8.0
 
 
@@ -262,7 +262,7 @@ def test_a_server_that_dies_in_lockstep_ends_the_run(tmp_path):
         os.kill(server.process.pid, signal.SIGKILL)
         out, _ = run.communicate(timeout=60)
     assert run.returncode == 1, out
-    assert "Whether the arm is at rest is not known" in out
+    assert "The arm may not be at rest" in out
 
 
 def test_an_arm_in_reflex_is_refused_with_the_way_out_and_recovers(tmp_path):
@@ -279,7 +279,7 @@ def test_an_arm_in_reflex_is_refused_with_the_way_out_and_recovers(tmp_path):
         refused = running("panda", where, tmp_path, *_FOLLOWING)
         out, _ = refused.communicate(timeout=60)
         assert refused.returncode == 2, out
-        assert "then let it recover. With --recover it does." in out
+        assert "then let it recover. Run with --recover." in out
         again = running("panda", where, tmp_path, "--recover", "--path", "hold", *_FOLLOWING[:-1], "1")
         out, _ = again.communicate(timeout=60)
         assert again.returncode == 0, out

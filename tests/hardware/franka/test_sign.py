@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from pretouch.contact.reaction import start_reaction
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.hardware.franka.state import FrankaState, error_names, packed, robot_state, unpacked
-from pretouch.params import ReactionParams
 from tests.hardware.franka.made import state
 
 
@@ -15,7 +14,7 @@ def test_a_push_on_the_arm_is_negative_for_the_vendor_positive_for_us_and_moves_
     assert ours.wrench is not None
     np.testing.assert_array_equal(ours.wrench, [0.0, 20.0, 0.0, 0.0, 0.0, 4.0])
     np.testing.assert_array_equal(ours.tau_ext, np.full(7, 2.0))
-    velocity = start_reaction(ours.wrench[:3], ReactionParams()).velocity
+    velocity = DecayingVelocity().begun(ours.wrench[:3]).velocity
     assert velocity[1] > 0.1
     assert velocity[0] == velocity[2] == 0.0
 

@@ -42,6 +42,6 @@ def test_recovery_lasts_until_a_state_tells_of_it(before: tuple[str, ...], after
 
 def test_an_arm_that_does_not_recover_is_told() -> None:
     client = GivenStates("reflex")
-    with pytest.raises(RobotError, match=r'told to recover and still is in mode "reflex" after joint_reflex: clear'):
+    with pytest.raises(RobotError, match=r'told to recover but is still in mode "reflex" after joint_reflex: free'):
         client.recover()
     assert client.states == 500

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.hardware.ros2.joint_trajectories import Trajectories, parts_of_day
 from pretouch.hardware.ros2.joints import Measured
 from pretouch.hardware.ros2.messages import Messages
 from pretouch.hardware.ros2.params import ArmParams
+from pretouch.hardware.ros2.trajectory_commands import TrajectoryCommands, parts_of_day
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from tests.hardware.ros2.spline import Release, Spline
@@ -27,7 +27,7 @@ def swing(time: float) -> np.ndarray:
     return 0.8 * np.sin(2.0 * time + np.arange(7)) * min(1.0, time)
 
 
-class Course:
+class TrajectoryRun:
     """Drives a simulated controller; `asked` has the positions at each of its periods."""
 
     def __init__(self, release: Release, rate: float, params: ArmParams | None = None, lag: float = 0.0) -> None:
@@ -36,7 +36,7 @@ class Course:
         node: Any = SimpleNamespace(messages=MESSAGES, publisher=lambda *_: publisher)
         self.params = params or ArmParams("on-robot", "base")
         names = list(MODEL.joints)
-        self.commands = Trajectories(self.params, MODEL, names, node, PERIOD)
+        self.commands = TrajectoryCommands(self.params, MODEL, names, node, PERIOD)
         self.controller = Spline(release, 1 / rate, names, MODEL.description.q_ready)
         self.rate, self.lag, self.tripped = rate, lag, ""
         self.wish_from, self.messages = SETTLED, 0
@@ -51,7 +51,7 @@ class Course:
         lost: Callable[[float], bool] = lambda t: False,
         off: tuple[float, float, np.ndarray | None] = (np.inf, np.inf, None),
         skew: float = 0.0,
-    ) -> "Course":
+    ) -> "TrajectoryRun":
         """Turn both.
 
         Args:
@@ -68,7 +68,7 @@ class Course:
         for now in np.arange(0.0, until, 1 / self.rate) + 0.3 / self.rate:
             measured = self._measured(now)
             while (begin := turn * PERIOD) <= now and not self.tripped:
-                self._turn(begin, wish, qd := self._next(qd, wish, begin), measured)
+                self._tick(begin, wish, qd := self._next(qd, wish, begin), measured)
                 if not lost(begin):
                     mail += [(begin + late(turn), message) for message in self.sent]
                 self.messages += len(self.sent)
@@ -97,7 +97,7 @@ class Course:
         back = round(self.lag * self.rate) + 1
         return self.asked[-back] if len(self.asked) >= back else MODEL.description.q_ready
 
-    def _turn(self, now: float, wish: Any, qd: np.ndarray, q: np.ndarray) -> None:
+    def _tick(self, now: float, wish: Any, qd: np.ndarray, q: np.ndarray) -> None:
         joints = Measured(now, q, np.zeros(7))
         if not self.commands.begun:
             self.commands.begin(joints, now)

@@ -17,8 +17,8 @@ from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, Sign, SkinParams
 from pretouch.hardware.ros2.robot import Ros2Robot
 from pretouch.hardware.ros2.skin import Ros2Skin
-from pretouch.params import PROFILES
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode
@@ -45,7 +45,7 @@ class Run:
         self.steps, clock = [], loop.MonotonicClock(0.01)
         loop.run(
             self.controller, self.robot, self.units, clock, self,
-            lambda step: done(step) or len(self.steps) * 0.01 > longest, lambda: resume,
+            lambda step: done(step) or len(self.steps) * 0.01 > longest, loop.Options(lambda: resume),
         )  # fmt: skip
         return self.steps
 
@@ -93,7 +93,7 @@ def test_a_pushed_arm_yields_to_the_push(
     lag = np.array([step.q_commanded - step.q for step in steps])
     assert np.percentile(np.abs(lag), 95) < 0.05
     # left behind, the arm stands
-    sleep(0.3)
+    sleep(0.6)
     log = arm.stop()
     assert np.abs(np.diff(log[-100:, 1:], axis=0)).max() < 1e-9
 
@@ -180,6 +180,6 @@ def test_an_arm_whose_machine_pauses_in_motion_ends_at_rest(
             steps = run.until(done, 20)
             assert steps[-1].mode is Mode.HOLD
         pause.join()
-    sleep(0.4)
+    sleep(0.8)
     log = arm.stop()
     assert np.abs(np.diff(log[-20:, 1:], axis=0)).max() < 1e-9

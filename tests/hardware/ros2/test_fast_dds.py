@@ -149,5 +149,5 @@ def test_a_range_of_the_other_layout_is_not_taken_for_ours(
             assert node.wait_for(lambda: bool(subscription.unreadable), 20)
             said = subscription.unreadable
             process.communicate(timeout=30)
-        assert f"sensor_msgs/msg/Range of {distribution}: choose the distribution" in said
+        assert f"sensor_msgs/msg/Range of {distribution}: choose the sender's distribution" in said
     assert not got

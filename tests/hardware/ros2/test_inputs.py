@@ -172,7 +172,7 @@ def test_the_wrench_is_brought_to_our_sign_and_frame(sign: Sign, factor: int, fr
 def test_six_zeros_are_no_estimate_where_that_is_set(sign: Sign, zeros: Zeros, none: bool) -> None:
     taken = Wrench(ArmParams(sign, "base", zeros), Stamps())
     taken.take(wrench(1, *[0.0] * 6), 5.0, 1)
-    assert taken.heard
+    assert taken.received_any
     assert (taken.read(5.0, np.eye(3)) is None) == none
 
 
@@ -195,7 +195,7 @@ def test_a_frame_id_that_does_not_fit_the_setting_is_named(frame_id: str, frame:
     message = wrench(1, *[1.0] * 6)
     message.header.frame_id = frame_id
     taken.take(message, 5.0, 1)
-    assert bool(taken.doubt) == doubted
+    assert bool(taken.warning) == doubted
 
 
 @pytest.mark.parametrize(

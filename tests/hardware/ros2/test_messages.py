@@ -111,7 +111,7 @@ def test_a_range_of_another_layout_is_refused_and_names_the_way_out(
 ) -> None:
     theirs, ours = messages_of(sender), messages_of(receiver)
     sent = theirs.encoded(RANGE, theirs.types[RANGE](**theirs.blank(RANGE)))
-    with pytest.raises(RobotError, match=r"is no sensor_msgs/msg/Range of .*: choose the distribution"):
+    with pytest.raises(RobotError, match=r"is not a sensor_msgs/msg/Range of .*: choose the sender's distribution"):
         ours.decoded(RANGE, sent)
 
 
@@ -124,7 +124,7 @@ def test_since_iron_a_range_has_a_variance() -> None:
 def test_a_message_cut_off_is_refused(cut: int) -> None:
     messages = messages_of("jazzy")
     ours, _ = Drawn(messages, 3).pair(MARKERS)
-    with pytest.raises(RobotError, match="is no visualization_msgs/msg/MarkerArray of jazzy"):
+    with pytest.raises(RobotError, match="is not a visualization_msgs/msg/MarkerArray of jazzy"):
         messages.decoded(MARKERS, messages.encoded(MARKERS, ours)[:cut])
 
 

@@ -31,30 +31,30 @@ def joint_state(node: Ros2Node, names: list[str], stamp: int = 1) -> Any:
 def test_who_comes_late_is_told_what_was_latched_and_nothing_else(node: Ros2Node, other: Ros2Node) -> None:
     node.publisher("/latched", TEXT, latched=True, depth=1).publish(text(node, "first"))
     node.publisher("/passing", TEXT).publish(text(node, "gone"))
-    heard, came = [], Event()
+    received, came = [], Event()
 
     def take(message: Any, *_: object) -> None:
-        heard.append(message.data)
+        received.append(message.data)
         came.set()
 
     passing = other.subscribe("/passing", TEXT, take, reliable=True)
     assert other.wait_for(lambda: passing.publishers == 1, 10)
     other.subscribe("/latched", TEXT, take, reliable=True, latched=True)
     assert came.wait(10)
-    assert heard == ["first"]
+    assert received == ["first"]
 
 
 def test_a_publisher_that_comes_again_is_heard_again(node: Ros2Node, domain: int) -> None:
-    heard: list[tuple[str, int]] = []
-    node.subscribe("/again", TEXT, lambda message, _, writer: heard.append((message.data, writer)))
+    received: list[tuple[str, int]] = []
+    node.subscribe("/again", TEXT, lambda message, _, writer: received.append((message.data, writer)))
     for said in ("one", "two"):
         with Ros2Node(NodeParams(domain=domain)) as passing:
             publisher = passing.publisher("/again", TEXT)
             assert passing.wait_for(lambda publisher=publisher: publisher.subscribers == 1, 10)
             publisher.publish(text(passing, said))
-            assert node.wait_for(lambda said=said: heard[-1:] != [] and heard[-1][0] == said, 5)
-    assert [said for said, _ in heard] == ["one", "two"]
-    assert heard[0][1] != heard[1][1]
+            assert node.wait_for(lambda said=said: received[-1:] != [] and received[-1][0] == said, 5)
+    assert [said for said, _ in received] == ["one", "two"]
+    assert received[0][1] != received[1][1]
 
 
 def test_a_node_that_is_closed_is_gone_for_others(node: Ros2Node, domain: int) -> None:
@@ -82,7 +82,7 @@ def test_an_arm_that_is_not_there_is_named_with_what_there_is(
         states = other.publisher("/elsewhere", JOINT_STATE)
         assert node.wait_for(lambda: node.topics(JOINT_STATE) == ("/elsewhere",), 10)
         with pytest.raises(
-            RobotError, match=r"Nothing came on /joint_states: .* set joint_states to one of /elsewhere"
+            RobotError, match=r"Nothing was received on /joint_states: .* set joint_states to one of /elsewhere"
         ):
             robot.wait(0.0)
         states = other.publisher("/joint_states", JOINT_STATE)
@@ -91,7 +91,9 @@ def test_an_arm_that_is_not_there_is_named_with_what_there_is(
         with pytest.raises(RobotError, match=r"/joint_states has no panda_joint1: set joint_names to .* fr3_joint1"):
             robot.wait(0.5)
         states.publish(joint_state(other, list(panda_model.joints), 2))
-        with pytest.raises(RobotError, match=r"Nothing came on /wrench: .*none yet.*geometry_msgs/WrenchStamped"):
+        with pytest.raises(
+            RobotError, match=r"Nothing was received on /wrench: .*none yet.*geometry_msgs/WrenchStamped"
+        ):
             robot.wait(0.5)
         with pytest.raises(RobotError, match="one for each of panda_joint1, "):
             Ros2Robot(ArmParams("on-robot", "base", joint_names=("a",)), panda_model, node)
@@ -107,7 +109,9 @@ def test_units_that_are_not_there_are_named(node: Ros2Node, other: Ros2Node, pap
         for name in [*paper_skin.ids[1:], "stranger"]:
             given = {"header": other.messages.header((1, 0), name), "min_range": 0.04, "max_range": 4.0, "range": 0.5}
             publisher.publish(other.messages.types[RANGE](**(blank | given)))
-        with pytest.raises(HardwareError, match=rf"No reading came from {paper_skin.ids[0]} on /ranges, and stranger"):
+        with pytest.raises(
+            HardwareError, match=rf"No reading was received from {paper_skin.ids[0]} on /ranges, only from stranger"
+        ):
             units.wait(1.0)
         readings = units.read()
         assert readings.stamp[0] == -np.inf

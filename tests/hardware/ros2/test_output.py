@@ -31,23 +31,28 @@ class Listener:
     """Keeps what is published on each of the topics."""
 
     def __init__(self, node: Ros2Node) -> None:
-        self.heard: dict[str, list[Any]] = defaultdict(list)
+        self.received: dict[str, list[Any]] = defaultdict(list)
         self._node = node
         self.subscriptions = {
-            topic: node.subscribe(topic, kind, lambda message, *_, topic=topic: self.heard[topic].append(message),
+            topic: node.subscribe(topic, kind, lambda message, *_, topic=topic: self.received[topic].append(message),
                                   reliable=True, latched=topic in LATCHED)
             for topic, kind in TOPICS.items()
         }  # fmt: skip
 
     def last(self, topic: str) -> Any:
-        assert self._node.wait_for(lambda: bool(self.heard[topic]), 5), topic
-        return self.heard[topic][-1]
+        assert self._node.wait_for(lambda: bool(self.received[topic]), 5), topic
+        return self.received[topic][-1]
 
     def found(self) -> bool:
         return self._node.wait_for(lambda: all(s.publishers for s in self.subscriptions.values()), 10)
 
 
-class Course:
+def matched(node: Ros2Node) -> bool:
+    """Wait until all that a node publishes has its listener: what is sent before is lost."""
+    return node.wait_for(lambda: all(publisher.subscribers for publisher in node._publishers), 10)
+
+
+class TrajectoryRun:
     """An arm that follows its commands, whose turns are recorded."""
 
     def __init__(self, model: RobotModel, skin: Skin, node: Ros2Node, **params: Any) -> None:
@@ -69,19 +74,21 @@ def listener(other: Ros2Node) -> Listener:
 
 
 @pytest.fixture
-def course(panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener) -> Iterator[Course]:
-    course = Course(panda_model, paper_skin, node, links=True, diagnostics_hz=10.0)
+def trajectory(
+    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
+) -> Iterator[TrajectoryRun]:
+    trajectory = TrajectoryRun(panda_model, paper_skin, node, links=True, diagnostics_hz=10.0)
     assert listener.found()
-    sleep(0.1)  # until they have matched the other way too
-    yield course
-    course.output.close()
+    assert matched(node)
+    yield trajectory
+    trajectory.output.close()
 
 
 def test_a_step_is_published_by_standard_messages(
-    course: Course, listener: Listener, panda_model: RobotModel, paper_skin: Skin
+    trajectory: TrajectoryRun, listener: Listener, panda_model: RobotModel, paper_skin: Skin
 ) -> None:
     for _ in range(3):
-        cycle = course.turn((1.0, 2.0, 3.0), {0: 0.4, 2: 0.3})
+        cycle = trajectory.turn((1.0, 2.0, 3.0), {0: 0.4, 2: 0.3})
         sleep(0.05)
     step = cycle.step
     assert len(step.obstacles.unit) == 2
@@ -106,9 +113,9 @@ def test_a_step_is_published_by_standard_messages(
 
 
 def test_links_and_units_lie_where_the_model_has_them(
-    course: Course, listener: Listener, panda_model: RobotModel, paper_skin: Skin
+    trajectory: TrajectoryRun, listener: Listener, panda_model: RobotModel, paper_skin: Skin
 ) -> None:
-    cycle = course.turn()
+    cycle = trajectory.turn()
     kin = panda_model.kinematics(cycle.step.q)
     places = {t.child_frame_id: t for t in listener.last("/tf").transforms}
     for name, position, rotation in zip(panda_model.links[1:], kin.position[1:], kin.rotation[1:], strict=True):
@@ -120,56 +127,58 @@ def test_links_and_units_lie_where_the_model_has_them(
     assert [t.header.frame_id for t in units] == [unit.link for unit in paper_skin.units]
 
 
-def test_each_contact_and_each_change_of_the_mode_is_published(course: Course, listener: Listener) -> None:
+def test_each_contact_and_each_change_of_the_mode_is_published(trajectory: TrajectoryRun, listener: Listener) -> None:
     for _ in range(105):
-        course.turn()
-    cycle = course.turn((0.0, 40.0, 0.0))
+        trajectory.turn()
+    cycle = trajectory.turn((0.0, 40.0, 0.0))
     contacts = int(cycle.step.contact is not None)
     for _ in range(60):
-        contacts += course.turn((0.0, 40.0, 0.0)).step.contact is not None
+        contacts += trajectory.turn((0.0, 40.0, 0.0)).step.contact is not None
     assert contacts == 1
     assert listener.last("/pretouch/contact").wrench.force.y > 10
     modes = ["HOLD", "TRACK", "REACT"]
     assert listener._node.wait_for(
-        lambda: [m for m in modes if any(t.data.startswith(m) for t in listener.heard["/pretouch/mode"])] == modes, 5
+        lambda: [m for m in modes if any(t.data.startswith(m) for t in listener.received["/pretouch/mode"])] == modes, 5
     )
     sleep(0.1)
-    assert len(listener.heard["/pretouch/contact"]) == 1
+    assert len(listener.received["/pretouch/contact"]) == 1
 
 
-def test_a_silent_unit_is_an_error_in_the_diagnostics(course: Course, listener: Listener, paper_skin: Skin) -> None:
-    readings = course.arm.readings(silent={1: 0.5, 2: 0.2})
-    inputs, before = Inputs(course.arm.time, course.arm.robot(), readings), course.arm.state
-    course.output.record(Cycle(inputs, before, course.arm.step(), course.arm.state))
+def test_a_silent_unit_is_an_error_in_the_diagnostics(
+    trajectory: TrajectoryRun, listener: Listener, paper_skin: Skin
+) -> None:
+    readings = trajectory.arm.readings(silent={1: 0.5, 2: 0.2})
+    inputs, before = Inputs(trajectory.arm.time, trajectory.arm.robot(), readings), trajectory.arm.state
+    trajectory.output.record(Cycle(inputs, before, trajectory.arm.step(), trajectory.arm.state))
     first, *units = listener.last("/diagnostics").status
     assert first.name == "pretouch: controller"
     assert (first.level, first.message.split(":")[0]) == (1, "HOLD")
     assert [unit.level for unit in units][:4] == [0, 2, 1, 0]
     assert [unit.hardware_id for unit in units] == list(paper_skin.ids)
-    assert units[1].message == "heard 0.50 s ago"
+    assert units[1].message == "received 0.50 s ago"
 
 
 def test_steps_are_published_at_the_rate_that_was_asked_for(
     panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
 ) -> None:
-    course = Course(panda_model, paper_skin, node, rate_hz=20.0, links=True)
+    trajectory = TrajectoryRun(panda_model, paper_skin, node, rate_hz=20.0, links=True)
     assert listener.found()
     for _ in range(50):
-        course.turn()
+        trajectory.turn()
         sleep(DT)
-    course.output.close()
-    assert 5 <= len(listener.heard["/pretouch/force"]) <= 25
-    assert course.output.dropped == 0
+    trajectory.output.close()
+    assert 5 <= len(listener.received["/pretouch/force"]) <= 25
+    assert trajectory.output.dropped == 0
 
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_recording_a_step_takes_the_loop_little_time(course: Course) -> None:
+def test_recording_a_step_takes_the_loop_little_time(trajectory: TrajectoryRun) -> None:
     took = []
     for _ in range(100):
-        cycle = course.turn()
+        cycle = trajectory.turn()
         begin = perf_counter()
-        course.output.record(cycle)
+        trajectory.output.record(cycle)
         took.append(perf_counter() - begin)
         sleep(DT)
     assert np.median(took) < 0.3e-3
@@ -178,26 +187,26 @@ def test_recording_a_step_takes_the_loop_little_time(course: Course) -> None:
 def test_the_last_steps_are_published_before_the_end(
     panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
 ) -> None:
-    course = Course(panda_model, paper_skin, node, links=True)
+    trajectory = TrajectoryRun(panda_model, paper_skin, node, links=True)
     assert listener.found()
-    sleep(0.1)
-    course.turn()
-    course.output.close()
+    assert matched(node)
+    trajectory.turn()
+    trajectory.output.close()
     assert listener.last("/pretouch/mode").data.startswith("HOLD")
 
 
 def test_a_failure_of_the_publishing_thread_is_told_and_keeps_nothing_waiting(
-    course: Course, monkeypatch: pytest.MonkeyPatch
+    trajectory: TrajectoryRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
         raise ValueError("no cloud")
 
-    monkeypatch.setattr(course.output._shown, "cloud", fail)
-    assert course.output.notes == ()
-    course.turn()
-    course.output._thread.join(5)
-    assert course.output.notes == ("Control steps are not published any more: ValueError: no cloud",)
+    monkeypatch.setattr(trajectory.output._step_messages, "cloud", fail)
+    assert trajectory.output.notes == ()
+    trajectory.turn()
+    trajectory.output._thread.join(5)
+    assert trajectory.output.notes == ("Publishing control steps failed: ValueError: no cloud",)
     for _ in range(40):
-        course.turn()
-    assert course.output._queue.qsize() == 0
-    assert course.output.dropped == 0
+        trajectory.turn()
+    assert trajectory.output._queue.qsize() == 0
+    assert trajectory.output.dropped == 0

@@ -13,14 +13,16 @@ import pytest
 
 from pretouch.hardware.ros2.params import ArmParams, NodeParams
 from pretouch.robot.description import panda
+from pretouch.session.confirmations import ConfirmedRobots
 from pretouch.session.push import DIRECTIONS
-from pretouch.session.remembered import Remembered
 from pretouch.session.ros2 import identity
 from tests.hardware.ros2.processes import ArmPeer, arm_peer
 
 # two processes in real time: alone, lest another test takes the arm's time and it is rightly found not to follow
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
 LIMIT_S = 90.0
+LATE_S = 0.2
+"""How late a busy machine may hand a message on [s]."""
 # a machine that CI shares stops either process for 50 ms and more, which is rightly held against a real arm
 PROFILE = "blind:failure.state_timeout_s=1"
 
@@ -50,7 +52,7 @@ def arm(domain: int, tmp_path: Path) -> Iterator[ArmPeer]:
 
 def confirmed(domain: int, folder: Path) -> None:
     known = identity(NodeParams(domain=domain), ArmParams("by-robot", "base"))
-    Remembered(folder / "state" / "pretouch").keep(known)
+    ConfirmedRobots(folder / "state" / "pretouch").keep(known)
 
 
 def lines_until(process: subprocess.Popen[str], sign: str) -> list[str]:
@@ -94,11 +96,11 @@ def test_a_run_that_is_killed_in_motion_leaves_the_arm_at_rest(domain: int, tmp_
         run.kill()
         killed = monotonic()
         run.wait(10)
-        sleep(0.6)
+        sleep(1.0)
     log = arm.stop()
     fast, time = speeds(log), log[1:, 0]
     assert fast[time < killed][-50:].max() > 0.05  # samples, not a time: a busy machine may log none for a while
-    assert time[fast > 1e-6][-1] - killed < 0.4
+    assert time[fast > 1e-6][-1] - killed < 0.4 + LATE_S
     limits = panda().qdd_max
     qd = np.diff(log[:, 1:], axis=0) / np.diff(log[:, 0])[:, None]
     braking = slice(np.searchsorted(time, killed + 0.1), None)

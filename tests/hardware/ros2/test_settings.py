@@ -14,9 +14,9 @@ from pretouch.hardware.ros2.params import ArmParams, NodeParams, OutputParams, S
     ("make", "said"),
     [
         (lambda: ArmParams("up", "base"), "ArmParams.sign is 'up': choose one of on-robot, by-robot"),  # type: ignore[arg-type]
-        (lambda: ArmParams("on-robot", "base", joint_states="joint_states"), "give a topic's full name"),
-        (lambda: ArmParams("on-robot", "base", wrench="/a//b"), "give a topic's full name"),
-        (lambda: ArmParams("on-robot", "base", command_topic="/1st"), "give a topic's full name"),
+        (lambda: ArmParams("on-robot", "base", joint_states="joint_states"), "give the full name of a topic"),
+        (lambda: ArmParams("on-robot", "base", wrench="/a//b"), "give the full name of a topic"),
+        (lambda: ArmParams("on-robot", "base", command_topic="/1st"), "give the full name of a topic"),
         (lambda: ArmParams("on-robot", "base", joint_names=("a", "a")), "name each joint once"),
         (lambda: ArmParams("on-robot", "base", command="velocities"), "a controller that stops by itself"),
         (
@@ -27,7 +27,7 @@ from pretouch.hardware.ros2.params import ArmParams, NodeParams, OutputParams, S
         (lambda: ArmParams("on-robot", "base", settle_s=1e-6), "must be at least 0.2"),
         (lambda: ArmParams("on-robot", "base", wrench_timeout_s=1e5), "must be at most 0.5"),
         (lambda: ArmParams("on-robot", "base", ahead_s=0.1), "must be at most 0.05"),
-        (lambda: SkinParams("/skin/{unit}/range here"), "give a topic's full name"),
+        (lambda: SkinParams("/skin/{unit}/range here"), "give the full name of a topic"),
         (lambda: OutputParams(rate_hz=0.0), "must be greater than 0"),
         (lambda: NodeParams(interface="lo; rm"), "give an address or name of an interface"),
         (lambda: NodeParams(domain=233), "must be at most 232"),
@@ -96,7 +96,7 @@ def test_a_network_that_the_environment_forbids_is_refused(
 
 
 def test_an_interface_that_is_not_there_is_refused(domain: int) -> None:
-    with pytest.raises(RobotError, match="cannot be joined by the interface 'nowhere0': give the address or the name"):
+    with pytest.raises(RobotError, match="cannot be joined through the interface 'nowhere0': give the address or name"):
         Ros2Node(NodeParams(domain=domain, interface="nowhere0"))
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.control.joint_box import JointLimits, box_and_brake, joint_box
-from pretouch.hardware.ros2.trajectory import Motion, Reference, motion
+from pretouch.hardware.ros2.trajectory import Reference, StoppingTrajectory, stopping_trajectory
 from pretouch.robot.description import panda
 
 PANDA = panda()
@@ -18,16 +18,16 @@ STILL = np.zeros(7)
 velocities = st.lists(st.floats(-1, 1), min_size=7, max_size=7).map(lambda v: np.array(v) * V)
 
 
-def sampled(course: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    time = np.linspace(0, course.time[-1] + 0.01, 301)
-    q, qd = zip(*(course.at(t) for t in time), strict=True)
+def sampled(trajectory: StoppingTrajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    time = np.linspace(0, trajectory.time[-1] + 0.01, 301)
+    q, qd = zip(*(trajectory.at(t) for t in time), strict=True)
     return time, np.array(q), np.array(qd)
 
 
 @given(qd=velocities, wanted=velocities)
 def test_velocities_change_within_the_limits_and_end_at_rest(qd: np.ndarray, wanted: np.ndarray) -> None:
-    course = motion(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD)
-    time, q, v = sampled(course)
+    trajectory = stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD)
+    time, q, v = sampled(trajectory)
     assert (np.abs(np.diff(v, axis=0)) <= A * np.diff(time)[:, None] * (1 + 1e-6) + 1e-9).all()
     assert not v[-1].any()
     # positions are what the velocities add up to
@@ -36,18 +36,18 @@ def test_velocities_change_within_the_limits_and_end_at_rest(qd: np.ndarray, wan
 
 @given(qd=velocities, wanted=velocities)
 def test_each_joint_brakes_as_hard_as_it_may_once_the_velocity_was_held(qd: np.ndarray, wanted: np.ndarray) -> None:
-    course = motion(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD)
+    trajectory = stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD)
     begin = max(HOLD, PERIOD, float((np.abs(wanted - qd) / A).max()))
     for share in (0.1, 0.5, 0.9):
         t = share * np.abs(wanted) / A
         expected = np.sign(wanted) * (np.abs(wanted) - A * t)
         for j in range(7):
-            assert course.at(begin + t[j])[1][j] == pytest.approx(expected[j], abs=2e-5)
+            assert trajectory.at(begin + t[j])[1][j] == pytest.approx(expected[j], abs=2e-5)
 
 
 @given(qd=velocities, wanted=velocities)
 def test_way_points_are_in_order_and_begin_where_the_velocity_was_held(qd: np.ndarray, wanted: np.ndarray) -> None:
-    points = list(motion(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD).way_points())
+    points = list(stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD).way_points())
     times = [point.time for point in points]
     assert times[0] >= HOLD
     assert all(b - a > 0.9e-6 for a, b in pairwise(times))
@@ -79,9 +79,9 @@ def test_braking_by_itself_ends_inside_the_joint_limits_that_the_controller_kept
         now = 1.0 + k * PERIOD
         q, qd = reference.at(now)
         lower, upper = joint_box(q, qd, limits)
-        course = reference.command(np.clip(wish, lower, upper), now)
+        trajectory = reference.command(np.clip(wish, lower, upper), now)
         # should this have been the last command, the arm still stops before its limits
-        assert (np.abs(course.q) <= 0.5 + 2e-5).all()
+        assert (np.abs(trajectory.q) <= 0.5 + 2e-5).all()
 
 
 def test_a_late_command_finds_the_arm_braking_and_goes_on_from_there() -> None:
@@ -94,10 +94,10 @@ def test_a_late_command_finds_the_arm_braking_and_goes_on_from_there() -> None:
     _, braking = reference.at(late)
     assert (braking < fast).all()
     q, qd = reference.motion_at(late)
-    course = reference.command(fast, late)
-    assert course.at(0.0)[0] == pytest.approx(q)
-    assert course.at(0.0)[1] == pytest.approx(qd)
-    _, _, v = sampled(course)
+    trajectory = reference.command(fast, late)
+    assert trajectory.at(0.0)[0] == pytest.approx(q)
+    assert trajectory.at(0.0)[1] == pytest.approx(qd)
+    _, _, v = sampled(trajectory)
     assert (v <= fast + 1e-9).all()
 
 
@@ -138,7 +138,7 @@ def test_the_loops_way_to_rest_is_followed_within_the_limits() -> None:
     for k in range(120):
         q = reference.at(1.0 + k * PERIOD)[0]
         qd = np.minimum(0.9 * V, qd + A * PERIOD) if k < 40 else box_and_brake(q, qd, limits.table)[2]
-        course = reference.command(qd, 1.0 + k * PERIOD)
-        assert (np.abs(np.diff(course.qd, axis=0)) <= A * np.diff(course.time)[:, None] + 1e-4).all()
+        trajectory = reference.command(qd, 1.0 + k * PERIOD)
+        assert (np.abs(np.diff(trajectory.qd, axis=0)) <= A * np.diff(trajectory.time)[:, None] + 1e-4).all()
     assert not qd.any()
     assert reference.ends == pytest.approx(1.0 + 119 * PERIOD + HOLD)

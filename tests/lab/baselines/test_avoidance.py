@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from pretouch.control.interface import MotionRequest
 from pretouch.control.joint_box import joint_limits
 from pretouch.errors import ParameterError
-from pretouch.params import profile
 from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.profiles import profile
 from pretouch.types import Obstacles, QpOutcome, RobotState
 from pretouch_lab.baselines.ding import Ding, ding_limit, ding_rows
 from pretouch_lab.baselines.flacco import Flacco, repulsion, repulsive_velocity, slowed_joints

@@ -8,8 +8,8 @@ import pytest
 
 from pretouch.controller import STAGES, Controller
 from pretouch.errors import ExperimentError
-from pretouch.params import PROFILES, Profile, at_rate
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES, Profile, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.types import Inputs, Mode
 from pretouch_lab.benchmarks import cycle
@@ -17,7 +17,7 @@ from pretouch_lab.benchmarks.cycle import CycleRequest, measure
 from pretouch_lab.benchmarks.workload import LARGEST_SKIN, Workload
 
 # a short window, so that the arm soon moves
-SHORT = replace(PROFILES["paper"], threshold=replace(PROFILES["paper"].threshold, window_samples=10))
+SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=10))
 FAST = at_rate(SHORT, 1000.0)
 
 

@@ -6,16 +6,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from pretouch.contact.detect import Detection
-from pretouch.contact.reaction import reaction_velocity
+from pretouch.contact.decaying_velocity import reaction_velocity
+from pretouch.contact.detector import Detection
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import run
-from pretouch.params import profile
 from pretouch.perception.closest import no_obstacles
+from pretouch.profiles import profile
 from pretouch.sensing.skin import paper_skin
-from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
@@ -35,6 +34,7 @@ from pretouch_lab.benchmarks.detection.results import delays, rate, resolution
 from pretouch_lab.benchmarks.detection.stream import StreamRecorder, load_stream, save_stream
 from pretouch_lab.benchmarks.detection.tables import reached
 from pretouch_lab.benchmarks.store import read_rows, run_tasks
+from pretouch_lab.ghost import Ghost
 
 HAND = 10
 PAPER = Contender("paper", "paper", "f_base_n")
@@ -107,7 +107,7 @@ def test_the_first_motion_of_an_answer_is_with_the_push(name, closed_loop, our_l
     assert judge._towards((0.05, made.onsets()[0]), touch, stream, away) is True
     assert judge._towards((0.05, moving[0] + 1), touch, stream, made) is False, "nothing moves"
     if name == "paper":
-        push = reaction_velocity(made.force[moving[0]], profile(name).reaction.compliance_m_s_n, 0.3)
+        push = reaction_velocity(made.force[moving[0]], profile(name).react.compliance_m_s_n, 0.3)
         np.testing.assert_allclose(model().ee_jacobian(kin)[:3] @ made.motion[moving[0]], push, atol=1e-9)
 
 

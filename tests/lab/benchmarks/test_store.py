@@ -4,9 +4,9 @@ from functools import partial
 import numpy as np
 import pytest
 
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
 from pretouch.text_table import TextTable, markdown
-from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.documents import begin_mark, end_mark, put
 from pretouch_lab.benchmarks.store import Task, missing, open_bench, read_rows, run_tasks, write_arrays
 

@@ -19,7 +19,7 @@ def run(capsys, *args):
         (("reproduce", "static", "--profiles", "paper,brave"), "The profile 'brave' is unknown"),
         (("reproduce", "static", "--restrictions", "firm"), "The restriction mode 'firm' is unknown"),
         (("reproduce", "static", "--stiffness", "25,soft"), "The stiffness is 'soft': give numbers in N/m"),
-        (("reproduce", "static", "--profiles", "paper:reaction.decay=3"), "The parameter 'reaction.decay' is unknown"),
+        (("reproduce", "static", "--profiles", "paper:react.decay=3"), "The parameter 'react.decay' is unknown"),
         (("reproduce", "static", "--orientation", "up"), "The orientation 'up' is unknown: choose from free, hold"),
         (("reproduce", "static", "--seeds", "-1"), "The number of seeds is -1"),
         (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
@@ -61,7 +61,7 @@ def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
 
 
 def _row(request, out):
-    from pretouch.whole_file import write_json
+    from pretouch.atomic_write import write_json
     from pretouch_lab.campaign import trial_file
 
     cell, seed = request.tasks()[0]

@@ -14,7 +14,7 @@ def table(tmp_path_factory):
     names = ["time_s"] + [f"{what}{j}_{unit}" for what, unit in (("q", "rad"), ("qd", "rad_s"), ("tau_ext", "Nm"))
                           for j in range(1, 8)]  # fmt: skip
     place = tmp_path_factory.mktemp("free") / "free.csv"
-    columns = np.column_stack([samples.time, samples.q, samples.qd, samples.tau])
+    columns = np.column_stack([samples.stamp, samples.q, samples.qd, samples.tau])
     np.savetxt(place, columns, delimiter=",", header=",".join(names), comments="")
     return place
 
@@ -89,6 +89,6 @@ def test_a_world_has_a_folder_of_its_own_and_is_kept_out_of_the_published_tables
     assert cli.main(["bench", "both", "--world", "stress", "--readme", "README.md"]) == 2
     assert "--readme writes the published tables" in capsys.readouterr().err
     assert cli.main(["bench", "detection", "--world", "strange"]) == 2
-    assert "none of nominal, realistic, stress" in capsys.readouterr().err
+    assert "not one of nominal, realistic, stress" in capsys.readouterr().err
     assert cli.main(["reproduce", "static", "--world", "strange"]) == 2
-    assert "none of nominal, realistic, stress" in capsys.readouterr().err
+    assert "not one of nominal, realistic, stress" in capsys.readouterr().err

@@ -1,6 +1,6 @@
 """Free motion of an arm made by equations of motion, without the simulator: sines, an observer, and known errors."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -66,6 +66,6 @@ def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5, every
 
 def with_hole(samples: ArmSamples, begin: int, end: int) -> ArmSamples:
     """The samples without some."""
-    which = np.ones(len(samples.time), bool)
+    which = np.ones(len(samples.stamp), bool)
     which[begin:end] = False
-    return replace(samples, time=samples.time[which], q=samples.q[which], qd=samples.qd[which], tau=samples.tau[which])
+    return samples.at(which)

@@ -64,7 +64,7 @@ def test_the_file_sets_a_simulation_to_that_arm(found, tmp_path):
     plant.check_joints(MODEL.n, len(MODEL.links))
     own = found.fit.of_joints(found.fit.numbers)
     assert plant.offsets_nm == pytest.approx(own[:, 0], rel=1e-4)
-    assert plant.payloads_kg == pytest.approx([found.fit.numbers[-2]], rel=1e-4)
+    assert plant.payload_kg == pytest.approx(found.fit.numbers[-2], rel=1e-4)
     assert plant.friction_compensated == PLANT.friction_compensated
     assert "friction_compensated stays at 0.2" in place.read_text()
     assert len(tomllib.loads(place.read_text())["plant"]["mass_factors"]["value"]) == len(MODEL.links)
@@ -100,7 +100,7 @@ def test_samples_that_are_no_numbers_and_gaps_are_left_out_and_said(samples):
 
 
 def short(samples, count):
-    return ArmSamples(*(column[:count] for column in (samples.time, samples.q, samples.qd, samples.tau)))
+    return ArmSamples(*(column[:count] for column in (samples.stamp, samples.q, samples.qd, samples.tau)))
 
 
 @pytest.mark.parametrize(
@@ -109,10 +109,10 @@ def short(samples, count):
         (lambda s: short(s, 1000), "record 20 s or more of free motion"),
         (lambda s: replace(s, q=s.q[:1] + 0.0 * s.q), "The arm stands"),
         (lambda s: replace(s, tau=s.tau * np.nan), "no two samples with numbers"),
-        (lambda s: replace(s, time=10.0 * s.time), "The samples come at 10 Hz"),
+        (lambda s: replace(s, stamp=10.0 * s.stamp), "The samples come at 10 Hz"),
         (lambda s: replace(s, q=s.q[:, :6]), "has 6 joints and 7 torques"),
         (
-            lambda s: replace(s, tau=s.tau + 15.0 * (np.sin(np.arange(len(s.time)) / 300.0) > 0.3)[:, None]),
+            lambda s: replace(s, tau=s.tau + 15.0 * (np.sin(np.arange(len(s.stamp)) / 300.0) > 0.3)[:, None]),
             "looks like contacts",
         ),
     ],

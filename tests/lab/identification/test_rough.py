@@ -16,7 +16,7 @@ MADE = Made()
 
 
 def some(samples, which):
-    columns = (samples.time, samples.q, samples.qd, samples.tau)
+    columns = (samples.stamp, samples.q, samples.qd, samples.tau)
     return ArmSamples(*(None if column is None else column[which] for column in columns))
 
 
@@ -33,13 +33,13 @@ def encoders(samples, seed=3):
 
 def received(samples, seed=7):
     """Stamps late by up to 2 ms, one in 200 samples lost, and 60 ms of samples every five seconds."""
-    rng, count = np.random.default_rng(seed), len(samples.time)
-    rate = round(1.0 / np.diff(samples.time).mean())
+    rng, count = np.random.default_rng(seed), len(samples.stamp)
+    rate = round(1.0 / np.diff(samples.stamp).mean())
     kept = rng.random(count) > 0.005
     for begin in range(4 * rate, count, 5 * rate):
         kept[begin : begin + round(0.06 * rate)] = False
     left = some(samples, kept)
-    return replace(left, time=left.time + rng.uniform(0.0, 0.002, len(left.time)))
+    return replace(left, stamp=left.stamp + rng.uniform(0.0, 0.002, len(left.stamp)))
 
 
 def hurried(fast, seed=9):
@@ -48,7 +48,7 @@ def hurried(fast, seed=9):
     read = np.arange(0.1, 59.9, 0.01) + np.minimum(rng.exponential(0.0015, 5980), 0.009)
     age = np.clip(rng.laplace(0.006, 0.002, len(read)), 0.002, 0.012)
     state = 2 * np.round(np.maximum.accumulate(read - age) / 0.002).astype(int)
-    return replace(some(fast, state), time=read)
+    return replace(some(fast, state), stamp=read)
 
 
 ROUGH = {
@@ -101,7 +101,7 @@ def test_noise_of_positions_is_not_taken_for_noise_of_torques(fast):
 @pytest.mark.parametrize("rough", ["encoders at 100 Hz", "received at 100 Hz"])
 def test_a_path_of_sharp_corners_is_refused_with_noise_as_well(fast, rough):
     smooth = some(fast, slice(9, None, 10))
-    phase = 2 * np.pi * smooth.time / 0.6
+    phase = 2 * np.pi * smooth.stamp / 0.6
     edges = 0.06 * np.arcsin(np.sin(phase)) * 2 / np.pi  # the speed turns round by 0.8 rad/s every 0.3 s
     slope = 0.06 * 4 / 0.6 * np.sign(np.cos(phase))
     sharp = replace(smooth, q=smooth.q + edges[:, None], qd=smooth.qd + slope[:, None])

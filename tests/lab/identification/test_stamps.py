@@ -24,10 +24,10 @@ TIME = np.arange(0.0, 40.0, 0.01)
 
 def test_stamps_off_by_milliseconds_are_put_right():
     late = np.random.default_rng(2).uniform(0.0, 0.006, len(TIME))
-    given = replace(at(TIME, 1e-5), time=TIME + late)
+    given = replace(at(TIME, 1e-5), stamp=TIME + late)
     found, motions = moved(usable(given))
     # what they are off for long is of no matter: from one to the next is
-    before, after = np.diff(given.time - TIME), np.diff(found.samples.time - TIME)
+    before, after = np.diff(given.stamp - TIME), np.diff(found.samples.stamp - TIME)
     assert before.std() == pytest.approx(np.sqrt(2.0) * late.std(), rel=0.1)
     assert after[50:-50].std() < 0.1 * before.std()
     assert "Stamps are off by 2.1 ms" in " ".join(found.notes)
@@ -37,17 +37,17 @@ def test_stamps_off_by_milliseconds_are_put_right():
 @pytest.mark.parametrize("noise", [0.0, 2e-5, 1e-4, 5e-4])
 def test_noise_of_encoders_moves_no_stamp(noise):
     found, _ = moved(usable(at(TIME, noise)))
-    assert np.array_equal(found.samples.time, TIME)
+    assert np.array_equal(found.samples.stamp, TIME)
 
 
 def test_time_that_goes_slow_for_a_while_shows_in_measured_velocities():
     rng = np.random.default_rng(3)
     slow = 0.004 * np.sin(2 * np.pi * 0.8 * TIME)  # 2 % faster and slower
-    given = replace(at(TIME), time=TIME + slow + rng.uniform(0.0, 0.004, len(TIME)))
+    given = replace(at(TIME), stamp=TIME + slow + rng.uniform(0.0, 0.004, len(TIME)))
     found, motions = moved(usable(given))
-    off = given.qd - motions[0].between()(found.samples.time, 1)
+    off = given.qd - motions[0].between()(found.samples.stamp, 1)
     blind, without = moved(usable(replace(given, qd=None)))
-    worse = given.qd - without[0].between()(blind.samples.time, 1)
+    worse = given.qd - without[0].between()(blind.samples.stamp, 1)
     inner = slice(100, -100)
     assert off[inner].std() < 0.0084
     assert worse[inner].std() > 0.009
@@ -61,10 +61,10 @@ def test_the_wide_fit_is_told():
 def test_states_that_are_told_again_count_once():
     given = at(TIME)
     again = np.sort(np.append(np.arange(len(TIME)), np.arange(0, len(TIME), 10)))
-    twice = ArmSamples(*(column[again] for column in (given.time, given.q, given.qd, given.tau)))
-    twice = replace(twice, time=twice.time + 0.004 * np.append(0.0, np.diff(again) == 0))
+    twice = ArmSamples(*(column[again] for column in (given.stamp, given.q, given.qd, given.tau)))
+    twice = replace(twice, stamp=twice.stamp + 0.004 * np.append(0.0, np.diff(again) == 0))
     found = usable(twice)
-    assert found.samples.time == pytest.approx(TIME)
+    assert found.samples.stamp == pytest.approx(TIME)
     assert "400 of 4400 samples repeat the one before them" in " ".join(found.notes)
 
 
@@ -72,7 +72,7 @@ def test_states_that_are_told_again_count_once():
 def test_a_short_gap_is_bridged_and_a_long_one_parts(missing, segments):
     given = at(TIME)
     left = np.delete(np.arange(len(TIME)), np.arange(2000, 2000 + missing))
-    found = usable(ArmSamples(*(column[left] for column in (given.time, given.q, given.qd, given.tau))))
+    found = usable(ArmSamples(*(column[left] for column in (given.stamp, given.q, given.qd, given.tau))))
     assert len(found.segments) == segments
     (motion, *_), path = moved(found)[1], 0.5 * RATES * np.cos(RATES * 20.04)
     assert segments == 2 or motion.between()(20.04, 1) == pytest.approx(path, abs=1e-4)
@@ -81,4 +81,4 @@ def test_a_short_gap_is_bridged_and_a_long_one_parts(missing, segments):
 @pytest.mark.parametrize(("rate", "left"), [(250, 250), (255, 255), (500, 250), (1000, 250)])
 def test_samples_are_thinned_to_about_250_a_second(rate, left):
     found = usable(at(np.arange(30 * rate) / rate + 1e-5 * np.sin(np.arange(30 * rate))))
-    assert len(found.samples.time) == 30 * left
+    assert len(found.samples.stamp) == 30 * left

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
-from pretouch.params import PROFILES
+from pretouch.profiles import PROFILES
 from pretouch.sim.scene import Box, SceneSpec
 from pretouch.types import Mode
 from pretouch_lab.cell import Cell, Context

@@ -9,8 +9,11 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 from pretouch.errors import ExperimentError, ParameterError, PretouchError, RecordingError
-from pretouch.params import profile
+from pretouch.perception.obstacles import points_of_units
+from pretouch.profiles import profile
+from pretouch.recording.run_record import MODES, RunRecord, TrueForces
 from pretouch.sensing.skin import Skin
+from pretouch.types import Contact, Mode
 from pretouch_lab.campaign import Request, open_folder, recording_file
 from pretouch_lab.cell import Cell
 from pretouch_lab.cli import figure as cli_figure
@@ -23,30 +26,31 @@ from pretouch_lab.paper.figures.close_up import close_up_figure
 from pretouch_lab.paper.figures.force_difference import force_difference_figure
 from pretouch_lab.paper.figures.interaction import interaction_figure
 from pretouch_lab.registry import EXPERIMENTS
-from pretouch_lab.trace import Trace, sensed_points, trace_of
+from pretouch_lab.trace import trace_of
 
 S, UNITS = 400, tuple("abcdefg")
 PAPER = profile("paper")
 TOUCHED, DETECTED = slice(300, 320), 305
 
 
-def made_trace() -> Trace:
+def made_trace() -> RunRecord:
     """Four seconds at rest at y = 0.2: an object at y = 0.6 from 1 s to 2 s, and a push of 20 N along +y at 3 s."""
     zeros = np.zeros((S, 3))
     points = np.full((S, 7, 3), np.nan)
     points[100:200, 1] = [0.5, 0.6, 0.3]
     ranges = np.where(np.isfinite(points[:, :, 0]), 0.3, np.nan)
-    scale, true, detected, reacting = np.ones(S), zeros.copy(), np.zeros(S, bool), np.zeros(S, bool)
+    scale, true, reacting = np.ones(S), zeros.copy(), np.zeros(S, bool)
     scale[100:200], scale[200:250] = 0.5, 0.8
     true[TOUCHED, 1] = 20.0
-    detected[DETECTED], reacting[DETECTED:350] = True, True
+    reacting[DETECTED:350] = True
     place = np.tile([0.5, 0.2, 0.3], (S, 1))
-    return Trace(
-        time=0.01 * np.arange(S), ee_position=place, ee_velocity=zeros, path_position=place, speed_scale=scale,
-        range_distance=ranges, sensed_point=points, approach_limit=np.full(S, np.nan), force=true,
-        filtered_force=0.5 * true, upper=zeros + 8.0, lower=zeros - 9.0, mean=zeros,
-        obstacle_positive=zeros + 1.0, obstacle_negative=zeros + 2.0, true_force=true, reacting=reacting,
-        detected=detected,
+    thresholds = np.broadcast_to(np.array([8.0, -9.0, 0.0, 0.0, 1.0, 2.0])[:, None], (S, 6, 3))
+    found = Contact(np.array([0.0, 20.0, 0.0]), np.array([False, True, False]))
+    return RunRecord(
+        time=0.01 * np.arange(S), mode=np.where(reacting, MODES.index(Mode.REACT), MODES.index(Mode.TRACK)),
+        ee_position=place, ee_velocity=zeros, path_position=place, speed_scale=scale, range_distance=ranges,
+        sensed_point=points, force=true, filtered_force=0.5 * true, thresholds=thresholds, armed=np.ones(S, bool),
+        evidence=np.zeros(S), contacts=((DETECTED, found, 0.1),), truth=TrueForces(0.01 * np.arange(S), true),
     )  # fmt: skip
 
 
@@ -124,7 +128,7 @@ def test_the_interaction_shades_slowed_and_touched_spans_and_names_the_push():
 
 
 def test_the_close_up_of_a_trace_without_a_touch_shows_all_of_it():
-    trace = replace(made_trace(), true_force=np.zeros((S, 3)))
+    trace = replace(made_trace(), truth=None)
     assert close_up_figure(trace, UNITS, PAPER).axes[1].get_xlim() == (0.0, 3.99)
 
 
@@ -174,21 +178,15 @@ def step_and_trace(recorded):
     return recorded[1], trace_of(recorded[1])
 
 
-def test_a_trace_keeps_what_each_unit_showed_and_the_limit_of_the_nearest(step_and_trace):
+def test_a_record_keeps_what_each_unit_showed(step_and_trace):
     record, trace = step_and_trace
-    assert np.isfinite(trace.approach_limit).sum() > 100
     for i in range(0, len(record.steps), 20):
         step = record.steps[i]
-        np.testing.assert_array_equal(sensed_points(step), trace.sensed_point[i])
+        np.testing.assert_array_equal(points_of_units(step.obstacles, 7), trace.sensed_point[i])
         shown = np.flatnonzero(np.isfinite(trace.sensed_point[i, :, 0]))
         assert shown.tolist() == sorted(step.obstacles.unit)
         for k, unit in enumerate(step.obstacles.unit):
             np.testing.assert_array_equal(trace.sensed_point[i, unit], step.obstacles.point[k])
-        near = {
-            float(step.obstacles.body_distance[k]): h for k, h in zip(step.restricted, step.approach_limit, strict=True)
-        }
-        assert trace.approach_limit[i] == near[min(near)] if near else np.isnan(trace.approach_limit[i])
-        np.testing.assert_array_equal(trace.obstacle_positive[i], step.thresholds.obstacle_positive)
 
 
 @pytest.fixture(scope="module")
@@ -274,7 +272,7 @@ def test_a_damaged_run_is_named(tmp_path):
     (cell,) = CATALOGUE["close-up"].cells("paper")
     open_folder(Request(("static",), seeds=1), tmp_path)
     recording_file(tmp_path, cell, 0).write_bytes(b"no recording")
-    with pytest.raises(RecordingError, match="is no MCAP file"):
+    with pytest.raises(RecordingError, match="is not an MCAP file"):
         draw_figure("close-up", tmp_path, tmp_path / "x.png")
     assert not (tmp_path / "x.png").exists()
 

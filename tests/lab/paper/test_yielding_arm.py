@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
-from pretouch.params import Profile, profile
+from pretouch.params import GiveUpParams
+from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import static_path, static_scene
@@ -63,7 +64,7 @@ def test_pushed_against_a_board_it_opens_and_holds(panda_model, paper_skin):
 @pytest.mark.slow
 def test_a_board_that_stays_is_given_up(panda_model, paper_skin):
     params = profile("pretouch:restriction.mode=off")
-    params = replace(params, reaction=replace(params.reaction, give_up_contacts=2, patience_s=1.0))
+    params = replace(params, react=replace(params.react, give_up=GiveUpParams(contacts=2), patience_s=1.0))
     scene, path = static_scene("line", "+y", 25_000.0, SEED), static_path("line", "+y")
     record = play(Setup(panda_model, paper_skin, params, scene, path, SEED), lambda step, _: step.stamp > 16.0)
     assert len(record.reactions()) == 2

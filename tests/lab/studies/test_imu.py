@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.cell import Grid
 from pretouch_lab.studies import imu
 from pretouch_lab.studies.impacts.contacts import plan

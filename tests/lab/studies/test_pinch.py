@@ -27,7 +27,7 @@ def test_the_arm_says_what_it_caught_opens_and_holds(panda_model: RobotModel, pa
 
 
 def test_without_the_switch_it_is_a_push(panda_model: RobotModel, paper_skin: Skin) -> None:
-    row, _ = played(panda_model, paper_skin, "crook", "pretouch:reaction.pinches=no")
+    row, _ = played(panda_model, paper_skin, "crook", "pretouch:react.pinch=none")
     assert row["caught"]
     assert not row["recognised"]
 

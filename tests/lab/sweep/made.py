@@ -14,7 +14,7 @@ import pytest
 from pretouch.checks import Check, Checked, NonNegative
 from pretouch_lab.sweep import cluster, local
 from pretouch_lab.sweep import work as jobs
-from pretouch_lab.sweep.definition import Sweep, sweep_of
+from pretouch_lab.sweep.definition import Asked, Sweep, sweep_of
 from pretouch_lab.sweep.measures import Measure, Numbers
 from pretouch_lab.sweep.registry import MEASURES
 from pretouch_lab.sweep.run import Run, opened
@@ -67,7 +67,7 @@ def work(text: str) -> str:
 
 
 def ishigami(samples: int = 8, pause_s: str = "0", design: str = "sobol", arms: int = 1) -> Sweep:
-    return sweep_of("ishigami", X, fix={"scene.pause_s": pause_s}, design=design, samples=samples, arms=arms)
+    return sweep_of(Asked("ishigami", X, fix={"scene.pause_s": pause_s}, design=design, samples=samples, arms=arms))
 
 
 def opened_ishigami(out: Path, samples: int = 8, pause_s: str = "0") -> Run:

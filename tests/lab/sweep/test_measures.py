@@ -7,7 +7,7 @@ from pretouch.sensing.skin import paper_skin
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import static
-from pretouch_lab.sweep.definition import sensitivity, smaller, sweep_of
+from pretouch_lab.sweep.definition import Asked, sensitivity, smaller, sweep_of
 from pretouch_lab.sweep.design import points
 from pretouch_lab.sweep.registry import MEASURES, measure
 from pretouch_lab.sweep.setting import built
@@ -27,10 +27,10 @@ def test_a_cell_of_the_static_experiment_is_its_trial():
 
 
 def test_detectors_of_one_stream_are_one_job_and_other_sensing_is_another():
-    sweep = sweep_of(
+    sweep = sweep_of(Asked(
         "free-motion", {"threshold.f_base_n": "4.5,20", "sensing.rate_hz": "10,50"},
         fix={"scene.counted_s": "3", "scene.warm_up_s": "2"}, design="grid", arms=1,
-    )  # fmt: skip
+    ))  # fmt: skip
     jobs = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
     assert [len(job.cells) for job in jobs] == [2, 2]
     low, high = (row["metrics"] for row in json.loads(work(jobs[0].written())))
@@ -42,10 +42,10 @@ def test_detectors_of_one_stream_are_one_job_and_other_sensing_is_another():
 
 
 def test_contacts_are_felt_sooner_with_a_lower_threshold():
-    sweep = sweep_of(
+    sweep = sweep_of(Asked(
         "contacts", {"threshold.f_base_n": "6,30"}, fix={"scene.contacts": "4", "scene.warm_up_s": "2"}, design="grid",
         arms=1,
-    )  # fmt: skip
+    ))  # fmt: skip
     (job,) = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
     low, high = (row["metrics"] for row in json.loads(work(job.written())))
     assert low["missed"] <= high["missed"]
@@ -53,7 +53,7 @@ def test_contacts_are_felt_sooner_with_a_lower_threshold():
 
 
 def test_a_stream_that_cannot_be_recorded_fails_all_of_its_cells_with_the_reason():
-    sweep = sweep_of("free-motion", {"threshold.f_base_n": "8,9"}, design="grid", arms=1)
+    sweep = sweep_of(Asked("free-motion", {"threshold.f_base_n": "8,9"}, design="grid", arms=1))
     (job,) = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
     asked = json.loads(job.written())
     for cell in asked["cells"]:

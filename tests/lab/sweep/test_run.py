@@ -11,7 +11,7 @@ from pyarrow import parquet
 
 from pretouch.errors import ExperimentError
 from pretouch_lab.sweep import local, work
-from pretouch_lab.sweep.definition import sweep_of
+from pretouch_lab.sweep.definition import Asked, sweep_of
 from pretouch_lab.sweep.document import picture, tables, written
 from pretouch_lab.sweep.results import values_of
 from pretouch_lab.sweep.run import Where, opened, play
@@ -54,28 +54,32 @@ def test_a_sweep_that_is_done_is_not_played_again_and_more_samples_play_the_new_
     assert len(opened_ishigami(tmp_path, samples=16).wanted) == 79
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("{", "Expecting property name"),
-        ("[]", "holds no object"),
-        ('{"values": {}}', "is of another cell"),
-        ('{"values": VALUES, "seed": 1000, "seconds": 1}', "neither numbers nor a reason"),
-        ('{"values": VALUES, "seed": 1000, "seconds": 1, "metrics": {"value": "3"}}', "something else than numbers"),
-        ('{"values": VALUES, "seed": 1000, "seconds": 1, "metrics": {}}', "not hold the numbers of ishigami"),
-        ('{"values": VALUES, "seed": 1000, "metrics": {"value": 3}}', "says not how long"),
-    ],
-)
-def test_a_damaged_file_is_told_and_its_cell_played_again(tmp_path, text, words):
+DAMAGED = {
+    "{": "Expecting property name",
+    "[]": "holds no object",
+    '{"values": {}}': "is of another cell",
+    '{"values": VALUES, "seed": 1000, "seconds": 1}': "neither numbers nor a reason",
+    '{"values": VALUES, "seed": 1000, "seconds": 1, "metrics": {"value": "3"}}': "something else than numbers",
+    '{"values": VALUES, "seed": 1000, "seconds": 1, "metrics": {}}': "not hold the numbers of ishigami",
+    '{"values": VALUES, "seed": 1000, "metrics": {"value": 3}}': "says not how long",
+}
+
+
+def test_damaged_files_are_told_and_their_cells_played_again(tmp_path):
     run = opened_ishigami(tmp_path, samples=2)
-    cell, store = run.cells[0], Store(run.folder / "cells", ISHIGAMI)
-    store.keep(cell, store.answered(run.jobs[0], work.work(run.jobs[0].written()))[0][1])
-    store.file(cell.key).write_text(text.replace("VALUES", json.dumps(cell.values)))
+    store, damaged = Store(run.folder / "cells", ISHIGAMI), run.cells[: len(DAMAGED)]
+    for job in run.jobs:
+        for cell, result in store.answered(job, work.work(job.written())):
+            store.keep(cell, result)
+    for cell, text in zip(damaged, DAMAGED, strict=True):
+        store.file(cell.key).write_text(text.replace("VALUES", json.dumps(cell.values)))
     again = opened_ishigami(tmp_path, samples=2)
-    assert any(cell.key in note and words in note and "played again" in note for note in again.notes)
-    assert cell.key in {one.key for one in again.wanted}
+    for cell, words in zip(damaged, DAMAGED.values(), strict=True):
+        assert any(cell.key in note and words in note and "played again" in note for note in again.notes), words
+    assert {one.key for one in again.wanted} == {cell.key for cell in damaged}
     play(again, HERE, ignore)
-    assert json.loads(store.file(cell.key).read_text())["metrics"] == {"value": known(cell)}
+    for cell in damaged:
+        assert json.loads(store.file(cell.key).read_text())["metrics"] == {"value": known(cell)}
 
 
 @pytest.mark.parametrize(
@@ -165,11 +169,11 @@ PARENT = """
 import sys
 from pathlib import Path
 import pytest
-from pretouch_lab.sweep.definition import sweep_of
+from pretouch_lab.sweep.definition import Asked, sweep_of
 from pretouch_lab.sweep.run import Where, opened, play
 from tests.lab.sweep.made import register
 register(pytest.MonkeyPatch())
-sweep = sweep_of("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1)
+sweep = sweep_of(Asked("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1))
 play(opened(sweep, Path(sys.argv[1])), Where(1), lambda _: print("done", flush=True))
 """
 
@@ -181,7 +185,7 @@ def test_a_sweep_whose_process_is_killed_goes_on_where_it_was(tmp_path):
         for _ in range(5):
             assert process.stdout.readline() == "done\n"
         process.kill()
-    sweep = sweep_of("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1)
+    sweep = sweep_of(Asked("ishigami", {"scene.x1": "0:1", "scene.x2": "0:1"}, samples=64, arms=1))
     run = opened(sweep, tmp_path)
     assert run.notes == []  # each file is whole
     assert 5 <= len(files(run)) < 256

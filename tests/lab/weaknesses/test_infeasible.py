@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from tests.lab.width import width
 
-from pretouch.params import profile
 from pretouch.perception.closest import closest_points
+from pretouch.profiles import profile
 from pretouch.types import Obstacles
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.weaknesses import infeasible

@@ -123,7 +123,7 @@ def test_cells_are_five_lengths_and_three_decays_of_each_profile_that_senses():
     cells = release.cells(Grid(("blind", "paper")))
     assert [cell.where["held_s"] for cell in cells[::3]] == [0.3, 1.0, 2.0, 3.0, 4.0]
     assert [cell.profile for cell in cells[:3]] == [
-        "paper", "paper:reaction.decay_cycles=50", "paper:reaction.decay_cycles=25",
+        "paper", "paper:react.decay_cycles=50", "paper:react.decay_cycles=25",
     ]  # fmt: skip
     assert len({cell.name for cell in cells}) == 15
 
@@ -134,7 +134,7 @@ def cell(held, profile="paper"):
 
 @pytest.fixture(scope="module")
 def trials(context):
-    quick = cell(0.3, "paper:reaction.decay_cycles=25")
+    quick = cell(0.3, "paper:react.decay_cycles=25")
     return {c.where["held_s"]: release.trial(c, 100, context) for c in (quick, cell(4.0))}
 
 
@@ -202,7 +202,7 @@ def test_pushes_of_all_trials_are_pooled_and_echoes_counted_once_a_push():
 
 def test_the_figure_shows_a_line_for_each_decay():
     rows = [row([push_row(against_after_release=1)], held) for held in (4.0, 1.0)] + [row([], 2.0)]
-    rows.append(row([push_row()], 1.0, "paper:reaction.decay_cycles=25"))
+    rows.append(row([push_row()], 1.0, "paper:react.decay_cycles=25"))
     (picture,) = release.EXPERIMENT.draw(SimpleNamespace(summary=release.summarise(rows)))
     left = picture.figure.axes[0]
     assert [line.get_label() for line in left.lines] == ["paper, reaction of 2 s", "paper, reaction of 0.25 s"]

@@ -4,9 +4,9 @@ from tests.lab.limits import assert_within_limits
 from tests.lab.rows import made_up
 from tests.lab.width import width
 
-from pretouch.params import profile
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import expected_range, no_fixtures
+from pretouch.profiles import profile
 from pretouch.sim.scene import fixtures
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.weaknesses import views

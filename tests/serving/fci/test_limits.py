@@ -111,12 +111,12 @@ def test_thresholds_are_those_of_what_the_arm_does() -> None:
     assert behavior is not None
     contacts.behavior = behavior
     torque, force = 1.5 * np.eye(7)[2], -4.0 * np.eye(6)[0]
-    assert contacts.feel(torque, force, _ZERO) == ()
+    assert contacts.update(torque, force, _ZERO) == ()
     assert contacts.joint_contact.tolist() == [False, False, True, False, False, False, False]
     assert contacts.cartesian_contact.tolist() == [True, False, False, False, False, False]
-    assert contacts.feel(5 * torque, 5 * force, np.ones(7)) == ()
-    assert contacts.feel(2 * torque, 2 * force, _ZERO) == ("cartesian_reflex", "joint_reflex")
-    assert contacts.feel(_ZERO, np.zeros(6), _ZERO) == ()
+    assert contacts.update(5 * torque, 5 * force, np.ones(7)) == ()
+    assert contacts.update(2 * torque, 2 * force, _ZERO) == ("cartesian_reflex", "joint_reflex")
+    assert contacts.update(_ZERO, np.zeros(6), _ZERO) == ()
     assert contacts.joint_collision[2]
     contacts.forget()
     assert not contacts.joint_collision.any()

@@ -6,6 +6,7 @@ scale of each axis, and gravity in the base frame.
 
 import numpy as np
 
+from pretouch.calibration import fit
 from pretouch.calibration.link_motion import ArmMotion, LinkMotion, skew
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.params import CalibrationParams
@@ -17,11 +18,6 @@ from pretouch.types import FloatArray, IntArray
 _ACCELERATION_NOISE, _ANGULAR_VELOCITY_NOISE = 0.01, 0.001
 """Standard deviation of what the model of a moving arm does not explain [m/s^2, rad/s]: twice that of the simulated
 arm, for what is between a real arm's joint sensors and its links."""
-_TURN, _PLACE, _ACC_BIAS, _GYRO_BIAS, _CLOCK, _LAG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12, 13
-_ACC_SCALE, _GYRO_SCALE, _GRAVITY = slice(14, 17), slice(17, 20), slice(20, 23)
-_UNKNOWNS = 23
-_POSE_PRIOR = np.array([np.pi] * 3 + [0.5] * 3)
-"""Standard deviation of a pose of which nothing is known [rad, m]."""
 
 
 class Observability:
@@ -39,13 +35,8 @@ class Observability:
         """Indices of the links."""
         middle = (body.a + body.b) / 2
         self._place = {link: middle[body.link == link].mean(axis=0) for link in self.links.tolist()}
-        p = self._params
-        prior = np.concatenate([
-            _POSE_PRIOR, np.full(3, p.acceleration_bias), np.full(3, p.angular_velocity_bias),
-            [p.clock_error_s, p.delay_difference_s], np.full(6, p.scale_error),
-            np.full(2, p.gravity * np.deg2rad(p.lean_deg)), [p.gravity_error],
-        ])  # fmt: skip
-        self.prior: FloatArray = np.broadcast_to(np.diag(prior**-2.0), (len(self.links), _UNKNOWNS, _UNKNOWNS))
+        alone = np.diag(fit.prior(self._params, self._params.clock_error_s) ** -2.0)
+        self.prior: FloatArray = np.broadcast_to(alone, (len(self.links), fit.UNKNOWNS, fit.UNKNOWNS))
         """(L', 23, 23) information before the arm moves."""
 
     def of_plan(self, plan: Plan) -> FloatArray:
@@ -69,13 +60,14 @@ class Observability:
         up = self._params.gravity * motion.R_link_base[:, :, 2]
         felt = motion.a + motion.lever @ self._place[int(self.links[which])] + up
         N, eye = len(felt), np.eye(3)
-        J = np.zeros((N, 6, _UNKNOWNS))
-        for rows, v, bias, scale in ((slice(0, 3), motion.w, _GYRO_BIAS, _GYRO_SCALE),
-                                     (slice(3, 6), felt, _ACC_BIAS, _ACC_SCALE)):  # fmt: skip
-            J[:, rows, _TURN], J[:, rows, bias], J[:, rows, scale] = skew(v), eye, v[:, :, None] * eye
+        J = np.zeros((N, 6, fit.UNKNOWNS))
+        for rows, v, bias, scale in ((slice(0, 3), motion.w, fit.GYRO_BIAS, fit.GYRO_SCALE),
+                                     (slice(3, 6), felt, fit.ACC_BIAS, fit.ACC_SCALE)):  # fmt: skip
+            J[:, rows, fit.TURN], J[:, rows, bias], J[:, rows, scale] = skew(v), eye, v[:, :, None] * eye
             if N > 1:
-                J[:, rows, _CLOCK] = np.gradient(v, 1 / self._params.rate_hz, axis=0)
-        J[:, 3:, _LAG], J[:, 3:, _GRAVITY], J[:, 3:, _PLACE] = J[:, 3:, _CLOCK], motion.R_link_base, motion.lever
+                J[:, rows, fit.CLOCK] = np.gradient(v, 1 / self._params.rate_hz, axis=0)
+        J[:, 3:, fit.LAG], J[:, 3:, fit.GRAVITY] = J[:, 3:, fit.CLOCK], motion.R_link_base
+        J[:, 3:, fit.PLACE] = motion.lever
         J[:, :3] /= _ANGULAR_VELOCITY_NOISE
         J[:, 3:] /= _ACCELERATION_NOISE
         return np.einsum("nij,nik->jk", J, J, optimize=True)
@@ -88,5 +80,5 @@ class Observability:
             information: (..., 23, 23), the prior included.
         """
         covariance = np.linalg.inv(information)
-        place, turn = (np.linalg.eigvalsh(covariance[..., part, part])[..., -1] for part in (_PLACE, _TURN))
+        place, turn = (np.linalg.eigvalsh(covariance[..., part, part])[..., -1] for part in (fit.PLACE, fit.TURN))
         return np.sqrt(place), np.sqrt(turn)

@@ -32,7 +32,7 @@ class MotionLimits:
         narrowest = int(np.argmin(high - low))
         if self.q_min[narrowest] >= self.q_max[narrowest]:
             raise CalibrationError(
-                f"A margin of {params.margin_rad:g} rad at both ends leaves nothing of the range of"
+                f"A margin of {params.margin_rad:g} rad at both ends uses up the whole range of"
                 f" {model.joints[narrowest]}, {high[narrowest] - low[narrowest]:.3g} rad: choose a smaller margin_rad."
             )
         self.qd_max: FloatArray = params.speed_share * arm.qd_max
@@ -73,10 +73,10 @@ class MotionLimits:
         samples = plan.sampled(rate)
         if not np.all(self._in_range(samples.q)):
             joint = int(np.argmax(np.maximum(self.q_min - samples.q, samples.q - self.q_max).max(axis=0)))
-            return f"{self.model.joints[joint]} comes nearer to its limit than {self.params.margin_rad:g} rad"
+            return f"{self.model.joints[joint]} comes closer to its limit than {self.params.margin_rad:g} rad"
         velocity, acceleration = self.use(samples)
         if max(velocity, acceleration) > 1.0:
-            return f"it needs {max(velocity, acceleration):.2f} times the speed or acceleration that it may use"
+            return f"it needs {max(velocity, acceleration):.2f} times the allowed speed or acceleration"
         return self._too_near(samples)
 
     def _too_near(self, samples: PlanSamples) -> str | None:
@@ -87,8 +87,8 @@ class MotionLimits:
             return None
         names = [*self._pair_names, "the arm and the floor"]
         return (
-            f"{names[pair]} come within {nearest[pair]:.3f} m of each other, clearance_m asks for"
-            f" {self.params.clearance_m:g} m"
+            f"{names[pair]} come within {nearest[pair]:.3f} m of each other (clearance_m is {self.params.clearance_m:g}"
+            " m)"
         )
 
 

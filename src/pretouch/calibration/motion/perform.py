@@ -78,7 +78,7 @@ def perform(
         robot: to command, at rest at the plan's start.
         clock: ticks every `params.period_s`.
         model: of the robot.
-        plan: where to go. `approach` gives the way to its start.
+        plan: where to go. `approach` gives the motion to its start.
         params: see there.
         on_tick: called after each command with the instant of the tick [s]: to collect what the units send. An
             exception in it stops the arm too.
@@ -110,7 +110,7 @@ def _checked_start(state: RobotState, tick: float, model: RobotModel, plan: Plan
     """Return the state of an arm that is at rest at the plan's start; any other is a CalibrationError."""
     sound, wrong = sound_robot(state, model.description.qd_max)
     if sound is None:
-        raise CalibrationError(f"The robot's state cannot be used: {wrong}; check the connection.")
+        raise CalibrationError(f"The robot's state cannot be used ({wrong}): check the connection.")
     trouble = (
         _old(sound, tick, params)
         or _misshapen(state, model.n)
@@ -130,8 +130,8 @@ def _elsewhere(state: RobotState, model: RobotModel, plan: Plan, tolerance: floa
     if off[joint] <= tolerance:
         return None
     return (
-        f"The arm is not where the plan begins: {model.joints[joint]} is {off[joint]:.3f} rad off, at most"
-        f" {tolerance:g} rad is allowed; move the arm there first."
+        f"The arm is not where the plan begins: {model.joints[joint]} is {off[joint]:.3f} rad off (limit {tolerance:g}"
+        " rad): move the arm there first."
     )
 
 
@@ -159,10 +159,10 @@ def _misshapen(state: RobotState, joints: int) -> str | None:
     try:
         shape = np.asarray(state.tau_ext, dtype=np.float64).shape
     except (TypeError, ValueError):
-        return "The robot's external torques are no array of numbers: check what its driver reports."
+        return "The robot's external torques are not an array of numbers: check its driver."
     if shape == (joints,):
         return None
-    return f"The robot's external torques have the shape {shape}, not ({joints},): check what its driver reports."
+    return f"The robot's external torques have the shape {shape}, not ({joints},): check its driver."
 
 
 def _dragged(state: RobotState, model: RobotModel, tolerance: float) -> str | None:
@@ -171,7 +171,7 @@ def _dragged(state: RobotState, model: RobotModel, tolerance: float) -> str | No
     joint = int(np.argmax(off))
     if off[joint] <= tolerance:
         return None
-    return f"{model.joints[joint]} is {off[joint]:.3f} rad from where it is commanded to be: see what holds it."
+    return f"{model.joints[joint]} is {off[joint]:.3f} rad from its commanded position: check what holds it."
 
 
 class _Follower:
@@ -210,7 +210,7 @@ class _Follower:
             self._go_on(state, tick - self.begin)
             on_tick(tick)
             tick = self._clock.tick()
-        return f"The clock ticked at {tick} s: see what became of it."
+        return f"The clock ticked at {tick} s: check the clock."
 
     def _trouble(self, state: RobotState) -> str | None:
         """Say what is not as planned, or None."""
@@ -218,12 +218,12 @@ class _Follower:
         off = np.abs(state.q - self._plan.at(state.stamp - self.begin)[0])
         if off.max() > p.path_tolerance_rad:
             joint = int(np.argmax(off))
-            return f"{names[joint]} strayed {off[joint]:.3f} rad from the plan: see what held it."
+            return f"{names[joint]} strayed {off[joint]:.3f} rad from the plan: check what held it."
         torque = np.asarray(state.tau_ext, dtype=np.float64)
         pushed = np.abs(torque) / self._touch
         if not np.all(pushed <= 1.0):
             joint = int(np.argmax(pushed))
-            return f"{names[joint]} was pushed with {torque[joint]:.1f} Nm: see who or what touches the arm."
+            return f"{names[joint]} was pushed with {torque[joint]:.1f} Nm: check who or what touches the arm."
         return _dragged(state, self._model, p.path_tolerance_rad)
 
     def _keep(self, state: RobotState) -> None:

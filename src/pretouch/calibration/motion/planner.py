@@ -90,8 +90,8 @@ class _Planner:
         wanted = self._params.poses
         if len(kept) < wanted:
             raise CalibrationError(
-                f"Of {_DRAWN} postures about the start {len(kept)} can be reached, and {wanted} are asked: start where"
-                " there is more room about the arm, or ask for less clearance_m, a lower floor_m or a higher speed."
+                f"Of {_DRAWN} postures around the start only {len(kept)} can be reached, but {wanted} are needed: start"
+                " with more space around the arm, or set a smaller clearance_m, a lower floor_m or a higher speed."
             )
         self._draws = self._draws[kept]
         return drawn[kept]
@@ -128,8 +128,8 @@ class _Planner:
         wanted = min(self._params.swings, self._params.poses)
         if len(usable) < wanted:
             raise CalibrationError(
-                f"The arm has room to swing in {len(usable)} of {len(swings)} postures, and {wanted} are asked:"
-                " start where there is more room about it, or ask for less clearance_m or margin_rad."
+                f"The arm can swing in only {len(usable)} of {len(swings)} postures, but {wanted} are needed: start"
+                " with more space around it, or set a smaller clearance_m or margin_rad."
             )
         told = np.array([
             self._knowledge.of_plan(Plan(np.array([0.0, _EXPECTED_S]), postures[[i, i]], (swing,)))
@@ -170,8 +170,8 @@ class _Planner:
         swings = {stop: swing for stop, swing in made.items() if swing is not None}
         if len(swings) < len(made):
             raise CalibrationError(
-                f"Where the arm is to swing it has no room for swings of {left:g} s in {len(made) - len(swings)} of"
-                f" {len(made)} postures: ask for another variant, or for less clearance_m or margin_rad."
+                f"Swings of {left:g} s do not fit in {len(made) - len(swings)} of {len(made)} postures: choose another"
+                " variant, or set a smaller clearance_m or margin_rad."
             )
         plan = route.with_swings(swings, left)
         trouble = self._limits.broken(plan)
@@ -179,5 +179,5 @@ class _Planner:
             plan = replace(plan, swings=tuple(swing.scaled(0.97) for swing in plan.swings))
             trouble = self._limits.broken(plan)
         if trouble:
-            raise CalibrationError(f"The motion planned is none the arm may do, {trouble}: ask for another variant.")
+            raise CalibrationError(f"The planned motion is not allowed ({trouble}): choose another variant.")
         return plan

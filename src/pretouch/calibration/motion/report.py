@@ -50,9 +50,9 @@ class PlanReport:
     def __str__(self) -> str:
         ranges = ", ".join(f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", self.low, self.high, strict=True))
         lines = [
-            f"{self.duration:.0f} s, {self.standing:.0f} s of them standing; parts move at up to {self.speed:.2f} m/s.",
-            f"The arm needs the room {ranges} m (base frame); {self.nearest:.3f} m from itself, {self.floor:.3f} m from"
-            " the floor.",
+            f"{self.duration:.0f} s, {self.standing:.0f} s of them at rest; parts move at up to {self.speed:.2f} m/s.",
+            f"The arm needs the space {ranges} m (base frame) and comes within {self.nearest:.3f} m of itself and"
+            f" {self.floor:.3f} m of the floor.",
             f"{'expected sigma':18}{'position':>10}{'orientation':>14}",
         ]
         for item in self.outlook:

@@ -60,8 +60,8 @@ class Router:
         trouble = limits.broken(Plan(np.array([0.0, 1.0]), np.array([start, start])))
         if trouble:
             raise CalibrationError(
-                f"No motion can begin at {np.round(start, 3).tolist()} rad: {trouble}; move the arm to where it has"
-                " room, or ask for less."
+                f"No motion can begin at {np.round(start, 3).tolist()} rad, because {trouble}: move the arm to where it"
+                " has more space, or relax the limits."
             )
 
     def way(self, begin: FloatArray, end: FloatArray) -> float | None:

@@ -1,22 +1,24 @@
 """The answer of `pretouch skin calibrate`: a table, sentences, the skin file, and all numbers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from scipy.spatial.transform import Rotation
 
-from pretouch.calibration.result import Calibration, UnitCalibration
+from pretouch.atomic_write import write_json
+from pretouch.calibration.observability import Observability
+from pretouch.calibration.result import Calibration, Finding, Place, UnitCalibration
 from pretouch.calibration.skin_of import skin_of
-from pretouch.cli.calibrate.numbers import numbers
 from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.cli.writing import unwritable_said
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, save_skin
-from pretouch.whole_file import write_json
 
 _COLUMNS = (
     "unit", "link", "position\n[mm]", "sigma\n[mm]", "sigma\n[deg]", "clock\n[ms]", "residual\n[m/s^2]", "verdict",
@@ -91,17 +93,86 @@ def _sentences(answer: Answer) -> Iterator[str]:
 def _written(answer: Answer, outputs: Outputs) -> str:
     """Write the skin file, and say what it holds."""
     if outputs.skin is None:
-        raise CalibrationError("No skin file is asked for: give one with --out.")
+        raise CalibrationError("No skin file is written: name one with --out.")
     try:
         made = skin_of(answer.calibration, answer.model, answer.believed)
     except CalibrationError as error:
         return f"{error} {outputs.skin} is not written."
     if not made.located:
-        return f"No unit's place was found well enough: {outputs.skin} is not written."
+        return f"No unit was located well enough, so {outputs.skin} is not written."
     save_skin(made.skin, outputs.skin)
     said = [f"Skin file: {outputs.skin} has {len(made.located)} units where they were found."]
     if made.kept:
-        said.append(f"As they were before, and not calibrated: {', '.join(made.kept)}.")
+        said.append(f"Kept as before, without calibration: {', '.join(made.kept)}.")
     if made.left_out:
         said.append(f"Left out: {', '.join(made.left_out)}.")
     return " ".join(said)
+
+
+def numbers(model: RobotModel, calibration: Calibration, clock_ahead: float, notes: Sequence[str]) -> dict[str, Any]:
+    """Return all numbers of a calibration; what is not finite is None."""
+    told = {
+        "arm": model.description.name,
+        "clock_ahead_s": clock_ahead,
+        "board_misalignment_sigma_rad": calibration.orientation_floor,
+        "notes": list(notes),
+        "units": [_unit(unit) for unit in calibration.units],
+        "findings": [_finding(finding) for finding in calibration.findings],
+    }
+    plain: dict[str, Any] = _plain(told)
+    return plain
+
+
+def _unit(unit: UnitCalibration) -> dict[str, Any]:
+    return {
+        "unit": unit.id,
+        "accepted": unit.accepted,
+        "place": None if unit.place is None else _place(unit.place),
+        "observability": None if unit.observability is None else _observability(unit.observability),
+        "findings": [_finding(finding) for finding in unit.findings],
+    }
+
+
+def _place(place: Place) -> dict[str, Any]:
+    return {
+        "link": place.link,
+        "position_m": place.T_link_sensor[:3, 3],
+        "quaternion_wxyz": Rotation.from_matrix(place.T_link_sensor[:3, :3]).as_quat(canonical=True, scalar_first=True),
+        "covariance": place.covariance,
+        "position_sigma_m": place.position_sigma,
+        "orientation_sigma_rad": place.orientation_sigma,
+        "acceleration_bias_m_s2": place.acceleration_bias,
+        "angular_velocity_bias_rad_s": place.angular_velocity_bias,
+        "acceleration_scale_error": place.acceleration_scale,
+        "angular_velocity_scale_error": place.angular_velocity_scale,
+        "clock_offset_s": place.clock_offset,
+        "acceleration_residual_m_s2": place.acceleration_residual,
+        "angular_velocity_residual_rad_s": place.angular_velocity_residual,
+        "used": place.used,
+    }
+
+
+def _observability(seen: Observability) -> dict[str, Any]:
+    return {
+        "position_directions": seen.position_directions,
+        "position_sigma_m": seen.position_sigma,
+        "orientation_axes": seen.orientation_axes,
+        "orientation_sigma_rad": seen.orientation_sigma,
+        "unknown": seen.unknown,
+        "known": seen.known,
+    }
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {"kind": finding.kind, "sentence": finding.sentence, "refused": finding.refused}
+
+
+def _plain(value: Any) -> Any:
+    """Return arrays as lists, and numbers that are not finite as None."""
+    if isinstance(value, dict):
+        return {name: _plain(part) for name, part in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -21,7 +21,6 @@ from pretouch.cli.calibrate.motion import planned
 from pretouch.cli.calibrate.outputs import Outputs, check_free, same_file
 from pretouch.cli.calibrate.recording import Sources, calibrate_recording
 from pretouch.cli.calibrate.session import Session
-from pretouch.cli.ending import Terminated
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_simulate import keys_for
 from pretouch.cli.writing import check_writable
@@ -32,6 +31,7 @@ from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin
 from pretouch.serving.simulated_arm import CATCH_UP_S, SimulatedArm, SimulateOptions
+from pretouch.signals import Terminated
 
 if TYPE_CHECKING:
     from pretouch.cli.calibrate.options import Calibrate, MotionOptions
@@ -43,11 +43,11 @@ def calibrate_live(command: "Calibrate", outputs: Outputs) -> int:
     """Calibrate the units of an arm that is moved; return 1 if a unit was refused or the motion ended early, or 0."""
     if command.live.robot not in _ROBOTS:
         raise HardwareError(
-            f"The arm {command.live.robot!r} cannot be moved from here: choose {' or '.join(_ROBOTS)}, or make the"
-            " motion of --plan with a driver of your own and calibrate from its --recording."
+            f"--robot {command.live.robot!r} is not supported: choose {' or '.join(_ROBOTS)}, or run the motion of"
+            " --plan with your own driver and calibrate from its --recording."
         )
     if not outputs.skin:
-        raise CalibrationError("No skin file to write is given: name one with --out.")
+        raise CalibrationError("--out is missing: name the skin file to write.")
     if not command.live.units_host:
         raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
     place = _recording_place(command, outputs)
@@ -58,7 +58,7 @@ def calibrate_live(command: "Calibrate", outputs: Outputs) -> int:
             _ask(sum(way.duration for way in ways))
         print("Waiting for the units.", flush=True)
         session.wait_for_units()
-        print(f"All that is measured is kept in {place}. {again}", flush=True)
+        print(f"All measurements are recorded in {place}. {again}", flush=True)
         stopped = _recorded(session, ways, place, again)
     if stopped:
         return 1
@@ -67,7 +67,7 @@ def calibrate_live(command: "Calibrate", outputs: Outputs) -> int:
         return calibrate_recording(model, Sources(place, skin=skin), outputs)
     except BaseException:
         with suppress(OSError):  # the terminal may be gone
-            print(f"The calibration was not finished. What was measured is in {place}. {again}", flush=True)
+            print(f"The calibration was not finished. The measurements are in {place}. {again}", flush=True)
         raise
 
 
@@ -98,7 +98,7 @@ def _session(command: "Calibrate", model: RobotModel) -> Iterator[Session]:
 
 
 def _ways(session: Session, model: RobotModel, options: "MotionOptions") -> list[Plan]:
-    """Return the motion, with the way to its start before it if the arm is elsewhere, and print the room for both."""
+    """Return the motion, after a motion to its start if the arm is elsewhere, and print the space for both."""
     plan, params = planned(model, options)
     print(report_on(model, plan, params), flush=True)
     q = session.posture()
@@ -107,19 +107,19 @@ def _ways(session: Session, model: RobotModel, options: "MotionOptions") -> list
     way = approach(model, q, plan, params)
     room = report_on(model, way, params)
     ranges = ", ".join(f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", room.low, room.high, strict=True))
-    print(f"Before that, the way to its start takes {way.duration:.0f} s and needs the room {ranges} m.", flush=True)
+    print(f"Before that, moving to its start takes {way.duration:.0f} s and needs the space {ranges} m.", flush=True)
     return [way, plan]
 
 
 def _ask(duration: float) -> None:
     """Have a person let the arm move for a time [s]; CalibrationError if none does."""
-    print("Nobody may be within the arm's reach, and nothing in the room above, while it moves.", flush=True)
+    print("While the arm moves, nobody may be within its reach, and nothing in the space given above.", flush=True)
     try:
         answer = input(f"Let it move for {duration:.0f} s? [y/N] ")
     except EOFError:
-        raise CalibrationError("There is no terminal to ask at whether the arm may move: give --yes.") from None
+        raise CalibrationError("There is no terminal to ask for permission to move the arm: give --yes.") from None
     if answer.strip().lower() not in ("y", "yes"):
-        raise CalibrationError("The arm was not moved: answer y to let it.")
+        raise CalibrationError("The arm was not moved: answer y to allow it.")
 
 
 def _recorded(session: Session, ways: list[Plan], place: Path, again: str) -> str | None:
@@ -145,7 +145,7 @@ def _moved(session: Session, ways: list[Plan]) -> str | None:
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True)) as bar:
         for way in ways:
-            task = bar.add_task("motion" if way is ways[-1] else "way to its start", total=way.duration)
+            task = bar.add_task("motion" if way is ways[-1] else "motion to its start", total=way.duration)
             stopped = session.follow(way, partial(_progress, bar, task))
             if stopped:
                 return stopped

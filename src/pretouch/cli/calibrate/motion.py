@@ -41,4 +41,4 @@ def write_motion(command: "Calibrate") -> None:
     with unwritable_said("file", place):  # first, for nobody may read on what is printed
         plan.save(place)
     print(report_on(model, plan, params))
-    print(f"Motion: {place}. Let nobody be within the arm's reach while it is made.", flush=True)
+    print(f"Motion: {place}. Keep everybody out of the arm's reach while it runs.", flush=True)

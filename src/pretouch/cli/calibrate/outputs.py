@@ -26,7 +26,7 @@ class Outputs:
     def of(cls, command: "Calibrate") -> Self:
         """Return what is asked for.
 
-        CalibrationError or ExperimentError for what could not be written, or would take the place of another file.
+        CalibrationError or ExperimentError for what could not be written, or is also another input or output file.
         """
         made = cls(Path(command.out) if command.out else None, Path(command.json) if command.json else None)
         _check_apart(command)
@@ -42,7 +42,7 @@ class Outputs:
 def check_free(what: str, place: Path, replace: bool) -> None:
     """Raise CalibrationError for a file that is there and not to be replaced."""
     if place.is_file() and not replace:
-        raise CalibrationError(f"The {what} {place} is there already: give another name, or --replace.")
+        raise CalibrationError(f"The {what} {place} exists already: give another name, or --replace.")
 
 
 def same_file(one: Path, other: Path) -> bool:

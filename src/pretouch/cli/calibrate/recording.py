@@ -13,8 +13,8 @@ from pretouch.calibration.stamps import instants, retimed
 from pretouch.cli.calibrate.answer import Answer, give
 from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.errors import CalibrationError
-from pretouch.foreign.joints import read_joints
-from pretouch.foreign.samples import TABLES
+from pretouch.imported_data.joints import read_joints
+from pretouch.imported_data.samples import TABLES
 from pretouch.recording.calibration_data import Measured, MeasuredUnit, read_measured
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin
@@ -41,14 +41,14 @@ def calibrate_recording(model: RobotModel, sources: Sources, outputs: Outputs) -
     """Calibrate from recordings, show and write the answer; return 1 if a unit was refused, or else 0."""
     if sources.recording.suffix.lower() in TABLES:
         raise CalibrationError(
-            f"{sources.recording} is a table, and no recording of units: give that with --recording, and joint states"
-            " with --joints."
+            f"{sources.recording} is a table, not a recording of units: give the recording with --recording, and joint"
+            " states with --joints."
         )
     believed = load_skin(sources.skin, model) if sources.skin else None
     measured = read_measured(sources.recording)
     joints, notes = _joints(model, measured, sources)
     if not measured.complete:
-        notes = [f"{sources.recording} was not ended in order, or is damaged: what can be read of it is used.", *notes]
+        notes = [f"{sources.recording} is incomplete or damaged: the readable part is used.", *notes]
     data = CalibrationData(joints, _units(measured, believed))
     if not data.units:
         raise CalibrationError(
@@ -62,7 +62,7 @@ def calibrate_recording(model: RobotModel, sources: Sources, outputs: Outputs) -
         way = "ahead of" if ahead > 0 else "behind"
         notes.append(f"The clock of {sources.recording} is {abs(ahead):.3f} s {way} that of {sources.joints}.")
         if len(told_by) == 1:
-            notes.append(f"Only {told_by[0]} tells that: no other unit agrees with it, and all poses rest on it.")
+            notes.append(f"Only {told_by[0]} shows this: no other unit agrees with it, and all poses depend on it.")
     return give(Answer(model, found, believed, ahead, tuple(notes)), outputs)
 
 
@@ -72,11 +72,11 @@ def _joints(model: RobotModel, measured: Measured, sources: Sources) -> tuple[Jo
         read = read_joints(sources.joints, model, sources.topic)
         return read.trace, [f"Joint states are {read.said} of {sources.joints}.", *read.notes]
     if sources.topic:
-        raise CalibrationError("A --topic needs --joints: it is one of that file.")
+        raise CalibrationError("--topic needs --joints: it names a topic of that file.")
     if measured.joints is None:
         raise CalibrationError(
-            f"{sources.recording} has no joint states: give the file that has them with --joints, or let the arm"
-            " make the motion by --robot."
+            f"{sources.recording} has no joint states: give the file that has them with --joints, or run the motion"
+            " with --robot."
         )
     missing = [name for name in model.joints if name not in measured.joint_names]
     if missing:

@@ -57,9 +57,9 @@ class Session:
             since = now if missing else since
             if missing and now - begin > _PATIENCE_S:
                 raise HardwareError(
-                    f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not heard at"
-                    f" {self._source.address[0]}:{self._source.address[1]}: see `pretouch skin monitor`; --skin names"
-                    " the units to calibrate, if not all."
+                    f"No data from {', '.join(missing)} at"
+                    f" {self._source.address[0]}:{self._source.address[1]}: check with `pretouch skin monitor`, or name"
+                    " fewer units with --skin."
                 )
 
     def posture(self) -> FloatArray:
@@ -95,7 +95,7 @@ class Session:
     def _keep(self) -> None:
         """Record what is new."""
         if not self._source.alive:
-            raise HardwareError("The receiver of the units has ended: what it printed tells why.")
+            raise HardwareError("The receiver of the units has ended: see what it printed.")
         heard = self._source.take_samples()
         if self._recording is None:
             return

@@ -7,24 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.cli.run.asking import demand_yes, say
-from pretouch.cli.run.learnt import free_motion
-from pretouch.cli.run.moving import Way, moved
-from pretouch.cli.run.opened import Opened
-from pretouch.cli.run.parts import Parts, parts
+from pretouch.cli.run.motion import PlannedRun, execute
 from pretouch.cli.run.robots import need_extra, opened
+from pretouch.cli.run.setup import OpenedRobot, RunSetup, free_motion, run_setup
 from pretouch.cli.writing import check_writable
 from pretouch.errors import RecordingError, RobotError
 from pretouch.loop import MonotonicClock
 from pretouch.realtime import check_wishes
-from pretouch.session.announce import announcement
-from pretouch.session.finding import refusals
-from pretouch.session.preflight import PreflightParams
+from pretouch.session.confirmations import ConfirmedRobots, state_folder
+from pretouch.session.preflight import PreflightParams, refusals
 from pretouch.session.push import Direction, GuidedPush, PushParams
-from pretouch.session.remembered import Remembered, state_folder
 from pretouch.session.session import Session
-from pretouch.session.standing import Standing
-from pretouch.session.start import way_to_start
+from pretouch.session.standstill import Standstill
+from pretouch.session.start import announcement, plan_to_start
+from pretouch.session.terminal import require_yes, say
 from pretouch.signals import noted_in_motion
 
 if TYPE_CHECKING:
@@ -39,7 +35,7 @@ def run(command: "Run") -> int:
     check_wishes(command.priority, command.cpu)
     if command.record:
         _check_free(Path(command.record))
-    made = parts(command)
+    made = run_setup(command)
     need_extra(command)
     if command.robot.lockstep:
         from pretouch.cli.run.lockstep import run_lockstep
@@ -52,27 +48,27 @@ def run(command: "Run") -> int:
             last.enter_context(noted_in_motion())  # until arm and units are closed
 
 
-def _run(command: "Run", made: Parts, found: Opened, last: ExitStack) -> int:
-    """Check, ask, and let the arm move; see `moved`."""
-    remembered = Remembered(state_folder())
-    known = found.identity is not None and remembered.knows(found.identity)  # a damaged file is found out first
+def _run(command: "Run", made: RunSetup, found: OpenedRobot, last: ExitStack) -> int:
+    """Check, ask, and let the arm move; see `execute`."""
+    remembered = ConfirmedRobots(state_folder())
+    known = found.identity is not None and remembered.is_confirmed(found.identity)  # a damaged file is found out first
     controller = made.controller(np.array(found.arm.read().q))
     clock = MonotonicClock(made.profile.task.control_period_s)
-    learnt = free_motion(command.robot, controller, found.learnt_as)
+    learnt = free_motion(command.robot, controller, found.free_motion_id)
     session = Session(found.arm, found.skin, found.units, controller, made.floor, clock)
-    say(f"{found.arm.name}: checks, while it stands still and nobody touches it.")
+    say(f"{found.arm.name}: checking it; let it stand still and do not touch it.")
     rest = _checked(session, command.task.approach, found.notes())
     if known and not command.robot.confirm_push:
-        say("The force sign of this robot was confirmed before; --confirm-push does it again.")
+        say("The force sign of this robot was confirmed before; --confirm-push repeats it.")
     else:
         _confirm(session, found, rest)
         if found.identity:
             remembered.keep(found.identity)
-        say("The force sign is confirmed: force on the arm, base frame.")
-    return moved(command, session, found, _allowed(command, session, made, rest), learnt, last)
+        say("The force sign is confirmed: the robot reports the force on the arm, in the base frame.")
+    return execute(command, session, found, _confirm_motion(command, session, made, rest), learnt, last)
 
 
-def _checked(session: Session, approach: bool, notes: Sequence[str]) -> Standing:
+def _checked(session: Session, approach: bool, notes: Sequence[str]) -> Standstill:
     """Check arm and units, print what was found, and raise RobotError for what forbids a run."""
     rest, findings = session.preflight(PREFLIGHT, approach)
     for note in (*notes, *(finding.sentence for finding in findings if not finding.refused)):
@@ -84,7 +80,7 @@ def _checked(session: Session, approach: bool, notes: Sequence[str]) -> Standing
     return rest
 
 
-def _confirm(session: Session, found: Opened, rest: Standing) -> None:
+def _confirm(session: Session, found: OpenedRobot, rest: Standstill) -> None:
     """Have the force sign confirmed by guided pushes."""
 
     def ask(direction: Direction) -> None:
@@ -94,18 +90,18 @@ def _confirm(session: Session, found: Opened, rest: Standing) -> None:
     GuidedPush(session.arm, session.clock, session.controller.model, ask, say, PUSH).confirm(rest)
 
 
-def _allowed(command: "Run", session: Session, made: Parts, rest: Standing) -> Way:
+def _confirm_motion(command: "Run", session: Session, made: RunSetup, rest: Standstill) -> PlannedRun:
     """Say what the arm will do, and ask; return it if the arm may do it, and stands where it was checked."""
     approach = command.task.approach
     q = session.recheck(rest, PREFLIGHT, approach)
-    way = Way(
-        way_to_start(made.model, q, session.controller.path, made.floor) if approach else None,
+    way = PlannedRun(
+        plan_to_start(made.model, q, session.controller.path, made.floor) if approach else None,
         command.task.seconds or np.inf,
     )
     for sentence in announcement(session.controller, way.seconds, way.approach):
         say(sentence)
     if not command.yes:
-        demand_yes("Go on?", "The arm was not moved")
+        require_yes("Go on?", "The arm was not moved")
     session.recheck(rest, PREFLIGHT, approach)
     return way
 
@@ -113,11 +109,11 @@ def _allowed(command: "Run", session: Session, made: Parts, rest: Standing) -> W
 def _check_free(place: Path) -> None:
     """Raise an error where no recording can be written; a folder that is made for it is said."""
     if place.exists():
-        raise RecordingError(f"{place} is there already: give another file to --record.")
+        raise RecordingError(f"{place} exists already: give another file to --record.")
     missing = not place.parent.exists()
     check_writable("recording", place)
     if missing:
-        say(f"The folder {place.parent} was made for the recording.")
+        say(f"The folder {place.parent} was created for the recording.")
 
 
 def _vector(values: np.ndarray) -> str:

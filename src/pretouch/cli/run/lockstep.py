@@ -7,57 +7,55 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.cli.run.asking import say
-from pretouch.cli.run.learnt import free_motion
-from pretouch.cli.run.parts import Parts
+from pretouch.cli.run.setup import RunSetup, free_motion
 from pretouch.cli.skin_keys import keys_file
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.client import connect
 from pretouch.hardware.franka.collision import collision_behavior
-from pretouch.hardware.franka.lockstep import run_in_lockstep
-from pretouch.hardware.franka.lockstep_skin import LockstepSkin
-from pretouch.hardware.franka.sentences import MotionAborted
+from pretouch.hardware.franka.errors import MotionAborted
+from pretouch.hardware.franka.lockstep import LockstepSkin, run_in_lockstep
 from pretouch.hardware.keys import load_keys
-from pretouch.session.finding import refusals
-from pretouch.session.keeping import keeping
-from pretouch.session.motion import Ending, named
+from pretouch.session.motion import Ending, error_text
+from pretouch.session.preflight import refusals
+from pretouch.session.progress import ProgressReporter
+from pretouch.session.run_files import open_run_files
 from pretouch.session.session import NoUnits
 from pretouch.session.start import check_start
-from pretouch.session.watching import Watcher
+from pretouch.session.terminal import say
 from pretouch.types import ControlStep, RangeReadings
 
 if TYPE_CHECKING:
     from pretouch.cli.run.options import Run
 
 
-def run_lockstep(command: "Run", parts: Parts) -> int:
+def run_lockstep(command: "Run", setup: RunSetup) -> int:
     """Let a controller move a simulated arm that waits for it; return 1 if that ended early, or else 0.
 
     Nobody is asked anything: nothing is real.
     """
     address, seconds = command.robot.ip, command.task.seconds
-    with connect(address, command.robot.arm) as client, _units(command, parts) as readings_at:
-        client.set_collision_behavior(collision_behavior(parts.profile, parts.model))
+    with connect(address, command.robot.arm) as client, _units(command, setup) as readings_at:
+        client.set_collision_behavior(collision_behavior(setup.profile, setup.model))
         q = client.read().q
-        controller = parts.controller(q)
+        controller = setup.controller(q)
         refused = refusals(check_start(controller, q))
         if refused:
             raise RobotError(refused[0])
-        say("In lockstep nothing is checked, and no push is asked for: the arm is a simulated one.")
+        say("In lockstep the arm is simulated, so there are no checks and no guided push.")
         place, folder = Path(command.record) if command.record else None, Path(command.holds)
         name, ending = f"{command.robot.arm} at {address}, in lockstep", Ending()
         learnt = free_motion(command.robot, controller, name, remembered=False)  # runs alike are to stay alike
-        with keeping(controller, name, place, folder, say, learnt) as kept:
-            watcher = Watcher(kept.recorder, say, "", controller.limits.period)
+        with open_run_files(controller, name, place, folder, say, learnt) as kept:
+            reporter = ProgressReporter(kept.recorder, say, "", controller.limits.period)
             try:
                 until, begin = _Until(seconds), learnt.begin if learnt else None
-                run_in_lockstep(client, controller, readings_at, watcher, until, learnt=begin)
+                run_in_lockstep(client, controller, readings_at, reporter, until, learnt=begin)
             except Exception as error:
                 ending = _ended(error)
-                if not watcher.course.steps:
+                if not reporter.summary.steps:
                     raise
             finally:
-                said = (*watcher.course.sentences(controller.limits.period), *kept.close())
+                said = (*reporter.summary.sentences(controller.limits.period), *kept.close())
                 say("\n".join((*ending.sentences(), *said)))
     return int(ending.early or bool(kept.trouble))
 
@@ -65,18 +63,18 @@ def run_lockstep(command: "Run", parts: Parts) -> int:
 def _ended(error: Exception) -> Ending:
     """Return how a motion ended by an error: a connection that was lost tells nothing of the arm."""
     lost = isinstance(error, MotionAborted) and not error.errors
-    return Ending(named(error), named(error) if lost else "")
+    return Ending(error_text(error), error_text(error) if lost else "")
 
 
 @contextmanager
-def _units(command: "Run", parts: Parts) -> Iterator[Callable[[float], RangeReadings]]:
+def _units(command: "Run", setup: RunSetup) -> Iterator[Callable[[float], RangeReadings]]:
     """Hear the units in the robot's time, if there are any."""
-    if not len(parts.skin):
+    if not len(setup.skin):
         nothing = NoUnits().read()
         yield lambda _: nothing
         return
     c = command.units
-    with LockstepSkin(parts.skin, load_keys(keys_file(c.keys)), c.units_host, c.units_port, command.seed) as skin:
+    with LockstepSkin(setup.skin, load_keys(keys_file(c.keys)), c.units_host, c.units_port, command.seed) as skin:
         yield skin
 
 

@@ -16,35 +16,35 @@ class RobotOptions:
     """The arm."""
 
     robot: Literal["simulated", "franka", "ros2"] = "simulated"
-    """simulated: a rehearsal of it all, without hardware. franka: by the Franka Control Interface. ros2: by topics."""
+    """simulated: a rehearsal without hardware. franka: over the Franka Control Interface. ros2: over topics."""
     arm: Literal["panda", "fr3"] = "panda"
-    """Which arm it is."""
+    """Model of the arm."""
     ip: str = ""
     """Address of the Franka robot."""
     lockstep: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The robot is a `pretouch serve-fci --lockstep` on this machine: it waits for each command."""
     confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Ask for the guided pushes although the force sign of this robot is confirmed."""
+    """Ask for the guided pushes even if the force sign of this robot is confirmed."""
     learnt: str = ""
-    """File of the arm's free motion, to begin with and to keep it in; by default one for each robot is remembered."""
+    """File of the arm's free-motion model, loaded at the start and saved at the end; by default one file per robot."""
     learn_anew: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Begin with no free motion learnt, and keep what is learnt now in place of what was."""
+    """Start without a free-motion model, and replace the saved one by what this run learns."""
     no_learnt: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Begin with no free motion learnt, and keep none."""
+    """Start without a free-motion model, and save none."""
     recover: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """With franka: let an arm that has stopped by itself recover first, once what it touched is cleared."""
+    """With franka: first recover an arm that has stopped by itself, once it is free of what it touched."""
     ros_sign: Literal["", "on-robot", "by-robot"] = ""
-    """With ros2, required: whose force the wrench topic gives, on the robot by its environment or by the robot."""
+    """With ros2, required: whether the wrench topic gives the force on the robot or by the robot."""
     ros_frame: Literal["", "base", "ee"] = ""
     """With ros2, required: the frame of the wrench."""
     ros_command: Literal["trajectory", "velocities"] = "trajectory"
     """With ros2: short trajectories that end at rest, or velocities for a controller with a time-out."""
     ros_controller: str = ""
-    """With ros2 and velocities: name of the ros2_control controller that takes them."""
+    """With ros2 and velocities: name of the ros2_control controller that receives them."""
     ros_timeout: float = 0.0
     """With ros2 and velocities: its command time-out [s]."""
     ros_own_clock: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """With ros2: the time of ROS is not this machine's time of day, as in a simulation or on another machine."""
+    """With ros2: ROS time differs from this machine's time of day, as in a simulation or on another machine."""
     ros_joint_states: str = "/joint_states"
     """With ros2: topic of the joint states."""
     ros_joints: tuple[str, ...] = ()
@@ -56,7 +56,7 @@ class RobotOptions:
     ros_ranges: str = "/skin/{unit}/range"
     """With ros2: topic of the units' ranges; {unit} stands for the id of each."""
     ros_distribution: Literal["foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical"] = "jazzy"
-    """With ros2: the distribution, which decides the layout of ranges."""
+    """With ros2: the distribution, which determines the layout of ranges."""
     ros_domain: int = -1
     """With ros2: the domain; by default that of ROS_DOMAIN_ID."""
     ros_interface: str = "127.0.0.1"
@@ -70,13 +70,13 @@ class SkinOptions:
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
     no_skin: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """The arm carries no units. The profile must be one that uses none, as blind."""
+    """The arm carries no units. The profile must not need any, such as blind."""
     keys: str = ""
     """File of the units' keys; a simulated arm needs none."""
     units_host: str = HOST
-    """Address at which units are heard; real ones need 0.0.0.0, which is every address of this machine."""
+    """Address to receive units at; real ones need 0.0.0.0, which is every address of this machine."""
     units_port: int = PORT
-    """UDP port at which units are heard."""
+    """UDP port to receive units at."""
 
 
 @dataclass(frozen=True)
@@ -84,19 +84,19 @@ class TaskOptions:
     """What the arm does."""
 
     path: Literal["circle", "line", "hold"] = "circle"
-    """circle and line: the paper's, begun where they are nearest. hold: stay where it is, and yield when touched."""
+    """circle and line: the paper's paths, started at the nearest point. hold: stay in place, and yield when touched."""
     center: tuple[float, float, float] = (0.5, 0.0, 0.25)
-    """Center of the circle [m], base frame."""
+    """Centre of the circle [m], base frame."""
     radius: float = 0.25
     """Radius of the circle [m]."""
     profile: str = "pretouch"
     """Parameters of the controller, or PROFILE:GROUP.FIELD=VALUE."""
     seconds: float = 0.0
-    """How long [s]; 0: until it is stopped."""
+    """Duration [s]; 0: until it is stopped."""
     approach: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """First go slowly to where the path begins."""
+    """First move slowly to the start of the path."""
     floor: float | None = None
-    """Height of what is below the arm, base frame [m]; by default 0, where its base stands, and -0.2 in simulation."""
+    """Height of the floor below the arm, base frame [m]; by default 0, level with its base, and -0.2 in simulation."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +116,9 @@ class Run:
     priority: int | None = None
     """Real-time priority of the control loop, 1 to 99; by default the process keeps its own."""
     cpu: int | None = None
-    """Number of the processor it stays on; by default the system decides."""
+    """Processor to run on; by default the system decides."""
     seed: int = 0
-    """Decides all that is random in a simulation."""
+    """Seed of everything that is random in a simulation."""
     yes: bool = False
     """Do not ask before the arm moves."""
 
@@ -131,22 +131,22 @@ class Run:
 
 
 def check_options(command: Run) -> None:
-    """Raise an error for options that do not go together."""
+    """Raise an error for options that cannot be combined."""
     robot, units, kind = command.robot, command.units, command.robot.robot
     if kind == "franka" and not robot.ip:
-        raise RobotError("No address of the robot is given: name it with --ip.")
+        raise RobotError("The robot's address is missing: give it with --ip.")
     odd = [_flag(name) for other, names in _ONLY.items() if other != kind for name in names if _given(robot, name)]
     if odd:
         raise RobotError(f"{', '.join(odd)} {'does' if len(odd) == 1 else 'do'} not go with --robot {kind}.")
     if kind == "ros2" and not (robot.ros_sign and robot.ros_frame):
         raise RobotError(
-            "With --robot ros2 both --ros-sign and --ros-frame must be given: ROS 2 says of no wrench whose force it"
-            " is; see the documentation of your robot's driver."
+            "--robot ros2 needs both --ros-sign and --ros-frame, because a ROS 2 wrench does not say whose force it is:"
+            " see the documentation of your robot's driver."
         )
     if kind == "ros2" and command.task.approach:
         raise RobotError(
-            "--approach does not go with --robot ros2, which tells no joint torques that could stop the arm on the way:"
-            " guide it to the start of its path."
+            "--approach does not go with --robot ros2, which has no joint torques that could stop the arm on the way:"
+            " guide it by hand to the start of its path."
         )
     if units.no_skin and (units.skin or units.keys):
         raise HardwareError("--no-skin does not go with --skin and --keys: leave one or the other out.")
@@ -170,8 +170,8 @@ def _check_lockstep(command: Run) -> None:
         here = False
     if not here:
         raise RobotError(
-            f"--lockstep is for a simulated arm on this machine, as 127.0.0.1, and the arm is at {command.robot.ip}:"
-            " leave it out."
+            "--lockstep is for a simulated arm on this machine (such as 127.0.0.1), but the arm is at"
+            f" {command.robot.ip}: leave it out."
         )
     if not command.task.seconds:
         raise RobotError("A run in lockstep needs --seconds: robot time passes as fast as this machine can.")

@@ -4,13 +4,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from pretouch.cli.run.opened import Opened, network_units
-from pretouch.cli.run.parts import Parts
+from pretouch.cli.run.setup import OpenedRobot, RunSetup, network_units
 from pretouch.extras import ROS2
 from pretouch.hardware.address import HOST
 from pretouch.hardware.franka.client import need_library
 from pretouch.robot.model import RobotModel
 from pretouch.session.session import NoUnits
+
+if TYPE_CHECKING:
+    from pretouch.cli.run.options import Run
+
 
 if TYPE_CHECKING:
     from pretouch.cli.run.options import Run
@@ -26,37 +29,37 @@ def need_extra(command: "Run") -> None:
 
 
 @contextmanager
-def opened(command: "Run", parts: Parts) -> Iterator[Opened]:
+def opened(command: "Run", setup: RunSetup) -> Iterator[OpenedRobot]:
     """Open the arm that the command names, and hear its units."""
     match command.robot.robot:
         case "simulated":
-            way = _simulated(command, parts)
+            way = _simulated(command, setup)
         case "franka":
             from pretouch.cli.run.franka import franka
 
-            way = franka(command, parts)
+            way = franka(command, setup)
         case "ros2":
             from pretouch.cli.run.ros2 import ros2
 
-            way = ros2(command, parts)
+            way = ros2(command, setup)
     with way as found:
         yield found
 
 
 @contextmanager
-def _simulated(command: "Run", parts: Parts) -> Iterator[Opened]:
+def _simulated(command: "Run", setup: RunSetup) -> Iterator[OpenedRobot]:
     from pretouch.serving.simulated_arm import SimulateOptions
     from pretouch.serving.wire_skin import made_keys
     from pretouch.session.simulated import SimulatedSessionArm
     from pretouch.sim.scene import SceneSpec
 
-    model, keys = RobotModel(parts.model.description), made_keys(parts.skin.ids, command.seed)
-    with network_units(command, parts, keys) as units:
+    model, keys = RobotModel(setup.model.description), made_keys(setup.skin.ids, command.seed)
+    with network_units(command, setup, keys) as units:
         port = units.address[1] if units else 9
-        options = SimulateOptions(model, parts.skin, keys, HOST, port, hand=False, seed=command.seed)
-        begin = parts.simulated_start()
-        with SimulatedSessionArm(options, begin, SceneSpec(floor_height=parts.floor)) as arm:
-            yield Opened(
+        options = SimulateOptions(model, setup.skin, keys, HOST, port, hand=False, seed=command.seed)
+        begin = setup.simulated_start()
+        with SimulatedSessionArm(options, begin, SceneSpec(floor_height=setup.floor)) as arm:
+            yield OpenedRobot(
                 arm, units or NoUnits(), None, units, lambda direction: arm.push(direction.axis),
-                learnt_as=f"{arm.name}, seed {command.seed}",
+                free_motion_id=f"{arm.name}, seed {command.seed}",
             )  # fmt: skip

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
-from pretouch.cli.run.opened import Opened
-from pretouch.cli.run.parts import Parts
+from pretouch.cli.run.setup import OpenedRobot, RunSetup
 from pretouch.errors import HardwareError
 from pretouch.hardware.ros2.params import ArmParams, Frame, NodeParams, OutputParams, Sign, SkinParams
 
@@ -16,7 +15,7 @@ _PATIENCE_S = 10.0
 
 
 @contextmanager
-def ros2(command: "Run", parts: Parts) -> Iterator[Opened]:
+def ros2(command: "Run", setup: RunSetup) -> Iterator[OpenedRobot]:
     """Join the others on ROS 2, hear arm and units, and publish each control step."""
     from pretouch.hardware.ros2.node import Ros2Node
     from pretouch.hardware.ros2.output import Ros2Output
@@ -28,17 +27,17 @@ def ros2(command: "Run", parts: Parts) -> Iterator[Opened]:
     if command.units.keys:
         raise HardwareError("--keys does not go with --robot ros2, whose units are topics: leave it out.")
     joined, arm = _params(command.robot)
-    period = parts.profile.task.control_period_s
+    period = setup.profile.task.control_period_s
     with ExitStack() as stack:
         node = stack.enter_context(Ros2Node(joined))
-        robot = stack.enter_context(Ros2Robot(arm, parts.model, node, period))
+        robot = stack.enter_context(Ros2Robot(arm, setup.model, node, period))
         robot.wait(_PATIENCE_S)
         ranges = SkinParams(command.robot.ros_ranges)
-        units = stack.enter_context(Ros2Skin(ranges, parts.skin, node)) if len(parts.skin) else None
+        units = stack.enter_context(Ros2Skin(ranges, setup.skin, node)) if len(setup.skin) else None
         if units:
             units.wait(_PATIENCE_S)
-        yield Opened(
-            Ros2SessionArm(robot, parts.model.n), units or NoUnits(), identity(joined, arm),
+        yield OpenedRobot(
+            Ros2SessionArm(robot, setup.model.n), units or NoUnits(), identity(joined, arm),
             notes=lambda: (*robot.notes, *(units.notes if units else ())),
             output=lambda controller: Ros2Output(OutputParams(), controller, node),
         )  # fmt: skip

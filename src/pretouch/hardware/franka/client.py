@@ -8,13 +8,13 @@ from typing import Literal, Protocol, Self
 
 from pretouch.errors import RobotError
 from pretouch.extras import FRANKA
+from pretouch.hardware.franka.arm_lock import ArmLock
 from pretouch.hardware.franka.collision import CollisionBehavior
-from pretouch.hardware.franka.only_one import OnlyOne
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.types import FloatArray
 
 Kind = Literal["panda", "fr3"]
-OnState = Callable[[FrankaState, float], tuple[FloatArray, bool]]
+StateCallback = Callable[[FrankaState, float], tuple[FloatArray, bool]]
 """Given a state and the robot time since the one before [s], answers with joint velocities (7,) [rad/s] and whether the
 motion is finished; it is then at rest."""
 
@@ -38,12 +38,12 @@ class Client(Protocol):
         """Wait for the next state, while no motion runs."""
         ...
 
-    def control(self, on_state: OnState) -> None:
+    def control(self, on_state: StateCallback) -> None:
         """Run a joint velocity motion, asking `on_state` for a command in each millisecond, until it is finished.
 
         The library's own rate limiter and low-pass filter are off: what `on_state` answers is what the arm gets. An
         exception of `on_state` stops the arm at once, as hard as it can, and is raised here. Raises MotionAborted
-        (`sentences`) if the arm ended the motion, and another RobotError if it is in no mode to move.
+        (`errors`) if the arm ended the motion, and another RobotError if it is in no mode to move.
         """
         ...
 
@@ -96,9 +96,9 @@ def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
     if real_time and not has_real_time_kernel():
         raise RobotError(
             "The kernel of this machine has no real-time capabilities: boot one with PREEMPT_RT, or connect without"
-            " demanding them (the arm then stops where this machine is too late 20 times in a row)."
+            " demand_real_time (the arm then stops when this machine is late 20 times in a row)."
         )
-    lock = OnlyOne(reachable(address))
+    lock = ArmLock(reachable(address))
     try:
         opened: Client = import_module(f"pretouch.hardware.franka.{kind}").open_client(address, real_time, lock)
     except BaseException:
@@ -121,11 +121,11 @@ def reachable(address: str) -> str:
         with socket.create_connection((address, PORT), ANSWER_S) as tried:
             return str(tried.getpeername()[0])
     except (socket.gaierror, UnicodeError):
-        what = "there is no machine of that name"
+        what = "there is no host of that name"
     except TimeoutError:
         what = f"nothing answers within {ANSWER_S:g} s"
     except ConnectionRefusedError:
-        what = f"nobody listens on port {PORT} there"
+        what = f"nothing listens on port {PORT} there"
     except OSError as error:
         what = f"it cannot be reached ({error.strerror})"
     raise RobotError(f"No Franka arm at {address}: {what}; check the address and the cable, and activate FCI in Desk.")

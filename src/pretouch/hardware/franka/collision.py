@@ -11,28 +11,29 @@ largest mean:
   filtered comparison, in which the force of a push still grows. For the paper's parameters that is 48 N, between the
   40 N below which a reaction comes too late and the 60 N that a hand meets at 0.3 m/s.
 
-The sequential detector has no threshold: it feels least while it has learnt nothing. The largest force on one axis that
-it may then miss at the arm's ready posture is `felt_from_n`, 38 N with the profile `pretouch`; once it has learnt, 4 to
-9 N on a simulated Panda. The arm stops by itself `upper_above_n` above that, but from `most_n` on at the latest: with
-an error of `bias_n` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm
-that is pushed yields at 0.27 m/s at least, whatever the direction, of the 0.3 m/s it may.
+The sequential test has no threshold: it is least sensitive while it has learnt nothing. The largest force on one axis
+that it may then miss at the arm's ready posture is 38 N with the profile `pretouch`; once it has learnt, 4 to 9 N on a
+simulated Panda. The arm stops by itself `upper_above_n` above that, but from `most_n` on at the latest: with an error
+of `bias_n` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm that is
+pushed yields at 0.27 m/s at least in any direction; its limit is 0.3 m/s.
 
 Joint torques are those of such a force at the end-effector with the longest lever its joint ever has, but at least the
 figures of the vendor's examples, which are above the noise of the estimate (20 20 18 18 16 14 12 Nm; libfranka,
 `examples_common.cpp`). Moments are to forces as in the same examples, 25 Nm to 20 N.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pretouch.checks import Checked, Positive
-from pretouch.contact.cues import no_cues
-from pretouch.contact.felt import sequential_init, take_sample
+from pretouch.contact.detector import Body
+from pretouch.contact.sequential_test import SequentialTest
 from pretouch.errors import ParameterError
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, Obstacles, RobotState
+from pretouch.sensing.skin import Skin
+from pretouch.types import FloatArray
 
 _VENDOR_NM = np.array([20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0])
 """Joint torques of the vendor's examples [Nm]."""
@@ -41,8 +42,6 @@ _MOMENT_M = 1.25
 _UPPER_SHARE = 1.5
 """Least ratio of an upper joint threshold to the vendor's figure."""
 _POSTURES = 1000
-_LARGEST_N, _TO_N = 1000.0, 0.1
-"""Up to which force the sequential detector is asked, and how exactly [N]."""
 
 
 @dataclass(frozen=True)
@@ -82,11 +81,10 @@ class CollisionBehavior:
 
 def largest_threshold(profile: Profile, model: RobotModel, params: CollisionParams) -> float:
     """Largest force on one axis at which our detection may still be silent [N]."""
-    if profile.detection.method == "fixed":
-        return profile.detection.force_n
-    if profile.detection.method == "sequential":
-        return felt_from_n(profile, model)
-    return profile.threshold.f_base_n + profile.threshold.f_std_n + params.bias_n
+    body = Body(model, Skin((), model), profile.task.control_period_s)
+    missed = profile.detect.largest_missed_n(body, profile.task.speed_m_s)
+    # the estimate's bias moves a threshold on the force, and is learnt by a test on torques
+    return missed if profile.detect.by_torques else missed + params.bias_n
 
 
 def collision_behavior(profile: Profile, model: RobotModel, params: CollisionParams | None = None) -> CollisionBehavior:
@@ -94,14 +92,14 @@ def collision_behavior(profile: Profile, model: RobotModel, params: CollisionPar
     given = params or CollisionParams()
     ours = largest_threshold(profile, model, given)
     lower, upper = ours + given.lower_above_n, ours + given.upper_above_n
-    if profile.detection.method == "sequential":
+    if isinstance(profile.detect, SequentialTest):
         upper = min(upper, given.most_n)
         lower = min(lower, 0.5 * (ours + upper))
         if not ours < upper:
             raise ParameterError(
-                f"The profile {profile.name} may miss {ours:.0f} N before it has learnt anything, and the arm must stop"
-                f" by itself from {given.most_n:g} N on: make its detection feel less, by smaller priors of free motion"
-                " or more detection.false_alarms_per_hour."
+                f"The profile {profile.name} may miss {ours:.0f} N before it has learnt anything, but the arm must stop"
+                f" by itself from {given.most_n:g} N on: make its detection more sensitive, by smaller priors of free"
+                " motion or more detect.false_alarms_per_hour."
             )
     levers, shape = longest_levers(model), np.array([1.0, 1.0, 1.0, _MOMENT_M, _MOMENT_M, _MOMENT_M])
     behavior = CollisionBehavior(
@@ -122,8 +120,9 @@ def check(
     lowest = float(behavior.lower_force[:3].min())
     if not lowest > ours:
         raise ParameterError(
-            f"The arm would report a contact from {lowest:g} N, but ours is felt from up to {ours:g} N: give"
-            f" CollisionBehavior.lower_force more than that, or profile {profile.name!r} a smaller threshold.f_base_n."
+            f"The arm would report a contact from {lowest:g} N on, but our detection may need up to {ours:g} N: set"
+            f" CollisionBehavior.lower_force higher than that, or give profile {profile.name!r} a smaller"
+            " detect.f_base_n."
         )
     for what, lower, upper in (
         ("force", behavior.lower_force, behavior.upper_force),
@@ -135,34 +134,6 @@ def check(
             raise ParameterError(
                 f"CollisionBehavior.upper_{what}[{i}] is {upper[i]:g}: it must be greater than the lower, {lower[i]:g}."
             )
-
-
-def felt_from_n(profile: Profile, model: RobotModel) -> float:
-    """Force on one axis [N] from which one sample is a contact to a moving arm at its ready posture that knows nothing.
-
-    Of the sequential detector itself, by bisection; infinite where it would miss any force up to `_LARGEST_N`.
-    """
-    q, speed = model.description.q_ready, np.full(model.n, profile.task.speed_m_s)
-    kin, rows, none, whole = model.kinematics(q), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64)
-    p, period, J = profile.detection, profile.task.control_period_s, model.ee_jacobian(kin)[:3]
-    fresh = sequential_init(model, p)
-    state = replace(fresh, model=replace(fresh.model, speed=speed))
-    nothing, quiet = Obstacles(whole, rows, none, rows, whole, rows, none, none), no_cues(len(model.links))
-
-    def is_felt(force: FloatArray) -> bool:
-        robot = RobotState(0.0, q, speed, q, speed, J.T @ force, None)
-        return take_sample(state, model, kin, robot, nothing, False, False, period, p, quiet)[0].evidence >= 1.0
-
-    latest = 0.0
-    for axis in np.eye(3):
-        if not is_felt(_LARGEST_N * axis):
-            return np.inf
-        low, high = 0.0, _LARGEST_N
-        while high - low > _TO_N:
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if is_felt(middle * axis) else (middle, high)
-        latest = max(latest, high)
-    return latest
 
 
 def longest_levers(model: RobotModel) -> FloatArray:

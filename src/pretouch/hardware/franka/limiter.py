@@ -18,7 +18,7 @@ _BRAKING = 0.7
 """Share of the usable acceleration that the way to rest before a position limit counts on: the rest catches up."""
 
 
-class _End(NamedTuple):
+class _RangeEnd(NamedTuple):
     """One end of a joint's range: at x before it the joint may move at -offset + sqrt(offset^2 + slope x)."""
 
     zero: float
@@ -67,8 +67,8 @@ class SetPointLimiter:
         at, now, changing = state.q_d.tolist(), state.dq_d.tolist(), state.ddq_d.tolist()
         if not all(map(math.isfinite, (*at, *now, *changing))):
             raise RobotError(
-                f"The arm says that it is to be at {at} rad, {now} rad/s and {changing} rad/s^2, which are not all"
-                " numbers: look at what it reports."
+                f"The arm reports the desired state {at} rad, {now} rad/s and {changing} rad/s^2, which is not finite:"
+                " check the arm and its library."
             )
         self.lost = self._sent is not None and self._differs(now, self._sent)
         if self._sent is None or self.lost:
@@ -84,7 +84,7 @@ class SetPointLimiter:
             self._ruckig.update(self._input, self._output)
         except RuckigError as error:
             raise RobotError(
-                f"From the arm's velocities {now} rad/s there is no way within its limits: look at what it reports."
+                f"No motion within the arm's limits starts at its velocities {now} rad/s: check what it reports."
                 f" ({str(error).strip()})"
             ) from None
         self._output.pass_to_input(self._input)
@@ -95,7 +95,9 @@ class SetPointLimiter:
         return max(abs(a - b) for a, b in zip(now, sent, strict=True)) > self._params.reseed_rad_s
 
 
-def _ends(limits: MotionLimits, margin: float, acceleration: list[float], jerk: list[float]) -> list[tuple[_End, _End]]:
+def _ends(
+    limits: MotionLimits, margin: float, acceleration: list[float], jerk: list[float]
+) -> list[tuple[_RangeEnd, _RangeEnd]]:
     """Lower and upper end of each joint's range.
 
     Braking at a with jerk j from v takes v^2 / 2a + v a / 2j: an end as of `SpeedEnvelope` with slope 2a. Along one
@@ -109,7 +111,7 @@ def _ends(limits: MotionLimits, margin: float, acceleration: list[float], jerk: 
             short = float(e.offset[i] ** 2 / e.slope[i])
             low, high = max(low, float(e.q_lower[i]) + short), min(high, float(e.q_upper[i]) - short)
             slope, offset = min(slope, float(e.slope[i])), offset + float(e.offset[i])
-        ends.append((_End(low + margin, offset, slope), _End(high - margin, offset, slope)))
+        ends.append((_RangeEnd(low + margin, offset, slope), _RangeEnd(high - margin, offset, slope)))
     return ends
 
 
@@ -117,7 +119,7 @@ def refusal(wanted: list[float], limits: MotionLimits) -> str:
     """Say what keeps a set-point [rad/s] from being one, or ''."""
     for i, (v, most) in enumerate(zip(wanted, limits.qd_max.tolist(), strict=True)):
         if not math.isfinite(v):
-            return f"joint {i + 1} was to move at {v} rad/s, which is no number"
+            return f"joint {i + 1} was to move at {v} rad/s, which is not finite"
         if abs(v) > most * _ROUNDING:
-            return f"joint {i + 1} was to move at {v:.3f} rad/s, and {most:g} rad/s is its limit"
+            return f"joint {i + 1} was to move at {v:.3f} rad/s (limit {most:g} rad/s)"
     return ""

@@ -1,6 +1,6 @@
 """Within what a Franka arm takes velocity commands, one a millisecond, and the share of it that is used."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
@@ -69,3 +69,19 @@ def motion_limits(model: RobotModel, kind: str) -> MotionLimits:
 def planned(description: RobotDescription, params: LimiterParams) -> RobotDescription:
     """Return what a controller is to know of an arm: of its accelerations, the share that is used on the way."""
     return replace(description, qdd_max=params.acceleration_share * description.qdd_max)
+
+
+@dataclass(frozen=True)
+class FrankaParams(Checked):
+    """Settings of the process that speaks with the arm."""
+
+    limiter: LimiterParams = field(default_factory=LimiterParams)
+    """The way from one set-point to the next."""
+    stale_after_s: Positive = 0.05
+    """Age at which a set-point no longer counts, and the arm is brought to rest [s]: five periods of a controller at
+    100 Hz, from which on the controller itself brakes (`FailureParams.overrun_s`)."""
+    end_after_s: Positive = 1.0
+    """Age of the newest set-point at which the motion is ended, and has to be begun anew [s]: a program that was
+    stopped for that long does not know where the arm is, nor who stands there by now."""
+    demand_real_time: bool = False
+    """Whether to refuse a kernel without real-time capabilities."""

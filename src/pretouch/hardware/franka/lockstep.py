@@ -4,6 +4,7 @@ For a simulated arm that waits for each command (`pretouch serve-fci --lockstep`
 """
 
 from collections.abc import Callable
+from typing import Self
 
 import numpy as np
 
@@ -14,11 +15,14 @@ from pretouch.hardware.franka.client import Client
 from pretouch.hardware.franka.limiter import PERIOD_S, SetPointLimiter
 from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.state import JOINTS, FrankaState, robot_state
+from pretouch.hardware.keys import Keys
+from pretouch.hardware.receiver import SkinReceiver
 from pretouch.loop import Cycle, Recorder
 from pretouch.ports import touch_of
 from pretouch.realtime import warm_up
+from pretouch.sensing.skin import Skin
 from pretouch.signals import noted
-from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings
+from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, TouchReadings
 
 _REST = [0.0] * JOINTS
 
@@ -54,12 +58,12 @@ def run_in_lockstep(
     every = round(controller.limits.period / PERIOD_S)
     if every < 1 or abs(every * PERIOD_S - controller.limits.period) > 1e-9:
         raise ParameterError(
-            f"The controller has a period of {controller.limits.period!r} s, which is no whole number of milliseconds:"
-            " params.at_rate makes a profile for another rate."
+            f"The controller has a period of {controller.limits.period!r} s, which is not a whole number of"
+            " milliseconds: params.at_rate makes a profile for another rate."
         )
     warm_up(controller, robot_state(client.read(), 0.0))
     limiter = SetPointLimiter(motion_limits(controller.model, client.kind), params or LimiterParams())
-    turning = _Turning(controller, skin_at, recorder, done, resume, every, learnt)
+    turning = _ControllerLoop(controller, skin_at, recorder, done, resume, every, learnt)
     with noted() as came:
 
         def answer(state: FrankaState, _since: float) -> tuple[FloatArray, bool]:
@@ -72,7 +76,7 @@ def run_in_lockstep(
         raise turning.error
 
 
-class _Turning:
+class _ControllerLoop:
     """The controller, turned by the arm's states."""
 
     def __init__(
@@ -117,3 +121,32 @@ class _Turning:
         self._recorder.record(Cycle(inputs, before, step, self._state))
         self._wanted = step.command.tolist()
         self.ended = self._done(step)
+
+
+class LockstepSkin:
+    """Gives the readings there are at a robot time, as `run_in_lockstep` asks for them; a context manager.
+
+    For one motion: the time of the next one is not that of the last.
+    """
+
+    def __init__(self, skin: Skin, keys: Keys, host: str, port: int, seed: int = 0) -> None:
+        """Listen for the skin's units; what the receiver draws comes from the seed, so that runs repeat."""
+        self._now = 0.0
+        draw = np.random.default_rng([seed, 8]).bytes
+        self.receiver = SkinReceiver(skin.ids, keys, host, port, clock=lambda: self._now, draw=draw)
+
+    def __call__(self, time: float) -> RangeReadings:
+        """Take in what has come by a robot time [s]; return the newest reading of each unit."""
+        self._now = time
+        self.receiver.receive()
+        return self.receiver.readings()
+
+    def touch(self) -> TouchReadings | None:
+        """Return the newest touch reading of each unit, as of the last time asked for."""
+        return self.receiver.touch()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.receiver.close()

@@ -21,19 +21,18 @@ from types import FrameType
 from pretouch.errors import PretouchError, RobotError
 from pretouch.hardware.franka.client import Client, Kind, connect
 from pretouch.hardware.franka.collision import CollisionBehavior
-from pretouch.hardware.franka.limits import MotionLimits
-from pretouch.hardware.franka.motion import Motion
-from pretouch.hardware.franka.orders import Boxes, Order, Told, Wish
-from pretouch.hardware.franka.params import FrankaParams
+from pretouch.hardware.franka.limits import FrankaParams, MotionLimits
+from pretouch.hardware.franka.mailboxes import Command, Feedback, Mailboxes, Request
+from pretouch.hardware.franka.motion import VelocityMotion
 from pretouch.hardware.franka.report import Communication
 from pretouch.realtime import real_time
 from pretouch.signals import OF_TERMINAL, leave_to_parent
 
-_TOLD_TO_END = "The process that moves the arm was told to end, so the arm was brought to rest: connect anew."
+_TERMINATED = "The process that moves the arm was told to end, so the arm was brought to rest: reconnect."
 
 
 @dataclass(frozen=True)
-class Task:
+class ProcessSettings:
     """What the process is to do."""
 
     address: str
@@ -43,85 +42,92 @@ class Task:
     params: FrankaParams
     priority: int | None
     parent: int
-    """Number of the process that gives the orders."""
+    """Number of the process that sends the commands."""
 
 
-def serve(task: Task, boxes: Boxes, started: Connection) -> None:
-    """Serve orders until told to quit or the program is gone; tell it '', or as a sentence what is wrong."""
+def serve(settings: ProcessSettings, mailboxes: Mailboxes, started: Connection) -> None:
+    """Carry out commands until told to quit or the program is gone; tell it '', or as a sentence what is wrong."""
     leave_to_parent(OF_TERMINAL)
     with ExitStack() as opened:
         try:
-            client = opened.enter_context(connect(task.address, task.kind, task.params.demand_real_time))
-            if task.behavior is not None:
-                client.set_collision_behavior(task.behavior)
-            server = ArmServer(client, task, boxes)
+            client = opened.enter_context(connect(settings.address, settings.kind, settings.params.demand_real_time))
+            if settings.behavior is not None:
+                client.set_collision_behavior(settings.behavior)
+            server = ArmServer(client, settings, mailboxes)
         except PretouchError as error:
             started.send((False, str(error)))
             return
-        missing = opened.enter_context(real_time(task.priority))
+        missing = opened.enter_context(real_time(settings.priority))
         started.send((True, " ".join(missing)))
         started.close()
         server.serve()
 
 
 class ArmServer:
-    """Turns orders into what the client does, one after the other."""
+    """Turns commands into what the client does, one after the other."""
 
-    def __init__(self, client: Client, task: Task, boxes: Boxes) -> None:
-        self._client, self._task, self._boxes = client, task, boxes
+    def __init__(self, client: Client, settings: ProcessSettings, mailboxes: Mailboxes) -> None:
+        self._client, self._settings, self._mailboxes = client, settings, mailboxes
         self._communication = Communication()
         self._answered, self._trouble = 0, ""
         self._leaving = False
         self._state, self._stamp = client.read(), time.monotonic()
-        self._tell()
+        self._send_feedback()
         signal.signal(signal.SIGTERM, self._leave)
         signal.siginterrupt(signal.SIGTERM, False)
 
     def serve(self) -> None:
-        """Do as the orders say until it is time to quit."""
+        """Carry out commands until it is time to quit."""
         while not self._is_over():
-            order = self._boxes.ordered()
-            if order.wish is Wish.QUIT:
+            command = self._mailboxes.newest_command()
+            if command.request is Request.QUIT:
                 break
-            if order.request > self._answered:
-                self._do(order)
-                self._boxes.put_report(self._communication.report())
+            if command.number > self._answered:
+                self._execute(command)
+                self._mailboxes.put_report(self._communication.report())
             try:
                 self._state, self._stamp = self._client.read(), time.monotonic()
             except RobotError as error:
                 self._trouble = self._trouble or str(error)
                 break
-            self._tell()
+            self._send_feedback()
         if self._leaving:
-            self._trouble = self._trouble or _TOLD_TO_END
-        self._tell()
+            self._trouble = self._trouble or _TERMINATED
+        self._send_feedback()
 
-    def _tell(self) -> None:
+    def _send_feedback(self) -> None:
         """Pass on the state there is while no motion runs."""
-        self._boxes.tell(Told(self._stamp, self._answered, False, self._trouble, self._state))
+        self._mailboxes.send_feedback(Feedback(self._stamp, self._answered, False, self._trouble, self._state))
 
-    def _do(self, order: Order) -> None:
+    def _execute(self, command: Command) -> None:
         self._trouble = ""
         try:
-            if order.wish is Wish.MOVE:
-                task = self._task
-                motion = Motion(
-                    order.request, task.limits, task.params, self._boxes, self._communication, self._is_over
+            if command.request is Request.MOVE:
+                settings = self._settings
+                motion = VelocityMotion(
+                    command.number,
+                    settings.limits,
+                    settings.params,
+                    self._mailboxes,
+                    self._communication,
+                    self._is_over,
                 )
                 self._client.control(motion.answer)
                 self._trouble = motion.trouble
-            elif order.wish is Wish.RECOVER:
+            elif command.request is Request.RECOVER:
                 self._client.recover()
         except RobotError as error:
             self._trouble = str(error)
-        if (told := self._boxes.told()) is not None:  # the motion's last state: there may be no other
-            self._state, self._stamp = told.state, told.stamp
+        if (
+            feedback := self._mailboxes.newest_feedback()
+        ) is not None:  # the motion's last state: there may be no other
+            self._state, self._stamp = feedback.state, feedback.stamp
         # what was asked during a motion ended it, and is not to be done at some later time
-        self._answered = self._boxes.ordered().request if order.wish is Wish.MOVE else order.request
+        self._answered = self._mailboxes.newest_command().number if command.request is Request.MOVE else command.number
 
     def _is_over(self) -> bool:
         """Whether there is nobody left to serve."""
-        return self._leaving or os.getppid() != self._task.parent
+        return self._leaving or os.getppid() != self._settings.parent
 
     def _leave(self, _number: int, _frame: FrameType | None) -> None:
         self._leaving = True

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, ClassVar, Literal, Self
 
-from pretouch.hardware.franka import sentences
-from pretouch.hardware.franka.client import OnState
+from pretouch.hardware.franka import errors
+from pretouch.hardware.franka.arm_lock import ArmLock
+from pretouch.hardware.franka.client import StateCallback
 from pretouch.hardware.franka.collision import CollisionBehavior
-from pretouch.hardware.franka.only_one import OnlyOne
 from pretouch.hardware.franka.state import FrankaState, franka_state
 from pretouch.types import FloatArray
 
@@ -28,22 +28,22 @@ class VendorClient:
     failures: ClassVar[tuple[type[Exception], ...]] = (RuntimeError,)
     """What the library raises."""
 
-    def __init__(self, address: str, real_time: bool, lock: OnlyOne) -> None:
+    def __init__(self, address: str, real_time: bool, lock: ArmLock) -> None:
         self._address, self._lock = address, lock
         wanted = self.library.RealtimeConfig
         try:
             self._robot: Any = self.library.Robot(address, wanted.kEnforce if real_time else wanted.kIgnore)
         except Exception as error:
-            sentences.unconnected(address, self.server_version, self.kind, error)
+            errors.raise_not_connected(address, self.server_version, self.kind, error)
 
     def read(self) -> FrankaState:
         """Wait for the next state."""
-        with self._asking("send its state"):
+        with self._translated_errors("send its state"):
             return franka_state(self._robot.read_once())
 
-    def control(self, on_state: OnState) -> None:
+    def control(self, on_state: StateCallback) -> None:
         """Run a joint velocity motion until `on_state` says that it is finished."""
-        sentences.check_ready(self.read(), self._address)
+        errors.check_ready(self.read(), self._address)
         raised: list[BaseException] = []
 
         def answer(raw: Any, since: Any) -> Any:
@@ -61,7 +61,7 @@ class VendorClient:
         except self.failures as error:
             if raised:
                 raise raised[0] from None
-            sentences.aborted(self._address, error)
+            errors.raise_aborted(self._address, error)
         finally:
             raised.clear()  # the exception holds this frame, and with it the motion
 
@@ -71,26 +71,26 @@ class VendorClient:
 
     def set_collision_behavior(self, behavior: CollisionBehavior) -> None:
         """Tell the arm from which forces on it reports a contact, and from which it stops."""
-        with self._asking("take the collision behaviour"):
+        with self._translated_errors("accept the collision behaviour"):
             self._robot.set_collision_behavior(*behavior.in_order())
 
     def set_load(self, mass: float, com: FloatArray, inertia: FloatArray) -> None:
         """Tell the arm what it carries."""
-        with self._asking("take the load"):
+        with self._translated_errors("accept the load"):
             self._robot.set_load(mass, com.tolist(), inertia.T.ravel().tolist())
 
     def recover(self) -> None:
         """Leave the mode "reflex", and wait for a state that says so: the answer may overtake states."""
-        with self._asking("recover"):
+        with self._translated_errors("recover"):
             self._robot.automatic_error_recovery()
         for _ in range(_STATES_AFTER):
             if (state := self.read()).mode not in _RECOVERING:
                 return
-        sentences.unrecovered(state, self._address)
+        errors.raise_not_recovered(state, self._address)
 
     def stop(self) -> None:
         """End any motion at once."""
-        with self._asking("stop"):
+        with self._translated_errors("stop"):
             self._robot.stop()
 
     def close(self) -> None:
@@ -105,9 +105,9 @@ class VendorClient:
         self.close()
 
     @contextmanager
-    def _asking(self, what: str) -> Iterator[None]:
+    def _translated_errors(self, what: str) -> Iterator[None]:
         """Turn what the library raises into a RobotError that says what the arm did not do."""
         try:
             yield
         except self.failures as error:
-            sentences.refused(self._address, what, error)
+            errors.raise_refused(self._address, what, error)

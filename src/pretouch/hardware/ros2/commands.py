@@ -13,7 +13,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 
-class Commands(Protocol):
+class CommandSender(Protocol):
     """Sends joint velocities, and reckons where the arm is asked to be."""
 
     publisher: Publisher
@@ -49,7 +49,7 @@ class Commands(Protocol):
         ...
 
 
-class Velocities:
+class VelocityCommands:
     """Sends std_msgs/Float64MultiArray. That its controller stops when none comes cannot be known."""
 
     ends = -math.inf

@@ -90,8 +90,8 @@ class Messages:
             return self._store.deserialize_cdr(data, kind)
         except Exception as error:  # any bytes may come from a network
             raise RobotError(
-                f"A message of {len(data)} bytes is no {kind} of {self.distribution}: choose the distribution that"
-                " the sender has."
+                f"A message of {len(data)} bytes is not a {kind} of {self.distribution}: choose the sender's"
+                " distribution."
             ) from error
 
     def type_hash(self, kind: str) -> str:

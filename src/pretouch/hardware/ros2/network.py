@@ -43,13 +43,13 @@ def check_range(params: NodeParams, environment: Mapping[str, str] = os.environ)
     """Refuse a network that the environment keeps ROS from using: a RobotError."""
     reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper()
     if reach == "OFF":
-        raise RobotError("ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, and nothing would be found: set it to LOCALHOST.")
+        raise RobotError("ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, so nothing would be found: set it to LOCALHOST.")
     local = reach == "LOCALHOST" or environment.get("ROS_LOCALHOST_ONLY", "") == "1"
     if local and params.interface not in _LOCAL:
         name = "ROS_AUTOMATIC_DISCOVERY_RANGE" if reach == "LOCALHOST" else "ROS_LOCALHOST_ONLY"
         raise RobotError(
-            f"{name} keeps ROS on this machine, and the interface is {params.interface!r}: unset the one, or leave the"
-            " other out."
+            f"{name} keeps ROS on this machine, but the interface is {params.interface!r}: unset {name}, or leave the"
+            " interface out."
         )
 
 
@@ -62,8 +62,8 @@ def participant(params: NodeParams) -> tuple[DomainParticipant, Domain | None]:
         return DomainParticipant(number), domain
     except DDSException as error:
         raise RobotError(
-            f"The domain {number} cannot be joined by the interface {params.interface!r}: give the address or the name"
-            f" of one that this machine has, or {LOOPBACK} ({error})."
+            f"The domain {number} cannot be joined through the interface {params.interface!r}: give the address or name"
+            f" of an interface of this machine, or {LOOPBACK} ({error})."
         ) from error
 
 

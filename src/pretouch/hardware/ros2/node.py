@@ -61,7 +61,7 @@ class Publisher:
         try:
             self._writer.write(sample)
         except DDSException as error:
-            raise RobotError(f"Nothing can be published on {self.topic}: restart the program ({error}).") from error
+            raise RobotError(f"Publishing on {self.topic} failed ({error}): restart the program.") from error
 
     def close(self) -> None:
         """Leave the topic; nothing can be published any more."""
@@ -114,8 +114,8 @@ class Subscription:
             return self._unreadable
         # cyclonedds drops what is too short for its type by itself, and only prints a line
         return (
-            f"{self.topic} is published, and nothing came that is {self.kind} of {self._messages.distribution}: choose"
-            " the distribution that the sender has."
+            f"{self.topic} is published, but no message is a {self.kind} of {self._messages.distribution}: choose the"
+            " sender's distribution."
         )
 
     @property
@@ -243,7 +243,7 @@ class Ros2Node:
                 for subscription in subscriptions:
                     subscription.take()
         except Exception as error:  # whoever reads next is told, and stops the arm
-            self.failure = f"Nothing is received from ROS 2 any more: restart ({type(error).__name__}: {error})."
+            self.failure = f"Receiving from ROS 2 failed ({type(error).__name__}: {error}): restart the program."
 
     def _discover(self) -> None:
         self._publications = {

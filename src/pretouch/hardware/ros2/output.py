@@ -9,7 +9,7 @@ from pretouch.controller import Controller
 from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, TEXT, TRANSFORMS, VECTOR, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import OutputParams
-from pretouch.hardware.ros2.shown import Shown, Stamp
+from pretouch.hardware.ros2.step_messages import Stamp, StepMessages
 from pretouch.loop import Cycle
 from pretouch.types import ControlStep, Mode
 
@@ -25,7 +25,7 @@ class Ros2Output:
     """
 
     def __init__(self, params: OutputParams, controller: Controller, node: Ros2Node) -> None:
-        self._shown = Shown(controller, node.messages, params.base_frame)
+        self._step_messages = StepMessages(controller, node.messages, params.base_frame)
         self._messages = node.messages
         self._period, self._diagnostics_period = 1 / params.rate_hz, 1 / params.diagnostics_hz
         self._next = self._next_diagnostics = 0.0
@@ -47,7 +47,7 @@ class Ros2Output:
         self._diagnostics = node.publisher("/diagnostics", DIAGNOSTICS)
         self._links = node.publisher("/tf", TRANSFORMS) if params.links else None
         units = node.publisher("/tf_static", TRANSFORMS, latched=True, depth=1)
-        units.publish(self._shown.units(_now()))
+        units.publish(self._step_messages.units(_now()))
         self._thread = Thread(target=self._work, name="ros2-output", daemon=True)
         self._thread.start()
 
@@ -88,7 +88,7 @@ class Ros2Output:
             try:
                 self._publish(*item)
             except Exception as error:  # the arm goes on: a person is told at the end
-                self.failure = f"Control steps are not published any more: {type(error).__name__}: {error}"
+                self.failure = f"Publishing control steps failed: {type(error).__name__}: {error}"
                 return
 
     def _publish(self, cycle: Cycle, at: Stamp) -> None:
@@ -97,20 +97,20 @@ class Ros2Output:
         self._published = cycle.step.mode
         if changed or now >= self._next_diagnostics:
             self._next_diagnostics = now + self._diagnostics_period
-            self._diagnostics.publish(self._shown.diagnostics(cycle, at))
+            self._diagnostics.publish(self._step_messages.diagnostics(cycle, at))
 
     def _publish_step(self, step: ControlStep, at: Stamp) -> None:
-        shown = self._shown
+        step_messages = self._step_messages
         if step.contact is not None:
-            self._contact.publish(shown.wrench(step.contact.force, at))
-        self._force.publish(shown.wrench(step.force, at))
-        self._upper.publish(shown.vector(step.thresholds.upper, at))
-        self._lower.publish(shown.vector(step.thresholds.lower, at))
-        self._cloud.publish(shown.cloud(step, at))
-        self._markers.publish(shown.markers(step, at))
+            self._contact.publish(step_messages.wrench(step.contact.force, at))
+        self._force.publish(step_messages.wrench(step.force, at))
+        self._upper.publish(step_messages.vector(step.thresholds.upper, at))
+        self._lower.publish(step_messages.vector(step.thresholds.lower, at))
+        self._cloud.publish(step_messages.cloud(step, at))
+        self._markers.publish(step_messages.markers(step, at))
         self._mode_text.publish(self._messages.make(TEXT, f"{step.mode.name}: {step.reason}"))
         if self._links is not None:
-            self._links.publish(shown.links(step, at))
+            self._links.publish(step_messages.links(step, at))
 
 
 def _now() -> Stamp:

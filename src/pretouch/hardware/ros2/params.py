@@ -101,9 +101,9 @@ class ArmParams(Checked):
     def _check_controller(self) -> None:
         if not self.controller or not 0 < self.timeout_s <= 0.5:
             raise ParameterError(
-                f"ArmParams.controller is {self.controller!r} with timeout_s {self.timeout_s:g}: velocities need the"
-                " name of a controller that stops by itself and its command time-out, at most 0.5 s, or else the arm"
-                " would go on when this program dies; otherwise use trajectory."
+                f"ArmParams.controller is {self.controller!r} with timeout_s {self.timeout_s:g}: for velocities give"
+                " the name of a controller that stops by itself and its command time-out, at most 0.5 s, or the arm"
+                " would keep moving when this program dies; otherwise use trajectory."
             )
 
     @property
@@ -157,8 +157,8 @@ def check_topic(owner: str, name: str, topic: str) -> None:
     """Refuse what ROS 2 does not take as the full name of a topic: a ParameterError."""
     if not _TOPIC.fullmatch(topic) or not topic.startswith("/"):
         raise ParameterError(
-            f"{owner}.{name} is {topic!r}: give a topic's full name, as /arm/joint_states: letters, digits and"
-            " underscores between slashes, none beginning with a digit."
+            f"{owner}.{name} is {topic!r}: give the full name of a topic, such as /arm/joint_states (letters, digits"
+            " and underscores between slashes, no part starting with a digit)."
         )
 
 

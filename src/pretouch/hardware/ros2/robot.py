@@ -7,13 +7,13 @@ from typing import Self
 import numpy as np
 
 from pretouch.errors import RobotError
-from pretouch.hardware.ros2.commands import Commands, Velocities
-from pretouch.hardware.ros2.joint_trajectories import Trajectories
+from pretouch.hardware.ros2.commands import CommandSender, VelocityCommands
 from pretouch.hardware.ros2.joints import Joints, Measured
 from pretouch.hardware.ros2.messages import JOINT_STATE, TRAJECTORY, VELOCITIES, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams
 from pretouch.hardware.ros2.stamps import Stamps
+from pretouch.hardware.ros2.trajectory_commands import TrajectoryCommands
 from pretouch.hardware.ros2.wrench import Wrench
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
@@ -35,7 +35,7 @@ class Ros2Robot:
         """Take the settings, the arm, the node, and the control period [s]."""
         if params.joint_names and len(params.joint_names) != model.n:
             raise RobotError(
-                f"joint_names has {len(params.joint_names)} names, and {model.description.name} has {model.n} joints:"
+                f"joint_names has {len(params.joint_names)} names, but {model.description.name} has {model.n} joints:"
                 f" give one for each of {', '.join(model.joints)}."
             )
         if params.hold_s < period:
@@ -46,12 +46,12 @@ class Ros2Robot:
         self._wrench = Wrench(params, Stamps(params.shared_clock))
         self._states = node.subscribe(params.joint_states, JOINT_STATE, self._joints.take)
         self._wrenches = node.subscribe(params.wrench, WRENCH, self._wrench.take)
-        self._commands: Commands = (
-            Trajectories(params, model, self._joints.names, node, period)
+        self._commands: CommandSender = (
+            TrajectoryCommands(params, model, self._joints.names, node, period)
             if params.command == "trajectory"
-            else Velocities(params, model, node)
+            else VelocityCommands(params, model, node)
         )
-        self._turn = self._turn_before = -math.inf
+        self._tick = self._tick_before = -math.inf
         self._lost = ""
 
     def wait(self, timeout: float = 5.0) -> None:
@@ -59,24 +59,24 @@ class Ros2Robot:
 
         What is not so by then is a RobotError that says what there is instead.
         """
-        if not self._node.wait_for(lambda: not (self._absent() or self._contested()), timeout):
-            raise RobotError(self._contested() or self._absent())
+        if not self._node.wait_for(lambda: not (self._missing_input() or self._conflict()), timeout):
+            raise RobotError(self._conflict() or self._missing_input())
         self._check_clock()
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
-        p, found = self.params, [self._wrench.doubt, self._states.unreadable, self._wrenches.unreadable]
+        p, found = self.params, [self._wrench.warning, self._states.unreadable, self._wrenches.unreadable]
         if self._joints.differentiated:
-            found.append(f"{p.joint_states} has no velocities: they are taken from the positions.")
+            found.append(f"{p.joint_states} has no velocities: they are computed from the positions.")
         if p.shared_clock and self._joints.newest is not None and self._joints.stamps.behind is None:
-            found.append(f"{p.joint_states} has no stamps: whether its clock is this machine's cannot be seen.")
+            found.append(f"{p.joint_states} has no stamps: whether its clock is this machine's cannot be checked.")
         if self._commands.publisher.subscribers > 1:
             found.append(f"{p.commands_on} has {self._commands.publisher.subscribers} subscribers.")
         if p.command == "velocities":
             found.append(
-                f"That {p.controller} stops by itself {p.timeout_s:g} s after the last command is taken from the"
-                " settings, and cannot be seen: should it not, the arm goes on when this program dies."
+                f"The settings say that {p.controller} stops by itself {p.timeout_s:g} s after the last command. This"
+                " cannot be checked: if it does not, the arm keeps moving when this program dies."
             )
         elif not p.shared_clock:
             found.append("Without a shared clock only joint_trajectory_controller 4.17 to 4.20 moves smoothly.")
@@ -91,7 +91,7 @@ class Ros2Robot:
     def read(self) -> RobotState:
         """Return the newest state; an arm that does not follow its commands is a RobotError, once."""
         now = monotonic()
-        self._turn_before, self._turn = self._turn, now
+        self._tick_before, self._tick = self._tick, now
         joints = self._newest()
         if not self._lost:
             try:
@@ -101,7 +101,7 @@ class Ros2Robot:
                 self._lost = str(error)
                 raise
         # a state of this turn, measured before the last command, is not moved on by the controller
-        q, qd = self._commands.at(joints, now if joints.stamp > self._turn_before else joints.stamp)
+        q, qd = self._commands.at(joints, now if joints.stamp > self._tick_before else joints.stamp)
         wrench = self._wrench.read(now, self._orientation(joints.q))
         no_torques = np.full(self._model.n, np.nan)
         return RobotState(joints.stamp, joints.q, joints.qd, q, qd, no_torques, wrench)
@@ -115,12 +115,12 @@ class Ros2Robot:
         if self._lost:
             raise RobotError(self._lost)
         if not np.isfinite(qd).all():
-            raise RobotError(f"The command holds {qd}: give finite joint velocities.")
-        now = self._turn if self._turn > -math.inf else monotonic()
+            raise RobotError(f"The command is {qd}: give finite joint velocities.")
+        now = self._tick if self._tick > -math.inf else monotonic()
         if not self._commands.begun:
             self._commands.begin(self._newest(), now)
         self._commands.send(qd, now)
-        self._turn = -math.inf
+        self._tick = -math.inf
 
     def end(self) -> None:
         """Bring the arm to rest: zeros to a controller of velocities, and the last trajectory is waited for."""
@@ -135,7 +135,7 @@ class Ros2Robot:
 
     def _newest(self) -> Measured:
         if self._joints.newest is None:
-            raise RobotError(self._absent())
+            raise RobotError(self._missing_input())
         return self._joints.newest
 
     def _orientation(self, q: FloatArray) -> FloatArray:
@@ -145,21 +145,21 @@ class Ros2Robot:
         return self._model.kinematics(q).rotation[self._model.ee]
 
     def _check_sound(self) -> None:
-        wrong = self._node.failure or self._contested()
+        wrong = self._node.failure or self._conflict()
         if wrong:
             raise RobotError(wrong)
 
-    def _contested(self) -> str:
+    def _conflict(self) -> str:
         """Say whom this program shares the arm with, or ''."""
         p = self.params
         if self._node.others(self._commands.publisher):
             return (
-                f"Another program publishes on {p.commands_on}: end it, or wait 10 s if it was killed: one alone may"
-                " command the arm."
+                f"Another program publishes on {p.commands_on}: only one program may command the arm, so end it, or"
+                " wait 10 s if it was killed."
             )
         for stamps, topic in ((self._joints.stamps, p.joint_states), (self._wrench.stamps, p.wrench)):
             if stamps.together():
-                return f"Several publishers tell of the arm on {topic}: let one alone, or give each a topic of its own."
+                return f"Several publishers send on {topic}: run only one, or give each its own topic."
         return ""
 
     def _check_clock(self) -> None:
@@ -168,34 +168,34 @@ class Ros2Robot:
         if p.shared_clock and behind is not None and abs(behind) > _SHARED_S:
             raise RobotError(
                 f"The stamps of {p.joint_states} are {behind:.3g} s behind this machine's time of day: set the clocks"
-                " by NTP, or say that they are not the same with shared_clock = false."
+                " by NTP, or set shared_clock = false."
             )
 
-    def _absent(self) -> str:
+    def _missing_input(self) -> str:
         """Say what has not come, and what there is; '' if nothing is missing."""
         p, joints = self.params, self._joints
         if joints.newest is None:
             if not joints.others:
-                return _nobody(p.joint_states, JOINT_STATE, "joint_states", self._node.topics(JOINT_STATE))
+                return _no_publisher(p.joint_states, JOINT_STATE, "joint_states", self._node.topics(JOINT_STATE))
             return (
                 f"{p.joint_states} has no {', '.join(joints.missing) or 'message with all joints'}: set joint_names to"
                 f" the arm's joints out of {', '.join(sorted(joints.others))}."
             )
-        if not self._wrench.heard:
-            return _nobody(p.wrench, WRENCH, "wrench", self._node.topics(WRENCH))
+        if not self._wrench.received_any:
+            return _no_publisher(p.wrench, WRENCH, "wrench", self._node.topics(WRENCH))
         if self._commands.publisher.subscribers:
             return ""
         kind = TRAJECTORY if p.command == "trajectory" else VELOCITIES
         there = self._node.topics(kind, subscribed=True)
         return (
-            f"Nobody takes {kind.replace('/msg/', '/')} on {p.commands_on}: activate the controller, or set"
-            f" command_topic to one of {', '.join(there) or 'those there are (none yet)'}."
+            f"Nothing subscribes to {p.commands_on} ({kind.replace('/msg/', '/')}): activate the controller, or set"
+            f" command_topic to one of {', '.join(there) or 'the topics that exist (none yet)'}."
         )
 
 
-def _nobody(topic: str, kind: str, setting: str, there: tuple[str, ...]) -> str:
-    known = ", ".join(there) or "those there are (none yet)"
+def _no_publisher(topic: str, kind: str, setting: str, there: tuple[str, ...]) -> str:
+    known = ", ".join(there) or "the topics that exist (none yet)"
     return (
-        f"Nothing came on {topic}: start what publishes it, in the same domain and network, or set {setting} to one of"
-        f" {known} ({kind.replace('/msg/', '/')})."
+        f"Nothing was received on {topic}: start its publisher, in the same domain and network, or set {setting} to one"
+        f" of {known} ({kind.replace('/msg/', '/')})."
     )

@@ -40,10 +40,10 @@ class Ros2Skin:
 
         if not self._node.wait_for(lambda: not silent(), timeout):
             there = ", ".join(self._node.topics(RANGE)) or "none"
-            beside = f", and {', '.join(sorted(self._unknown))} were" if self._unknown else ""
+            beside = f", only from {', '.join(sorted(self._unknown))}" if self._unknown else ""
             raise HardwareError(
-                f"No reading came from {', '.join(silent())} on {self.params.topic}{beside}: set the topic by what"
-                f" there is of sensor_msgs/Range ({there}). {' '.join(self.notes)}".strip()
+                f"No reading was received from {', '.join(silent())} on {self.params.topic}{beside}: set the"
+                f" topic to fit those of sensor_msgs/Range ({there}). {' '.join(self.notes)}".strip()
             )
 
     @property
@@ -70,7 +70,7 @@ class Ros2Skin:
         topics = [self.params.topic.replace(UNIT, topic_name(name)) for name in self._ids]
         twice = {topic for topic in topics if topics.count(topic) > 1}
         if twice:
-            raise HardwareError(f"Several units would share {', '.join(sorted(twice))}: give them other ids.")
+            raise HardwareError(f"Several units would share {', '.join(sorted(twice))}: give them different ids.")
         return topics
 
     def _take_any(self, message: Any, received: float, writer: int) -> None:

@@ -25,7 +25,7 @@ _WRITERS = 8
 class _Writer:
     """What one writer has stamped."""
 
-    heard: float
+    last_received: float
     """When it was heard last [s]."""
     newest: float
     """Its newest stamp [s]."""
@@ -66,12 +66,12 @@ class Stamps:
 
     def together(self) -> bool:
         """Whether several writers publish at once."""
-        heard = sorted(known.heard for known in tuple(self._writers.values()))
-        return len(heard) > 1 and heard[-1] - heard[-2] < _TOGETHER_S
+        instants = sorted(known.last_received for known in tuple(self._writers.values()))
+        return len(instants) > 1 and instants[-1] - instants[-2] < _TOGETHER_S
 
     def _known(self, writer: int, received: float) -> _Writer:
         known = self._writers.pop(writer, None) or _Writer(received, 0.0)
-        known.heard = received
+        known.last_received = received
         if len(self._writers) >= _WRITERS:
             del self._writers[next(iter(self._writers))]
         self._writers[writer] = known  # the last of them is the one heard last

@@ -31,7 +31,7 @@ _NEAREST_S = 1e-4
 
 
 @value
-class Motion:
+class StoppingTrajectory:
     """Positions and velocities at instants, the latter linear in between; at rest before and behind."""
 
     time: FloatArray
@@ -63,9 +63,9 @@ class Motion:
         return self.q[i] + (self.qd[i] + slope * step / 2) * step, self.qd[i] + slope * step
 
 
-def motion(
+def stopping_trajectory(
     q: FloatArray, qd: FloatArray, wanted: FloatArray, qdd_max: FloatArray, period: float, hold: float
-) -> Motion:
+) -> StoppingTrajectory:
     """Go from q and qd (n,) to wanted velocities (n,) [rad/s], hold them, and brake, within `qdd_max` (n,) [rad/s^2].
 
     Args:
@@ -85,7 +85,7 @@ def motion(
     speed[-1] = 0.0  # and no rounding error of it
     qd = np.vstack([qd, speed])
     steps = (qd[1:] + qd[:-1]) / 2 * np.diff(time)[:, None]
-    return Motion(time, np.vstack([q, q + np.cumsum(steps, axis=0)]), qd, 2 if kept else 1)
+    return StoppingTrajectory(time, np.vstack([q, q + np.cumsum(steps, axis=0)]), qd, 2 if kept else 1)
 
 
 @value
@@ -101,11 +101,11 @@ class Point:
 
 
 @value
-class _Sent:
+class _SentTrajectory:
     """A trajectory and what it was made of."""
 
     began: float
-    course: Motion
+    trajectory: StoppingTrajectory
     wanted: FloatArray
 
 
@@ -115,7 +115,7 @@ class Reference:
     def __init__(self, qdd_max: FloatArray, period: float, hold: float) -> None:
         """Take the limits (n,) [rad/s^2], the control period and how long a velocity is held [s]."""
         self._qdd_max, self._period, self._hold = qdd_max, period, hold
-        self._sent: deque[_Sent] = deque(maxlen=_REMEMBERED)
+        self._sent: deque[_SentTrajectory] = deque(maxlen=_REMEMBERED)
 
     @property
     def begun(self) -> bool:
@@ -125,28 +125,32 @@ class Reference:
     @property
     def ends(self) -> float:
         """When the last trajectory ends [s]; in the past if there is none."""
-        return self._sent[-1].began + float(self._sent[-1].course.time[-1]) if self._sent else -math.inf
+        return self._sent[-1].began + float(self._sent[-1].trajectory.time[-1]) if self._sent else -math.inf
 
-    def begin(self, q: FloatArray, now: float, settle: float) -> Motion:
+    def begin(self, q: FloatArray, now: float, settle: float) -> StoppingTrajectory:
         """Begin, or begin anew, at rest at q (n,) [rad], to be reached within a time [s]."""
         still = np.zeros_like(q)
-        course = Motion(np.array([0.0, settle]), np.stack([q, q]), np.stack([still, still]))
+        trajectory = StoppingTrajectory(np.array([0.0, settle]), np.stack([q, q]), np.stack([still, still]))
         self._sent.clear()
-        self._sent.append(_Sent(now, course, still))
-        return course
+        self._sent.append(_SentTrajectory(now, trajectory, still))
+        return trajectory
 
-    def command(self, wanted: FloatArray, now: float) -> Motion:
+    def command(self, wanted: FloatArray, now: float) -> StoppingTrajectory:
         """Go on to wanted velocities (n,) [rad/s] from an instant on [s]."""
         q, qd = self.motion_at(now)
-        self._sent.append(_Sent(now, motion(q, qd, wanted, self._qdd_max, self._period, self._hold), wanted.copy()))
-        return self._sent[-1].course
+        self._sent.append(
+            _SentTrajectory(
+                now, stopping_trajectory(q, qd, wanted, self._qdd_max, self._period, self._hold), wanted.copy()
+            )
+        )
+        return self._sent[-1].trajectory
 
     def passed(self, now: float, past: float) -> tuple[Point, ...]:
         """Return what was asked for in a time [s] before an instant [s]: its begin, and each change since."""
         begins = [sent.began for sent in self._sent]
         places = [now - past]
         for sent, until in zip(self._sent, [*begins[1:], math.inf], strict=True):
-            knots = sent.began + sent.course.time
+            knots = sent.began + sent.trajectory.time
             places += knots[knots < min(until, now) - _NEAREST_S].tolist()
         found: list[Point] = []
         for place in sorted(p for p in places if now - past <= p < now - _NEAREST_S):
@@ -157,16 +161,16 @@ class Reference:
     def motion_at(self, instant: float) -> tuple[FloatArray, FloatArray]:
         """Return positions [rad] and velocities [rad/s] (n,) that were asked for at an instant [s]."""
         sent = self._active(instant)
-        return sent.course.at(instant - sent.began)
+        return sent.trajectory.at(instant - sent.began)
 
     def at(self, instant: float) -> tuple[FloatArray, FloatArray]:
         """Return the commanded positions and velocities (n,) at an instant [s], as of a set-point that is held."""
         sent = self._active(instant)
-        q, qd = sent.course.at(instant - sent.began)
-        kept = instant - sent.began <= max(self._hold, float(sent.course.time[1]))
+        q, qd = sent.trajectory.at(instant - sent.began)
+        kept = instant - sent.began <= max(self._hold, float(sent.trajectory.time[1]))
         return q + qd * self._period / 2, sent.wanted if kept else qd
 
-    def _active(self, instant: float) -> _Sent:
+    def _active(self, instant: float) -> _SentTrajectory:
         for sent in reversed(self._sent):
             if sent.began <= instant:
                 return sent

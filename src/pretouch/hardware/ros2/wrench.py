@@ -18,13 +18,13 @@ class Wrench:
     def __init__(self, params: ArmParams, stamps: Stamps) -> None:
         self._params, self.stamps = params, stamps
         self._newest: tuple[float, FloatArray] | None = None
-        self.heard = False
+        self.received_any = False
         """Whether any message came, with an estimate or without."""
         self.frame_id = ""
 
     def take(self, message: Any, received: float, writer: int) -> None:
         """Take a message in."""
-        self.heard, self.frame_id = True, message.header.frame_id
+        self.received_any, self.frame_id = True, message.header.frame_id
         stamp = self.stamps.instant(message.header, received, writer)
         if stamp is None:
             return
@@ -47,14 +47,14 @@ class Wrench:
         return our_wrench(given, self._params, R_O_ee)
 
     @property
-    def doubt(self) -> str:
+    def warning(self) -> str:
         """What makes the setting of the frame look wrong, as a sentence, or ''."""
         looks_ee = self.frame_id.lower().endswith(_EE_FRAMES)
         if looks_ee == (self._params.frame == "ee") or not self.frame_id:
             return ""
         return (
-            f"The wrench's frame_id is {self.frame_id!r}, and the frame is set to {self._params.frame!r}: see that it"
-            " is right."
+            f"The wrench's frame_id is {self.frame_id!r}, but the frame is set to {self._params.frame!r}: check the"
+            " setting."
         )
 
 

@@ -49,13 +49,13 @@ def _along(axes: Axes, course: Course, k: int, shown: slice, known: slice) -> No
         )  # fmt: skip
     draw(axes, time, course.force[shown, k], color=GREY, lw=0.9, label="estimate")
     if course.by_thresholds:
-        draw(axes, time, course.filtered[shown, k], color=BLUE, lw=1.3, label="value of eq. 8")
+        draw(axes, time, course.filtered_force[shown, k], color=BLUE, lw=1.3, label="value of eq. 8")
     draw(axes, time, course.upper[shown, k], color=INK, lw=1.0, label=bounds(course))
     draw(axes, time, course.lower[shown, k], color=INK, lw=1.0)
     first, past, _ = shown.indices(len(course))
     felt = [i for i, contact, _ in course.contacts if contact.axes[k] or not course.by_thresholds]
     at = np.array([i for i in felt if first <= i < past], dtype=np.int64)
-    found = course.filtered if course.by_thresholds else course.force
+    found = course.filtered_force if course.by_thresholds else course.force
     axes.plot(course.time[at], found[at, k], "v", color=RED, mec="white", mew=0.6, ms=7, label="detected")
     axes.set_ylabel(f"force along {AXES[k]} [N]")
 

@@ -1,12 +1,12 @@
 """Sections about what ran, with which parameters, and how well units, robot and loop did."""
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from pretouch.composition import as_table
-from pretouch.params import PROFILES
+from pretouch.composition import leaves
+from pretouch.profiles import PROFILES
 from pretouch.reporting.course import Course
 from pretouch.reporting.health import UnitHealth
 from pretouch.reporting.html import (
@@ -123,13 +123,12 @@ def parameter_section(m: Measures) -> Html:
         return element("p", "No profile is known.")
     shown = profiles[:_PROFILE_COLUMNS]
     head = ("parameter", "unit", "paper", *(profile.name for profile in shown))
+    paper, *others = [dict(leaves(replace(profile, name=""))) for profile in (PROFILES["paper"], *shown)]
     rows: list[list[Text]] = []
-    usual, *found = (_parameters(as_table(profile)) for profile in (PROFILES["paper"], *shown))
-    for path in dict.fromkeys(path for values in (usual, *found) for path in values):
-        values = [_value(profile.get(path, _ABSENT)) for profile in found]
-        norm = _value(usual.get(path, _ABSENT))
-        marked: list[Text] = [value if value == norm else element("b", value, "other") for value in values]
-        rows.append([path, unit_of(path), norm, *marked])
+    for path in dict.fromkeys(path for values in (paper, *others) for path in values if path != "name"):
+        usual, values = paper.get(path, _ABSENT), [known.get(path, _ABSENT) for known in others]
+        marked: list[Text] = [_value(v) if v == usual else element("b", _value(v), "other") for v in values]
+        rows.append([path, unit_of(path.rpartition(".")[2]), _value(usual), *marked])
     left_out = len(profiles) - len(shown)
     return joined([
         table(head, rows, words=2),
@@ -138,16 +137,8 @@ def parameter_section(m: Measures) -> Html:
     ])  # fmt: skip
 
 
-def _parameters(table: dict[str, Any], where: str = "") -> dict[str, object]:
-    """Return each parameter of a profile by its path, and the name of each part."""
-    found: dict[str, object] = {}
-    for name, value in table.items():
-        path = where if name == "part" else f"{where}.{name}".lstrip(".")
-        if isinstance(value, dict):
-            found |= _parameters(value, path)
-        elif path != "name":
-            found[path] = _ABSENT if value is None else value
-    return found
+_ABSENT = "–"
+"""Stands for a parameter of a part that a profile does not have."""
 
 
 def unit_of(name: str) -> str:

@@ -52,7 +52,9 @@ class ServedArm:
         """Let it stand; its time begins."""
         model = setup.model
         if model.n != JOINTS:
-            raise RobotModelError(f"{model.description.name} has {model.n} joints: only arms with {JOINTS} speak FCI.")
+            raise RobotModelError(
+                f"{model.description.name} has {model.n} joints: FCI supports only arms with {JOINTS} joints."
+            )
         self.model, self.kind = model, setup.kind
         self.plant = Plant(model, setup.scene, PlantParams(), setup.q, setup.seed)
         self.limits, self.contacts, self.frames = motion_limits(model, setup.kind), Contacts(), frames_of(model)
@@ -126,7 +128,7 @@ class ServedArm:
             self._since_motion += 1
         self.plant.command(self.qd)
         self._pass_time()
-        return self._feel() or ending
+        return self._check_contacts() or ending
 
     def _pass_time(self) -> None:
         self.plant.advance(PERIOD_S)
@@ -136,10 +138,10 @@ class ServedArm:
         """(3,) all forces on the arm [N], base frame."""
         self.plant.take_log()
 
-    def _feel(self) -> Ending | None:
+    def _check_contacts(self) -> Ending | None:
         """Look for contacts; a collision is a reflex, which ends a motion."""
         wrench = np.zeros(6) if self.report.wrench is None else self.report.wrench
-        reflexes = self.contacts.feel(self.report.tau_ext, wrench, self.qdd)
+        reflexes = self.contacts.update(self.report.tau_ext, wrench, self.qdd)
         if not reflexes or self.mode is RobotMode.REFLEX:
             return None
         moved = self.moving

@@ -61,7 +61,7 @@ class Contacts:
         self.joint_contact, self.cartesian_contact = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
         self.joint_collision, self.cartesian_collision = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
 
-    def feel(self, torques: FloatArray, wrench: FloatArray, qdd: FloatArray) -> tuple[str, ...]:
+    def update(self, torques: FloatArray, wrench: FloatArray, qdd: FloatArray) -> tuple[str, ...]:
         """Take external torques (7,) [Nm] and the wrench (6,) [N, Nm]; return the reflexes they cause.
 
         `qdd` (7,) are the commanded accelerations [rad/s^2].
@@ -75,12 +75,12 @@ class Contacts:
             self.joint_collision | joint,
             self.cartesian_collision | cartesian,
         )
-        return _named(cartesian, "cartesian_reflex") + _named(joint, "joint_reflex")
+        return _names(cartesian, "cartesian_reflex") + _names(joint, "joint_reflex")
 
     def forget(self) -> None:
         """Forget collisions."""
         self.joint_collision, self.cartesian_collision = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
 
 
-def _named(crossed: BoolArray, name: str) -> tuple[str, ...]:
+def _names(crossed: BoolArray, name: str) -> tuple[str, ...]:
     return (name,) if np.any(crossed) else ()

@@ -43,10 +43,10 @@ def hand_of(model: RobotModel, flange: int) -> Inertial:
         for link, inertial in enumerate(inertials(model))
         if link > flange and inertial.mass > 0
     ]
-    return together(parts)
+    return combined(parts)
 
 
-def together(parts: list[Inertial]) -> Inertial:
+def combined(parts: list[Inertial]) -> Inertial:
     """Return several bodies in one frame as one."""
     mass = sum(part.mass for part in parts)
     if not mass:

@@ -24,7 +24,7 @@ def drop_of(text: str) -> Drop:
     """Read N/M."""
     lost, slash, of = text.partition("/")
     if not (slash and lost.isdecimal() and of.isdecimal() and 0 < int(lost) < int(of)):
-        raise ParameterError(f"The commands to drop are {text!r}: give how many of how many, as 3/50.")
+        raise ParameterError(f"--drop is {text!r}: give two numbers, such as 3/50 for 3 of 50 commands.")
     return Drop(int(lost), int(of))
 
 
@@ -39,7 +39,7 @@ class ServeOptions(Checked):
     lockstep: bool = False
     """Whether the next state follows the command for the last one, and not the clock."""
     patience_s: Positive = 60.0
-    """In lockstep, a command that has not come after this time is lost [s]."""
+    """In lockstep, a command that has not arrived after this time is lost [s]."""
     grace_s: NonNegative = 0.01
     """In real time, how much longer than its millisecond a command of a motion is waited for, while time stands [s]. A
     robot waits for none; but on a machine shared with its client each would be late now and then."""

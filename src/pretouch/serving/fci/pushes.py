@@ -46,7 +46,7 @@ def push_of(text: str) -> TcpPush:
         start = duration = x = y = z = math.nan
     if len(parts) > 3 or not all(map(math.isfinite, (start, duration, x, y, z))) or start < 0 or duration <= 0:
         raise ParameterError(
-            f"The push is {text!r}: give start, force and, if you like, duration, as 2.0:0,15,0:0.5 [s, N, s]."
+            f"The push is {text!r}: give start, force and optionally duration, such as 2.0:0,15,0:0.5 [s, N, s]."
         )
     if max(map(abs, (x, y, z))) > _MOST_N:
         raise ParameterError(f"The push is {text!r}: give at most {_MOST_N:g} N along each axis.")
@@ -62,7 +62,8 @@ def typed_push(text: str, now: float) -> TcpPush:
         return push_of(f"{now}:{plain}")
     except ParameterError:
         raise ParameterError(
-            f"{plain!r} is no push: type an axis, as +y, or a force, as 0,15,0 [N], of at most {_MOST_N:g} N."
+            f"{plain!r} is not a push: type an axis, such as +y, or a force, such as 0,15,0 [N], of at most {_MOST_N:g}"
+            " N."
         ) from None
 
 

@@ -9,8 +9,8 @@ from typing import Self
 import numpy as np
 
 from pretouch.serving.fci.arm import ServedArm
-from pretouch.serving.fci.connections import Connection, Door, Gone
-from pretouch.serving.fci.desk import Desk
+from pretouch.serving.fci.connections import Connection, Disconnected, Listener
+from pretouch.serving.fci.handler import RequestHandler
 from pretouch.serving.fci.limits import PERIOD_S
 from pretouch.serving.fci.motion import Setpoint
 from pretouch.serving.fci.options import ServeOptions
@@ -22,8 +22,8 @@ _LATE_S = 0.003
 """A machine that is later than this leaves the time out [s]: states in a burst could not be answered in time."""
 _DATAGRAMS_MOST = 256
 """So many datagrams are looked at in one go: a flood must not stop the clock."""
-_HEARD_BEFORE = 8
-"""Before another client is turned away, what the one that is served has sent is read so many times."""
+_READS_BEFORE_REFUSAL = 8
+"""Before another client is refused, the requests of the current one are read so many times."""
 _FIRST_WAITS_S = (0.25, 0.75)
 """In lockstep, how long the first state of a motion, and each that follows, stands without an answer [s]: the vendor's
 clients answer the second one, and give up after a second without a state."""
@@ -49,8 +49,8 @@ class FciServer:
         self._arm, self._options, self._watch, self._say = arm, options, watch, say
         self.protocol = PROTOCOLS[arm.kind]
         urdf_of(arm.model)  # made while no clock runs yet
-        self._door = Door(options.host, options.port)
-        host, port = self._door.sock.getsockname()
+        self._listener = Listener(options.host, options.port)
+        host, port = self._listener.sock.getsockname()
         self.address: tuple[str, int] = (host, port)
         """Where it listens."""
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -59,7 +59,7 @@ class FciServer:
         self._state = StateDatagram(self.protocol, arm)
         self._client: Connection | None = None
         self._client_udp = ("", 0)
-        self._desk: Desk | None = None
+        self._handler: RequestHandler | None = None
         self._served = False
         self._tick = 0
         self._motions = self._unanswered = self._of_motion = 0
@@ -75,14 +75,14 @@ class FciServer:
         self.close()
 
     def close(self) -> None:
-        """Let the client go and listen no more."""
+        """Disconnect the client and stop listening."""
         if self._client is not None:
             self._client.close()
-        self._door.close()
+        self._listener.close()
         self._udp.close()
 
     def serve(self, done: Callable[[], bool] = lambda: False) -> None:
-        """Serve until `done` says so, or, if asked to serve once, until the client has gone."""
+        """Serve until `done` says so, or, if asked to serve once, until the client has disconnected."""
         self._start = self._next = time.monotonic()
         while not done() and not (self._options.once and self._served and self._client is None):
             self._settle()
@@ -108,15 +108,15 @@ class FciServer:
             if now - self._next > _LATE_S:
                 self.left_out += now - self._next
                 self._next = now
-            self._look(self._next)
+            self._poll_sockets(self._next)
             if self._command is None and arm.motion is not None and arm.motion.begun:
-                self._look(self._next + self._options.grace_s, for_command=True)
+                self._poll_sockets(self._next + self._options.grace_s, for_command=True)
         elif arm.motion is None:
-            self._look(now + PERIOD_S)
+            self._poll_sockets(now + PERIOD_S)
         elif arm.motion.begun:
-            self._look(now + self._options.patience_s, for_command=True)
+            self._poll_sockets(now + self._options.patience_s, for_command=True)
         else:
-            self._look(now + _FIRST_WAITS_S[min(self._unanswered, 1)], for_command=True)
+            self._poll_sockets(now + _FIRST_WAITS_S[min(self._unanswered, 1)], for_command=True)
 
     def _pass_time(self, setpoint: Setpoint | None) -> None:
         """Let the plant move on, unless in lockstep it stands."""
@@ -130,13 +130,13 @@ class FciServer:
             arm.units.offset = PERIOD_S * self._tick + self.left_out - arm.plant.time
         ending = arm.step(setpoint)
         self._tick += 1
-        if ending is not None and self._desk is not None:
-            self._attempt(lambda desk: desk.motion_ended(ending))
+        if ending is not None and self._handler is not None:
+            self._attempt(lambda handler: handler.motion_ended(ending))
         self._watch(PERIOD_S * self._tick, arm)
         if arm.units is not None:
             arm.units.step(self._robot_time if lockstep else self._wall_time)
-        if self._desk is not None and arm.at_rest:
-            self._attempt(lambda desk: desk.at_rest())
+        if self._handler is not None and arm.at_rest:
+            self._attempt(lambda handler: handler.at_rest())
 
     def _robot_time(self) -> float:
         return PERIOD_S * self._tick
@@ -179,65 +179,65 @@ class FciServer:
 
     # clients
 
-    def _look(self, until: float, for_command: bool = False) -> None:
-        """See to all sockets until an instant [s], or until a command has come."""
+    def _poll_sockets(self, until: float, for_command: bool = False) -> None:
+        """Poll all sockets until an instant [s], or until a command has come."""
         while True:
             timeout = max(0.0, until - time.monotonic())
             client = [] if self._client is None else [self._client.sock]
-            waiting = {c.sock: c for c in self._door.waiting}
-            ready, _, _ = select.select([self._udp, self._door.sock, *client, *waiting], [], [], timeout)
+            waiting = {c.sock: c for c in self._listener.waiting}
+            ready, _, _ = select.select([self._udp, self._listener.sock, *client, *waiting], [], [], timeout)
             if self._udp in ready:
                 self._take_command()
             if client and client[0] in ready:
-                self._hear()
-            if self._door.sock in ready:
-                for _ in range(_HEARD_BEFORE):  # a client that has gone makes room for the next
-                    self._hear()
-                self._door.admit(taken=self._client is not None)
+                self._serve_requests()
+            if self._listener.sock in ready:
+                for _ in range(_READS_BEFORE_REFUSAL):  # a client that has gone makes room for the next
+                    self._serve_requests()
+                self._listener.admit(taken=self._client is not None)
             for sock in ready:
                 if sock in waiting:
-                    self._greet(waiting[sock])
+                    self._check_protocol(waiting[sock])
             if for_command and (self._command is not None or self._arm.motion is None):
                 return
             if time.monotonic() >= until:
                 return
 
-    def _greet(self, connection: Connection) -> None:
-        """Hear what a connection speaks; the first that speaks as the robot does is served."""
-        if connection not in self._door.waiting:
+    def _check_protocol(self, connection: Connection) -> None:
+        """Read the protocol version of a connection; the first with that of the robot is served."""
+        if connection not in self._listener.waiting:
             return
         try:
             requests = connection.requests(self.protocol)
             if not requests:
                 return
             if requests[0].name != "Connect":
-                raise Gone(f"asks for {requests[0].name} before it has connected")
+                raise Disconnected(f"asks for {requests[0].name} before it has connected")
             version, port = CONNECT.unpack(requests[0].body)
             fits = version == self.protocol.version
             answer = bytes([not fits]) + self.protocol.version.to_bytes(2, "little")
             connection.send(self.protocol.reply("Connect", requests[0].identifier, answer))
             if not fits:
-                raise Gone(f"speaks FCI {version}, this robot {self.protocol.version}")
-        except Gone as why:
-            self._door.waiting.remove(connection)
+                raise Disconnected(f"speaks FCI {version}, this robot {self.protocol.version}")
+        except Disconnected as why:
+            self._listener.waiting.remove(connection)
             connection.close()
             if str(why) != "closed by the client":
                 self._say(f"Not served: {connection.peer} {why}.")
             return
         self._serve_client(connection, port)
-        self._attempt(lambda desk: desk.serve(requests[1:]))
+        self._attempt(lambda handler: handler.serve(requests[1:]))
 
-    def _hear(self) -> None:
-        """Serve what the client asks for."""
+    def _serve_requests(self) -> None:
+        """Serve the client's requests."""
         client = self._client
         if client is not None:
-            self._attempt(lambda desk: desk.serve(client.requests(self.protocol)))
+            self._attempt(lambda handler: handler.serve(client.requests(self.protocol)))
 
     def _serve_client(self, connection: Connection, port: int) -> None:
-        self._door.waiting.remove(connection)
-        self._door.clear()
+        self._listener.waiting.remove(connection)
+        self._listener.clear()
         self._client, self._client_udp, self._served = connection, (connection.peer, port), True
-        self._desk = Desk(
+        self._handler = RequestHandler(
             connection, self.protocol, self._arm, self._state, self._settle, self._begin_motion, self._say
         )
         self._say(f"Client {connection.peer} connected.")
@@ -255,20 +255,20 @@ class FciServer:
         while self._options.lockstep and not self._arm.moving and not self._arm.settled:
             self._pass_time(None)
 
-    def _attempt(self, do: Callable[[Desk], None]) -> None:
-        """Do something for the client, and let it go where that cannot be done."""
-        if self._desk is None:
+    def _attempt(self, do: Callable[[RequestHandler], None]) -> None:
+        """Do something for the client; disconnect it if that fails."""
+        if self._handler is None:
             return
         try:
-            do(self._desk)
-        except Gone as why:
-            self._let_go(str(why))
+            do(self._handler)
+        except Disconnected as why:
+            self._disconnect(str(why))
 
-    def _let_go(self, why: str) -> None:
+    def _disconnect(self, why: str) -> None:
         if self._client is None:
             return
-        self._say(f"Client {self._client.peer} has gone: {why}.")
+        self._say(f"Client {self._client.peer} disconnected: {why}.")
         self._client.close()
-        self._client = self._desk = None
+        self._client = self._handler = None
         if self._arm.moving:
             self._arm.stop()

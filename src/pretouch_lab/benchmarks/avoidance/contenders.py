@@ -1,7 +1,7 @@
 """Who takes part: short names for profiles."""
 
 from pretouch.errors import ParameterError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.ablations import ablations
 
 CONTENDERS = {

@@ -8,7 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from pretouch.errors import ExperimentError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.avoidance.contenders import ABLATED, ABLATED_IN, ABLATED_SEEDS, CONTENDERS, profile_text
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from pretouch.control.path import Circle, Path, line
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin

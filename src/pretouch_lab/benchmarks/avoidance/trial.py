@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pretouch.params import profile
-from pretouch.whole_file import write_json
+from pretouch.atomic_write import write_json
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.avoidance import measures
 from pretouch_lab.benchmarks.avoidance.contenders import profile_text
 from pretouch_lab.benchmarks.avoidance.livelock import livelocks

@@ -11,11 +11,10 @@ from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
-from pretouch.sim.ghost import Ghost
 from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -24,6 +23,7 @@ from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.stream import PROFILE, Stream, StreamRecorder
 from pretouch_lab.benchmarks.scenario_files import scenario, scenario_path
+from pretouch_lab.ghost import Ghost
 from pretouch_lab.paper.claims.free_run import Standing
 from pretouch_lab.trial import SETTLE_S
 from pretouch_lab.worlds import Parts, in_world

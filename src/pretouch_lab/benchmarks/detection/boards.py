@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from pretouch.atomic_write import write_json
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.paper_scenes import static_path, static_scene
-from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.detection.arm import Sensing, model, sensing_of
 from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of

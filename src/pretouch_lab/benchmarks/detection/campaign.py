@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
 from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated
@@ -149,7 +149,7 @@ def _contacts_s(cell: ContactCell) -> float:
 
 
 def _replay_cost(contender: Contender) -> float:
-    return _REPLAY_COST[contender.profile.detection.method]
+    return _REPLAY_COST[contender.profile.detect.name]
 
 
 def _where(cell: FreeCell) -> tuple[str, str, float, str]:

@@ -5,9 +5,9 @@ from typing import Literal
 
 import numpy as np
 
-from pretouch.contact.detect import Detection
-from pretouch.contact.feel import FeelState
-from pretouch.params import Profile, ThresholdParams, profile
+from pretouch.contact.detector import Detection
+from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.profiles import Profile, profile
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.ablations import ablations
 
@@ -20,7 +20,7 @@ class Contender:
 
     name: str
     profile_text: str
-    """As `pretouch.params.profile` reads it."""
+    """As `pretouch.profiles.profile` reads it."""
     sweep: Sweep
     """Base force of the paper's thresholds [N], or a factor on the evidence that makes an alarm."""
 
@@ -32,11 +32,9 @@ class Contender:
     @property
     def default(self) -> float:
         """Return the value of the sweep that the profile itself has."""
-        return self.profile.threshold.f_base_n if self.sweep == "f_base_n" else 1.0
+        return thresholds_of(self.profile.detect).f_base_n if self.sweep == "f_base_n" else 1.0
 
-    def statistic(
-        self, found: Detection, after: FeelState, wrench: FloatArray | None, params: ThresholdParams
-    ) -> float:
+    def statistic(self, found: Detection, filtered: FloatArray, wrench: FloatArray | None) -> float:
         """Return the largest value of the sweep at which a step would still be an alarm; -inf where none would.
 
         With the paper's thresholds that is exact: neither window, F_sigma nor F_obs depends on F_b. Other detectors say
@@ -50,7 +48,8 @@ class Contender:
         if wrench is None:
             return -np.inf
         limits = found.thresholds
-        force = after.window.newest if params.compare == "filtered" else wrench[:3]
+        params = thresholds_of(self.profile.detect)
+        force = filtered if params.compare == "filtered" else wrench[:3]
         return float(np.max(np.maximum(force - limits.upper, limits.lower - force))) + params.f_base_n
 
 
@@ -59,7 +58,7 @@ CONTENDERS = (
     Contender("fixed", "fixed", "scale"),
     Contender("observer", "observer", "scale"),
     Contender("paper", "paper", "f_base_n"),
-    Contender("paper-raw", "paper:threshold.compare=raw", "f_base_n"),
+    Contender("paper-raw", "paper:detect.compare=raw", "f_base_n"),
     Contender("pretouch", "pretouch", "scale"),
 )
 """The detectors; `pretouch` last."""

@@ -7,7 +7,6 @@ import numpy as np
 
 from pretouch.loop import Cycle
 from pretouch.robot.vectors import placed
-from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
@@ -25,6 +24,7 @@ from pretouch_lab.benchmarks.detection.arm import (
 )
 from pretouch_lab.benchmarks.detection.stream import Stream, save_stream
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
+from pretouch_lab.ghost import Ghost
 
 _HAND_SIDE_M = 0.102
 """How far the arm's hand reaches out to the side of its origin [m]."""

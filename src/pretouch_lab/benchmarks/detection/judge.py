@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.atomic_write import write_json
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray
-from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, Touching, touches_of
 from pretouch_lab.benchmarks.detection.contenders import Contender

@@ -5,24 +5,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.contact.cues import Cues
-from pretouch.contact.feel import feel, feel_init
-from pretouch.params import ReactionParams
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.perception.closest import no_obstacles
-from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched, TouchReadings
 from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.stream import Stream
+from pretouch_lab.detector_alone import DetectorAlone
 
 NOTHING = no_obstacles()
 """What a profile without proximity is shown."""
-REST = ReactionParams().decay_cycles
+REST = DecayingVelocity().decay_cycles
 """Control cycles for which an alarm is answered, and no other is looked for."""
 
 
-Said = Callable[[int, Kinematics], Cues | None]
-"""Gives what units said of a touch, by the number of a step and the arm's posture in it."""
+Touches = Callable[[int], TouchReadings | None]
+"""Gives what the units' touch sensors said in a step, by its number."""
 
 
 @dataclass(frozen=True)
@@ -56,20 +56,23 @@ def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
     return found
 
 
-def replay(stream: Stream, contender: Contender, model: RobotModel, said: Said = lambda step, kin: None) -> Replayed:
+def replay(
+    stream: Stream, contender: Contender, model: RobotModel, touch: Touches = lambda step: None,
+    skin: Skin | None = None,
+) -> Replayed:  # fmt: skip
     """Give a detector each step of a stream, from its beginning, and what units said of a touch."""
     params = contender.profile
     sees = params.perception.enabled
-    state, steps = feel_init(model, params), len(stream.count)
+    detector, steps = DetectorAlone(params, model, skin), len(stream.count)
     alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
     force, touched = np.full((steps, 3), np.nan), [NOT_TOUCHED] * steps
     motion, first = np.full((steps, model.n), np.nan), FirstMotion(model, params, stream.robot["q"][0], REST)
     for i, (robot, obstacles, reacting, watched) in enumerate(stream.steps()):
         near = obstacles if sees else NOTHING
         kin = model.kinematics(robot.q)
-        found, state = feel(state, model, kin, robot, near, reacting, params, sees and watched, said(i, kin))
+        found = detector.step(kin, robot, near, reacting, sees and watched, touch(i))
         touched[i] = found.touched
-        statistic[i] = contender.statistic(found, state, robot.wrench, params.threshold)
+        statistic[i] = contender.statistic(found, detector.window.newest, robot.wrench)
         if found.contact is not None:
             alarm[i], force[i] = True, found.contact.force
         begins = first.step(kin, robot, found, near)

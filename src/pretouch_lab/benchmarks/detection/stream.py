@@ -9,12 +9,12 @@ import numpy as np
 
 from pretouch.errors import ExperimentError
 from pretouch.loop import Cycle
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState
 from pretouch_lab.benchmarks.store import write_arrays
 
-PROFILE = "paper:threshold.f_base_n=1000:reduction.enabled=no:restriction.mode=off:perception.closing_speed=yes"
+PROFILE = "paper:detect.f_base_n=1000:reduction.enabled=no:restriction.mode=off:perception.closing_speed=yes"
 """Of the arms that are recorded: proximity is sensed, but no force is a contact and nothing near changes the motion.
 Closing speeds are there for the detectors that use them; nothing else that is sensed depends on them."""
 

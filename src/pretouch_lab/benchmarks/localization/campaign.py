@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell, duration_s, record_touched, touched_cells
 from pretouch_lab.benchmarks.localization.judge import PROFILE, WITHOUT, judge_touched
 from pretouch_lab.benchmarks.scenario_files import SeedRange

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.loop import run
-from pretouch.params import profile
-from pretouch.sim.ghost import Ghost
+from pretouch.profiles import profile
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
@@ -18,6 +17,7 @@ from pretouch_lab.benchmarks.detection.contacts import Toucher, Touching, descri
 from pretouch_lab.benchmarks.detection.stream import PROFILE, StreamRecorder, save_stream
 from pretouch_lab.benchmarks.localization.motion import Wandering, WanderingController, wandering
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
+from pretouch_lab.ghost import Ghost
 from pretouch_lab.trial import SETTLE_S
 
 _TAIL_S = 0.6

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pretouch.contact.feel import feel, feel_init
-from pretouch.params import profile
+from pretouch.atomic_write import write_json
+from pretouch.profiles import profile
 from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray, IntArray, Touched
-from pretouch.whole_file import write_json
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching, touches_of
 from pretouch_lab.benchmarks.detection.replay import NOTHING
@@ -20,6 +19,7 @@ from pretouch_lab.benchmarks.localization.contacts import TouchedCell
 from pretouch_lab.benchmarks.localization.limit import position_limit
 from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.detector_alone import DetectorAlone
 from pretouch_lab.metrics import rounded
 
 PROFILE = "pretouch"
@@ -84,7 +84,7 @@ def judge_touched(cell: TouchedCell, skin: str, stream: Path, file: Path) -> Non
 def replayed(stream: Stream, skin: str, touches: list[Touching]) -> Said:
     """Give the profile each step of a stream, as with the skin that is named."""
     params, arm = profile(PROFILE), model()
-    state, blind = feel_init(arm, params), skin in WITHOUT
+    detector, blind = DetectorAlone(params, arm), skin in WITHOUT
     warm = scenario("localization")["duration"]["warm_up_s"]
     start, end = (np.array([getattr(touch, name) for touch in touches]) for name in ("start", "end"))
     start, end = np.sort(start) - _BEFORE_S, np.sort(end) + _AFTER_S
@@ -94,7 +94,7 @@ def replayed(stream: Stream, skin: str, touches: list[Touching]) -> Said:
         sees = watched and skin != WITHOUT[1] and (not blind or robot.stamp < warm - 1.0)
         kin = arm.kinematics(robot.q)
         begun = time.thread_time()
-        found, state = feel(state, arm, kin, robot, near, False, params, sees)
+        found = detector.step(kin, robot, near, False, sees)
         taken = time.thread_time() - begun
         if len(found.touched.link):
             busy.append(taken)
@@ -103,7 +103,7 @@ def replayed(stream: Stream, skin: str, touches: list[Touching]) -> Said:
             stamps.append(robot.stamp)
             touched.append(found.touched)
             q.append(robot.q)
-            spread.append(state.sequential[0].model.spread)
+            spread.append(detector.state.test.model.spread)
     return Said(np.array(stamps), touched, np.array(q), np.array(spread), np.array(busy))
 
 

@@ -7,7 +7,7 @@ free motion was learnt to be, of the mean of so many independent samples; across
 
 import numpy as np
 
-from pretouch.params import DetectionParams, LocalisationParams
+from pretouch.params import LocalisationParams, SequentialParams
 from pretouch.robot.model import Kinematics
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.arm import model
@@ -29,7 +29,7 @@ def position_limit(touch: Touching, kin: Kinematics, q: FloatArray, spread: Floa
         q: (n,) the same [rad].
         spread: (2, 2, n) what was learnt of free motion, see `ResidualModel`.
     """
-    p, d, arm = LocalisationParams(), DetectionParams(), model()
+    p, d, arm = LocalisationParams(), SequentialParams(), model()
     M, moving = arm.mass_matrix(q), spread[1]
     S = (M * moving[0]) @ M.T + np.diag(moving[1] + d.noise_floor_nm**2)
     S = S / SAMPLES + np.diag(np.full(arm.n, d.bias_floor_nm**2))

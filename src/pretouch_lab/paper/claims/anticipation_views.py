@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.contact.thresholds import obstacle_force
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.scene import HandSpec
 from pretouch.text_table import TextTable
 from pretouch_lab.metrics import rounded, spread
@@ -27,7 +28,7 @@ def expected(direction: str) -> tuple[str, int]:
 
 def equation_11(true_distance: float) -> float:
     """F_obs [N] of a fist with its centre at a distance [m], if the point of it that is nearest were sensed."""
-    p = profile(PROFILE).threshold
+    p = thresholds_of(profile(PROFILE).detect)
     return float(obstacle_force(np.array(true_distance - HandSpec.radius), p.f_d_n, p.d_max_m, p.d_min_m))
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.pushes import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 
 from pretouch.control.path import Circle, Path, line
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.sensing.skin import Skin
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import BoolArray, FloatArray

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pretouch.contact.thresholds import noise_force
-from pretouch.contact.window import add, window_init
-from pretouch.params import ThresholdParams
+from pretouch.contact.window import add_force, window_init
+from pretouch.params import ThresholdParams, WindowParams
 from pretouch.types import BoolArray, FloatArray
 
-TABLE_I = ThresholdParams()
+TABLE_I, WINDOW = ThresholdParams(), WindowParams()
 
 
 @dataclass(frozen=True)
@@ -25,21 +25,21 @@ class Windowed:
     """Sample standard deviation of the window."""
 
 
-def windowed(force: FloatArray, params: ThresholdParams = TABLE_I) -> Windowed:
+def windowed(force: FloatArray, params: WindowParams = WINDOW) -> Windowed:
     """Send forces (S, 3) [N] through the window of eq. 8, and leave out the samples that only fill it."""
-    state, course = window_init(params.window_samples), []
+    state, course = window_init(params.samples), []
     for sample in force:
         armed = state.full
-        state = add(state, sample, params.alpha, params.lambda_)
+        state = add_force(state, sample, params)
         if armed:
             course.append((state.newest, state.mean(), state.std()))
     filtered, mean, sigma = np.array(course).reshape(-1, 3, 3).swapaxes(0, 1)
-    return Windowed(force[params.window_samples :], filtered, mean, sigma)
+    return Windowed(force[params.samples :], filtered, mean, sigma)
 
 
 def smooth(force: FloatArray, alpha: float) -> Windowed:
     """As `windowed`, with another influence of outliers than Table I's."""
-    return windowed(force, replace(TABLE_I, alpha=alpha))
+    return windowed(force, replace(WINDOW, alpha=alpha))
 
 
 def band(course: Windowed, f_base: float, f_obs: float = 0.0) -> FloatArray:

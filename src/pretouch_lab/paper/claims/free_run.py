@@ -4,9 +4,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.thresholds import noise_force
 from pretouch.control.path import Path
-from pretouch.params import ReactionParams, TaskParams
+from pretouch.params import TaskParams
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec
@@ -23,7 +24,7 @@ DURATION_S = 150.0
 """Time that counts [s]: that in which the window fills comes before it."""
 
 _PERIOD_S = TaskParams().control_period_s
-_ANSWERED = ReactionParams().decay_cycles
+_ANSWERED = DecayingVelocity().decay_cycles
 """Control cycles for which a detection is answered."""
 
 
@@ -70,7 +71,7 @@ def leave_alone(what: Solitude, cell: Cell, seed: int, context: Context) -> Reco
         recording=context.recording,
         plant=what.plant,
     )
-    end = SETTLE_S + profile.threshold.window_samples * _PERIOD_S + what.duration_s
+    end = SETTLE_S + profile.window.samples * _PERIOD_S + what.duration_s
     return play(setup, lambda step, _: step.stamp >= end - 0.5 * _PERIOD_S)
 
 

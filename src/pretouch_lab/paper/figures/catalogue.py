@@ -5,16 +5,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pretouch.errors import ExperimentError
-from pretouch.params import Profile, profile
+from pretouch.profiles import Profile, profile
+from pretouch.recording.run_record import RunRecord
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper import avoidance, dynamic, static
 from pretouch_lab.paper.claims import between
-from pretouch_lab.trace import Trace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Played = list[tuple[Cell, Trace]]
+Played = list[tuple[Cell, RunRecord]]
 
 
 @dataclass(frozen=True)

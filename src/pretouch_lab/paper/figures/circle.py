@@ -4,17 +4,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.params import Profile
+from pretouch.profiles import Profile
+from pretouch.recording.run_record import RunRecord
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.paper.figures.marks import near, shade, slowed
-from pretouch_lab.trace import Trace
 
 _OFF_PATH_M = 0.01
 _POINTS = 12
 """One in so many sensed points is drawn."""
 
 
-def circle_figure(trace: Trace, profile: Profile) -> Figure:
+def circle_figure(trace: RunRecord, profile: Profile) -> Figure:
     """End-effector path: free, avoiding what is sensed (red), recovering (green); and its course in time."""
     figure = Figure(figsize=(9, 9), layout="constrained")
     plane, course, aside = figure.subplots(3, 1, height_ratios=[1.9, 0.8, 0.6])
@@ -36,7 +36,7 @@ def circle_figure(trace: Trace, profile: Profile) -> Figure:
     return figure
 
 
-def _plane(axes: Axes, trace: Trace, avoiding: BoolArray, recovering: BoolArray, profile: Profile) -> None:
+def _plane(axes: Axes, trace: RunRecord, avoiding: BoolArray, recovering: BoolArray, profile: Profile) -> None:
     """Draw path, end-effector and sensed points in the plane of the circle."""
     ee = trace.ee_position
     axes.plot(*trace.path_position[:, 1:].T, color="tab:blue", lw=7, alpha=0.3, label="path")

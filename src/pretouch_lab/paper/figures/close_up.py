@@ -3,20 +3,26 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from pretouch.params import Profile
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.params import ProximityPriorParams
+from pretouch.profiles import Profile
+from pretouch.recording.run_record import RunRecord
 from pretouch_lab.paper.figures.marks import Y, distances, force_with_thresholds, shade, touching
-from pretouch_lab.trace import Trace
 
 _BEFORE_S, _AFTER_S = 4.0, 2.5
 
 
-def close_up_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -> Figure:
+def close_up_figure(trace: RunRecord, units: tuple[str, ...], profile: Profile) -> Figure:
     """Distances with the region that matters, and force along y with thresholds, about the first touch."""
     figure = Figure(figsize=(9, 6.4), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
     distances(top, trace, units)
-    paper = profile.detection.method == "thresholds"
-    d_max, name = (profile.threshold.d_max_m, "d_max") if paper else (profile.detection.near_m, "near")
+    detector, near = profile.detect, ProximityPriorParams()
+    paper = isinstance(detector, MovingThresholds)
+    if isinstance(detector, SequentialTest):
+        near = detector.proximity or near
+    d_max, name = (detector.d_max_m, "d_max") if isinstance(detector, MovingThresholds) else (near.distance_m, "near")
     top.axhspan(0.0, d_max, facecolor="gold", alpha=0.18, zorder=0)
     top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"{name} {d_max:g} m")
     top.annotate("region of interest", (0.01, d_max), (0, -5), ("axes fraction", "data"), "offset points", va="top")
@@ -37,7 +43,7 @@ def close_up_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -> F
     return figure
 
 
-def _window(trace: Trace) -> tuple[float, float]:
+def _window(trace: RunRecord) -> tuple[float, float]:
     """First and last instant to show [s]: about the first touch, or all where there is none."""
     touched = np.flatnonzero(touching(trace))
     if len(touched) == 0:

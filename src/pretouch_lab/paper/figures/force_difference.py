@@ -6,14 +6,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.params import profile
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.profiles import profile
+from pretouch.recording.run_record import RunRecord
 from pretouch_lab.paper.figures.marks import BLIND, OURS, SENSING, Y, touching
-from pretouch_lab.trace import Trace
 
 _TRAJECTORIES, _SIDES = ("circle", "line"), ("-y", "+y")
 
 
-def force_difference_figure(traces: Mapping[tuple[str, str, str], Trace], profiles: Sequence[str]) -> Figure:
+def force_difference_figure(traces: Mapping[tuple[str, str, str], RunRecord], profiles: Sequence[str]) -> Figure:
     """Force along y with the band between the thresholds, before and after contact.
 
     Blind is blue, the first of the others red, the second green.
@@ -42,7 +43,7 @@ def force_difference_figure(traces: Mapping[tuple[str, str, str], Trace], profil
     return figure
 
 
-def _force(axes: Axes, trace: Trace, push: float, name: str, colour: str, hatch: str) -> None:
+def _force(axes: Axes, trace: RunRecord, push: float, name: str, colour: str, hatch: str) -> None:
     """Draw the estimate and its detection; of a detector by thresholds, these until then and the value of eq. 8 too."""
     style, filtered, marker = ("--", ":", "o") if hatch else ("-", "-.", "s")
     touched = np.flatnonzero(touching(trace))
@@ -51,7 +52,7 @@ def _force(axes: Axes, trace: Trace, push: float, name: str, colour: str, hatch:
     time = trace.time - trace.time[touched[0]]
     found = np.flatnonzero(trace.detected & (time >= 0))
     before = time <= (time[found[0]] if len(found) else time[-1])
-    if profile(name).detection.method == "thresholds":
+    if isinstance(profile(name).detect, MovingThresholds):
         axes.fill_between(
             time[before], push * trace.lower[before, Y], push * trace.upper[before, Y], facecolor=(colour, 0.15),
             edgecolor=(colour, 0.5), lw=0.8, ls=style, hatch=hatch, label=f"{name}: between thresholds",

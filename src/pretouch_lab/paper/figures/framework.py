@@ -58,10 +58,10 @@ BLOCKS = (
         "Contact",
         (2.6, 2.6),
         (
-            ("eq. 8: window", "contact.window.add"),
+            ("eq. 8: window", "contact.window.add_force"),
             ("eqs. 9-10: thresholds", "contact.thresholds.thresholds"),
             ("eq. 11: anticipation", "contact.thresholds.obstacle_force"),
-            ("crossed: contact", "contact.detect.detect"),
+            ("crossed: contact", "contact.moving_thresholds.MovingThresholds"),
         ),
     ),
     Block(
@@ -70,8 +70,8 @@ BLOCKS = (
         (
             ("TRACK, REACT, HOLD", "modes.next_mode"),
             ("the path, by its phase", "control.path.follow"),
-            ("eq. 12: with the push", "contact.reaction.reaction_velocity"),
-            ("its linear decay", "contact.reaction.decayed"),
+            ("eq. 12: with the push", "contact.decaying_velocity.reaction_velocity"),
+            ("its linear decay", "contact.decaying_velocity.decayed"),
         ),
     ),
     Block(

@@ -4,20 +4,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.params import Profile
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.profiles import Profile
+from pretouch.recording.run_record import RunRecord
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import spans
 from pretouch_lab.paper.figures.marks import AXES, Y, distances, force_with_thresholds, shade, slowed, touching
-from pretouch_lab.trace import Trace
 
 
-def interaction_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -> Figure:
+def interaction_figure(trace: RunRecord, units: tuple[str, ...], profile: Profile) -> Figure:
     """Distances with the activation line, force along y with moving thresholds, end-effector velocity along y."""
     figure = Figure(figsize=(10, 8.4), layout="constrained")
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     distances(top, trace, units)
     d_max = profile.d_max_m
-    if profile.slow is not None or profile.detection.method == "thresholds":
+    if profile.slow is not None or isinstance(profile.detect, MovingThresholds):
         top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"activation, d_max {d_max:g} m")
     top.set(ylim=(0.0, 1.4), title=f"Three pushes in thirty seconds, profile {profile.name}")
     force_with_thresholds(middle, trace, Y, profile)
@@ -34,7 +35,7 @@ def interaction_figure(trace: Trace, units: tuple[str, ...], profile: Profile) -
     return figure
 
 
-def _name_pushes(axes: Axes, trace: Trace) -> None:
+def _name_pushes(axes: Axes, trace: RunRecord) -> None:
     """Say at the foot of the panel which way each push went, as only one axis of the force is drawn."""
     low, high = axes.get_ylim()
     axes.set_ylim(low - 0.15 * (high - low), high + 0.2 * (high - low))

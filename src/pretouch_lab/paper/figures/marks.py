@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from pretouch.params import Profile
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.profiles import Profile
+from pretouch.recording.run_record import RunRecord
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import spans
 from pretouch.types import BoolArray, FloatArray
-from pretouch_lab.trace import Trace
 
 BLIND, SENSING, OURS = "tab:blue", "tab:red", "tab:green"
 AXES = "xyz"
@@ -41,23 +42,23 @@ def shade(axes: Axes, time: FloatArray, flags: BoolArray, colour: str, hatch: st
         )  # fmt: skip
 
 
-def near(trace: Trace, d_max: float) -> BoolArray:
+def near(trace: RunRecord, d_max: float) -> BoolArray:
     """Whether anything sensed in each step (S,) is within d_max [m] of the end-effector's origin."""
     distance = np.linalg.norm(trace.sensed_point - trace.ee_position[:, None], axis=2)
     return np.any(distance < d_max, axis=1)
 
 
-def slowed(trace: Trace) -> BoolArray:
+def slowed(trace: RunRecord) -> BoolArray:
     """Whether the arm is slowed in each step (S,)."""
     return trace.speed_scale < _SLOWED
 
 
-def touching(trace: Trace) -> BoolArray:
+def touching(trace: RunRecord) -> BoolArray:
     """Whether something truly touches the arm in each step (S,)."""
     return np.linalg.norm(trace.true_force, axis=1) > TOUCH_N
 
 
-def distances(axes: Axes, trace: Trace, units: tuple[str, ...]) -> None:
+def distances(axes: Axes, trace: RunRecord, units: tuple[str, ...]) -> None:
     """Draw the distance each unit reads."""
     for k, unit in enumerate(units):
         colour, style, marker = _UNITS[k % len(_UNITS)]
@@ -68,12 +69,12 @@ def distances(axes: Axes, trace: Trace, units: tuple[str, ...]) -> None:
     axes.set_ylabel("distance read [m]")
 
 
-def force_with_thresholds(axes: Axes, trace: Trace, axis: int, profile: Profile) -> None:
+def force_with_thresholds(axes: Axes, trace: RunRecord, axis: int, profile: Profile) -> None:
     """Draw the force estimate along an axis, the value of eq. 8 and the moving thresholds.
 
     Of a detector without thresholds, the bands in which one sample alone is no contact.
     """
-    paper = profile.detection.method == "thresholds"
+    paper = isinstance(profile.detect, MovingThresholds)
     bounds = "thresholds" if paper else "bands of one sample"
     axes.plot(trace.time, trace.upper[:, axis], color="black", lw=1, label=bounds)
     axes.plot(trace.time, trace.lower[:, axis], color="black", lw=1)

@@ -19,9 +19,10 @@ from scipy.stats import qmc
 from pretouch.calibration.data import CalibrationData, UnitData
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.signals import interpolated, smooth, times
+from pretouch.calibration.signals import FINE_S, smooth, times
 from pretouch.errors import ExperimentError
 from pretouch.robot.model import RobotModel
+from pretouch.traces import on_grid
 from pretouch.types import BoolArray, FloatArray
 
 _LARGEST = np.array([np.pi, 0.5, np.pi, 0.5, 0.5, np.pi])
@@ -95,7 +96,7 @@ def _residuals(arm: ArmMotion, unit: UnitData, standing: list[BoolArray]) -> Cal
 def _acceleration(unit: UnitData, at: FloatArray) -> FloatArray:
     """Low-passed acceleration (N, 3) [m/s^2] at stamps (N,)."""
     fine = times(unit.imu.stamp[0], unit.imu.stamp[-1])
-    return interpolated(at, fine, smooth(unit.imu.stamp, unit.imu.acceleration, fine, CalibrationParams()))
+    return on_grid(at, fine[0], FINE_S, smooth(unit.imu.stamp, unit.imu.acceleration, fine, CalibrationParams()))
 
 
 def _search(residuals: Callable[[FloatArray], FloatArray]) -> FloatArray:

@@ -10,10 +10,10 @@ from pretouch.coverage.ways import seen_by, ways_to
 from pretouch.errors import ExperimentError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sim.ghost import Ghost
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import fixtures
 from pretouch.types import FloatArray
+from pretouch_lab.ghost import Ghost
 
 START_S, EVERY_S = 2.0, 2.5
 """When the first one sets out, and how long after it the next [s]."""

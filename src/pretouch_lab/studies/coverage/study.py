@@ -13,7 +13,7 @@ from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import candidates, suggest
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import Ways, seen_by
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit

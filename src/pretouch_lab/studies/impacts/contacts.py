@@ -1,23 +1,26 @@
 """Contacts on an arm whose units have IMUs, recorded once, and what the sequential test makes of them."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pretouch.contact.cues import no_cues
-from pretouch.contact.feel import FeelState, feel, feel_init
+from pretouch.contact.detector import Sample
 from pretouch.contact.hypotheses import NearPrior, write_hypotheses
-from pretouch.contact.impact import impact_init, listen
 from pretouch.contact.residual_model import spread_of_sample
 from pretouch.contact.sequential import LENGTHS, Hypotheses, judge, window_means
+from pretouch.contact.sequential_detector import SequentialState
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.errors import ExperimentError
 from pretouch.groups import NOTHING_NEAR
-from pretouch.params import Profile
+from pretouch.params import ProximityPriorParams
+from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant
 from pretouch.sim.units import SentImus
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, ImuReadings, RobotState, Touched
+from pretouch_lab.baselines.accelerometers import Accelerometers
 from pretouch_lab.benchmarks.detection.arm import (
     AWAY,
     Alone,
@@ -30,6 +33,7 @@ from pretouch_lab.benchmarks.detection.arm import (
 )
 from pretouch_lab.benchmarks.detection.contacts import Toucher, Touching, place_on, start_posture
 from pretouch_lab.benchmarks.detection.stream import Stream
+from pretouch_lab.detector_alone import DetectorAlone
 from pretouch_lab.studies.impacts.kinds import HELD_S, IMPACTS_M_S, KINDS, LINKS, PUSH_N, PUSHES_S, pulse
 
 LOOK = 3
@@ -105,38 +109,45 @@ class Played:
     """Where the arm was said to be touched in each step."""
 
 
-def play_again(course: Course, profile: Profile, use_imu: bool) -> Played:
-    """Give the test each step of a course, with the cues or without."""
-    arm, stream = model(), course.stream
-    state, impact = feel_init(arm, profile), impact_init(arm, len(course.sensing.believed))
-    steps = len(stream.count)
+def play_again(course: Course, found: Profile, use_imu: bool) -> Played:
+    """Give the sequential test of a profile each step of a course, with the accelerometers or without."""
+    arm, stream, skin, cue = model(), course.stream, course.sensing.believed, Accelerometers()
+    test = replace(test_of(found), cues=(cue,) if use_imu else ())
+    detector = DetectorAlone(replace(found, detect=test), arm, skin)
+    steps, jolts = len(stream.count), cue.init(detector.body)
     alarm, gain = np.zeros(steps, np.bool_), np.ones((steps, len(arm.links)))
     links, touched = np.full((steps, len(arm.parts)), np.nan), [NOT_TOUCHED] * steps
     for i, (robot, near, reacting, watched) in enumerate(stream.steps()):
-        kin, cues = arm.kinematics(robot.q), no_cues(len(arm.links))
-        if use_imu:
-            cues, impact = listen(
-                impact, arm, course.sensing.believed, kin, robot, course.imu[i], robot.stamp, profile
-            )  # fmt: skip
-        found, state = feel(state, arm, kin, robot, near, reacting, profile, watched, cues)
-        alarm[i], gain[i], touched[i] = found.contact is not None, cues.gain, found.touched
+        kin, imu = arm.kinematics(robot.q), course.imu[i]
+        if use_imu:  # once more beside the test, to see what it is told
+            sample = Sample(robot.stamp, kin, robot, detector.window, True, near, imu=imu)
+            cues, jolts = cue.step(jolts, detector.body, sample)
+            gain[i] = 1.0 if cues is None else cues.gain
+        said = detector.step(kin, robot, near, reacting, watched, imu=imu)
+        alarm[i], touched[i] = said.contact is not None, said.touched
         if i >= LOOK and alarm[i - LOOK]:
-            links[i] = link_evidence(state, kin, robot, profile)
+            links[i] = link_evidence(detector.state.test, kin, robot, test)
     return Played(alarm, gain, links, touched)
 
 
-def link_evidence(state: FeelState, kin: Kinematics, robot: RobotState, profile: Profile) -> FloatArray:
+def test_of(found: Profile) -> SequentialTest:
+    """Return the sequential test of a profile; an ExperimentError if it detects otherwise."""
+    if not isinstance(found.detect, SequentialTest):
+        raise ExperimentError(f"The profile {found.name} detects by {found.detect.name}: choose pretouch.")
+    return found.detect
+
+
+def link_evidence(known: SequentialState, kin: Kinematics, robot: RobotState, p: SequentialTest) -> FloatArray:
     """Return ln R (P,) of the windows that end with a step, of a force at the middle of each link alone."""
-    arm, p = model(), profile.detection
-    (known,) = state.sequential
+    arm, near = model(), p.proximity or ProximityPriorParams()
     n, parts = arm.n, len(arm.parts)
     means, S = np.zeros((len(LENGTHS), n)), np.empty((n, n))
     whole = window_means(known.ring, known.at, known.count, means)
     moving = int(np.any(np.abs(robot.qd_commanded) > p.still_rad_s))
     spread_of_sample(arm.mass_matrix(robot.q), known.model.spread[moving], p.noise_floor_nm, S)
     contacts = Hypotheses(np.empty((parts, 3, n)), np.empty(parts, np.int64), np.empty(n + parts), np.zeros((parts, 3)))
-    near = NearPrior(p.near_gain, p.near_m, p.near_horizon_s)
-    write_hypotheses(kin, arm.mechanism, robot.qd, NOTHING_NEAR, np.ones(len(arm.links)), near, contacts)
+    prior = NearPrior(near.gain, near.distance_m, near.horizon_s)
+    write_hypotheses(kin, arm.mechanism, robot.qd, NOTHING_NEAR, np.ones(len(arm.links)), prior, contacts)
     doubt, found = np.full(n, p.bias_floor_nm**2), np.empty(parts)
     for h in range(parts):
         one = np.zeros(n + parts)

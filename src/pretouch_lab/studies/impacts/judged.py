@@ -1,11 +1,10 @@
 """What the sequential test makes of one arm's contacts and of its free motion, with the accelerometers and without."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching
@@ -37,7 +36,6 @@ def judged(
         kinds: of contacts.
         links: each is touched once by each kind.
     """
-    asked = replace(found, detection=replace(found.detection, use_imu=True))
     touches = plan(seed, kinds, links)
     touched = course(seed, touches, touches[-1].end + 1.0, way)
     alone = course(seed, [], free_s, way)
@@ -45,11 +43,11 @@ def judged(
     contacts: list[Row] = [_about(touch) for touch in touches]
     row: Row = {"hours": rounded(float(counted.sum()) * found.task.control_period_s / 3600, 5)}
     for name, use in (("without", False), ("with", True)):
-        made = play_again(touched, asked, use)
+        made = play_again(touched, found, use)
         onsets = begun(made.alarm)
         for contact, touch in zip(contacts, touches, strict=True):
             contact[name] = _judged(touch, touched, made, _felt(touch, touched.stream.stamp, onsets))
-        free = play_again(alone, asked, use)
+        free = play_again(alone, found, use)
         row[name] = {
             "alarms": int(counted[begun(free.alarm)].sum()),
             "cued": rounded(float((free.gain[counted].max(axis=1) >= _GAIN).mean()), 5),

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import ExperimentError, ParameterError
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch.sim.plant_params import PlantParams
 from pretouch_lab.benchmarks.avoidance.contenders import ABLATED, CONTENDERS, TUNINGS, profile_text
 from pretouch_lab.benchmarks.avoidance.run import Request

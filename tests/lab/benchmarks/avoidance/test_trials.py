@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pretouch.control.posture import brought_to
-from pretouch.params import profile
 from pretouch.perception.closest import closest_points
+from pretouch.profiles import profile
 from pretouch_lab.benchmarks.avoidance.run import Request, rows_of, run
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import setting

@@ -5,7 +5,7 @@ import pytest
 from tests.lab.limits import assert_within_limits
 from tests.lab.width import width
 
-from pretouch.params import profile
+from pretouch.profiles import profile
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper.claims import between
 from pretouch_lab.paper.figures.close_up import close_up_figure

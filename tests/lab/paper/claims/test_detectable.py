@@ -258,7 +258,7 @@ def test_cells_are_all_different_and_cheap_enough(context):
     cells = detectable.EXPERIMENT.cells(Grid(("blind", "paper")))
     assert len({c.name for c in cells}) == len(cells) == 87
     assert 4 * sum(map(detectable.EXPERIMENT.cost, cells)) < 12_000
-    assert all(context.profile(c).threshold.f_base_n == 1000.0 for c in cells)
+    assert all(context.profile(c).detect.f_base_n == 1000.0 for c in cells)
 
 
 @pytest.mark.slow

@@ -1,12 +1,11 @@
 import numpy as np
 import pytest
 
-from pretouch.contact.detect import detect
-from pretouch.contact.window import window_init
-from pretouch.params import ThresholdParams
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.window import add_force, window_init
 from pretouch.types import Obstacles
 from pretouch_lab.paper.claims import detectors
-from pretouch_lab.paper.claims.detectors import TABLE_I, Windowed, dispersion_of, rate_bounds
+from pretouch_lab.paper.claims.detectors import TABLE_I, WINDOW, Windowed, dispersion_of, rate_bounds
 
 NEAR = np.vstack([np.eye(3), -np.eye(3)]) * TABLE_I.d_min_m
 
@@ -33,7 +32,7 @@ def obstacles(points):
 
 
 @pytest.mark.parametrize(
-    ("detector", "params"), [(detectors.filtered, TABLE_I), (detectors.raw, ThresholdParams(compare="raw"))]
+    ("detector", "params"), [(detectors.filtered, MovingThresholds()), (detectors.raw, MovingThresholds(compare="raw"))]
 )
 @pytest.mark.parametrize(("points", "f_obs"), [(np.zeros((0, 3)), 0.0), (NEAR, TABLE_I.f_d_n)])
 def test_a_course_is_judged_as_the_controller_judges_it(detector, params, points, f_obs):
@@ -41,12 +40,13 @@ def test_a_course_is_judged_as_the_controller_judges_it(detector, params, points
     force = 2.0 * rng.standard_normal((600, 3)) + [1.0, -2.0, 4.0]
     force[300:330, 1] += 25.0
     force[450:454, 2] -= 40.0
-    window, felt = window_init(params.window_samples), []
+    window, felt = window_init(WINDOW.samples), []
     for sample in force:
-        detection, window = detect(window, sample, np.zeros(3), obstacles(points), params)
+        armed, window = window.full, add_force(window, sample, WINDOW)
+        detection = params.judged(window, sample, armed, np.zeros(3), obstacles(points))
         felt.append(detection.contact is not None)
     found = detector(detectors.windowed(force), params.f_base_n, f_obs)
-    assert found.tolist() == felt[params.window_samples :]
+    assert found.tolist() == felt[WINDOW.samples :]
     assert 0 < found.sum() < len(found)
 
 

@@ -1,0 +1,45 @@
+"""Atomic writes: a file has its old content or all of its new one."""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+
+def atomic_write(path: Path, text: str) -> None:
+    """Write a text file beside its place and put it there; into a device or pipe as it is. Raises OSError.
+
+    Where the path is a symbolic link, the file it leads to is replaced. Whatever goes wrong, what was there stays.
+    """
+    place = Path(os.path.realpath(path))
+    if place.exists() and not place.is_file() and not place.is_dir():
+        place.write_text(text, encoding="utf-8")
+        return
+    with atomic_replacement(place) as unfinished, unfinished.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextmanager
+def atomic_replacement(place: Path) -> Iterator[Path]:
+    """Give a path beside a file's place; what is written there replaces the file, or is gone after an exception."""
+    name = sha256(os.fsencode(place.name)).hexdigest()[:16]  # as short for a long name
+    unfinished = place.with_name(f".{name}.{os.getpid()}.tmp")
+    try:
+        yield unfinished
+        if place.is_file():
+            shutil.copymode(place, unfinished)
+        os.replace(unfinished, place)
+    except BaseException:
+        unfinished.unlink(missing_ok=True)
+        raise
+
+
+def write_json(value: Any, path: Path) -> None:
+    """Write a value as JSON by `atomic_write`. Raises OSError, and ValueError for numbers that are not finite."""
+    atomic_write(path, json.dumps(value, indent=1, allow_nan=False) + "\n")

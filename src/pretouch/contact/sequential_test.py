@@ -1,0 +1,133 @@
+"""Contact detection by a sequential test on the torques, which learns the arm's free motion as it goes."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pretouch.contact.cues import Cue, Cues, no_cues, together
+from pretouch.contact.detector import Body, Detection, Detector, Readings, Sample, no_torques, strongest
+from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
+from pretouch.contact.localisation.significance import clearest_mean
+from pretouch.contact.residual_model import ResidualModel
+from pretouch.contact.sequential_detector import Observation, SequentialState, sequential_init, sequential_step
+from pretouch.groups import NOTHING_NEAR
+from pretouch.params import LocalisationParams, SequentialParams
+from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds
+from pretouch.values import value
+
+
+@value
+class SequentialTestState:
+    """All that the sequential test remembers."""
+
+    test: SequentialState
+    localisation: LocalisationState | None
+    """None where no contact is localised."""
+    cues: tuple[object, ...]
+    """Of each cue."""
+
+
+@dataclass(frozen=True)
+class SequentialTest(SequentialParams, Detector, name="sequential"):
+    """A test on the torques less their learnt mean in free motion (docs/explanation/detection.md)."""
+
+    cues: tuple[Cue, ...] = ()
+    """What else the units say of a touch."""
+    localise: LocalisationParams | None = None
+    """How the place of a contact is inferred (docs/explanation/localization.md); None: it is not."""
+
+    State = SequentialTestState
+
+    @property
+    def reads(self) -> frozenset[Readings]:
+        """What its cues take of the units."""
+        return frozenset(cue.reads for cue in self.cues)
+
+    def on(self, body: Body) -> "SequentialTest":
+        """Return the test with its cues made for an arm."""
+        return replace(self, cues=tuple(cue.on(body) for cue in self.cues))
+
+    def init(self, body: Body, learnt: ResidualModel | None = None) -> SequentialTestState:
+        """Return what is remembered before the first step."""
+        test = sequential_init(body.model, self, learnt)
+        return SequentialTestState(test, localisation_init() if self.localise else None, self._cues_init(body))
+
+    def _cues_init(self, body: Body) -> tuple[object, ...]:
+        return tuple(cue.init(body) for cue in self.cues)
+
+    def step(self, state: SequentialTestState, body: Body, sample: Sample) -> tuple[Detection, SequentialTestState]:
+        """Hold one sample of the torques against free motion, and learn from it if nothing can be a contact."""
+        model, period, location = body.model, body.period, state.localisation
+        cues, remembered = self._heard(state.cues, body, sample)
+        found = no_torques(body, sample)
+        if found is not None:
+            return found, SequentialTestState(state.test, localisation_init() if location else None, remembered)
+        said = no_cues(len(model.links)) if cues is None else cues
+        alone = sample.watched and not len(said.link)
+        seen = Observation(sample.kin, sample.robot, sample.obstacles, said)
+        felt, test = sequential_step(state.test, model, seen, sample.reacting, alone, period, self)
+        bands, touched, clear = Thresholds(felt.bands), NOT_TOUCHED, None
+        contact = strongest(felt.force, bands) if felt.detected and sample.armed else None
+        if self.localise:
+            touched, location = localise(
+                location or localisation_init(), model, seen, felt.windows, felt.log_likelihood_ratio, period,
+                self.localise,
+            )  # fmt: skip
+        if felt.log_likelihood_ratio >= 1.0:
+            clear = clearest_mean(felt.windows, period, self.localise or _USUAL)
+        made = Detection(
+            bands, contact, sample.armed, felt.residual, felt.log_likelihood_ratio, felt.learning, felt.lasting,
+            touched, clear,
+        )  # fmt: skip
+        return made, SequentialTestState(test, location if self.localise else None, remembered)
+
+    def _heard(self, states: tuple[object, ...], body: Body, sample: Sample) -> tuple[Cues | None, tuple[object, ...]]:
+        """Return what all cues say together, None for nothing, and what each remembers."""
+        if not self.cues:
+            return None, states
+        steps = [cue.step(state, body, sample) for cue, state in zip(self.cues, states, strict=True)]
+        said = [cues for cues, _ in steps if cues is not None]
+        return together(*said) if said else None, tuple(state for _, state in steps)
+
+    def adopted(self, state: Any, body: Body, before: Detector) -> SequentialTestState:
+        """Go on from another sequential test's state, with what is known of free motion; other cues begin anew."""
+        if not isinstance(before, SequentialTest):
+            return self.init(body)
+        return state if self.cues == before.cues else replace(state, cues=self._cues_init(body))
+
+    def learnt(self, state: SequentialTestState) -> ResidualModel:
+        """Return what was learnt of free motion."""
+        return state.test.model
+
+    def largest_missed_n(self, body: Body, speed: float) -> float:
+        """Force from which one sample is a contact to an arm at its ready posture that has learnt nothing.
+
+        By bisection; infinite where it would miss any force up to `_LARGEST_N`.
+        """
+        model, q, qd = body.model, body.model.description.q_ready, np.full(body.model.n, speed)
+        kin, fresh, said = model.kinematics(q), sequential_init(model, self), no_cues(len(model.links))
+        state, J = replace(fresh, model=replace(fresh.model, speed=qd)), model.ee_jacobian(kin)[:3]
+
+        def is_felt(force: FloatArray) -> bool:
+            robot = RobotState(0.0, q, qd, q, qd, J.T @ force, None)
+            seen = Observation(kin, robot, NOTHING_NEAR, said)
+            felt, _ = sequential_step(state, model, seen, False, False, body.period, self)
+            return felt.log_likelihood_ratio >= 1.0
+
+        latest = 0.0
+        for axis in np.eye(3):
+            if not is_felt(_LARGEST_N * axis):
+                return np.inf
+            low, high = 0.0, _LARGEST_N
+            while high - low > _TO_N:
+                middle = 0.5 * (low + high)
+                low, high = (low, middle) if is_felt(middle * axis) else (middle, high)
+            latest = max(latest, high)
+        return latest
+
+
+_LARGEST_N, _TO_N = 1000.0, 0.1
+"""Up to which force it is asked, and how exactly [N]."""
+_USUAL = LocalisationParams()
+"""Times over which torques are averaged where no contact is localised."""

@@ -1,0 +1,296 @@
+"""Yielding to a push as long as it is felt: a virtual mass and damper in joint space that take energy and give none.
+
+Each joint obeys M dv/dt = d(tau) - D v, integrated implicitly, with tau the external torque less its mean in free
+motion. See docs/explanation/reaction.md for why joint space, and for the bound on the energy (Hannaford and Ryu 2002;
+Ferraguti et al. 2015; both bound it with what they call passivity observer and energy tank).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pretouch.compiled import ByName, compiled, entry
+from pretouch.groups import CapsuleArrays
+from pretouch.params.reaction import AdmittanceParams
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.types import BoolArray, FloatArray
+from pretouch.values import value
+
+
+@value
+class VirtualMass:
+    """The virtual mass of n joints, and what is remembered of the torque that moves it."""
+
+    mean: FloatArray
+    """(2, n) residual torque filtered once and twice [Nm]; the latter is the mean in free motion."""
+    samples: int
+    """How many samples the mean holds."""
+    torque: FloatArray
+    """(n,) last residual less the mean [Nm]."""
+    velocity: FloatArray
+    """(n,) of the virtual mass [rad/s]."""
+    side: FloatArray
+    """(n,) sign of the torque that last drove each joint in this reaction, 0 for none."""
+    tank: float
+    """Energy taken from the push and not given back, with the start value [J]."""
+    steady: FloatArray
+    """(2, n) torque filtered once and twice, without most of its noise [Nm]."""
+    sliding: FloatArray
+    """(n,) 1 of a joint that a push has torn loose from static friction, 0 of one that sticks."""
+    quiet: float
+    """Time since a torque moved a joint or kept it moving [s]."""
+    unfelt: float
+    """Time since the detector felt a contact [s]."""
+    since: float
+    """Time since the contact that began a reaction [s], infinite without one."""
+
+
+def mass_init(n: int, params: AdmittanceParams) -> VirtualMass:
+    """Return the state of n joints at rest, before the first sample."""
+    none, twice = np.zeros(n), np.zeros((2, n))
+    return VirtualMass(twice, 0, none, none, none, params.start_energy_j, twice, none, 0.0, 0.0, math.inf)
+
+
+def dead_band(torque_limit: FloatArray, params: AdmittanceParams) -> FloatArray:
+    """External torque (n,) that moves nothing [Nm], given the joints' torque limits (n,) [Nm]."""
+    return params.dead_band_nm + params.dead_band_fraction * torque_limit
+
+
+def learnt(state: VirtualMass, residual: FloatArray, dt: float, params: AdmittanceParams) -> VirtualMass:
+    """Let a sample of free motion into the mean.
+
+    Of two filters in a row the second takes in little of what has only begun: of a torque that has lasted for 60 ms
+    less than one part in a hundred.
+    """
+    weight = max(1.0 - math.exp(-dt / _MEAN_S), 1.0 / (state.samples + 1))
+    none, mean, torque = np.zeros(len(residual)), np.empty((2, len(residual))), np.empty(len(residual))
+    _learn(state.mean, residual, weight, mean, torque)
+    return VirtualMass(
+        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros_like(mean), none,
+        0.0, 0.0, math.inf,
+    )  # fmt: skip
+
+
+@compiled
+def _learn(before: FloatArray, residual: FloatArray, weight: float, mean: FloatArray, torque: FloatArray) -> None:
+    """Write the mean (2, n) after a sample, and what of the sample (n,) it leaves."""
+    for j in range(len(residual)):
+        mean[0, j] = before[0, j] + weight * (residual[j] - before[0, j])
+        mean[1, j] = before[1, j] + weight * (mean[0, j] - before[1, j])
+        torque[j] = residual[j] - mean[1, j]
+
+
+def begun(
+    state: VirtualMass, model: RobotModel, kin: Kinematics, torque: FloatArray, before: FloatArray,
+    band: FloatArray, params: AdmittanceParams,
+) -> VirtualMass:  # fmt: skip
+    """Begin a reaction: at the speed that the torque (n,) [Nm] would keep up, as far as the start energy allows.
+
+    With static friction a joint begins only where what was felt `before` (n,) [Nm] says the same, and at the lesser of
+    both: what only noise or a small bias says moves no joint, and so none towards who pushes.
+    """
+    lesser, least = torque, band
+    if params.static_friction_nm > 0:
+        lesser = np.where(torque * before > 0, np.sign(torque) * np.minimum(np.abs(torque), np.abs(before)), 0.0)
+        least = np.maximum(band, _KEEPS * params.static_friction_nm)
+    drive = np.where(np.abs(lesser) > least, _shrunk(lesser, band), 0.0)
+    velocity = drive / params.damping_nm_s
+    energy = 0.5 * params.inertia_kg_m2 * float(velocity @ velocity)
+    if energy > params.start_energy_j:
+        velocity = velocity * math.sqrt(params.start_energy_j / energy)
+    velocity = _no_faster(velocity, model, kin, params.speed_max_m_s)
+    return VirtualMass(
+        state.mean, state.samples, torque, velocity, np.sign(drive), params.start_energy_j, np.stack((torque, lesser)),
+        np.abs(np.sign(drive)), 0.0, 0.0, 0.0,
+    )  # fmt: skip
+
+
+def yielded(
+    state: VirtualMass, arm: tuple[RobotModel, Kinematics], residual: FloatArray, command: FloatArray,
+    band: FloatArray, dt: float, params: AdmittanceParams, contact: bool = True,
+) -> VirtualMass:  # fmt: skip
+    """Move the virtual mass by one period under the torque that is felt.
+
+    Args:
+        state: memory.
+        arm: model and posture.
+        residual: (n,) external torque [Nm].
+        command: (n,) joint velocities commanded last [rad/s].
+        band: (n,) dead band [Nm].
+        dt: period [s].
+        params: parameters.
+        contact: whether the detector feels one.
+    """
+    p, torque = params, residual - state.mean[1]
+    velocity, side, sliding, steady = np.empty_like(band), np.empty_like(band), np.empty_like(band), state.steady.copy()
+    keep = math.exp(-dt / p.lag_s) if p.lag_s > 0 else 0.0
+    # just after a contact the filters still lag, and the detector has found a push already
+    at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
+    tank, pushed = _yield(
+        torque, command, band, state, p, (keep, at_once, 1.0 - math.exp(-dt / _STEADY_S), dt),
+        (velocity, side, sliding, steady),
+    )  # fmt: skip
+    velocity = _no_faster(velocity, *arm, p.speed_max_m_s)
+    quiet, unfelt = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.unfelt + dt
+    return VirtualMass(
+        state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, unfelt, state.since + dt
+    )
+
+
+def _no_faster(velocity: FloatArray, model: RobotModel, kin: Kinematics, most: float) -> FloatArray:
+    """Scale joint velocities (n,) [rad/s] so that no point of the body's axes is faster than `most` [m/s]."""
+    body = model.body
+    fastest = fastest_point(kin, model.moved_by, body.arrays, velocity)
+    return velocity * (most / fastest) if fastest > most else velocity
+
+
+_MEAN_S = 0.5
+"""Time constant of each of the two filters whose output is the mean torque in free motion [s]: longer than it takes to
+find a contact, so that little of one is in it, and shorter than a bias takes to drift."""
+_REVERSE_BAND = 2.0
+"""Factor on the dead band of a joint for torques against the push it has just yielded to: what the release of a push
+leaves in the estimate must not pull the arm towards the person."""
+_TANK_MAX_J = 2.0
+"""Most of the energy taken from a push that is kept to be given back [J]: that of 15 N over 0.13 m."""
+_STEADY_S = 0.1
+"""Time constant of each of the two filters that take the noise out of the torque [s]."""
+_KEEPS = 0.85
+"""Share of the static friction beyond which a torque keeps a joint moving that it tore loose: a bias of two thirds of
+it lets a joint stop, and does not tear it loose again."""
+_AT_ONCE = 2.0
+"""Times the static friction from which two samples in a row tear a joint loose, whatever the filters say."""
+_FIRST_S = 0.3
+"""Time after the onset of a contact in which two samples beyond what keeps a joint moving do the same [s]."""
+_REST_RAD_S = 1e-3
+"""Speed at which a joint that nothing drives sticks [rad/s]: none that can be seen."""
+
+
+class _Before(NamedTuple):
+    """As of `VirtualMass`."""
+
+    torque: FloatArray
+    velocity: FloatArray
+    side: FloatArray
+    sliding: FloatArray
+    tank: float
+
+
+class _Params(NamedTuple):
+    """Of `AdmittanceParams`."""
+
+    inertia_kg_m2: float
+    damping_nm_s: float
+    static_friction_nm: float
+
+
+class _Step(NamedTuple):
+    """What a period comes to."""
+
+    keep: float
+    """Part of the torque before that the estimate still shows."""
+    at_once: float
+    """Times the static friction from which two samples tear a joint loose."""
+    weight: float
+    """Of a sample in the filters."""
+    dt: float
+    """[s]"""
+
+
+class _After(NamedTuple):
+    """Room for what follows, as of `VirtualMass`; `steady` is that of before."""
+
+    velocity: FloatArray
+    side: FloatArray
+    sliding: FloatArray
+    steady: FloatArray
+
+
+@entry
+def _yield(
+    torque: FloatArray, command: FloatArray, band: FloatArray, state: ByName[_Before], p: ByName[_Params], step: _Step,
+    after: _After,
+) -> tuple[float, bool]:  # fmt: skip
+    """Write what follows; return the energy in the tank [J], and whether a push goes on."""
+    before, v, side, loose, tank = state
+    inertia, damping, friction = p
+    keep, at_once, weight, dt = step
+    velocity, sides, sliding, steady = after
+    n, power, pushed = len(v), 0.0, False
+    for i in range(n):
+        steady[0, i] += weight * (torque[i] - steady[0, i])
+        steady[1, i] += weight * (steady[0, i] - steady[1, i])
+        lasts = abs(steady[0, i]) > max(band[i], _KEEPS * friction)
+        starts = _both(steady[0, i], steady[1, i], friction) or _both(torque[i], before[i], at_once * friction)
+        sliding[i] = 1.0 if friction == 0.0 or starts or (loose[i] > 0.0 and lasts) else 0.0
+        pushed = pushed or (lasts and sliding[i] > 0.0)
+
+        # what acted in the last period, by the exact inverse of the estimate's lag over one period
+        acted = (torque[i] - keep * before[i]) / (1.0 - keep)
+        # the least energy that it gave, whichever of the two is true and whatever is wrong within the dead band
+        power += min(torque[i] * v[i], acted * v[i]) - band[i] * abs(v[i])
+        felt, now = _beyond(torque[i], band[i]), _beyond(acted, band[i])
+        drive = 0.0
+        if felt * now > 0.0 and sliding[i] > 0.0:
+            drive = felt if abs(felt) < abs(now) else now
+        if drive * side[i] < 0.0:
+            least = _REVERSE_BAND * band[i]
+            far = min(abs(torque[i]), abs(acted)) > least
+            drive = drive if far else 0.0
+        velocity[i] = (inertia * v[i] + dt * drive) / (inertia + dt * damping)
+        sides[i] = side[i]
+        if drive != 0.0:
+            sides[i] = np.sign(drive)
+        elif velocity[i] * command[i] <= 0.0 or (friction > 0.0 and abs(velocity[i]) < _REST_RAD_S):
+            velocity[i] = 0.0
+        elif abs(velocity[i]) > abs(command[i]):
+            # nothing drives it: it is never asked for more than it does
+            velocity[i] = command[i]
+    tank = min(tank + dt * power, _TANK_MAX_J)
+    if tank < 0.0:
+        # no more to give: only what takes energy may move
+        for i in range(n):
+            acted = (torque[i] - keep * before[i]) / (1.0 - keep)
+            if min(torque[i] * velocity[i], acted * velocity[i]) <= band[i] * abs(velocity[i]):
+                velocity[i] = 0.0
+    return tank, pushed
+
+
+@compiled
+def _both(one: float, other: float, level: float) -> bool:
+    """Whether both are beyond a level, on the same side."""
+    return one * other > 0.0 and min(abs(one), abs(other)) > level
+
+
+@compiled
+def _beyond(torque: float, band: float) -> float:
+    """How far a torque lies beyond the dead band, with its sign: never more than it is without a bias that small."""
+    return np.sign(torque) * max(0.0, abs(torque) - band)
+
+
+def _shrunk(torque: FloatArray, band: FloatArray) -> FloatArray:
+    return np.sign(torque) * np.maximum(0.0, np.abs(torque) - band)
+
+
+@entry
+def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, qd: FloatArray) -> float:
+    """Speed [m/s] of the fastest end of any capsule's axis at joint velocities `qd` (n,) [rad/s].
+
+    The speed along an axis is convex, so no point of it is faster than both its ends.
+    """
+    position, rotation, anchor, axis = kin
+    link, a, b = capsules.link, capsules.a, capsules.b
+    fastest = 0.0
+    for c in range(len(link)):
+        k = link[c]
+        for end in (a[c], b[c]):
+            point = rotation[k] @ end + position[k]
+            vx, vy, vz = 0.0, 0.0, 0.0
+            for j in range(len(qd)):
+                if moved_by[k, j]:
+                    x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
+                    vx += (axis[j, 1] * z - axis[j, 2] * y) * qd[j]
+                    vy += (axis[j, 2] * x - axis[j, 0] * z) * qd[j]
+                    vz += (axis[j, 0] * y - axis[j, 1] * x) * qd[j]
+            fastest = max(fastest, np.sqrt(vx * vx + vy * vy + vz * vz))
+    return fastest

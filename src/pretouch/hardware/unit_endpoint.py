@@ -1,0 +1,207 @@
+"""One unit as its receiver sees it: session, clock, newest reading, traffic."""
+
+import math
+from collections.abc import Callable
+
+from pretouch.hardware.keys import UnitKey
+from pretouch.hardware.link import Link, LinkParams, Session
+from pretouch.hardware.traffic import Received, UnitTraffic
+from pretouch.hardware.unit_clock import UnitClock
+from pretouch.hardware.wire import NO_FORCE, Flag, Sample, touch_part
+from pretouch.types import FloatArray, RangeStatus, TouchStatus
+
+_LEAST = 10
+"""Readings that must be alike; fewer may be so by chance."""
+_NEW = int(Flag.RANGE_NEW)
+
+
+class StuckDetector:
+    """Watches the readings of one unit: a range finder that repeats itself to the last digit does not measure."""
+
+    def __init__(self, after: float) -> None:
+        """Call a unit stuck whose readings are alike for so long [s]."""
+        self._after = after
+        self.stuck = False
+        self._values: tuple[int, ...] = ()
+        self._alikes, self._values_since = 0, math.inf
+        self.forget_stream()
+
+    def forget_stream(self) -> None:
+        """Let the count of measurements begin anew, as after a reboot; values that were alike still are."""
+        self._stream, self._streams, self._stream_since = -1, 0, math.inf
+
+    def update(self, sample: Sample, now: float) -> bool:
+        """Take in a sample newer than those before, that arrived at this instant [s]; return whether it is stuck."""
+        if not sample.flags & _NEW:
+            return self.stuck
+        if sample.range_stream != self._stream:
+            self._stream, self._streams, self._stream_since = sample.range_stream, 0, now
+        values = (
+            sample.range_mm,
+            sample.range_sigma,
+            sample.range_signal,
+            sample.range_ambient,
+            sample.range_spads,
+        )
+        if values != self._values:
+            self._values, self._alikes, self._values_since = values, 0, now
+        self._streams += 1
+        self._alikes += 1
+        self.stuck = (self._streams >= _LEAST and now - self._stream_since >= self._after) or (
+            self._alikes >= _LEAST and now - self._values_since >= self._after
+        )
+        return self.stuck
+
+
+_RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
+NO_READING = (-math.inf, 0.0, float(RangeStatus.NONE))
+"""Stamp [s], distance [m] and status of a unit that has measured nothing."""
+_GREETING_S = 1.0
+"""Time without a hello after which a unit no longer asks for a session [s]; it would ask ten times in it."""
+
+NO_TOUCH = (-math.inf, 0.0, math.nan, float(TouchStatus.NONE))
+"""Stamp [s], contact, force [N] and status of a unit that has told of no touch sensor."""
+
+Address = tuple[str, int]
+
+
+class UnitEndpoint:
+    """What is known of one unit. Times in seconds of the host's clock."""
+
+    def __init__(
+        self, index: int, unit: UnitKey, params: LinkParams, draw: Callable[[int], bytes], reading: FloatArray,
+        touch: FloatArray,
+    ) -> None:  # fmt: skip
+        """Know nothing yet of the unit with this index in the skin.
+
+        Stamp, distance and status of its range go to `reading`, those of `NO_TOUCH` to `touch`.
+        """
+        self._reading, self._touch = reading, touch
+        self.traffic = UnitTraffic(unit.id, unit.number)
+        self.address: Address | None = None
+        """Where its last sample came from, as the socket knows it."""
+        self._index, self._params = index, params
+        self._link = Link(unit.key, params, draw)
+        self._clock = UnitClock(1e-6 * params.drift_ppm, params.clock_window_s)
+        self._stuck = StuckDetector(params.stuck_after_s)
+        self._session: Session | None = None
+        self._last_hello = -math.inf
+        self._echoed = 0
+        """Beacon whose echo was used last: the same one again tells nothing new."""
+        self._trusted_from = 0
+        """First beacon whose echo tells the time: those before were heard before the unit's clock jumped."""
+
+    def hello(self, datagram: memoryview, now: float) -> bytes | str:
+        """Return the answer to what looks like a hello, or why there is none."""
+        answer = self._link.hello(datagram, now)
+        if isinstance(answer, bytes):
+            traffic = self.traffic
+            traffic.hellos += 1
+            self._last_hello = now
+            if traffic.state in ("never heard", "silent"):
+                traffic.state = "greeting"
+        return answer
+
+    def sample(self, datagram: memoryview, sequence: int, address: Address, now: float) -> Received | str:
+        """Return what a datagram that looks like a sample brought, or why it is not believed."""
+        verified = self._link.sample(datagram, sequence, now)
+        traffic = self.traffic
+        if isinstance(verified, str):
+            traffic.replayed += verified == "replayed"
+            return verified
+        session, sample, lost = verified
+        if session is not self._session:
+            self._begin(session)
+        traffic.state = "live"
+        traffic.accepted += 1
+        traffic.lost += lost
+        traffic.last_arrival = now
+        traffic.sample = sample
+        if address != self.address:
+            self.address, traffic.address = address, address[:2]
+        self._tell_time(session, sample, now)
+        if sample.touch:
+            self._take_touch(sample)
+        stamp = self._take_reading(sample, now) if sample.flags & _RANGE_NEW else math.nan
+        return Received(self._index, now, stamp, traffic.offset, traffic.bound, sample)
+
+    def beacon_due(self, now: float) -> bool:
+        """Return whether a beacon is to be sent to `address`; do what else time asks for."""
+        traffic = self.traffic
+        if (traffic.state == "live" and now - traffic.last_arrival > self._params.silent_after_s) or (
+            traffic.state == "greeting" and now - self._last_hello > _GREETING_S
+        ):
+            traffic.state = "silent"
+        self._link.expire(now)
+        return now >= self._link.beacon_due
+
+    def beacon(self, now: float) -> bytes:
+        """Return the beacon that is due, to be sent at once."""
+        return self._link.beacon(now)
+
+    def _begin(self, session: Session) -> None:
+        """Another session is live."""
+        traffic, before = self.traffic, self.traffic.sample
+        traffic.sessions += 1
+        if before is not None and session.hello.uptime_us < before.time_us:
+            traffic.reboots += 1
+            self._stuck.forget_stream()
+        traffic.firmware, traffic.reset = session.hello.firmware, session.hello.reset
+        self._session, self._trusted_from, self._echoed = session, 0, 0
+        self._clock.forget()
+
+    def forget_time(self, now: float) -> None:
+        """Know nothing of the unit's clock, and have no reading, until it echoes a beacon sent from an instant on."""
+        self._clock.forget()
+        self._link.forget_offers()
+        self._distrust_beacons(now)
+        traffic = self.traffic
+        traffic.offset, traffic.bound, traffic.last_reading_stamp = math.nan, math.inf, -math.inf
+        self._reading[:], self._touch[:] = NO_READING, NO_TOUCH
+
+    def _distrust_beacons(self, now: float) -> None:
+        """Take the time from no beacon that was sent already, and send another soon."""
+        if self._session is not None:
+            self._trusted_from = self._session.number + 1
+            self._link.beacon_due = now
+
+    def _tell_time(self, session: Session, sample: Sample, now: float) -> None:
+        """Renew offset, bound and latency."""
+        clock, traffic = self._clock, self.traffic
+        made, hold = 1e-6 * sample.time_us, sample.beacon_hold_us
+        sent = None
+        if sample.beacon != self._echoed and sample.beacon >= self._trusted_from:
+            sent, self._echoed = session.sent.get(sample.beacon), sample.beacon
+        if not clock.update(made, now, sent, 1e-6 * hold):
+            self._distrust_beacons(now)
+        traffic.clock_jumps = clock.jumps
+        traffic.offset, traffic.bound = clock.offset, clock.bound
+        if clock.known:
+            latency = now - clock.earliest(made)
+            known = traffic.latency
+            traffic.latency = latency if math.isnan(known) else known + 0.0625 * (latency - known)
+
+    def _take_reading(self, sample: Sample, now: float) -> float:
+        """Keep a reading if it is the newest; return its stamp, NaN if it cannot be told."""
+        traffic, clock = self.traffic, self._clock
+        instant = 1e-6 * (sample.time_us - sample.range_age_us)
+        newest = instant > clock.last_reading
+        if newest:
+            traffic.stuck = self._stuck.update(sample, now)
+        stamp = clock.stamp(instant)
+        if not clock.known:
+            return math.nan
+        if newest and stamp > traffic.last_reading_stamp:
+            traffic.last_reading_stamp = stamp
+            self._reading[:] = stamp, 1e-3 * sample.range_mm, _STUCK if traffic.stuck else sample.range_status
+        return stamp
+
+    def _take_touch(self, sample: Sample) -> None:
+        """Keep a touch reading if it is the newest whose instant is known."""
+        part = touch_part(sample)
+        if part is None or not self._clock.known:
+            return
+        stamp = self._clock.earliest(1e-6 * (sample.time_us - part.age_us))
+        if stamp > self._touch[0]:
+            force = math.nan if part.force_mn == NO_FORCE else 1e-3 * part.force_mn
+            self._touch[:] = stamp, float(part.contact != 0), force, part.status

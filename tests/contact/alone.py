@@ -1,0 +1,70 @@
+"""A profile's detector given one sample after the other, with nothing around it."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pretouch.contact.cues import Cue, Cues
+from pretouch.contact.detector import Body, Detection, Sample
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.contact.window import WindowState, add_force, window_init
+from pretouch.profiles import Profile
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ImuReadings, Obstacles, RobotState, TouchReadings
+
+
+@dataclass(frozen=True)
+class Given(Cue):
+    """Says what it is given."""
+
+    reads = "touch"
+    said: Cues | None = None
+
+    def step(self, state: None, body: Body, sample: Sample) -> tuple[Cues | None, None]:
+        return self.said, None
+
+
+@dataclass(frozen=True)
+class Alone:
+    """What is remembered."""
+
+    window: WindowState
+    state: Any
+
+
+def body_of(model: RobotModel, profile: Profile, skin: Skin | None = None) -> Body:
+    return Body(model, skin or Skin((), model), profile.task.control_period_s)
+
+
+def begun(model: RobotModel, profile: Profile) -> Alone:
+    return Alone(window_init(profile.window.samples), profile.detect.init(body_of(model, profile)))
+
+
+def feel(
+    before: Alone, model: RobotModel, kin: Kinematics, robot: RobotState, obstacles: Obstacles, reacting: bool,
+    profile: Profile, watched: bool = True, cues: Cues | None = None,
+) -> tuple[Detection, Alone]:  # fmt: skip
+    """Take in one sample; what units say of a touch is given as it is."""
+    detect, state = profile.detect, before.state
+    if isinstance(detect, SequentialTest):
+        detect, state = replace(detect, cues=(Given(cues),)), replace(state, cues=(None,))
+    window = add_force(before.window, None if robot.wrench is None else robot.wrench[:3], profile.window)
+    given = Sample(robot.stamp, kin, robot, window, before.window.full, obstacles, reacting, watched)
+    found, state = detect.step(state, body_of(model, profile), given)
+    return found, Alone(before.window if reacting and profile.window.freeze_while_reacting else window, state)
+
+
+def sample(
+    kin: Kinematics, robot: RobotState, near: Obstacles, now: float, touches: TouchReadings | None = None,
+    imu: ImuReadings | None = None,
+) -> Sample:  # fmt: skip
+    """A step in which units felt something."""
+    return Sample(now, kin, robot, window_init(2), True, near, touches=touches, imu=imu)
+
+
+def standing(model: RobotModel, stamp: float = 0.0) -> RobotState:
+    """The arm at rest in its ready posture, with nothing felt."""
+    q, still = model.description.q_ready, np.zeros(model.n)
+    return RobotState(stamp, q, still, q, still, still, np.zeros(6))

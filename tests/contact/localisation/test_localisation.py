@@ -1,0 +1,201 @@
+"""Contact localisation: likelihoods against linear algebra, noiseless contacts found again, priors, two at once."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from tests.contact.localisation.arm import (
+    MODEL,
+    NOISE,
+    SURFACE,
+    N,
+    P,
+    exposed,
+    of,
+    pose_of,
+    poses,
+    posture,
+    said,
+    torques,
+)
+
+from pretouch.contact.cues import Cues, no_cues
+from pretouch.contact.localisation.double_contact import covariance_with_contact
+from pretouch.contact.localisation.prior import LocalisationNumbers, SeenNear, UnitCues, log_prior
+from pretouch.contact.localisation.single_contact import Candidates, log_posterior
+from pretouch.types import Obstacles
+
+NUMBERS = LocalisationNumbers(*(getattr(P, name) for name in LocalisationNumbers._fields))
+
+
+def test_candidates_lie_on_the_capsules_and_stand_for_their_area():
+    body = MODEL.body
+    for c in range(0, len(SURFACE), 7):
+        own = body.of_links(SURFACE.link[c : c + 1])
+        axis = own.b - own.a
+        part = np.clip(((SURFACE.point[c] - own.a) * axis).sum(axis=1) / (axis**2).sum(axis=1), 0, 1)
+        gap = np.linalg.norm(SURFACE.point[c] - own.a - part[:, None] * axis, axis=1) - own.radius
+        assert np.abs(gap).min() < 1e-9
+    assert_allclose(np.linalg.norm(SURFACE.normal, axis=1), 1.0)
+    # one capsule alone: 2 pi r (l + 2 r)
+    link4 = body.of_links(np.array([MODEL.link_index("panda_link4")]))
+    length = np.linalg.norm(link4.b - link4.a, axis=1)
+    whole = (2 * np.pi * link4.radius * (length + 2 * link4.radius)).sum()
+    found = SURFACE.area[SURFACE.link == MODEL.link_index("panda_link4")].sum()
+    assert 0.5 * whole < found < whole
+
+
+def test_the_likelihood_is_that_of_a_normal_distribution_with_the_force_integrated_out():
+    # with many degrees of freedom, and a force whose size is known, it is N(tau; 0, S + J^T V J)
+    kin, c = posture(), of("panda_link6", posture())
+    point, normal = pose_of(kin, c)
+    torque = torques(kin, (c, 30.0))
+    ln, force = np.empty(len(SURFACE)), np.empty((len(SURFACE), 3))
+    known = NUMBERS._replace(friction=0.25, force_n=1000.0, tails=1e9)
+    candidates = Candidates(
+        torque, kin, MODEL.moved_by, SURFACE.arrays, *poses(kin), np.zeros(len(SURFACE)), known
+    )  # fmt: skip
+    left = log_posterior(NOISE, candidates, ln, force)
+    assert_allclose(force[c], -30.0 * normal, atol=0.5)
+    assert left < 0.1
+    size = -force[c] @ normal
+    whole = np.empty((N, N))
+    covariance_with_contact(NOISE, candidates, c, size, whole)
+    J = MODEL.jacobian(kin, int(SURFACE.link[c]), point)[:3]
+    V = 1000.0**2 * np.outer(normal, normal) + (0.25 * size) ** 2 * (np.eye(3) - np.outer(normal, normal))
+    assert_allclose(whole, NOISE + J.T @ V @ J, rtol=1e-9)
+    # only a push is allowed: twice the density
+    expected = np.log(2.0) - 0.5 * torque @ np.linalg.solve(whole, torque)
+    expected -= 0.5 * np.linalg.slogdet(whole)[1]
+    assert ln[c] == pytest.approx(expected, abs=0.02)
+
+
+@pytest.mark.parametrize("link", ["panda_link5", "panda_link6", "panda_link7", "panda_hand"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_contact_on_an_outer_link_is_found_where_it_is(link, seed):
+    kin = posture(seed)
+    c = of(link, kin)
+    found, _ = said(kin, torques(kin, (c, 40.0)), steps=4)
+    point, normal = pose_of(kin, c)
+    assert len(found.link) == 1
+    assert MODEL.rigid[found.link[0]] == MODEL.rigid[SURFACE.link[c]]
+    assert np.linalg.norm(found.point[0] - point) < 0.03
+    assert found.force[0] @ -normal > 30.0
+    assert found.probability[0] > 0.9
+
+
+def test_a_force_line_that_crosses_the_body_twice_is_taken_where_it_pushes_inwards():
+    kin = posture(1)
+    c = of("panda_hand", kin)
+    point, normal = pose_of(kin, c)
+    found, _ = said(kin, torques(kin, (c, 40.0)))
+    other, _ = said(kin, -torques(kin, (c, 40.0)))
+    assert found.force[0] @ normal < 0 < other.force[0] @ normal
+    assert np.linalg.norm(found.point[0] - point) < np.linalg.norm(other.point[0] - point)
+
+
+def test_two_contacts_are_told_from_one():
+    kin = posture(2)
+    a, b = of("panda_link4", kin), of("panda_hand", kin)
+    found, state = said(kin, torques(kin, (a, 40.0), (b, 30.0)), steps=8)
+    assert len(found.link) == 2
+    assert set(MODEL.rigid[found.link]) == {MODEL.rigid[SURFACE.link[a]], MODEL.rigid[SURFACE.link[b]]}
+    assert found.probability[0] >= found.probability[1]
+    hand = int(np.argmax(MODEL.rigid[found.link]))
+    assert np.linalg.norm(found.point[hand] - pose_of(kin, b)[0]) < 0.04
+    # when one of them goes, what is left is one again
+    found, _ = said(kin, torques(kin, (b, 30.0)), steps=3, state=state)
+    assert len(found.link) == 1
+
+
+def test_two_contacts_are_on_two_bodies_even_where_both_of_their_places_spread_to_a_third():
+    found, _ = said(posture(1951), np.array([29.3, -24.7, 12.3, 5.5, -5.1, 9.3, 6.9]))
+    assert len(found.link) == 2
+    assert MODEL.rigid[found.link[0]] != MODEL.rigid[found.link[1]]
+    assert ((found.probability > 0.0) & (found.probability <= 1.0)).all()
+    assert found.probability[0] >= found.probability[1]
+
+
+def test_nothing_is_said_while_nothing_is_felt_and_nothing_is_remembered_afterwards():
+    kin = posture()
+    torque = torques(kin, (of("panda_hand", kin), 40.0))
+    found, state = said(kin, torque, ratio=0.9)
+    assert not len(found.link)
+    assert state.steps == 0
+    found, state = said(kin, torque)
+    assert len(found.link) == 1
+    assert said(kin, torque, ratio=0.6, state=state)[1].steps == 2  # it goes on below the ratio it began with
+    found, state = said(kin, torque, ratio=0.4, state=state)
+    assert not len(found.link)
+    assert not len(state.ln)
+
+
+def test_a_touched_unit_and_a_seen_hand_say_where_when_the_torques_do_not():
+    kin = posture()
+    c = of("panda_link2", kin)
+    point, normal = pose_of(kin, c)
+    torque = torques(kin, (c, 60.0))
+    alone, _ = said(kin, torque)
+    cue = Cues(np.ones(len(MODEL.links)), SURFACE.link[c : c + 1], point[None], np.array([0.01]), np.array([np.nan]))
+    told, _ = said(kin, torque, cues=cue)
+    ball = (point + 0.05 * normal)[None]
+    near = Obstacles(
+        np.zeros(1, np.int64), ball, np.array([1.0]), point[None], SURFACE.link[c : c + 1], normal[None],
+        np.array([0.05]), np.zeros(1),
+    )  # fmt: skip
+    seen, _ = said(kin, torque, obstacles=near)
+    assert MODEL.rigid[told.link[0]] == MODEL.rigid[SURFACE.link[c]]
+    assert np.linalg.norm(told.point[0] - point) < 0.02
+    assert np.linalg.norm(seen.point[0] - point) < 0.06
+    assert told.sigma[0] < alone.sigma[0]
+    # and a link that units call likely more is believed
+    gain = np.ones(len(MODEL.links))
+    gain[SURFACE.link[c]] = 100.0
+    likely, _ = said(kin, torque, cues=replace(no_cues(len(MODEL.links)), gain=gain))
+    assert MODEL.rigid[likely.link[0]] == MODEL.rigid[SURFACE.link[c]]
+
+
+def test_the_prior_is_one_in_all_and_hides_what_cannot_be_touched():
+    kin = posture()
+    point, _ = poses(kin)
+    hidden, ln = ~exposed(kin), np.empty(len(SURFACE))
+    assert 0 < hidden.sum() < len(SURFACE) / 2
+    log_prior(
+        point, SURFACE.arrays, hidden, SeenNear(point[:2] + 0.03, np.array([0.03, 0.2])),
+        UnitCues(np.ones(len(MODEL.links)), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)),
+        NUMBERS, ln,
+    )  # fmt: skip
+    assert np.exp(ln).sum() == pytest.approx(1.0, abs=1e-6)
+    assert np.exp(ln[hidden]).max() < 1e-11
+
+
+def test_between_two_inferences_the_last_one_holds():
+    kin = posture()
+    torque = torques(kin, (of("panda_hand", kin), 40.0))
+    slow = replace(P, update_s=0.05)
+    first, state = said(kin, torque, p=slow)
+    second, state = said(kin, 2.0 * torque, p=slow, state=state)
+    assert second is first
+    later, _ = said(kin, 2.0 * torque, p=slow, state=state, steps=4)
+    assert later is not first
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.floats(-200, 200), min_size=N, max_size=N),
+    st.lists(st.floats(-2.5, 2.5), min_size=N, max_size=N),
+    st.integers(1, 5),
+)
+def test_whatever_is_felt_what_is_said_is_sound(torque, q, steps):
+    kin = MODEL.kinematics(np.clip(np.array(q), MODEL.q_min, MODEL.q_max))
+    found, _ = said(kin, np.array(torque), steps=steps)
+    assert len(found.link) in (0, 1, 2)
+    for values in (found.point, found.force, found.sigma, found.probability):
+        assert np.isfinite(values).all()
+    assert ((found.probability > 0) & (found.probability <= 1 + 1e-9)).all()
+    assert (found.sigma >= 0).all()
+    if len(found.link) == 2:
+        assert MODEL.rigid[found.link[0]] != MODEL.rigid[found.link[1]]

@@ -1,0 +1,208 @@
+"""What is caught between two links, or between one and a fixture, and what is only a push."""
+
+import numpy as np
+import pytest
+
+from pretouch.contact.clamp import caught_between, clamp_begun, clamp_init, gone, opened
+from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
+from pretouch.params import ClampParams, PinchParams
+from pretouch.robot.body import Capsules, no_capsules
+from pretouch.robot.model import RobotModel
+from pretouch.robot.self_distance import nearest_points, segment_distance
+from pretouch.types import NOT_TOUCHED, FloatArray, Touched
+
+P = PinchParams()
+FOLDED = np.array([0.0, -1.2, 0.0, -2.95, 0.0, 1.75, 0.785])
+"""Forearm and upper arm some 0.1 m apart."""
+FOLDING = np.array([0.0, 0.0, 0.0, -0.3, 0.0, 0.0, 0.0])
+NOISE = np.diag([0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.05]) ** 2
+FLOOR = np.array([[0.0, 0.0, 1.0, -0.2]])
+NONE = no_capsules()
+
+
+def gap_of(model: RobotModel, one: str, other: str, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where two links are nearest to each other, on the surface of each, and the unit vector across."""
+    kin, body = model.kinematics(q), model.capsules
+    best = None
+    for i in np.flatnonzero(body.link == model.link_index(one)):
+        for j in np.flatnonzero(body.link == model.link_index(other)):
+            ends = [
+                kin.position[body.link[c]] + kin.rotation[body.link[c]] @ e[c] for c in (i, j) for e in (body.a, body.b)
+            ]
+            p, r = nearest_points(*ends)
+            apart = float(np.linalg.norm(r - p))
+            if best is None or apart - body.radius[i] - body.radius[j] < best[0]:
+                u = (r - p) / apart
+                best = apart - body.radius[i] - body.radius[j], p + body.radius[i] * u, r - body.radius[j] * u, u
+    assert best is not None
+    return best[1:]
+
+
+def squeezed(model: RobotModel, newtons: float, tilt: float = 0.0) -> FloatArray:
+    """Torques of something between upper arm and forearm that pushes both apart."""
+    kin = model.kinematics(FOLDED)
+    at_upper, at_fore, u = gap_of(model, "panda_link2", "panda_link5", FOLDED)
+    aside = np.cross(u, [0.0, 1.0, 0.0])
+    force = newtons * (u + tilt * aside / np.linalg.norm(aside))
+    J = [
+        model.jacobian(kin, model.link_index(f"panda_{link}"), at)[:3]
+        for link, at in (("link5", at_fore), ("link2", at_upper))
+    ]
+    return np.asarray((J[0] - J[1]).T @ force)
+
+
+def found(model: RobotModel, torque: FloatArray, q: FloatArray = FOLDED, qd: FloatArray = FOLDING):
+    return find_self_clamp(model, model.kinematics(q), torque, NOISE, qd, P)
+
+
+def test_what_pushes_upper_arm_and_forearm_apart_is_caught_between_them(panda_model: RobotModel) -> None:
+    pinch = found(panda_model, squeezed(panda_model, 60.0))
+    assert pinch is not None
+    assert [panda_model.links[link] for link in pinch.link] == ["panda_link2", "panda_link5"]
+    assert pinch.force == pytest.approx(60.0, rel=0.05)
+
+
+def test_friction_tilts_the_force_and_it_is_still_caught(panda_model: RobotModel) -> None:
+    assert found(panda_model, squeezed(panda_model, 60.0, 0.3)) is not None
+
+
+@pytest.mark.parametrize(
+    ("newtons", "q", "qd"),
+    [
+        (-60.0, FOLDED, FOLDING),  # pulls them together
+        (60.0, FOLDED, -FOLDING),  # the arm was opening
+        (60.0, FOLDED, np.zeros(7)),  # or stood
+        (5.0, FOLDED, FOLDING),  # too weak
+        (60.0, np.array([0.0, -0.3, 0.0, -1.2, 0.0, 1.2, 0.785]), FOLDING),  # the same torques of an arm stretched out
+    ],
+)
+def test_what_is_not_caught(panda_model: RobotModel, newtons: float, q: FloatArray, qd: FloatArray) -> None:
+    assert found(panda_model, squeezed(panda_model, newtons), q, qd) is None
+
+
+def test_the_same_force_from_outside_is_a_push(panda_model: RobotModel) -> None:
+    kin = panda_model.kinematics(FOLDED)
+    _, at, u = gap_of(panda_model, "panda_link2", "panda_link5", FOLDED)
+    J = panda_model.jacobian(kin, panda_model.link_index("panda_link5"), at)[:3]
+    assert found(panda_model, J.T @ (60.0 * u)) is None
+
+
+def test_noise_alone_is_nothing(panda_model: RobotModel) -> None:
+    rng = np.random.default_rng(1009)
+    assert all(found(panda_model, np.sqrt(np.diag(NOISE)) * rng.standard_normal(7)) is None for _ in range(50))
+
+
+def test_nearest_points_are_as_far_apart_as_the_segments() -> None:
+    rng = np.random.default_rng(1010)
+    a, b, c, d = rng.uniform(-1, 1, (4, 200, 3))
+    p, q = nearest_points(a, b, c, d)
+    assert np.linalg.norm(p - q, axis=1) == pytest.approx(segment_distance(a, b, c, d), abs=1e-12)
+    grid = np.linspace(0.0, 1.0, 41)
+    every = (a[:, None] + grid[:, None] * (b - a)[:, None])[:, :, None] - (
+        c[:, None] + grid[:, None] * (d - c)[:, None]
+    )[:, None]
+    least = np.linalg.norm(every, axis=3).min(axis=(1, 2))
+    assert np.all(segment_distance(a, b, c, d) <= least + 1e-12)
+    assert segment_distance(a, b, c, d) == pytest.approx(least, abs=0.05)
+
+
+# between a link and a fixture
+
+
+def down(model: RobotModel, speed: float) -> FloatArray:
+    """Joint velocities with which the hand goes down [m/s]."""
+    kin = model.kinematics(model.description.q_ready)
+    return np.asarray(np.linalg.pinv(model.ee_jacobian(kin)) @ np.array([0.0, 0.0, -speed, 0.0, 0.0, 0.0]))
+
+
+def touch(model: RobotModel, force: tuple[float, float, float]) -> Touched:
+    """A contact at the end of the hand."""
+    kin = model.kinematics(model.description.q_ready)
+    return Touched(
+        np.array([model.ee]), kin.position[model.ee][None].copy(), np.array([force]), np.array([0.01]), np.array([0.9])
+    )
+
+
+def under(model: RobotModel, gap: float) -> FloatArray:
+    """A floor that far under the end of the hand."""
+    height = model.kinematics(model.description.q_ready).position[model.ee][2] - gap
+    return np.array([[0.0, 0.0, 1.0, height]])
+
+
+@pytest.mark.parametrize(
+    ("force", "gap", "speed", "is_pressed"),
+    [
+        ((0.0, 0.0, 30.0), 0.1, 0.1, True),
+        ((5.0, 0.0, 30.0), 0.1, 0.1, True),
+        ((0.0, 0.0, 30.0), 0.1, -0.1, False),  # the hand goes up
+        ((0.0, 0.0, 30.0), 0.1, 0.0, False),  # or stands
+        ((30.0, 0.0, 0.0), 0.1, 0.1, False),  # from the side
+        ((0.0, 0.0, -30.0), 0.1, 0.1, False),  # from above
+        ((0.0, 0.0, 5.0), 0.1, 0.1, False),  # too weak
+        ((0.0, 0.0, 30.0), 0.3, 0.1, False),  # room for anybody
+        ((0.0, 0.0, 30.0), 0.005, 0.1, False),  # the floor itself
+    ],
+)
+def test_what_is_pressed_on_a_floor(
+    panda_model: RobotModel, force: tuple[float, float, float], gap: float, speed: float, is_pressed: bool
+) -> None:
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    qd, floor = down(panda_model, speed), under(panda_model, gap)
+    assert presses_on_fixture(panda_model, kin, touch(panda_model, force), floor, NONE, qd, P) == is_pressed
+
+
+def test_what_is_pressed_on_a_post(panda_model: RobotModel) -> None:
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    x, y, z = kin.position[panda_model.ee]
+    lying = Capsules(
+        np.zeros(1, np.int64), np.array([[x, y - 1, z - 0.2]]), np.array([[x, y + 1, z - 0.2]]), np.full(1, 0.1)
+    )
+    up, qd = touch(panda_model, (0.0, 0.0, 30.0)), down(panda_model, 0.1)
+    assert presses_on_fixture(panda_model, kin, up, np.zeros((0, 4)), lying, qd, P)
+    aside = touch(panda_model, (30.0, 0.0, 0.0))
+    assert not presses_on_fixture(panda_model, kin, aside, np.zeros((0, 4)), lying, qd, P)
+    assert not presses_on_fixture(panda_model, kin, up, np.zeros((0, 4)), NONE, qd, P)
+
+
+def test_an_arm_that_is_not_touched_presses_nothing(panda_model: RobotModel) -> None:
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    assert not presses_on_fixture(panda_model, kin, NOT_TOUCHED, FLOOR, NONE, down(panda_model, 0.1), P)
+
+
+# the way out
+
+DT, WAY = 0.01, np.eye(7)[3]
+
+
+def come(cycles: int = 60):
+    """The state of an arm that has turned its fourth joint by 0.01 rad in each cycle, and where it is."""
+    state = clamp_init(np.zeros(7))
+    for k in range(cycles):
+        state = gone(state, 0.01 * (k + 1) * WAY, DT)
+    return state, 0.01 * cycles * WAY
+
+
+def test_the_arm_opens_the_way_it_came() -> None:
+    before, q = come()
+    state = caught_between(clamp_begun(before, q, 1.0 * WAY), "one and other", 50.0, 6.0 * WAY)
+    way, state = opened(state, -6.0 * WAY, q, DT, ClampParams())
+    assert way @ WAY < 0.0
+    assert way - (way @ WAY) * WAY == pytest.approx(np.zeros(7))
+    assert not state.open
+
+
+def test_what_has_been_opened_already_is_not_closed_again() -> None:
+    before, q = come()
+    state = caught_between(clamp_begun(before, q, 1.0 * WAY), "one and other", 50.0, 6.0 * WAY)
+    ahead = q - 0.22 * WAY  # four places of the way farther back
+    way, state = opened(state, -6.0 * WAY, ahead, DT, ClampParams())
+    assert way @ WAY < 0.0
+    beyond, state = opened(state, -6.0 * WAY, -1.0 * WAY, DT, ClampParams())
+    assert beyond == pytest.approx(np.zeros(7))
+    assert state.open
+
+
+def test_the_way_begins_anew_where_the_arm_has_been_moved() -> None:
+    before, q = come()
+    moved = gone(before, q + 0.5 * np.eye(7)[0], DT)
+    assert np.all(moved.path == q + 0.5 * np.eye(7)[0])

@@ -1,0 +1,226 @@
+"""The detector on imported data, held against the plain one of `tests.reference` and against the controller itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.errors import RecordingError
+from pretouch.imported_data.detect import detect_imported
+from pretouch.imported_data.samples import read_imported
+from pretouch.imported_data.source import Choice
+from pretouch.imported_data.summary import findings, guidance, summary
+from pretouch.profiles import PROFILES, at_rate, profile
+from tests.following_arm import Arm
+from tests.imported_data.files import PUSHES, force_columns, joints, pushed, ranging, stamps, write_bag, write_csv
+from tests.imported_data.files import wrenches as wrench_messages
+from tests.reference.contact import Touch
+
+PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]
+
+
+@pytest.fixture
+def of_force(tmp_path):
+    """Read a force (N, 3) as from a CSV file."""
+    return lambda force, rate=100.0: read_imported(
+        write_csv(tmp_path / f"{rate}.csv", force_columns(force, rate)), Choice()
+    )
+
+
+def expected(force, p):
+    """What the plain detector finds in samples, one a cycle: (cycle, force) of each contact, and all thresholds."""
+    touch, nothing = Touch(p.detect, p.window), type("Nothing", (), {"point": ()})()
+    contacts, limits, busy_until = [], [], -1
+    for cycle, sample in enumerate(force):
+        there = sample if np.isfinite(sample).all() else None
+        thresholds, contact, _ = touch.feel(there, np.zeros(3), nothing)
+        limits.append(thresholds)
+        if contact is not None and cycle > busy_until:
+            contacts.append((cycle, contact.force, contact.axes))
+            busy_until = cycle + p.react.decay_cycles
+    return contacts, limits
+
+
+@pytest.mark.parametrize("name", ["paper", "paper:threshold.compare=raw", "blind:threshold.window_samples=150"])
+def test_contacts_and_thresholds_are_those_of_the_plain_detector(of_force, name):
+    force, p = pushed(14.0, PUSHES), profile(name)
+    found = detect_imported(of_force(force), p)
+    contacts, limits = expected(force, p)
+    assert len(contacts) == 3
+    assert [c.time for c in found.contacts] == pytest.approx([0.005 + cycle / 100 for cycle, *_ in contacts])
+    for contact, (_, there, axes) in zip(found.contacts, contacts, strict=True):
+        np.testing.assert_allclose(contact.force, there, atol=1e-9)
+        np.testing.assert_array_equal(contact.axes, axes)
+    np.testing.assert_allclose(found.upper, [t.upper for t in limits], atol=1e-9)
+    np.testing.assert_allclose(found.lower, [t.lower for t in limits], atol=1e-9)
+    np.testing.assert_array_equal(found.force, force)
+
+
+def test_a_push_that_lasts_is_found_again_after_each_reaction_as_by_the_plain_detector(of_force):
+    p = profile("paper:react.decay_cycles=20")
+    force = pushed(8.0, ((2.0, 4.0, (0.0, 60.0, 0.0)),))
+    found, (contacts, _) = detect_imported(of_force(force), p), expected(force, p)
+    assert len(contacts) > 2
+    assert [c.time for c in found.contacts] == pytest.approx([0.005 + cycle / 100 for cycle, *_ in contacts])
+
+
+def test_a_controller_given_the_same_forces_decides_the_same(of_force, panda_model, paper_skin):
+    force = pushed(10.0, PUSHES)
+    arm = Arm(panda_model, paper_skin, BLIND)
+    steps = [arm.step(tuple(sample)) for sample in force]
+    found = detect_imported(of_force(force), BLIND)
+    reactions = [(i, s.contact.force) for i, s in enumerate(steps) if s.contact is not None]
+    assert len(reactions) == 2
+    assert [round((c.time - 0.005) * 100) for c in found.contacts] == [i for i, _ in reactions]
+    for contact, (_, there) in zip(found.contacts, reactions, strict=True):
+        np.testing.assert_array_equal(contact.force, there)
+    np.testing.assert_array_equal(found.upper, [s.thresholds.upper for s in steps])
+    np.testing.assert_array_equal(found.reacting, [s.mode.value == "react" for s in steps])
+    np.testing.assert_array_equal(found.armed, [s.armed for s in steps])
+
+
+def test_jitter_of_a_few_milliseconds_neither_doubles_nor_drops_a_sample(tmp_path):
+    force = pushed(10.0, PUSHES)
+    columns = force_columns(force)
+    columns["time_s"] = columns["time_s"] + np.random.default_rng(1).uniform(-2e-3, 2e-3, len(force))
+    found = detect_imported(read_imported(write_csv(tmp_path / "j.csv", columns), Choice()), PAPER)
+    np.testing.assert_array_equal(found.force[:990], force[:990])
+
+
+def test_of_faster_data_the_newest_sample_of_each_cycle_is_taken(of_force):
+    force = pushed(5.0, PUSHES, rate=1000.0)
+    found = detect_imported(of_force(force, 1000.0), PAPER)
+    np.testing.assert_array_equal(found.force, force[::10])
+
+
+def test_slower_data_are_held_and_the_way_out_is_named(of_force):
+    force = pushed(14.0, PUSHES, rate=25.0)
+    imported = of_force(force, 25.0)
+    found = detect_imported(imported, PAPER)
+    np.testing.assert_array_equal(found.force[:100:4], force[:25])
+    np.testing.assert_array_equal(found.force[3:100:4], force[:25])
+    (said,) = findings(imported, found, PAPER)
+    assert "at 25 Hz" in said
+    assert "--rate 25" in said
+    slow = at_rate(PAPER, 25.0)
+    found = detect_imported(imported, slow)
+    contacts, _ = expected(force, slow)
+    assert [c.time for c in found.contacts] == pytest.approx([0.02 + cycle / 25 for cycle, *_ in contacts])
+    assert findings(imported, found, slow) == ()
+
+
+def test_after_a_gap_there_is_no_force_and_nothing_is_felt_until_it_comes_back(tmp_path):
+    force = pushed(20.0, ((3.0, 0.6, (0.0, 40.0, 0.0)), (16.0, 0.6, (0.0, 40.0, 0.0))))
+    columns = force_columns(force)
+    kept = (columns["time_s"] < 8.0) | (columns["time_s"] >= 15.0)
+    file = write_csv(tmp_path / "gap.csv", {name: values[kept] for name, values in columns.items()})
+    imported = read_imported(file, Choice())
+    found = detect_imported(imported, PAPER)
+    assert [round(c.time, 1) for c in found.contacts] == [3.1, 16.1]
+    assert np.isnan(found.force[(found.time > 8.2) & (found.time < 15.0)]).all()
+    assert np.isfinite(found.force[(found.time > 7.99) & (found.time < 8.18)]).all()
+    assert any("A gap of more than 0.2 s, 7.01 s in all" in said for said in findings(imported, found, PAPER))
+
+
+def test_a_gap_of_days_costs_no_time_and_no_memory(tmp_path):
+    columns = force_columns(pushed(6.0, ()))
+    columns["time_s"][300:] += 20 * 86_400.0
+    found = detect_imported(read_imported(write_csv(tmp_path / "days.csv", columns), Choice()), PAPER)
+    assert len(found.time) < 1000
+    assert not found.contacts
+
+
+@pytest.mark.parametrize("broken", [np.nan, 1e6])
+def test_samples_that_are_no_estimate_leave_the_window_as_it_is(of_force, broken):
+    force = pushed(6.0, ())
+    force[300:320] = broken
+    found = detect_imported(of_force(force), PAPER)
+    assert not found.contacts
+    assert np.isnan(found.force[300:320]).all()
+    np.testing.assert_array_equal(found.upper[300:320], np.tile(found.upper[299], (20, 1)))
+
+
+def test_data_too_short_or_too_slow_are_one_sentence(of_force):
+    with pytest.raises(RecordingError, match=r"0\.90 s of usable force, but the window of paper takes 1 s to fill"):
+        detect_imported(of_force(pushed(0.9, ())), PAPER)
+    with pytest.raises(RecordingError, match=r"comes every 1 s.*unit of the time"):
+        detect_imported(of_force(pushed(100.0, (), rate=1.0), 1.0), PAPER)
+
+
+def test_base_forces_that_the_summary_names_are_the_borderline(of_force):
+    imported = of_force(pushed(14.0, PUSHES))
+    found = summary(detect_imported(imported, PAPER), PAPER)
+    for f_base, contacts in ((found.f_base_all - 0.01, 1), (found.f_base_all + 0.01, 0)):
+        p = replace(PAPER, detect=replace(PAPER.detect, f_base_n=f_base))
+        assert len(detect_imported(imported, p).contacts) == contacts
+    assert found.f_base_free < 10.0 < found.f_base_all
+
+
+def test_the_noise_in_free_motion_is_that_of_the_data(of_force):
+    decisions = detect_imported(of_force(pushed(60.0, PUSHES, noise=0.4)), PAPER)
+    found = summary(decisions, PAPER)
+    np.testing.assert_allclose(found.mean, [1.0, -2.0, 0.5], atol=0.2)
+    np.testing.assert_allclose(found.sigma, 0.4, rtol=0.1)
+    assert np.all((found.sigma_window > 0.0) & (found.sigma_window < found.sigma))  # eq. 8 makes outliers smaller
+    np.testing.assert_allclose(found.width, 10.0 + found.sigma_window, atol=0.02)
+    assert found.duration == pytest.approx(59.0, abs=0.05)
+    assert 50.0 < found.free < 53.0
+    assert "if nobody touched the arm, 3 false contacts" in guidance(decisions, found, PAPER)
+
+
+def ranged(model, skin, distance, force):
+    """Messages of a resting arm, one of whose units shows something; the others see nothing."""
+    messages = wrench_messages(force)
+    for k, unit in enumerate(skin.ids):
+        for t in stamps(len(force) // 2, 50.0):
+            messages.append((f"/skin/{unit}/range", t, ranging(t, distance if k == 0 else np.inf, unit)))
+    messages += [("/joint_states", t, joints(t, model.description.q_ready)) for t in stamps(len(force))]
+    return sorted(messages, key=lambda m: m[1])
+
+
+def test_with_ranges_and_a_skin_it_is_the_controller_that_decides(tmp_path, panda_model, paper_skin):
+    force = pushed(6.0, ((3.0, 0.6, (0.0, 40.0, 0.0)),))
+    file = write_bag(tmp_path / "bag", ranged(panda_model, paper_skin, 0.2, force))
+    imported = read_imported(file, Choice(ranges=True))
+    found = detect_imported(imported, PAPER, paper_skin)
+    arm = Arm(panda_model, paper_skin, PAPER)
+    blind = detect_imported(imported, BLIND, paper_skin)
+    steps = []
+    for i, sample in enumerate(force):
+        arm.q, arm.qd, arm.time = panda_model.description.q_ready.copy(), np.zeros(7), 0.005 + i / 100
+        seen = replace(arm.readings({0: float(np.float32(0.2))}), stamp=np.full(len(paper_skin), (i // 2) * 0.02))
+        arm.readings = lambda *_, seen=seen: seen
+        steps.append(arm.step(tuple(sample)))
+        del arm.readings
+    np.testing.assert_array_equal(found.upper, [s.thresholds.upper for s in steps])
+    np.testing.assert_array_equal(found.lower, [s.thresholds.lower for s in steps])
+    assert [c.time for c in found.contacts] == pytest.approx([s.stamp for s in steps if s.contact is not None])
+    assert np.any(found.upper < blind.upper - 1.0) or np.any(found.lower > blind.lower + 1.0)
+    alone = detect_imported(imported, BLIND)
+    np.testing.assert_array_equal(blind.upper, alone.upper)
+    assert [c.time for c in blind.contacts] == [c.time for c in alone.contacts]
+
+
+def test_a_skin_whose_units_no_topic_names_is_refused(tmp_path, panda_model, paper_skin):
+    messages = [
+        (topic.replace("/skin/", "/sensor_"), t, m)
+        for topic, t, m in ranged(panda_model, paper_skin, 0.2, pushed(2.0, ()))
+    ]
+    for topic, _, message in messages:
+        if "sensor" in topic:
+            message.header.frame_id = "somewhere"
+    imported = read_imported(write_bag(tmp_path / "bag", messages), Choice(ranges=True))
+    with pytest.raises(RecordingError, match="No unit of the skin"):
+        detect_imported(imported, PAPER, paper_skin)
+
+
+def test_a_posture_that_is_missing_for_a_while_only_costs_that_while(tmp_path, panda_model, paper_skin):
+    force = pushed(9.0, ((3.0, 0.6, (0.0, 40.0, 0.0)), (7.0, 0.6, (0.0, 40.0, 0.0))))
+    messages = [
+        m for m in ranged(panda_model, paper_skin, 0.5, force)
+        if m[0] != "/joint_states" or not 2.5e9 < m[1] - stamps(1)[0] < 4.0e9
+    ]  # fmt: skip
+    imported = read_imported(write_bag(tmp_path / "bag", messages), Choice(ranges=True))
+    found = detect_imported(imported, PAPER, paper_skin)
+    assert [round(c.time, 1) for c in found.contacts] == [7.1]
+    assert np.isnan(found.force[(found.time > 2.6) & (found.time < 3.9)]).all()

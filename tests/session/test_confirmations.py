@@ -1,0 +1,72 @@
+"""The file of robots whose force sign is confirmed."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from pretouch.errors import RobotError
+from pretouch.session.confirmations import ConfirmedRobots, Identity, state_folder
+
+ROBOT = Identity("panda", "172.16.0.2", "libfranka 0.9.2, server 5")
+
+
+def test_a_robot_is_known_once_it_was_kept_and_others_stay_known(tmp_path):
+    other = Identity("fr3", "172.16.0.3", "libfranka 0.21.3, server 10")
+    for robot in (ROBOT, other):
+        assert not ConfirmedRobots(tmp_path / "new").is_confirmed(robot)
+        ConfirmedRobots(tmp_path / "new").keep(robot)
+    assert all(ConfirmedRobots(tmp_path / "new").is_confirmed(robot) for robot in (ROBOT, other))
+    assert [file.name for file in (tmp_path / "new").iterdir()] == ["force-sign.json"]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        Identity("fr3", ROBOT.address, ROBOT.connection),
+        Identity(ROBOT.kind, "172.16.0.3", ROBOT.connection),
+        Identity(ROBOT.kind, ROBOT.address, "libfranka 0.10, server 5"),
+    ],
+)
+def test_another_robot_address_or_library_is_not_known(tmp_path, other):
+    ConfirmedRobots(tmp_path).keep(ROBOT)
+    assert not ConfirmedRobots(tmp_path).is_confirmed(other)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[1]", '{"a": 3}', "[" * 100_000, "\x00"])
+def test_a_damaged_file_is_a_sentence_with_the_way_out(tmp_path, text):
+    file = tmp_path / "force-sign.json"
+    file.write_text(text)
+    for use in (ConfirmedRobots(tmp_path).is_confirmed, ConfirmedRobots(tmp_path).keep):
+        with pytest.raises(RobotError, match="is damaged: delete it"):
+            use(ROBOT)
+    assert file.read_text() == text
+
+
+def test_a_file_that_is_no_text_is_a_sentence(tmp_path):
+    (tmp_path / "force-sign.json").write_bytes(b"\xff\xfe\x80")
+    with pytest.raises(RobotError, match="damaged"):
+        ConfirmedRobots(tmp_path).is_confirmed(ROBOT)
+
+
+def test_a_folder_that_cannot_be_made_is_a_sentence(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RobotError, match=r"cannot be (read|noted)"):
+        ConfirmedRobots(tmp_path / "file" / "folder").keep(ROBOT)
+
+
+def test_writing_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
+    ConfirmedRobots(tmp_path).keep(ROBOT)
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(RobotError, match="No space left"):
+        ConfirmedRobots(tmp_path).keep(Identity("fr3", "a", "b"))
+    assert ConfirmedRobots(tmp_path).is_confirmed(ROBOT)
+
+
+@pytest.mark.parametrize(("given", "wanted"), [("/some/where", Path("/some/where/pretouch")), ("relative", None)])
+def test_the_folder_is_that_of_the_xdg_specification(given, wanted):
+    assert state_folder({"XDG_STATE_HOME": given}) == (wanted or Path.home() / ".local" / "state" / "pretouch")

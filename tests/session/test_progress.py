@@ -1,0 +1,77 @@
+"""What a person is told of a run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.loop import Cycle
+from pretouch.session.progress import ProgressReporter, RunSummary
+from pretouch.types import Inputs
+from tests.following_arm import Arm
+
+
+class Sink:
+    def __init__(self):
+        self.cycles = []
+
+    def record(self, cycle):
+        self.cycles.append(cycle)
+
+
+@pytest.fixture
+def watched(panda_model, paper_skin):
+    """An arm under a controller, a watcher of it, what it told, and how to turn both."""
+    arm, told, sink = Arm(panda_model, paper_skin), [], Sink()
+    reporter = ProgressReporter(sink, told.append, " Press Enter.", 0.01)
+
+    def turn(cycles, **given):
+        for _ in range(cycles):
+            before, robot = arm.state, arm.robot()
+            step = arm.step(**given)
+            inputs = Inputs(step.stamp, robot, arm.readings())
+            reporter.record(Cycle(inputs, before, step, arm.state))
+
+    return reporter, told, sink, turn
+
+
+def test_each_change_is_told_once_and_all_is_handed_on(watched):
+    reporter, told, sink, turn = watched
+    turn(150)
+    assert [sentence.split()[0] for sentence in told] == ["HOLD", "TRACK"]
+    assert len(sink.cycles) == reporter.summary.steps == 150
+    (held,) = reporter.summary.holds.items()
+    assert held[0].startswith("The force window is filling")
+    assert held[1] == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_hold_that_latches_says_what_to_do(watched):
+    _, told, _, turn = watched
+    turn(120)
+    turn(1, change=lambda robot: replace(robot, q=np.full(7, np.nan)))
+    assert told[-1].startswith("HOLD  The robot's state cannot be used")
+    assert told[-1].endswith("then resume. Press Enter.")
+
+
+def test_silent_units_are_named_although_the_arm_held_before(watched):
+    _, told, _, turn = watched
+    turn(10)
+    turn(120, silent=dict.fromkeys(range(7), 1.0))
+    assert any("No usable reading" in sentence for sentence in told)
+
+
+def test_a_hold_of_a_moment_is_not_counted():
+    summary = RunSummary(steps=200, holds={"The window fills.": 1.0, "A unit was late.": 0.01})
+    assert summary.sentences(0.01) == ("200 control steps, 2.0 s; 0 contacts.", "Held for 1.0 s: The window fills.")
+
+
+def test_contacts_are_counted_and_a_line_comes_every_five_seconds(watched):
+    reporter, told, _, turn = watched
+    turn(150)
+    turn(40, force=(0.0, 25.0, 0.0))
+    assert reporter.summary.contacts == 1
+    assert any(sentence.startswith("REACT") for sentence in told)
+    before = len(told)
+    turn(900)
+    assert 1 <= sum("m/s" in sentence for sentence in told[before:]) <= 2
+    assert any("1 contact." in sentence for sentence in reporter.summary.sentences(0.01))
