@@ -125,7 +125,7 @@ def short(**changed):
         (short(q4_rad="q4_ms"), "'q4_ms' of .* has the unit 'ms': write q4_rad or q4_deg"),
         (short() | {"q4_deg": np.zeros(50)}, "names joint 4 twice, 'q4' and 'q4'"),
         (short() | {"panda_joint4_rad": np.zeros(50)}, "names joint 4 twice, 'q4' and 'panda_joint4'"),
-        (short(q4_rad=np.degrees(MOVING[:, 3])), r"panda_joint4 in .* is at -131.8 rad, outside its range"),
+        (short(q4_rad=np.degrees(MOVING[:, 3])), r"panda_joint4 in .* is at -131.8 rad, out of its range"),
         (short(q4_rad=np.full(50, np.nan)), "has 0 samples of all joints.* 50 samples are not finite"),
         (short(time_s=np.full(50, 3.0)), "has 1 sample of all joints.* a stamp was repeated 49 times"),
         (short(time_s=np.linspace(0, 1e9, 50)), "span 1e[+]09 s: check their unit"),
@@ -146,7 +146,7 @@ def test_what_is_wrong_with_a_bag_is_said_in_one_line(tmp_path, panda_model):
         ("twice", states(np.hstack([MOVING, MOVING]), tuple(f"{a}_joint{i}" for a in "ab" for i in range(1, 8))),
          "names joint 1 twice, 'a_joint1' and 'b_joint1'"),
         ("nan", states(np.full((9, 7), np.nan)), "9 samples are not finite numbers"),
-        ("far", states(100 * MOVING), "outside its range of .* check the unit and the arm"),
+        ("far", states(100 * MOVING), "out of its range of .* check the unit and the arm"),
     ):  # fmt: skip
         with pytest.raises(RecordingError, match=words) as error:
             read_joints(write_bag(tmp_path / name, messages), panda_model)

@@ -71,7 +71,7 @@ def test_a_contact_above_the_arms_own_threshold_is_its_reflex_and_it_recovers(se
     assert "cartesian_reflex" in result["trouble"]
     assert result["mode"] == "reflex"
     assert result["refused"].endswith(
-        'is in mode "reflex" after cartesian_reflex: free it from what it touches, then let it recover.'
+        'is in mode "reflex" after cartesian_reflex; free it from what it touches, then let it recover.'
     )
     assert result["last_errors"] == result["errors"]
     # pushed towards +y, the arm pushes its environment towards -y

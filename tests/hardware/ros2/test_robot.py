@@ -185,10 +185,10 @@ def test_a_second_program_that_commands_the_arm_is_refused_and_ends_a_run(
     robot, _ = pair
     robot.read()
     with Ros2Node(NodeParams(domain=domain)) as third, Ros2Robot(params, panda_model, third) as second:
-        assert third.wait_for(lambda: bool(second._contested()), 10)
+        assert third.wait_for(lambda: bool(second._conflict()), 10)
         with pytest.raises(RobotError, match="Another program publishes on /joint_trajectory_controller"):
             second.wait(0.1)
-        assert robot._node.wait_for(lambda: bool(robot._contested()), 10)
+        assert robot._node.wait_for(lambda: bool(robot._conflict()), 10)
         with pytest.raises(RobotError, match="Another program publishes"):
             robot.read()
 

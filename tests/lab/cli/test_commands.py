@@ -25,8 +25,8 @@ def run(capsys, *args):
         (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("reproduce", "static", "--out", "/dev/null/x"), "/dev/null/x cannot be used"),
         (("reproduce", "static", "--out", "OUT", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
-        (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "cannot be written: Is a directory"),
-        (("reproduce", "static", "--out", "OUT", "--json", "x" * 256), "cannot be written: File name too long"),
+        (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "cannot be written (Is a directory): give another file."),
+        (("reproduce", "static", "--out", "OUT", "--json", "x" * 256), "cannot be written (File name too long): give another file."),
         (("demo", "--seeds", "0"), "The number of seeds is 0"),
         (("bench", "cycle", "--points", "7,x"), "The numbers of points are '7,x': give whole numbers"),
         (("bench", "cycle", "--points", ""), "The numbers of points are '': give whole numbers"),
@@ -98,7 +98,7 @@ def test_results_that_cannot_be_written_at_the_end_are_said(capsys, tmp_path, mo
     monkeypatch.setattr("pretouch_lab.cli.campaigns.run_campaign", play)
     code, said = run(capsys, "reproduce", "static", "--out", str(tmp_path))
     assert code == 2
-    assert "results.json cannot be written: No space left on device" in said.err
+    assert "results.json cannot be written (No space left on device)" in said.err
 
 
 @pytest.mark.slow

@@ -243,9 +243,9 @@ def test_a_figure_is_written_here_by_its_name(tmp_path, monkeypatch):
         ({"profile": "brave"}, "The profile 'brave' is unknown"),
         ({"out": "figure.jpg"}, "no ending that says its format: use .png, .pdf, .svg"),
         ({"out": "figure"}, "no ending that says its format"),
-        ({"out": "/dev/null/x.png"}, "The figure /dev/null/x.png cannot be written: File exists"),
-        ({"out": "FOLDER.png"}, "FOLDER.png cannot be written: Is a directory"),
-        ({"out": "x" * 300 + ".png"}, "cannot be written: File name too long"),
+        ({"out": "/dev/null/x.png"}, "The figure /dev/null/x.png cannot be written .File exists.: give another"),
+        ({"out": "FOLDER.png"}, "FOLDER.png cannot be written .Is a directory.: give another"),
+        ({"out": "x" * 300 + ".png"}, "cannot be written .File name too long.: give another"),
         ({"run": "/nowhere"}, r"The run /nowhere cannot be read \(No such file or directory\)"),
         (
             {"run": "EMPTY"},
