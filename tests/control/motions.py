@@ -6,7 +6,7 @@ from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import JointLimits
 from pretouch.control.motion import Motion, MotionState, joint_motion, restriction_on
 from pretouch.control.setup import motion_setup
-from pretouch.params import Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import Obstacles, RobotState
 
