@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from contextlib import suppress
 from dataclasses import fields, replace
 
 import pytest
@@ -24,7 +25,15 @@ from pretouch.params import (
     ThresholdParams,
     WindowParams,
 )
-from pretouch.profiles import PROFILES, Profile, profile, restriction_mode, restriction_modes, with_restriction
+from pretouch.profiles import (
+    PROFILES,
+    Profile,
+    profile,
+    restriction_mode,
+    restriction_modes,
+    value_of,
+    with_restriction,
+)
 
 SETS = [
     PerceptionParams(), TaskParams(), SpeedReduction(), RestrictionParams(), ThresholdParams(), FailureParams(),
@@ -186,6 +195,27 @@ def test_a_profile_is_varied_by_its_name():
 def test_what_earlier_versions_called_it_is_the_same(old: str, new: str):
     assert replace(profile(old), name="") == replace(profile(new), name="")
     assert profile(new) != profile(new.partition(":")[0])
+
+
+_ONCE = {
+    "reduction": "enabled d_max_m l_max_cycles",
+    "restriction": "mode v_max_m_s beta d_repulse_m d_crit_m d_notice_m floor_m_s slack_weight",
+    "anticipation": "deceleration_m_s2 latency_s margin_m touch_speed_max_m_s retreat_max_m_s effective_mass"
+    " body_region region_force_n force_fraction rotor_inertia_kg_m2 closing_speed closing_deadband_m_s tangential"
+    " tangential_distance_m tangential_speed_m_s tighten_m_s2 loosen_m_s2 null_space null_distance_m null_speed_m_s"
+    " null_joint_rad_s null_rate_rad_s2 blocked_after_s",
+    "baselines": "flacco_v_max_m_s flacco_alpha flacco_rho_m flacco_size_m ding_repulse_m ding_zero_low_m"
+    " ding_zero_high_m ding_notice_m ding_approach_m_s ding_retreat_m_s ding_weighted_m",
+}
+
+
+@pytest.mark.parametrize("old", [f"{group}.{name}" for group, names in _ONCE.items() for name in names.split()])
+def test_every_parameter_of_the_groups_that_parts_replaced_is_found_by_its_old_name(old: str):
+    found = []
+    for name in ("paper", "pretouch", "flacco", "ding"):
+        with suppress(ParameterError):
+            found.append(value_of(profile(name), old))
+    assert any(isinstance(value, bool | float | int | str) for value in found)
 
 
 def test_each_way_to_restrict_the_arm_can_be_chosen_by_its_name():

@@ -111,6 +111,11 @@ REMOVED = {
 """Parameters that earlier versions had, and what to do without each."""
 
 
+def path_today(path: str) -> str:
+    """Return what a parameter or switch of an earlier version is called today; another name as it is."""
+    return next(iter(next(iter(SWITCHES[path].values())))) if path in SWITCHES else RENAMED.get(path, path)
+
+
 def of_today(path: str, text: str) -> dict[str, str]:
     """Return what a change by a name of an earlier version is today: path -> text."""
     if path in SWITCHES:

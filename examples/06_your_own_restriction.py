@@ -1,6 +1,6 @@
 """A restriction of your own: speed and separation, as a class and an entry in a profile.
 
-    python examples/own_restriction.py
+    python examples/06_your_own_restriction.py
 
 No point of the arm comes nearer to an object faster than it could stop in time, as seen by the skin. Put the class in a
 package of yours with an entry point of the group `pretouch.restrictions`, and `paper:approach=separation` works in
