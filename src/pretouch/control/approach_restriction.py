@@ -49,7 +49,7 @@ class _OnBody(Restriction):
 @entry
 def _motion(step: Step, rows: Rows, fixed: Fixed, params: ApproachParams, weight: float) -> Ended:
     """Write the rows of eqs. 5-7 and the answer within them."""
-    found = rows_into(step.kin, fixed.arm.moved_by, step.obstacles, params, rows)
+    found = rows_into(step.kin, fixed.arm.moved_by, step.near, params, rows)
     none = np.empty(0)
     allowed = Allowed(rows.G[:found], rows.h[:found], rows.which[:found], weight, none, none, False)
     return motion_within(step, allowed, fixed)

@@ -20,10 +20,10 @@ from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, 
 from pretouch.control.motion_entry import Allowed, Ended, Fixed, Step, motion_within
 from pretouch.control.restriction import Rows
 from pretouch.control.touch_speed import TouchLimits, touch_limits
-from pretouch.groups import Chain
+from pretouch.groups import Chain, ObstacleArrays
 from pretouch.params import BrakingParams
 from pretouch.robot.model import Kinematics
-from pretouch.types import WHOLE, FloatArray, Obstacles, RobotState
+from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,18 @@ class _OnBody(Restriction):
             # a touch speed whatever the mass, and no heed of what moves by itself
             still = self._limits._replace(deadband_m_s=np.inf)
             numbers = flattened(TouchLimits(np.inf, 1.0, 1.0, request.touch), still, self._weight)
-        return CompiledRows(_motion, room, self._weight, (*slots, counts, mass, *numbers)), slots
+        return CompiledRows(
+            _motion, room, self._weight, (obstacles.unit, obstacles.closing_speed, *slots, counts, mass, *numbers)
+        ), slots
+
+
+class _Seen(NamedTuple):
+    """What the rows need to know of obstacles beside where they are."""
+
+    unit: IntArray
+    """(K,) index of the unit that shows each."""
+    closing_speed: FloatArray
+    """(K,) speed of the object itself towards the body [m/s]."""
 
 
 class _Slowing(NamedTuple):
@@ -94,13 +105,16 @@ class _Slowing(NamedTuple):
 
 @entry
 def _motion(
-    step: Step, rows: Rows, fixed: Fixed, slots: Slots, mass_counts: bool, mass: FloatArray, p: _Slowing
+    step: Step, rows: Rows, fixed: Fixed, seen: _Seen, slots: Slots, mass_counts: bool, mass: FloatArray, p: _Slowing
 ) -> Ended:
     """Change the slots, and write the rows and the answer within them."""
-    kin, L = step.kin, np.eye(len(step.robot.q))
+    kin, near, L = step.kin, step.near, np.eye(len(step.robot.q))
+    obstacles = ObstacleArrays(
+        seen.unit, near.link, near.body_point, near.direction, near.body_distance, seen.closing_speed
+    )
     chain = Chain(kin.anchor, kin.axis, fixed.arm.moved_by, step.robot.qd_commanded)
     factored = Mass(mass_counts and factor(mass, L), L)
-    seen, found = braking_rows(slots, step.obstacles, chain, factored, p.touching, p.limits, rows)
+    count, found = braking_rows(slots, obstacles, chain, factored, p.touching, p.limits, rows)
     none = np.empty(0)
-    allowed = Allowed(rows.G[:found], rows.h[:found], rows.which[:seen], p.weight, none, none, False)
+    allowed = Allowed(rows.G[:found], rows.h[:found], rows.which[:count], p.weight, none, none, False)
     return motion_within(step, allowed, fixed)

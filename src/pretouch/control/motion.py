@@ -45,6 +45,7 @@ class Motion:
 _NONE = np.zeros(0)
 """What stands for joint velocities that are not given."""
 _ANY = _NONE, _NONE
+_NO_COST = np.zeros((0, 0))
 
 
 def joint_motion(
@@ -62,27 +63,27 @@ def joint_motion(
         request: what is asked.
         allowed: what a restriction allows.
     """
-    n, o, p, velocity = len(robot.q), obstacles, setup.numbers, request.velocity
+    n, o, velocity = len(robot.q), obstacles, request.velocity
     if isinstance(allowed, CompiledRows):
         rows, speeds = allowed, None
     else:
         rows, speeds = _given(allowed, n), allowed.speeds
         velocity = velocity if allowed.velocity is None else velocity + allowed.velocity
     G, h, which = rows.room
-    null_velocity = state.null_velocity.copy() if p.moves_away else state.null_velocity
-    cost, qd, velocities = np.empty((n + 1, n)), np.empty(n), np.empty((2, 3))
+    null_velocity = state.null_velocity.copy() if setup.moves_away else state.null_velocity
+    hard = rows.weight == 0.0
+    cost, qd, velocities = np.empty((n + 1, n)) if hard else _NO_COST, np.empty(n), np.empty((2, 3))
     slack, multipliers = np.empty(len(h)), np.empty(n + len(h))
     seen, found, ending, violated, blocked = rows.motion.flat(
         robot.q, robot.qd, robot.q_commanded, robot.qd_commanded,
-        o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
-        velocity, request.rotation_goal, request.hold, request.tracks,
-        request.qd is not None, _NONE if request.qd is None else request.qd,
+        o.link, o.body_point, o.direction, o.body_distance,
+        velocity, request.rotation_goal, request.hold, request.tracks, _NONE if request.qd is None else request.qd,
         null_velocity, state.blocked, cost, qd, slack, multipliers, velocities, *kin,
         G, h, which, *setup.fields, *rows.numbers,
     )  # fmt: skip
-    after = MotionState(null_velocity, blocked) if p.moves_away or p.times_blocked else state
+    after = MotionState(null_velocity, blocked) if setup.remembers else state
     which, limit = which[:seen], h[:seen]
-    if violated and rows.weight == 0.0 and not request.hold:
+    if violated and hard and not request.hold:
         qp = _with_hard_rows(setup, robot, ApproachRows(G[:found], h[:found], soft=False), speeds, cost)
         J = setup.body.model.ee_jacobian(kin)[:3]
         of_obstacles = QpSolution(qp.qd, qp.slack[:seen], qp.multipliers[: n + seen], qp.outcome, qp.status)

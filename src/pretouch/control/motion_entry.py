@@ -16,7 +16,7 @@ from pretouch.control.penalty import SOLVED, Minimum, Problem, excesses, minimis
 from pretouch.control.qp import CostParams, cost_into
 from pretouch.control.restriction import Rows
 from pretouch.control.task import twist
-from pretouch.groups import Arm, JointArrays, ObstacleArrays
+from pretouch.groups import Arm, JointArrays, NearArrays
 from pretouch.robot.model import Kinematics, jacobian_into
 from pretouch.types import FloatArray, IntArray
 
@@ -38,17 +38,12 @@ class MotionNumbers(NamedTuple):
     """`JointLimits.table`."""
     q_mid: FloatArray
     """(n,) middle of the joint ranges [rad]."""
-    in_null_space: bool
-    """Whether the cost has a term in the null space of the task."""
     projected: bool
-    """Whether the mid-joint term is in it."""
-    moves_away: bool
-    """Whether links before the hand move away in it."""
+    """Whether the mid-joint term is in the null space of the task."""
     away: NullSpaceLimits
-    """How, if so."""
-    times_blocked: bool
-    """Whether the time is counted for which the path is blocked."""
-    period_s: float
+    """How links before the hand move away in it; within no distance: they do not."""
+    blocked_s: float
+    """What a period adds to the time for which the path is blocked; 0: that is not counted."""
 
 
 class Fixed(NamedTuple):
@@ -65,10 +60,8 @@ class Asked(NamedTuple):
     rotation_goal: FloatArray
     hold: bool
     tracks: bool
-    by_joint: bool
-    """Whether joint velocities are asked for."""
     joints: FloatArray
-    """(n,) these [rad/s]; without meaning if not."""
+    """(n,) joint velocities asked for [rad/s], or none."""
 
 
 class Memory(NamedTuple):
@@ -84,7 +77,7 @@ class Answer(NamedTuple):
     """Room for the answer."""
 
     cost: FloatArray
-    """(n + 1, n) H and f of `Cost`."""
+    """(n + 1, n) H and f of `Cost`, or none for what nobody asks for."""
     qd: FloatArray
     """(n,) joint velocities [rad/s]."""
     slack: FloatArray
@@ -99,7 +92,7 @@ class Step(NamedTuple):
     """What comes new with each step, and room for its answer."""
 
     robot: JointArrays
-    obstacles: ObstacleArrays
+    near: NearArrays
     asked: Asked
     memory: Memory
     answer: Answer
@@ -141,34 +134,36 @@ def given_motion(step: Step, rows: Rows, fixed: Fixed, p: Given) -> Ended:
 def motion_within(step: Step, allowed: Allowed, fixed: Fixed) -> Ended:
     """Write the answer, and change what is remembered."""
     robot, asked, memory, answer, kin = step.robot, step.asked, step.memory, step.answer, step.kin
-    arm, p, near = fixed.arm, fixed.numbers, step.obstacles
+    arm, p, near = fixed.arm, fixed.numbers, step.near
     n, seen, found = len(robot.q), len(allowed.which), len(allowed.h)
     G, h, which, slack, qd = allowed.G, allowed.h, allowed.which, answer.slack[:found], answer.qd
-    if p.moves_away:
+    if p.away.distance_m > 0.0:
         memory.null_velocity[:] = away(memory.null_velocity, G[:seen], which, near, arm.moved_by, p.away)
     J = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J)
     lower, upper, stop = _box(robot, allowed, p)
     ending = SOLVED
     if not asked.hold:
-        H, f = answer.cost[:n], answer.cost[n]
-        _pose(J, robot.q, asked, kin.rotation[arm.ee], memory.null_velocity, p, answer)
+        cost = answer.cost if len(answer.cost) > 0 else np.empty((n + 1, n))
+        H, f = cost[:n], cost[n]
+        _pose(J, robot.q, asked, kin.rotation[arm.ee], memory.null_velocity, p, cost)
         minimum = Minimum(qd, slack, answer.multipliers[: n + found])
         ending = minimise(Problem(H, f, lower, upper, G, h, allowed.weight), p.budget, minimum)
     if asked.hold or ending != SOLVED:
         qd[:], answer.multipliers[:] = stop, 0.0
         excesses(G, h, qd, slack)
-    _hand_velocities(J, robot.qd, qd, p.in_null_space or allowed.by_product, answer.velocities)
+    by_product = allowed.by_product or p.projected or p.away.distance_m > 0.0
+    _hand_velocities(J, robot.qd, qd, by_product, answer.velocities)
     violated, blocked = False, memory.blocked
     for k in range(found):
         violated = violated or slack[k] > 0.0
-    if p.times_blocked and asked.tracks and not asked.hold:
+    if p.blocked_s > 0.0 and asked.tracks and not asked.hold:
         hand, towards = np.empty(seen, np.bool_), np.empty((seen, 3))
         for k in range(seen):
             hand[k] = arm.moved_by[near.link[which[k]]].all()
             towards[k] = near.direction[which[k]]
         moving = answer.velocities[1]
-        blocked = time_blocked(blocked, asked.velocity, moving, towards, h[:seen], hand, p.period_s)
+        blocked = time_blocked(blocked, asked.velocity, moving, towards, h[:seen], hand, p.blocked_s)
     return seen, found, ending, violated, blocked
 
 
@@ -187,17 +182,17 @@ def _box(robot: JointArrays, allowed: Allowed, p: MotionNumbers) -> tuple[FloatA
 @inlined
 def _pose(
     J: FloatArray, q: FloatArray, asked: Asked, rotation: FloatArray, null_velocity: FloatArray, p: MotionNumbers,
-    answer: Answer,
+    cost: FloatArray,
 ) -> None:  # fmt: skip
     """Write the cost of eq. 2, or of how far the joint velocities are from those asked for."""
     n = len(q)
-    H, f = answer.cost[:n], answer.cost[n]
-    if asked.by_joint:
+    H, f = cost[:n], cost[n]
+    if len(asked.joints) > 0:
         H[:], f[:] = np.eye(n), -asked.joints
         return
     m = 6 if p.holds_orientation else 3
     x_d = twist(asked.velocity, rotation, asked.rotation_goal, p.orientation_gain_1_s)
-    if p.in_null_space:
+    if p.projected or p.away.distance_m > 0.0:
         H[:], f[:] = cost_with_null_space(J[:m], x_d[:m], q, p.q_mid, p.cost, p.projected, null_velocity)
     else:
         cost_into(J[:m], x_d[:m], q, p.q_mid, p.cost, H, f)

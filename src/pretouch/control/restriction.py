@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import ByName, compiled, entry, inlined
-from pretouch.groups import ObstacleArrays
+from pretouch.groups import NearArrays
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
 from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles
@@ -115,21 +115,19 @@ class Rows(NamedTuple):
 
 
 @entry
-def _rows(
-    kin: Kinematics, moved_by: BoolArray, obstacles: ByName[ObstacleArrays], rows: Rows, p: ApproachParams
-) -> int:
-    return rows_into(kin, moved_by, obstacles, p, rows)
+def _rows(kin: Kinematics, moved_by: BoolArray, near: ByName[NearArrays], rows: Rows, p: ApproachParams) -> int:
+    return rows_into(kin, moved_by, near, p, rows)
 
 
 @inlined
-def rows_into(kin: Kinematics, moved_by: BoolArray, obstacles: ObstacleArrays, p: ApproachParams, rows: Rows) -> int:
+def rows_into(kin: Kinematics, moved_by: BoolArray, near: NearArrays, p: ApproachParams, rows: Rows) -> int:
     """Write the rows of `approach_rows` and the indices of their obstacles; return how many."""
     anchor, axis = kin.anchor, kin.axis
-    link, point, direction = obstacles.link, obstacles.body_point, obstacles.direction
+    link, point, direction = near.link, near.body_point, near.direction
     G, h, which = rows.G, rows.h, rows.which
     found = 0
     for k in range(len(link)):
-        limit = _limit(obstacles.body_distance[k], p)
+        limit = _limit(near.body_distance[k], p)
         if limit == np.inf:
             continue
         h[found], which[found] = limit, k

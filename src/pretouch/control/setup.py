@@ -1,5 +1,6 @@
 """What the arm's motion is made with, set up once."""
 
+import math
 from typing import Any
 
 from pretouch.compiled import flattened
@@ -17,17 +18,22 @@ class MotionSetup:
 
     body: MotionBody
     numbers: MotionNumbers
+    moves_away: bool
+    """Whether links before the hand move away in the null space."""
+    remembers: bool
+    """Whether anything is remembered from step to step."""
     fields: tuple[Any, ...]
     """Of `Fixed`, for compiled code."""
 
 
 def motion_setup(body: MotionBody, null_space: NullSpaceMotion | None, budget: int) -> MotionSetup:
     """Return what `joint_motion` is made with; `budget` counts the factorisations after which it gives up."""
-    model, t, p = body.model, body.task, null_space or NullSpaceMotion()
-    away = NullSpaceLimits(p.distance_m, p.speed_m_s, p.joint_rad_s, p.rate_rad_s2 * t.control_period_s)
+    model, t, p, moves_away = body.model, body.task, null_space or NullSpaceMotion(), null_space is not None
+    within = p.distance_m if moves_away else -math.inf
     numbers = MotionNumbers(
         cost_params(t), t.orientation_gain_1_s, t.orientation == "hold", budget, body.limits.table, model.q_mid,
-        t.mid_joint_projected or null_space is not None, t.mid_joint_projected, null_space is not None, away,
-        t.blocked_after_s is not None, body.limits.period,
+        t.mid_joint_projected, NullSpaceLimits(within, p.speed_m_s, p.joint_rad_s, p.rate_rad_s2 * t.control_period_s),
+        0.0 if t.blocked_after_s is None else body.limits.period,
     )  # fmt: skip
-    return MotionSetup(body, numbers, flattened(Fixed(model.arm, numbers)))
+    remembers = moves_away or t.blocked_after_s is not None
+    return MotionSetup(body, numbers, moves_away, remembers, flattened(Fixed(model.arm, numbers)))
