@@ -92,7 +92,9 @@ class Controller:
         self._setup = motion_setup(self._moved, profile.null_space, profile.failure.solver_iterations)
         self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
         self._detector = profile.detect.on(self.body)
+        self._units = len(skin)
         self._touching = "touch" in profile.detect.reads and len(skin.touching) > 0
+        self._shaken = "imu" in self._detector.reads
         self._mark = mark
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
@@ -151,20 +153,14 @@ class Controller:
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         """Run one control cycle; to be called once a period, with the state that the step before returned."""
-        p, model, mark = self.profile, self.model, self._mark
-        if len(state.command) != model.n or len(state.tracks.point) != len(self.skin):
+        p, model, units, mark = self.profile, self.model, self._units, self._mark
+        if len(state.command) != model.n or len(state.tracks.point) != units:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         robot, events, watch = examine(
-            state.watch,
-            inputs,
-            state.command,
-            self.limits.period,
-            self.limits.qd_max,
-            p.failure,
-            p.detect.by_torques,
+            state.watch, inputs, state.command, self.limits.period, self.limits.qd_max, p.failure, p.detect.by_torques
         )
-        readings, unfit = sound_readings(inputs.readings, len(self.skin))
-        touches, wrong = sound_touch(inputs.touch, len(self.skin)) if self._touching else (None, "")
+        readings, unfit = sound_readings(inputs.readings, units)
+        touches, wrong = sound_touch(inputs.touch, units) if self._touching else (None, "")
         points, lost = sound_points(inputs.points)
         unfit, now = unfit or wrong, watch.stamp
         mark("state")
@@ -173,7 +169,7 @@ class Controller:
         mark("kinematics")
 
         # what is near: eq. 1 and the closest points of the body
-        known = track_init(len(self.skin)) if Event.TIME_BACKWARDS in events else state.tracks
+        known = track_init(units) if Event.TIME_BACKWARDS in events else state.tracks
         seen, tracks = perceive(known, self._sight, kin, readings, now, robot)
         seen, outside = see_outside(
             state.outside, Event.TIME_BACKWARDS in events, seen, points, self._sight, kin, robot, now
@@ -183,10 +179,10 @@ class Controller:
         mark("perception")
 
         # what is felt: eqs. 8-11
-        watched = p.perception.enabled and len(self.skin) > 0 and heard >= 1.0 and not silent
+        watched = p.perception.enabled and units > 0 and heard >= 1.0 and not silent
         reacting = state.mode.mode is Mode.REACT
         window = add_force(state.window, None if robot.wrench is None else robot.wrench[:3], p.window)
-        imu = sound_imu(inputs.imu, len(self.skin)) if "imu" in self._detector.reads else None
+        imu = sound_imu(inputs.imu, units) if self._shaken else None
         sample = Sample(now, kin, robot, window, state.window.full, seen.obstacles, reacting, watched, touches, imu)
         felt, detector = self._detector.step(state.detector, self.body, sample)
         if reacting and p.window.freeze_while_reacting:
@@ -214,7 +210,7 @@ class Controller:
 
         # how near: eqs. 5-7, and the joint velocities: eq. 2
         touch = None if answer is None else answer.touch_speed
-        room = len(self.skin) + (0 if outside is None else len(outside.sigma))
+        room = units + (0 if outside is None else len(outside.sigma))
         hold = mode.mode is Mode.HOLD and qd is None
         request = MotionRequest(desired, state.rotation_goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
         allowed, approach = self._approach.step(state.approach, self._moved, kin, robot, seen.obstacles, request)
