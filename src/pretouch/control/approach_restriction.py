@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from pretouch.compiled import entry, flattened
-from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restriction
+from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.control.motion_entry import Allowed, Ended, Fixed, Step, motion_within
-from pretouch.control.restriction import ApproachParams, Rows, approach_params, rows_into
+from pretouch.control.restriction import ApproachParams, Rows, approach_params, approach_rows, rows_into
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
 from pretouch.types import WHOLE, Obstacles, RobotState
@@ -19,15 +19,16 @@ class ApproachRestriction(RestrictionParams, Restriction, name="paper"):
     """Restricting the body's approach to obstacles, as in the paper (eqs. 5-7)."""
 
     def on(self, body: MotionBody) -> Restriction:
-        """Return the same with what compiled code takes of the parameters."""
+        """Return the same for compiled code, which writes the rows where it solves."""
         return _OnBody(self)
 
     def step(
         self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
         request: MotionRequest,
-    ) -> tuple[CompiledRows, Any]:  # fmt: skip
+    ) -> tuple[Restricted, Any]:  # fmt: skip
         """Return the rows of `approach_rows`; nothing is remembered."""
-        return _OnBody(self).step(state, body, kin, robot, obstacles, request)
+        rows, which = approach_rows(kin, body.model.moved_by, obstacles, self)
+        return Restricted(rows.G, rows.h, which, self.slack_weight if rows.soft else 0.0), state
 
 
 class _OnBody(Restriction):

@@ -1,13 +1,13 @@
 """A few readings in a row are lost while the arm stands before a board: what of thresholds, rows and speed jumps."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
-from pretouch.control.approach_restriction import ApproachRestriction, of_table_i
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.path import line
 from pretouch.control.qp import solve, task_cost
 from pretouch.control.restriction import approach_rows
@@ -225,11 +225,9 @@ def free_answer(step: ControlStep, upright: FloatArray, params: Profile, model: 
     if step.qp.outcome is QpOutcome.SKIPPED:
         return None
     kin = model.kinematics(step.q)
-    approach = of_table_i(params.approach)
-    if not isinstance(params.approach, ApproachRestriction):  # its rows would be other ones
-        approach = replace(approach, rows="hard")
-    near = no_obstacles() if params.approach is None else step.obstacles
-    rows, _ = approach_rows(kin, model.moved_by, near, approach)
+    part = params.approach  # rows of another part would be other ones
+    approach = part if isinstance(part, ApproachRestriction) else ApproachRestriction(rows="hard")
+    rows, _ = approach_rows(kin, model.moved_by, no_obstacles() if part is None else step.obstacles, approach)
     goal = task(model.ee_jacobian(kin), step.desired_velocity, kin.rotation[model.ee], upright, params.task)
     cost, fastest = task_cost(*goal, step.q, model.q_mid, params.task), model.description.qd_max
     return solve(cost, -fastest, fastest, rows, approach.slack_weight, np.zeros(model.n)).qd
