@@ -100,8 +100,8 @@ def test_a_number_no_joint_can_have_is_named_and_not_believed(name: str, called:
         (np.zeros(3), "have the shape (3,), not (2,)"),
         (np.zeros((1, 2)), "have the shape (1, 2), not (2,)"),
         (0.5, "have the shape (), not (2,)"),
-        (["a", "b"], "are no array of numbers"),
-        ([[1.0], [1.0, 2.0]], "are no array of numbers"),
+        (["a", "b"], "are not arrays of numbers"),
+        ([[1.0], [1.0, 2.0]], "are not arrays of numbers"),
         (None, "have the shape (), not (2,)"),
     ],
 )
@@ -263,8 +263,8 @@ def test_readings_that_fit_are_copied(kind: type):
         (readings(distance=np.zeros((2, 1))), "have the shapes (2,), (2, 1) and (2,), not (2,)"),
         (readings(status=(0.0, np.nan)), "statuses are of type float64"),
         (readings(status=("ok", "ok")), "statuses are of type <U2"),
-        (readings(stamp=("a", "b")), "no arrays of numbers"),
-        (readings(distance=[[1.0], [1.0, 2.0]]), "no arrays of numbers"),
+        (readings(stamp=("a", "b")), "not arrays of numbers"),
+        (readings(distance=[[1.0], [1.0, 2.0]]), "not arrays of numbers"),
     ],
 )
 def test_of_readings_that_do_not_fit_none_is_taken(given: RangeReadings, said: str):

@@ -92,9 +92,12 @@ def test_a_source_once_given_that_falls_silent_stops_the_arm_and_lets_it_go_on(p
         (5, "gives 5"),
         (SeenPoints(1.0, np.zeros(2), np.zeros((3, 3)), np.zeros(3)), "of the shapes (2,), (3, 3) and (3,)"),
         (SeenPoints(1.0, np.zeros(1), np.zeros(3), np.zeros(1)), "of the shapes (1,), (3,) and (1,)"),
-        (SeenPoints("soon", np.zeros(1), np.zeros((1, 3)), np.zeros(1)), "no arrays of numbers"),
+        (SeenPoints("soon", np.zeros(1), np.zeros((1, 3)), np.zeros(1)), "something other than arrays of numbers"),
         (seen(1.0, *np.zeros((MOST_POINTS + 1, 3))), f"gives 20001 points, more than {MOST_POINTS}"),
-        (seen(1.0, *np.full((5, 3), 500.0), [np.nan] * 3, [0.0] * 3), "5 of 6 points that are none"),
+        (
+            seen(1.0, *np.full((5, 3), 500.0), [np.nan] * 3, [0.0] * 3),
+            "5 implausible points of 6: a coordinate of 100 m or more, or a sigma outside 0 to 1 m",
+        ),
     ],
 )
 def test_points_that_cannot_be_used_are_named(panda_model, paper_skin, points, said):

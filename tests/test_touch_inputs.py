@@ -51,7 +51,7 @@ def test_readings_that_fit_are_copied():
         (replace(readings(), force=np.zeros((7, 1))), "not (7,)"),
         (replace(readings(), contact=np.zeros(7)), "are of types float64 and int64"),
         (replace(readings(), status=np.array(["a"] * 7)), "are of types bool and <U1"),
-        (replace(readings(), stamp=["soon"] * 7), "touch readings are no arrays of numbers"),
+        (replace(readings(), stamp=["soon"] * 7), "touch readings are not arrays of numbers"),
         ("nothing", "touch readings are 'nothing'"),
     ],
 )

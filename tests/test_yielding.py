@@ -116,14 +116,14 @@ def test_the_link_that_is_pushed_goes_with_the_push(arm: Pushed, link: str, forc
 
 def test_caught_between_two_things_it_opens_the_way_it_came_and_holds_until_resumed(arm: Pushed):
     steps = caught(arm)
-    assert "Caught between two things" in steps[-1].reason
+    assert "Clamped between two objects" in steps[-1].reason
     start = arm.ee()[1]
     opening = arm.run(40)
     assert modes(opening) == {Mode.REACT}
     assert 0.02 < arm.ee()[1] - start < 0.06, "back, at no more than 0.1 m/s"
     held = arm.run(60)
     assert held[-1].mode is Mode.HOLD
-    assert "caught between two things" in held[-1].reason
+    assert "clamped between two objects" in held[-1].reason
     assert "resume" in held[-1].reason
     assert arm.step(resume=True).mode is Mode.TRACK
 

@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.perception.chosen_points import usable
+from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
 from pretouch.types import (
     WHOLE,
     FloatArray,
@@ -148,7 +148,7 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
     except AttributeError:
         return None, f"it is {robot!r}"
     except (TypeError, ValueError, OverflowError):
-        return None, "its force estimate is no array of numbers"
+        return None, "its force estimate is not an array of numbers"
     if stamp is None:
         return None, f"its time stamp is {robot.stamp}"
     try:
@@ -167,7 +167,7 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
 
 
 def _torques(given: object, joints: int) -> FloatArray:
-    """Copy external torques as (n,) of float64; what can be none is NaN."""
+    """Copy external torques as (n,) of float64; what an arm cannot have is NaN."""
     try:
         torques = np.array(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -194,7 +194,7 @@ def _misfit(given: tuple[FloatArray, ...], joints: int) -> str:
         try:
             shape = np.array(part, dtype=np.float64).shape
         except (TypeError, ValueError, OverflowError):
-            return f"{name} are no array of numbers"
+            return f"{name} are not arrays of numbers"
         if shape != (joints,):
             return f"{name} have the shape {shape}, not ({joints},)"
     return ""
@@ -209,7 +209,7 @@ def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, 
     except AttributeError:
         return _nothing(units), f"they are {readings!r}"
     except (TypeError, ValueError, OverflowError):
-        return _nothing(units), "they are no arrays of numbers"
+        return _nothing(units), "they are not arrays of numbers"
     if not stamp.shape == distance.shape == status.shape == (units,):
         shapes = f"{stamp.shape}, {distance.shape} and {status.shape}"
         return _nothing(units), f"stamps, distances and statuses have the shapes {shapes}, not ({units},)"
@@ -221,9 +221,9 @@ def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, 
 
 
 def sound_imu(imu: ImuReadings | None, units: int) -> ImuReadings | None:
-    """Copy what of IMU samples can be some of so many units; None where nothing can.
+    """Copy the IMU samples that are plausible for so many units; None where none is.
 
-    No fault is told: they only add to what the torques say, so that without them an arm feels as one that has none.
+    This is no fault: they only add to the evidence of the torques, as of an arm whose units have no IMU.
     """
     if imu is None:
         return None
@@ -260,7 +260,7 @@ def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings 
     except AttributeError:
         return None, f"touch readings are {touch!r}"
     except (TypeError, ValueError, OverflowError):
-        return None, "touch readings are no arrays of numbers"
+        return None, "touch readings are not arrays of numbers"
     if not stamp.shape == force.shape == contact.shape == status.shape == (units,):
         shapes = f"{stamp.shape}, {contact.shape}, {force.shape} and {status.shape}"
         return None, f"stamps, contacts, forces and statuses of touch have the shapes {shapes}, not ({units},)"
@@ -274,7 +274,7 @@ def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings 
 def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
     """Give points of outside sources as arrays of float64; of those that cannot be used, take none and say why.
 
-    A set of which more than half the points are no such thing cannot be used; single ones are left out later. No copy
+    A set of which more than half the points are implausible cannot be used; single ones are left out later. No copy
     is made, for nothing of the arrays is kept beyond the step.
     """
     if points is None:
@@ -286,14 +286,18 @@ def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
     except AttributeError:
         return None, f"gives {points!r}"
     except (TypeError, ValueError, OverflowError):
-        return None, "gives what is no arrays of numbers"
+        return None, "gives something other than arrays of numbers"
     if stamp.shape != sigma.shape or point.shape != (*stamp.shape, 3) or stamp.ndim != 1:
         return None, f"gives stamps, points and sigmas of the shapes {stamp.shape}, {point.shape} and {sigma.shape}"
     if len(stamp) > MOST_POINTS:
         return None, f"gives {len(stamp)} points, more than {MOST_POINTS}"
     good, none = usable(stamp, point, sigma)
     if 2 * good < len(stamp) - none:
-        return None, f"gives {len(stamp) - none - good} of {len(stamp) - none} points that are none"
+        shown = len(stamp) - none
+        return None, (
+            f"gives {shown - good} implausible points of {shown}: a coordinate of {FARTHEST:g} m or more, or a sigma"
+            f" outside 0 to {LARGEST_SIGMA:g} m"
+        )
     return SeenPoints(heard, stamp, point, sigma), ""
 
 

@@ -69,23 +69,23 @@ TABLE: tuple[Transition, ...] = (
     ),
     Transition(
         Event.BLOCKED, frozenset({Mode.TRACK}), Mode.HOLD,
-        "What is near cannot be kept away from within the acceleration limits: braking, and trying again.",
+        "The approach limits cannot be met within the acceleration limits: braking and trying again.",
     ),
     Transition(
         Event.BLOCKED, frozenset({Mode.REACT}), Mode.REACT,
-        "Moving with a contact, but what is near leaves no way within the acceleration limits: braking.",
+        "Moving with a contact, but the approach limits allow no motion within the acceleration limits: braking.",
     ),
     Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "{}", latches=True),
     Transition(Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT, "A contact of {}: moving with it."),
     Transition(Event.REACTING, frozenset({Mode.REACT}), Mode.REACT, "Moving with a contact: {} left."),
     Transition(
         Event.CLAMPED, frozenset({Mode.REACT}), Mode.HOLD,
-        "The arm was caught between two things ({}) and has opened the way it came: free it, then resume.",
+        "The arm was clamped between two objects ({}) and has opened the way it came: free it, then resume.",
         latches=True, soft=True,
     ),
     Transition(
         Event.OPENING, frozenset({Mode.REACT}), Mode.REACT,
-        "Caught between two things ({}): opening the way it came.",
+        "Clamped between two objects ({}): opening the way it came.",
     ),
     Transition(
         Event.YIELDING, frozenset({Mode.REACT}), Mode.REACT, "Yielding to a contact: the task goes on {}.",
@@ -107,8 +107,8 @@ TABLE: tuple[Transition, ...] = (
     ),
     Transition(
         Event.NO_FORCE, _ANY, Mode.HOLD,
-        "The robot has given no force estimate for {}, as near a singularity, and contacts could not be felt: guide"
-        " the arm to another posture.",
+        "The robot has given no force estimate for {}, as near a singularity, and contacts could not be detected:"
+        " guide the arm to another posture.",
         soft=True,
     ),
     Transition(
@@ -118,17 +118,17 @@ TABLE: tuple[Transition, ...] = (
     Transition(Event.GIVEN_UP, _ANY, Mode.HOLD, "Given up after {}.", soft=True),
     Transition(
         Event.PRESSED, frozenset({Mode.REACT, Mode.HOLD}), Mode.HOLD,
-        "Something is felt that does not move the arm, for {}: free the arm, or, if nothing touches it, tell the robot"
-        " its load; the arm goes on when it is no longer felt.",
+        "A force that does not move the arm has been detected for {}: free the arm, or, if nothing touches it, set the"
+        " robot's load; the arm continues when the force is gone.",
         soft=True,
     ),
     Transition(
         Event.WINDOW_FILLING, _ANY, Mode.HOLD,
-        "The force window is filling ({}): contacts cannot be told from noise yet.",
+        "The force window is filling ({}): contacts cannot be distinguished from noise yet.",
     ),
     Transition(
         Event.PATH_BLOCKED, frozenset({Mode.TRACK}), Mode.TRACK,
-        "Something near has kept the hand from its path for {}: waiting for the way to clear.",
+        "An obstacle has kept the hand from its path for {}: waiting until it is clear.",
     ),
     Transition(Event.CLEAR, _ANY, Mode.TRACK, "Following the path."),
 )  # fmt: skip

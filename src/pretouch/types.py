@@ -262,13 +262,8 @@ class Touched:
     """(C,) that it is this rigid body that is touched, from 0 to 1."""
 
 
-def untouched() -> Touched:
-    """Return that nothing is felt."""
-    return Touched(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-
-
-NOT_TOUCHED = untouched()
-"""One of these for all steps: its arrays are not written to either."""
+NOT_TOUCHED = Touched(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+"""Nothing is felt. One of these for all steps: its arrays are not written to either."""
 
 
 class QpOutcome(Enum):
@@ -350,5 +345,5 @@ class ControlStep:
     """(n,) external joint torques less what the detector takes for free motion [Nm], NaN where there are none."""
     evidence: float
     """How far the detector is on the way to a contact: one from 1 on, while armed."""
-    touched: Touched = field(default_factory=untouched)
+    touched: Touched = field(default_factory=lambda: NOT_TOUCHED)
     """Where the arm is touched; empty where nothing is felt or the profile does not localise."""

@@ -1,31 +1,27 @@
-"""Many trials in parallel processes, each result in its own file, so that a run that was stopped goes on."""
+"""The trials of experiments as tasks: which of them a request asks for, and how a worker plays one."""
 
-import json
 import os
-from collections.abc import Callable
-from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass, replace
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import Literal, cast, get_args
 
-from pretouch import __version__
 from pretouch.atomic_write import write_json
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.params import Orientation
 from pretouch.profiles import profile, restriction_modes
-from pretouch.robot.description import panda
-from pretouch.robot.description_file import FILE, load_description
+from pretouch.robot.description_file import description_text
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import PAPER_SKIN, load_skin, paper_skin
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import skin_file, skin_for
 from pretouch.sim.randomisation import world_set
 from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.domain_randomisation import digest_of
+from pretouch_lab.engine import Task, open_folder
 from pretouch_lab.registry import EXPERIMENTS
 from pretouch_lab.result_key import parameters_digest, result_key
-from pretouch_lab.results_file import failure_said
-from pretouch_lab.workers import interrupt_held_back, workers
 
 Recorded = Literal["first", "all"]
 """Trials to record: those of the first seed of which figures are drawn, or all."""
@@ -52,10 +48,11 @@ class Request:
     record: str = "first"
     """Trials to record, `Recorded`."""
     arm: str | None = None
-    """Folder of an imported arm, or its robot.toml; None for the Panda."""
+    """Name of an arm, or the folder of an imported one; None for the Panda."""
     first_seed: int = 0
     world: str | None = None
-    """Set of worlds of which each trial's seed draws its own (`sim.randomisation`), or None for the usual one."""
+    """Set of the domain randomisation (`sim.randomisation`) of which each trial's seed draws its own, or None for the
+    usual arm."""
 
     def __post_init__(self) -> None:
         for name in self.experiments:
@@ -88,7 +85,7 @@ class Request:
             raise ExperimentError(f"The stiffnesses are {listed} N/m: name each wanted one once.")
         if self.world:
             world_set(self.world)
-        if not self.tasks():
+        if not self.trials():
             raise ExperimentError(
                 f"There is nothing to run: {', '.join(self.experiments)} is about proximity, and none of the profiles"
                 f" {', '.join(self.profiles)} has it."
@@ -96,27 +93,32 @@ class Request:
 
     def context(self) -> Context:
         """Load what all trials share."""
-        model = RobotModel(load_description(self.arm) if self.arm else panda())
-        skin = load_skin(self.skin_file, model) if self.skin or self.arm else paper_skin(model)
+        model = RobotModel(robot_named(self.arm or "panda"))
+        skin = skin_for(model, self.skin or "")
         return Context(model, skin, cast(Orientation | None, self.orientation), placement_for(model), self.world or "")
 
-    @property
-    def skin_file(self) -> Path:
-        """The skin's file: the one asked for, or else the arm's own."""
-        if self.skin:
-            return Path(self.skin)
-        return _arm_folder(self.arm) / "skin.toml" if self.arm else PAPER_SKIN
-
-    def tasks(self) -> list[tuple[Cell, int]]:
+    def trials(self) -> list[tuple[Cell, int]]:
         """Every trial once, seed by seed, so that a stopped run has some of each cell."""
         grid = Grid(self.profiles, self.restrictions, self.stiffness)
         cells = [cell for name in self.experiments for cell in EXPERIMENTS[name].cells(grid)]
         once = list({cell.name: cell for cell in cells}.values())
         return [(cell, seed) for seed in range(self.first_seed, self.first_seed + self.seeds) for cell in once]
 
+    def tasks(self, out: Path) -> list[Task]:
+        """Return the trials as tasks that keep their rows in a folder; their cost is simulated time [s]."""
+        return [
+            Task(
+                trial_file(out, cell, seed), partial(play_trial, self, out, cell, seed),
+                EXPERIMENTS[cell.experiment].cost(cell), seed,
+                cell.row(seed),
+            )
+            for cell, seed in self.trials()
+        ]  # fmt: skip
 
-def _arm_folder(arm: str) -> Path:
-    return Path(arm) if Path(arm).is_dir() else Path(arm).parent
+    def open(self, out: Path) -> None:
+        """Make a folder for the results, or take up one that a run with the same parameters began."""
+        self.context()  # a bad skin is refused here, before any process starts
+        open_folder(out, asdict(self), _fingerprints(self), ("trials", "recordings"))
 
 
 def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:
@@ -124,119 +126,20 @@ def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:
         raise ExperimentError(f"The {what} {choice!r} is unknown: choose from {', '.join(allowed)}.")
 
 
-def open_folder(request: Request, out: Path) -> None:
-    """Make a folder for the results, or take one up that a run with the same parameters began."""
-    wanted = json.loads(json.dumps({"version": __version__, **asdict(request), "sha256": _fingerprints(request)}))
-    about = out / "run.json"
-    try:
-        for folder in {out / "recordings", *(trial_file(out, *task).parent for task in request.tasks())}:
-            folder.mkdir(parents=True, exist_ok=True)
-        if about.exists():
-            _check_same(_object(about), wanted, out)
-        else:
-            write_json(wanted, about)
-    except OSError as error:
-        raise ExperimentError(f"The folder {out} cannot be used: {error.strerror}: give another --out.") from error
-    except _Damaged as error:
-        raise ExperimentError(f"The file {about} is damaged ({error}): give another --out.") from error
-
-
 def _fingerprints(request: Request) -> dict[str, str]:
     """Digests of what a request only names: the skin file, and the parameters of each profile."""
-    path = request.skin_file
+    arm = robot_named(request.arm or "panda")
+    path = Path(request.skin or skin_file(arm))
     try:
         digests = {"the skin file has": sha256(path.read_bytes()).hexdigest()}
     except OSError as error:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
-    if request.world:
-        digests["the world's file has"] = world_set(request.world).digest
+    digests |= digest_of(request.world or "")
     if request.arm:
-        digests["the arm's files have"] = sha256(_arm_files(request.arm)).hexdigest()
-    for name in dict.fromkeys(cell.profile for cell, _ in request.tasks()):
+        digests["the arm's files have"] = sha256(description_text(arm).encode() + arm.mjcf.read_bytes()).hexdigest()
+    for name in dict.fromkeys(cell.profile for cell, _ in request.trials()):
         digests[f"the parameters of profile {name} have"] = parameters_digest(profile(name))
     return digests
-
-
-def _arm_files(arm: str) -> bytes:
-    """Content of an arm's files."""
-    mjcf = load_description(arm).mjcf
-    file = Path(arm) / FILE if Path(arm).is_dir() else Path(arm)
-    return file.read_bytes() + mjcf.read_bytes()
-
-
-def _check_same(found: dict[str, Any], wanted: dict[str, Any], out: Path) -> None:
-    """Refuse to go on with a run that other parameters began."""
-    digests: dict[str, str] = wanted["sha256"]
-    for key, value in wanted.items():
-        if key != "sha256" and found.get(key) != value:
-            raise ExperimentError(
-                f"The folder {out} holds a run with {key} = {found.get(key)!r}, not {value!r}:"
-                " give another --out, or the parameters of that run."
-            )
-    before = found.get("sha256")
-    for what, digest in digests.items():
-        if not isinstance(before, dict) or before.get(what) != digest:
-            raise ExperimentError(f"The folder {out} holds a run, but {what} changed since: give another --out.")
-
-
-class _Damaged(Exception):
-    """A JSON file holds something else than an object."""
-
-
-def _object(path: Path) -> dict[str, Any]:
-    """Read a JSON file that holds an object."""
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:  # not UTF-8, not JSON, brackets too deep
-        raise _Damaged(error) from error
-    if not isinstance(value, dict):
-        raise _Damaged("it holds no object")
-    return value
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a campaign is."""
-
-    done: int
-    """Trials that are finished."""
-    total: int
-    cost_done: float
-    """Simulated time of those trials, about [s]."""
-    cost_total: float
-
-
-def progress_of(request: Request, out: Path) -> Progress:
-    """How far a campaign in a folder is."""
-    tasks = request.tasks()
-    missing = [task for task in tasks if _row(out, *task) is None]
-    total = sum(_cost(cell) for cell, _ in tasks)
-    return Progress(len(tasks) - len(missing), len(tasks), total - sum(_cost(cell) for cell, _ in missing), total)
-
-
-def _cost(cell: Cell) -> float:
-    return EXPERIMENTS[cell.experiment].cost(cell)
-
-
-def run_campaign(request: Request, out: Path, progress: Callable[[float], None]) -> None:
-    """Run all trials that have no result yet, on all processors; `progress(cost)` after each, with its cost.
-
-    However it ends, the results of finished trials stay.
-    """
-    request.context()  # a bad skin is refused here, before any process starts
-    open_folder(request, out)
-    missing = [task for task in request.tasks() if _row(out, *task) is None]
-    if not missing:
-        return
-    # the long ones first, so that no processor waits for one at the end
-    missing.sort(key=lambda task: (task[1], -_cost(task[0])))
-    with workers(min(len(missing), os.cpu_count() or 1)) as pool:
-        with interrupt_held_back(), failure_said(out):
-            futures = {pool.submit(_work, request, out, cell, seed): _cost(cell) for cell, seed in missing}
-        for future in as_completed(futures):
-            with failure_said(out):
-                future.result()
-            progress(futures[future])
 
 
 def trial_file(out: Path, cell: Cell, seed: int) -> Path:
@@ -250,28 +153,13 @@ def recording_file(out: Path, cell: Cell, seed: int) -> Path:
     return out / "recordings" / f"{cell.name}_{seed:04d}.mcap"
 
 
-def finished(request: Request, out: Path) -> list[dict[str, Any]]:
-    """Read the rows of all finished trials, in the order of the tasks."""
-    return [row for task in request.tasks() if (row := _row(out, *task)) is not None]
-
-
-def _row(out: Path, cell: Cell, seed: int) -> dict[str, Any] | None:
-    """Read a trial's row of results; None where there is none, or a damaged one, and the trial is still to run."""
-    try:
-        row = _object(trial_file(out, cell, seed))
-    except (OSError, _Damaged):
-        return None
-    its_own = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
-    return row if all(row.get(key) == value for key, value in its_own.items()) else None
-
-
 @cache
 def _context(request: Request) -> Context:
     return request.context()
 
 
-def _work(request: Request, out: Path, cell: Cell, seed: int) -> None:
-    """Run one trial in a worker process and keep its results, and its recording if it is wanted."""
+def play_trial(request: Request, out: Path, cell: Cell, seed: int, file: Path) -> None:
+    """Run one trial in a worker process; write its row to a file, and its recording beside if it is wanted."""
     experiment, context = EXPERIMENTS[cell.experiment], _context(request)
     place = recording_file(out, cell, seed)
     place.unlink(missing_ok=True)  # of another program, or of a trial whose row was damaged
@@ -287,4 +175,4 @@ def _work(request: Request, out: Path, cell: Cell, seed: int) -> None:
         row = {**row, "world": context.world}
     if unfinished.exists():  # some trials play nothing
         os.replace(unfinished, place)
-    write_json(row, trial_file(out, cell, seed))
+    write_json(row, file)

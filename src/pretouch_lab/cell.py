@@ -4,7 +4,9 @@ import re
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
+from pretouch.control.path import Path as TaskPath
 from pretouch.params import Orientation
 from pretouch.profiles import Profile, profile, restriction_mode, with_restriction
 from pretouch.robot.model import RobotModel
@@ -12,6 +14,9 @@ from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams
+from pretouch.sim.scene import SceneSpec
+from pretouch_lab.rows import Row
+from pretouch_lab.trial import Setup
 
 _OF_THE_PAPER = ("off", "hard", "slack", "floor")
 """Restriction modes of the paper's equations; any other makes a profile what it is."""
@@ -66,6 +71,10 @@ class Cell:
         plain = safe == re.sub(r"[:=]", "-", exact)
         return safe if plain else f"{safe}-{sha256(exact.encode()).hexdigest()[:8]}"
 
+    def row(self, seed: int) -> Row:
+        """Begin the row of results of a trial: what tells it from all others."""
+        return {"experiment": self.experiment, **self.where, "profile": self.profile, "seed": seed}
+
 
 @dataclass(frozen=True)
 class Context:
@@ -78,7 +87,7 @@ class Context:
     placement: Placement = field(default_factory=Placement)
     """Where the paper's paths are for this arm: the static experiment's."""
     world: str = ""
-    """Set of worlds of which each trial's seed draws its own, or none."""
+    """Set of the domain randomisation of which each trial's seed draws its own, or none."""
     recording: Path | None = None
     """File to record the trial in, if it is to be recorded."""
     plant: PlantParams | None = None
@@ -97,3 +106,11 @@ class Context:
         if "restrictions" in cell.where:
             found = with_restriction(found, str(cell.where["restrictions"]))
         return replace(found, task=replace(found.task, orientation=self.orientation or found.task.orientation))
+
+    def setup(self, cell: Cell, seed: int, scene: SceneSpec, path: TaskPath, **other: Any) -> Setup:
+        """Return what a trial of a cell is made of; `other` are further fields of `Setup`, or other values of them."""
+        usual = Setup(
+            self.model, self.skin, self.profile(cell), scene, path, seed, plant=self.arm, ranging=self.ranging,
+            recording=self.recording, world=self.world,
+        )  # fmt: skip
+        return replace(usual, **other)

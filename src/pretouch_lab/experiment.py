@@ -2,18 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pretouch.recording.run_record import RunRecord
 from pretouch.text_table import TextTable
 from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.rows import Row
 from pretouch_lab.trial import Record
 
 if TYPE_CHECKING:  # workers that only play trials need none of it
     from matplotlib.figure import Figure
-
-Row = dict[str, Any]
-"""Results of one trial, as they are written to a JSON file."""
 
 
 @dataclass(frozen=True)

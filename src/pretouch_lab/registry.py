@@ -3,9 +3,10 @@
 from typing import Any
 
 from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Experiment, Row
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import avoidance, dynamic, static
 from pretouch_lab.paper.claims import anticipation, between, detectable, free_motion, noise
+from pretouch_lab.rows import Row
 from pretouch_lab.studies import clamp, imu, mounting, pinch, tactile, vision, wire
 from pretouch_lab.studies.coverage import study as coverage
 from pretouch_lab.weaknesses import (

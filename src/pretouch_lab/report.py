@@ -10,10 +10,11 @@ from pretouch.reporting.html import Html, document, element, joined, titled_tabl
 from pretouch.text_table import markdown
 from pretouch_lab.campaign import Request, recording_file
 from pretouch_lab.cell import Cell
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
+from pretouch_lab.domain_randomisation import sentence
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.registry import GROUPS
+from pretouch_lab.rows import Row
 from pretouch_lab.trace import read_trace
-from pretouch_lab.worlds import sentence
 
 _TITLE = "Contact anticipation in simulation"
 _NOTE = (
@@ -60,7 +61,7 @@ def _write(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: P
 
 
 def _about(request: Request) -> str:
-    cells = [cell for cell, _ in request.tasks()]
+    cells = [cell for cell, _ in request.trials()]
     profiles = dict.fromkeys(cell.profile for cell in cells)
     modes = dict.fromkeys(str(cell.where["restrictions"]) for cell in cells if "restrictions" in cell.where)
     said = f"{', '.join(request.experiments)}: {request.seeds} seeds, profiles {', '.join(profiles)}"

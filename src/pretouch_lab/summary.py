@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from pretouch_lab.metrics import spread
+from pretouch_lab.rows import Row, spread
 
 _STATIC = (
     "impact_speed_m_s", "detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n", "peak_estimate_n",
@@ -14,8 +14,6 @@ _AVOIDANCE = (
 )  # fmt: skip
 _DYNAMIC = ("peak_estimate_n", "true_peak_20ms_n", "true_peak_n")
 _PLACE = ("trajectory", "side", "place", "stiffness_n_per_m")
-
-Row = dict[str, Any]
 
 
 def static_summary(rows: list[Row]) -> Row:

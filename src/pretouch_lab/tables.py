@@ -1,11 +1,11 @@
 """The summaries of the three experiments as tables, for the terminal and for the page."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
-from pretouch.text_table import TextTable, tabulated
-
-Row = dict[str, Any]
+from pretouch.text_table import Column, TextTable, tabulated
+from pretouch_lab.rows import Row
 
 _STATIC = (
     ("impact_speed_m_s", "impact\n[m/s]", 3),
@@ -64,72 +64,71 @@ def _values(cells: list[Row], name: str) -> list[Any]:
 
 
 def _places(part: Row, stiffness: float, modes: dict[str, str]) -> TextTable:
-    rows: list[tuple[str, ...]] = []
-    false = 0
     with_mode = "".join(f", {mode} restrictions" for mode in dict.fromkeys(modes.values()) if mode not in _UNSAID)
-    for cell in part["cells"]:
-        if cell["stiffness_n_per_m"] != stiffness or cell["restrictions"] != modes.get(cell["profile"]):
-            continue
-        felt = f"{cell['detected_fraction'] * cell['trials']:.0f}/{cell['contact_fraction'] * cell['trials']:.0f}"
-        false += cell["false_detections"]
-        name = f"{cell['profile']}\n{cell['trajectory']} {cell['side']}"
-        rows.append((name, *_forces(cell), felt))
-        rows += [("ratio", *_force_ratios(ratio), "") for ratio in _its_ratio(part["ratios"], cell)]
-    return TextTable(
+    cells = [
+        cell
+        for cell in part["cells"]
+        if cell["stiffness_n_per_m"] == stiffness and cell["restrictions"] == modes.get(cell["profile"])
+    ]
+    where = ("profile\nwhere", lambda cell: f"{cell['profile']}\n{cell['trajectory']} {cell['side']}")
+    return _with_ratios(
         f"Static object, {stiffness / 1000:g} N/mm{with_mode}: medians and ratios blind/profile, 10-90 % below",
-        ("profile\nwhere", *(label for _, label, _ in _STATIC), "felt"),
-        tuple(rows),
+        (where, *_FORCES, ("felt", _felt)),
+        cells,
+        part["ratios"],
         "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
         " (eq. 8) and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, of its 20 ms"
         " mean and of itself. Felt: contacts detected, of all contacts. The paper finds forces about two times smaller"
-        f" with proximity; which force is meant decides the number. False detections: {false}.",
-        names=1,
+        " with proximity; which force is meant decides the number. False detections:"
+        f" {sum(cell['false_detections'] for cell in cells)}.",
     )
+
+
+def _felt(cell: Row) -> str:
+    return f"{cell['detected_fraction'] * cell['trials']:.0f}/{cell['contact_fraction'] * cell['trials']:.0f}"
 
 
 def _stiffnesses(part: Row, modes: dict[str, str]) -> TextTable:
-    rows: list[tuple[str, ...]] = []
-    for cell in part["pooled_cells"]:
-        if cell["restrictions"] == modes[cell["profile"]]:
-            name = f"{cell['profile']}\n{cell['stiffness_n_per_m'] / 1000:g} N/mm"
-            rows.append((name, *_forces(cell)))
-            rows += [("ratio", *_force_ratios(r)) for r in _its_ratio(part["pooled_ratios"], cell)]
-    return TextTable(
+    what = ("profile\nobject", lambda cell: f"{cell['profile']}\n{cell['stiffness_n_per_m'] / 1000:g} N/mm")
+    return _with_ratios(
         "Static object, by stiffness and by what proximity is used for: all four places together",
-        ("profile\nobject", *(label for _, label, _ in _STATIC)),
-        tuple(rows),
+        (what, *_FORCES),
+        [cell for cell in part["pooled_cells"] if cell["restrictions"] == modes[cell["profile"]]],
+        part["pooled_ratios"],
         " ".join(said for name, said in _MEANT.items() if name in _values(part["pooled_cells"], "profile")),
-        names=1,
     )
 
 
+def _with_ratios(title: str, columns: tuple[Column, ...], cells: list[Row], ratios: list[Row], note: str) -> TextTable:
+    """Make a table of cells, each with its ratio to `blind` below it if there is one."""
+    made = tabulated(title, columns, cells, note, names=1)
+    rows: list[tuple[str, ...]] = []
+    for cell, row in zip(cells, made.rows, strict=True):
+        rows.append(row)
+        for ratio in _its_ratio(ratios, cell):
+            shown = ("" if "delay" in key else _ratio(ratio[key]) for key, _, _ in _STATIC)
+            rows.append(("ratio", *shown, *[""] * (len(columns) - 1 - len(_STATIC))))
+    return replace(made, rows=tuple(rows))
+
+
 def _restrictions(part: Row, stiffness: float) -> TextTable:
-    rows = [
-        (
-            f"{cell['profile']}\n{cell['restrictions']}",
-            f"{cell['contact_fraction'] * cell['trials']:.0f}/{cell['trials']}",
-            with_spread(cell["least_sensed_m"], 3),
-            *_forces(cell)[:-1],
-        )
-        for cell in part["pooled_cells"]
-        if cell["profile"] != "blind" and cell["stiffness_n_per_m"] == stiffness
+    shown = [
+        cell for cell in part["pooled_cells"] if cell["profile"] != "blind" and cell["stiffness_n_per_m"] == stiffness
     ]
-    return TextTable(
+    columns = (
+        ("profile\nmode", lambda cell: f"{cell['profile']}\n{cell['restrictions']}"),
+        ("hit", hits),
+        ("least\n[m]", ranged("least_sensed_m", 3)),
+        *_FORCES[:-1],
+    )
+    return tabulated(
         f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: all four places together",
-        ("profile\nmode", "hit", "least\n[m]", *(label for _, label, _ in _STATIC[:-1])),
-        tuple(rows),
+        columns,
+        shown,
         "Hit: trials with contact. Least: nearest that anything sensed came to the arm's surface in 40 s or until"
         " contact, by what was sensed.",
         names=1,
     )
-
-
-def _forces(cell: Row) -> list[str]:
-    return [with_spread(cell[key], digits, 1000 if "delay" in key else 1) for key, _, digits in _STATIC]
-
-
-def _force_ratios(ratio: Row) -> list[str]:
-    return ["" if "delay" in key else _ratio(ratio[key]) for key, _, _ in _STATIC]
 
 
 def _its_ratio(ratios: list[Row], cell: Row) -> list[Row]:
@@ -218,5 +217,19 @@ def with_spread(value: Row | None, digits: int, factor: float = 1.0) -> str:
     return f"{factor * value['median']:.{digits}f}\n{factor * value['p10']:.{few}f}-{factor * value['p90']:.{few}f}"
 
 
+def ranged(key: str, digits: int, factor: float = 1.0) -> Callable[[Row], str]:
+    """Write a row's spread by `with_spread`."""
+    return lambda row: with_spread(row[key], digits, factor)
+
+
+def hits(row: Row) -> str:
+    """Write in how many of a row's trials there was a contact."""
+    return f"{row['contact_fraction'] * row['trials']:.0f}/{row['trials']}"
+
+
 def _ratio(value: Row | None) -> str:
     return "-" if value is None else f"{value['median']:.2f}\n{value['p10']:.1f}-{value['p90']:.1f}"
+
+
+_FORCES = tuple((label, ranged(key, digits, 1000 if "delay" in key else 1)) for key, label, digits in _STATIC)
+"""Columns of the forces and speeds of a contact with a static object."""

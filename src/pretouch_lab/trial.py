@@ -31,7 +31,7 @@ from pretouch.sim.scene import SceneSpec, described, fixtures
 from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.depth_camera import DepthCamera, DepthCameraParams
-from pretouch_lab.worlds import Parts, in_world
+from pretouch_lab.domain_randomisation import Parts, randomised
 
 SETTLE_S = 0.2
 """Time the arm stands before the controller starts [s]: the observer's transient is over."""
@@ -65,7 +65,8 @@ class Setup:
     recording: FilePath | None = None
     """File to record it in; none, and it is not recorded."""
     world: str = ""
-    """Set of worlds of which the seed draws one (`sim.randomisation`); none: plant, ranging and skin as they are."""
+    """Set of the domain randomisation (`sim.randomisation`) of which the seed draws one; none: plant, ranging and skin
+    as they are."""
     prepare: Callable[[Plant, RangeFinders], None] | None = None
     """What else is to happen: may have things done before each physics step, to the arm or to its units."""
 
@@ -178,7 +179,7 @@ def _recording(setup: Setup, controller: Controller) -> Iterator[Recording | Non
 
 def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     """Run a trial until `done` says so of a step."""
-    parts = in_world(
+    parts = randomised(
         setup.world, setup.seed, setup.model, Parts(setup.plant, setup.ranging, setup.skin, setup.believed)
     )
     setup = replace(setup, plant=parts.plant, ranging=parts.ranging, believed=parts.believed)

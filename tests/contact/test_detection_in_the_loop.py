@@ -12,8 +12,8 @@ from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec, fixtures
 from pretouch.types import Inputs, Mode, RangeReadings, RobotState
+from pretouch_lab.baselines.detection import BASELINES
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, path_of, record, sensing_of
-from pretouch_lab.benchmarks.detection.contenders import CONTENDERS
 from pretouch_lab.benchmarks.detection.replay import replay
 from pretouch_lab.paper.claims.forces import Event, apply
 from pretouch_lab.trial import Setup, play
@@ -133,4 +133,4 @@ def test_an_arm_that_turns_round_hard_with_an_unknown_load_gives_no_alarm(panda_
     plant = replace(PlantParams(), payload_max_kg=0.5, friction_compensated=0.0)
     alone = Alone(path_of("line"), 0.3, plant, sensing_of("seven", 1112), 0.15, 1112, 120.0)
     stream = record(alone, lambda _: lambda _: AWAY)
-    assert not replay(stream, CONTENDERS[-1], panda_model).onsets()
+    assert not replay(stream, BASELINES[-1], panda_model).onsets()

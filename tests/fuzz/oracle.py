@@ -14,13 +14,13 @@ SHOWN, NEAR, NO_TARGET = {0, 6, 11}, {3, 13}, {1, 2, 4, 7}
 WORDS = {
     "unusable": "The robot's state cannot be used", "backwards": "Time went backwards (from",
     "stale": "The robot's state is",
-    "failed": "gave no answer", "blocked": "What is near cannot be kept away from",
-    "blocked reaction": "leaves no way within", "contact": "A contact of", "reacting": "Moving with a contact",
+    "failed": "gave no answer", "blocked": "The approach limits cannot be met",
+    "blocked reaction": "allow no motion within", "contact": "A contact of", "reacting": "Moving with a contact",
     "silent": "No usable reading from", "no force": "no force estimate", "overrun": "The step before this one was",
-    "filling": "The force window is filling", "clear": "Following the path.", "opening": "Caught between two things",
-    "caught": "The arm was caught between two things", "yielding": "Yielding to a contact",
-    "given up": "Given up after", "pressed": "Something is felt that does not move the arm",
-    "path blocked": "Something near has kept the hand from its path",
+    "filling": "The force window is filling", "clear": "Following the path.", "opening": "Clamped between two objects",
+    "caught": "The arm was clamped between two objects", "yielding": "Yielding to a contact",
+    "given up": "Given up after", "pressed": "A force that does not move the arm",
+    "path blocked": "An obstacle has kept the hand from its path",
 }  # fmt: skip
 """Cause -> words its sentence holds."""
 

@@ -285,7 +285,7 @@ STREAMS = {
     **{f"course/{name}": Stream(name, course, _REACHED.get(name, ())) for name in PROFILES},
     "release/paper": Stream("paper", release, ("react", "track")),
     "release/pretouch": Stream("pretouch", release, ("react", "track")),
-    "clamp": Stream("pretouch", clamp, ("Caught between two things", "free it, then resume")),
+    "clamp": Stream("pretouch", clamp, ("Clamped between two objects", "free it, then resume")),
     "pinch": Stream(
         "pretouch", pinch, ("link2 and panda_link5",), path=((0.21, 0.0, 0.38), (0.09, 0.0, 0.1)),
     ),

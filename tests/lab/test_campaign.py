@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import wait
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -17,17 +18,24 @@ from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import PAPER_SKIN
-from pretouch_lab import campaign, workers
-from pretouch_lab.campaign import (
-    Request,
-    finished,
-    open_folder,
-    progress_of,
-    run_campaign,
-    trial_file,
-)
+from pretouch_lab import campaign, engine
+from pretouch_lab.campaign import Request, play_trial, recording_file, trial_file
+from pretouch_lab.engine import missing, rows_of, run_tasks
 
 SMALL = Request(("static",), seeds=1, profiles=("blind",))
+
+
+def open_folder(request, out):
+    request.open(out)
+
+
+def run_campaign(request, out, progress):
+    request.open(out)
+    run_tasks(request.tasks(out), out, progress)
+
+
+def finished(request, out):
+    return rows_of(request.tasks(out))
 
 
 @pytest.mark.parametrize(
@@ -63,7 +71,7 @@ def test_a_bad_skin_is_refused_before_anything_runs(tmp_path):
 
 
 def test_tasks_take_all_cells_seed_by_seed():
-    tasks = Request(("static", "dynamic"), seeds=2).tasks()
+    tasks = Request(("static", "dynamic"), seeds=2).trials()
     assert len(tasks) == 2 * (8 + 2)
     assert [seed for _, seed in tasks] == [0] * 10 + [1] * 10
     assert len({trial_file(Path("x"), *task) for task in tasks}) == 20
@@ -73,23 +81,23 @@ def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
     one = replace(SMALL, seeds=1)
     seen = []
     open_folder(one, tmp_path)
-    before = progress_of(one, tmp_path)
-    assert (before.done, before.total, before.cost_done) == (0, 4, 0.0)
+    tasks = one.tasks(tmp_path)
+    assert missing(tasks) == tasks
     run_campaign(one, tmp_path, seen.append)
-    assert sum(seen) == pytest.approx(before.cost_total)
-    assert progress_of(one, tmp_path).done == len(seen) == 4
+    assert sum(seen) == pytest.approx(sum(task.cost for task in tasks))
+    assert (len(seen), missing(tasks)) == (4, [])
     rows = finished(one, tmp_path)
     assert [row["seed"] for row in rows] == [0, 0, 0, 0]
     files = sorted((tmp_path / "trials").glob("*/*.json"))
     files[2].unlink()
     kept = {file: file.stat().st_mtime_ns for file in files if file.exists()}
     seen.clear()
-    assert progress_of(one, tmp_path).done == 3
+    assert len(missing(tasks)) == 1
     run_campaign(one, tmp_path, seen.append)
     assert len(seen) == 1
     assert {file: file.stat().st_mtime_ns for file in kept} == kept
     assert finished(one, tmp_path) == rows
-    monkeypatch.setattr(workers, "ProcessPoolExecutor", None)
+    monkeypatch.setattr(engine, "ProcessPoolExecutor", None)
     run_campaign(one, tmp_path, seen.append)
     assert len(seen) == 1
 
@@ -121,7 +129,7 @@ def test_a_changed_skin_file_is_noticed(tmp_path):
 def test_a_changed_built_in_skin_is_noticed(tmp_path, monkeypatch):
     open_folder(SMALL, tmp_path / "out")
     (tmp_path / "skin.toml").write_text("")
-    monkeypatch.setattr(campaign, "PAPER_SKIN", tmp_path / "skin.toml")
+    monkeypatch.setattr(campaign, "skin_file", lambda arm: tmp_path / "skin.toml")
     with pytest.raises(ExperimentError, match="but the skin file has changed since"):
         open_folder(SMALL, tmp_path / "out")
 
@@ -147,15 +155,16 @@ def test_a_damaged_folder_is_named(tmp_path, content):
 @pytest.mark.parametrize("content", [b"{", b"{}", b"[]", b"\xff", b"[" * 100_000, b"", None])
 def test_a_damaged_trial_is_run_again(tmp_path, monkeypatch, content):
     open_folder(SMALL, tmp_path)
-    first, *others = [trial_file(tmp_path, *task) for task in SMALL.tasks()]
-    for (cell, seed), file in zip(SMALL.tasks()[1:], others, strict=True):
-        write_json({"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}, file)
-    _damage(first, content)
+    first, *others = SMALL.tasks(tmp_path)
+    first.file.parent.mkdir(parents=True)
+    for task in others:
+        write_json(task.about, task.file)
+    _damage(first.file, content)
     assert len(finished(SMALL, tmp_path)) == 3
-    again = _play_with(monkeypatch, lambda *task: Future())
+    again = _play_with(monkeypatch, lambda _file: Future())
     with pytest.raises(_EnoughError):
         run_campaign(SMALL, tmp_path, lambda *_: None)
-    assert [trial_file(*args[1:]) for args in again] == [first]
+    assert again == [first.file]
 
 
 def _damage(file, content):
@@ -177,20 +186,20 @@ def _play_with(monkeypatch, result):
         def __init__(self, *_args, **_options):
             pass
 
-        def submit(self, _work, *args):
-            asked.append(args)
-            return result(*args)
+        def submit(self, _work, file):
+            asked.append(file)
+            return result(file)
 
         def shutdown(self, **_options):
             pass
 
-    def completed(futures):
+    def completed(futures, **_options):
         if not any(f.done() for f in futures):
             raise _EnoughError
-        return futures
+        return SimpleNamespace(done=list(futures))
 
-    monkeypatch.setattr(workers, "ProcessPoolExecutor", Pool)
-    monkeypatch.setattr(campaign, "as_completed", completed)
+    monkeypatch.setattr(engine, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(engine, "wait", completed)
     return asked
 
 
@@ -228,9 +237,8 @@ def test_a_trial_that_a_signal_ends_ends_its_worker_and_leaves_no_result(tmp_pat
     monkeypatch.setattr(campaign.os, "_exit", end)
     monkeypatch.setitem(campaign.EXPERIMENTS, "static", replace(campaign.EXPERIMENTS["static"], trial=terminated))
     request = Request(("static",), seeds=1)
-    campaign.open_folder(request, tmp_path)
     with pytest.raises(Ended, match="143"):
-        campaign._work(request, tmp_path, *request.tasks()[0])
+        play_trial(request, tmp_path, *request.trials()[0], tmp_path / "trials" / "row.json")
     assert list((tmp_path / "trials").glob("*/*")) == []
 
 
@@ -243,13 +251,13 @@ def test_the_trials_that_are_wanted_are_recorded(tmp_path, monkeypatch, record, 
 
     monkeypatch.setitem(campaign.EXPERIMENTS, "static", replace(campaign.EXPERIMENTS["static"], trial=played))
     request = Request(("static",), seeds=2, record=record)
-    campaign.open_folder(request, tmp_path)
-    cell = request.tasks()[0][0]
-    campaign.recording_file(tmp_path, cell, 0).with_suffix(".unfinished").write_text("of a killed worker")
+    cell = request.trials()[0][0]
+    (tmp_path / "recordings").mkdir()
+    recording_file(tmp_path, cell, 0).with_suffix(".unfinished").write_text("of a killed worker")
     for seed in (0, 1):
-        campaign._work(request, tmp_path, cell, seed)
-    assert [seed for seed in (0, 1) if campaign.recording_file(tmp_path, cell, seed).exists()] == kept
-    assert campaign.recording_file(tmp_path, cell, 0).read_text() == "0"
+        play_trial(request, tmp_path, cell, seed, tmp_path / "row.json")
+    assert [seed for seed in (0, 1) if recording_file(tmp_path, cell, seed).exists()] == kept
+    assert recording_file(tmp_path, cell, 0).read_text() == "0"
     assert len(list((tmp_path / "recordings").iterdir())) == len(kept)
 
 

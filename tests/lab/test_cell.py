@@ -21,7 +21,7 @@ def test_files_of_different_cells_differ():
 
 
 def test_a_cell_that_is_named_twice_runs_once():
-    tasks = Request(("release",), 1, profiles=("paper", "paper:react.decay_cycles=50")).tasks()
+    tasks = Request(("release",), 1, profiles=("paper", "paper:react.decay_cycles=50")).trials()
     names = [cell.name for cell, _ in tasks]
     assert len(names) == len(set(names))
 
@@ -36,15 +36,15 @@ def test_a_grid_gives_each_profile_its_modes():
 
 def test_the_whole_paper_runs_every_experiment_and_no_trial_twice():
     runs = whole_paper(Request(tuple(EXPERIMENTS), seeds=2))
-    cells = [(cell.name, seed) for _, request in runs for cell, seed in request.tasks()]
+    cells = [(cell.name, seed) for _, request in runs for cell, seed in request.trials()]
     assert len(cells) == len(set(cells))
-    assert {cell.experiment for _, request in runs for cell, _ in request.tasks()} == set(EXPERIMENTS)
+    assert {cell.experiment for _, request in runs for cell, _ in request.trials()} == set(EXPERIMENTS)
     assert len({name for name, _ in runs}) == len(runs)
 
 
 def test_the_whole_paper_with_less_is_less():
     asked = Request(tuple(EXPERIMENTS), 1, profiles=("paper",), restrictions=("slack",), stiffness=(2e3,))
-    cells = [c for _, request in whole_paper(asked) for c, _ in request.tasks() if c.experiment == "static"]
+    cells = [c for _, request in whole_paper(asked) for c, _ in request.trials() if c.experiment == "static"]
     assert [(c.profile, c.where["restrictions"], c.where["stiffness_n_per_m"]) for c in cells] == [
         ("paper", "slack", 2e3)
     ] * 4

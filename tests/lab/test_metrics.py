@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pretouch.traces import mean_over
-from pretouch_lab.metrics import angle_deg, peak, spread
+from pretouch_lab.rows import angle_deg, peak, spread
 
 
 def test_moving_mean_by_numbers():

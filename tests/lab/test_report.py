@@ -12,7 +12,7 @@ from pretouch.errors import ExperimentError, RecordingError
 from pretouch.recording.reader import open_recording
 from pretouch.recording.run_record import columns_of
 from pretouch.text_table import TextTable
-from pretouch_lab.campaign import Request, open_folder, recording_file, trial_file
+from pretouch_lab.campaign import Request, recording_file, trial_file
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper import dynamic, static
 from pretouch_lab.registry import EXPERIMENTS, summarise
@@ -39,7 +39,9 @@ class Links(HTMLParser):
 @pytest.fixture(scope="module")
 def request_and_folder(context, tmp_path_factory):
     request, out = Request(("static", "dynamic"), seeds=1), tmp_path_factory.mktemp("run")
-    open_folder(request, out)
+    request.open(out)
+    for task in request.tasks(out):
+        task.file.parent.mkdir(exist_ok=True)
     cells = [c for c in static.cells(Grid(("blind", "paper"))) if (c.where["trajectory"], c.where["side"]) == LINE]
     for cell in [*cells, Cell(dynamic.NAME, "paper", {"restrictions": "slack"})]:
         recorded = replace(context, recording=recording_file(out, cell, 0))
@@ -66,7 +68,7 @@ def test_the_page_shows_each_table_and_picture(request_and_folder):
 
 def test_a_run_without_trials_still_has_a_page(tmp_path):
     request = Request(("static",), seeds=1)
-    open_folder(request, tmp_path)
+    request.open(tmp_path)
     text = write_report([(request, tmp_path)], {}, tmp_path).read_text()
     assert "<table" not in text
     assert "static: 1 seeds, profiles blind, paper" in text

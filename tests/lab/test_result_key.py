@@ -36,16 +36,16 @@ def named(source: Path, patch: pytest.MonkeyPatch) -> dict[str, set[object]]:
     keys._code.cache_clear()
     avoidance._key.cache_clear()
     benches = {
-        "bench avoidance": avoidance.Request(quick=True).tasks(out),
-        "bench localization": localization.Bench(out, quick=True).every(),
+        "bench avoidance": avoidance.AvoidanceBench(out, quick=True).every(),
+        "bench localization": localization.LocalizationBench(out, quick=True).every(),
     }
-    bench = detection.Bench(out, quick=True)
+    bench = detection.DetectionBench(out, quick=True)
     for part in ("streams", "free", "contacts", "boards"):
         benches[f"bench detection {part}"] = getattr(bench, part)()
     found: dict[str, set[object]] = {name: {task.file for task in tasks} for name, tasks in benches.items()}
     found |= {f"sweep {name}": {code(name)} for name in MEASURES}
     for name in EXPERIMENTS:
-        tasks = Request((name,), seeds=1, profiles=("paper", "pretouch")).tasks()
+        tasks = Request((name,), seeds=1, profiles=("paper", "pretouch")).trials()
         found[f"reproduce {name}"] = {trial_file(out, *task) for task in tasks}
     return found
 

@@ -24,6 +24,7 @@ from pretouch.recording.codec import (
 from pretouch.recording.messages import OWN, PACKAGE, decoded, definition, fields_of, own_definition
 from pretouch.recording.truth import Truth
 from pretouch.types import (
+    NOT_TOUCHED,
     Contact,
     ControlStep,
     ImuReadings,
@@ -38,7 +39,6 @@ from pretouch.types import (
     Thresholds,
     Touched,
     TouchReadings,
-    untouched,
 )
 from tests.fuzz.invariants import same
 from tests.recording.oracle import typestore
@@ -136,7 +136,7 @@ def test_a_step_of_a_version_that_knew_no_touched_places_comes_back_without_any(
     before = bytes(store.serialize_cdr(store.types[kind](*known), kind, little_endian=True))
     number, back, _ = decode_step(before)
     assert number == 7
-    assert same(back, replace(step, touched=untouched()))
+    assert same(back, replace(step, touched=NOT_TOUCHED))
 
 
 @given(steps())

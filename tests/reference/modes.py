@@ -11,17 +11,19 @@ from pretouch.types import Inputs, Mode, RobotState
 UNUSABLE = "The robot's state cannot be used ({}): check the connection to the arm, then resume."
 BACKWARDS = "Time went backwards ({}): let one monotonic clock stamp everything, then resume."
 STALE = "The robot's state is {}: check the connection to the arm, then resume."
-BLOCKED = "What is near cannot be kept away from within the acceleration limits: braking, and trying again."
-BLOCKED_REACT = "Moving with a contact, but what is near leaves no way within the acceleration limits: braking."
+BLOCKED = "The approach limits cannot be met within the acceleration limits: braking and trying again."
+BLOCKED_REACT = (
+    "Moving with a contact, but the approach limits allow no motion within the acceleration limits: braking."
+)
 CONTACT = "A contact of {}: moving with it."
 REACTING = "Moving with a contact: {} left."
 SILENT = "No usable reading from {}: check the unit's power, radio and sensor; the arm goes on when it is heard again."
 NO_FORCE = (
-    "The robot has given no force estimate for {}, as near a singularity, and contacts could not be felt: guide the arm"
-    " to another posture."
+    "The robot has given no force estimate for {}, as near a singularity, and contacts could not be detected: guide the"
+    " arm to another posture."
 )
 OVERRUN = "The step before this one was {} ago: braking; give the controller a process of its own."
-FILLING = "The force window is filling ({}): contacts cannot be told from noise yet."
+FILLING = "The force window is filling ({}): contacts cannot be distinguished from noise yet."
 TRACKING = "Following the path."
 
 LARGEST = 1e3

@@ -301,5 +301,5 @@ def test_the_fr3_has_the_same_seven_units(paper_skin):
 
 def test_another_arm_has_no_skin_yet():
     other = RobotModel(replace(panda(), name="other"))
-    with pytest.raises(SkinError, match="There is no skin of seven units for other: write a file like panda"):
+    with pytest.raises(SkinError, match="The arm other comes without a skin: write a file like panda"):
         sensing_skin.paper_skin(other)

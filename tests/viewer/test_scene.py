@@ -6,7 +6,7 @@ import pytest
 from tests.viewer.fake_scene import FakeScene
 
 from pretouch.profiles import PROFILES
-from pretouch.types import ControlStep, Obstacles, Touched, untouched
+from pretouch.types import NOT_TOUCHED, ControlStep, Obstacles, Touched
 from pretouch.viewer import palette
 from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.scene import ARROW_MOST_M, PARTS, Scene
@@ -157,7 +157,7 @@ def test_a_touched_place_is_an_arrow_that_ends_there(
     np.testing.assert_allclose(end, at[0], atol=1e-6)
     np.testing.assert_allclose(end - begin, [0.0, 0.0, -0.24], atol=1e-6)
     assert not nodes.nodes["/place/1"].visible
-    scene.draw(frame(replace(some_step, touched=untouched())), 0.0)
+    scene.draw(frame(replace(some_step, touched=NOT_TOUCHED)), 0.0)
     assert not nodes.nodes["/place/0"].visible
 
 

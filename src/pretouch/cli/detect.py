@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
+from pretouch.cli.tables import grid
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
@@ -138,16 +138,11 @@ def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> No
 
 def contact_table(contacts: Sequence[tuple[str, Found]]) -> Table:
     """Make a table of contacts, each with who found it, in time order."""
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("", overflow="fold")
-    for name in ("time [s]", "x", "y", "z", "norm", "axes"):
-        table.add_column(escape(name), justify="right", no_wrap=True)
+    rows = []
     for name, found in sorted(contacts, key=lambda pair: pair[1].time):
         force = [f"{value:.1f}" for value in (*found.force, np.linalg.norm(found.force))]
-        table.add_row(escape(name), f"{found.time:.3f}", *force, axes_shown(found))
-    if not contacts:
-        table.add_row("none")
-    return table
+        rows.append((name, f"{found.time:.3f}", *force, axes_shown(found)))
+    return grid(("", "time [s]", "x", "y", "z", "norm", "axes"), rows or [("none",)], whole=1)
 
 
 def axes_shown(found: Found) -> str:
@@ -156,15 +151,12 @@ def axes_shown(found: Found) -> str:
 
 
 def _noise_table(columns: list[Column]) -> Table:
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("", overflow="fold")
-    for name in ("along", "mean", "sigma", "sigma in window", "thresholds at +-"):
-        table.add_column(name, justify="right", no_wrap=True)
+    rows = []
     for _, d, s in columns:
         name = f"{d.name}, {s.free:.1f} of {s.duration:.1f} s"
         for axis, *values in zip("xyz", s.mean, s.sigma, s.sigma_window, s.width, strict=True):
-            table.add_row(escape(name) if axis == "x" else "", axis, *(f"{value:.2f}" for value in values))
-    return table
+            rows.append((name if axis == "x" else "", axis, *(f"{value:.2f}" for value in values)))
+    return grid(("", "along", "mean", "sigma", "sigma in window", "thresholds at +-"), rows, whole=1)
 
 
 def _numbers(imported: ImportedData, columns: list[Column], notes: list[str]) -> dict[str, Any]:

@@ -31,12 +31,12 @@ def live(command: "Live") -> None:
 
     from pretouch.robot.description import panda
     from pretouch.robot.model import RobotModel
-    from pretouch.sensing.skin import load_skin, paper_skin
+    from pretouch.sensing.skin import skin_for
     from pretouch.viewer.live import serve_live
     from pretouch.viewer.simulation import LiveSimulation
 
     model = RobotModel(panda())
-    skin = load_skin(command.skin, model) if command.skin else paper_skin(model)
+    skin = skin_for(model, command.skin)
     believed = skin
     if command.world:
         from pretouch.sim.misplacement import Misplacement, misplaced

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
 from pretouch.cli.detect import axes_shown
+from pretouch.cli.tables import grid
 from pretouch.extras import VIEWER
 from pretouch.profiles import profile as find_profile
 from pretouch.recording import recover as recovering
@@ -136,18 +136,15 @@ def _show(console: Console, comparison: Comparison) -> None:
 
 
 def _table(comparison: Comparison) -> Table:
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    for name in ("recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"):
-        table.add_column(escape(name), justify="right")
-    rows: list[tuple[Found | None, Found | None]] = [*comparison.both]
-    rows += [(found, None) for found in comparison.only_recorded]
-    rows += [(None, found) for found in comparison.only_other]
-    for mine, other in sorted(rows, key=lambda row: min(found.time for found in row if found)):
-        later = f"{other.time - mine.time:+.2f}" if mine and other else ""
-        table.add_row(*_cells(mine), *_cells(other), later)
-    if not rows:
-        table.add_row("none", "", "", "none", "", "", "")
-    return table
+    pairs: list[tuple[Found | None, Found | None]] = [*comparison.both]
+    pairs += [(found, None) for found in comparison.only_recorded]
+    pairs += [(None, found) for found in comparison.only_other]
+    rows = [
+        (*_cells(mine), *_cells(other), f"{other.time - mine.time:+.2f}" if mine and other else "")
+        for mine, other in sorted(pairs, key=lambda pair: min(found.time for found in pair if found))
+    ]
+    header = "recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"
+    return grid(header, rows or [("none", "", "", "none", "", "", "")], left=())
 
 
 def _cells(found: Found | None) -> tuple[str, str, str]:

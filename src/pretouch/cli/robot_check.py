@@ -7,12 +7,11 @@ from rich.console import Console
 
 from pretouch.cli.tables import show
 from pretouch.errors import RobotModelError
-from pretouch.importing.folder import SKIN
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
 from pretouch.robot.description_file import FILE, load_description
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import load_skin
-from pretouch.text_table import TextTable
+from pretouch.sensing.skin import OWN_SKIN, load_skin
+from pretouch.text_table import TextTable, tabulated
 
 if TYPE_CHECKING:
     from pretouch.cli.robot_commands import Check
@@ -29,7 +28,7 @@ def check_arm(command: "Check") -> None:
         raise RobotModelError(f"{error} (in {file}, or its {description.mjcf.name})") from error
     check_posture(description.q_ready, model.q_min, model.q_max, f"{file}: q_ready")
     ready = rated(model, description.q_ready)
-    own = file.parent / SKIN
+    own = file.parent / OWN_SKIN
     skin = load_skin(command.skin or own, model) if command.skin or own.exists() else None
     together = ", ".join(f"{a} and {b}" for a, b in never_apart(model)) or "none"
     note = (
@@ -47,16 +46,16 @@ def check_arm(command: "Check") -> None:
 def joint_table(model: RobotModel, ready: Ready, note: str) -> TextTable:
     """Show the limits of an arm's joints and their places in the ready posture."""
     arm = model.description
-    rows = [
-        (
-            name, f"{model.q_min[j]:.3f}", f"{model.q_max[j]:.3f}", f"{arm.qd_max[j]:.3g}",
-            f"{arm.qdd_max[j]:.3g}", f"{arm.tau_max[j]:.3g}", f"{ready.q[j]:.3f}",
-        )
-        for j, name in enumerate(model.joints)
-    ]  # fmt: skip
-    units = {"lower": "rad", "upper": "rad", "speed": "rad/s", "accel.": "rad/s^2", "torque": "Nm", "ready": "rad"}
-    header = ("joint", *(f"{what}\n[{unit}]" for what, unit in units.items()))
-    return TextTable(f"{arm.name}: {model.n} joints, end-effector {arm.ee_body}", header, tuple(rows), note, 1)
+    columns = (
+        ("joint", lambda j: model.joints[j]),
+        ("lower\n[rad]", lambda j: f"{model.q_min[j]:.3f}"),
+        ("upper\n[rad]", lambda j: f"{model.q_max[j]:.3f}"),
+        ("speed\n[rad/s]", lambda j: f"{arm.qd_max[j]:.3g}"),
+        ("accel.\n[rad/s^2]", lambda j: f"{arm.qdd_max[j]:.3g}"),
+        ("torque\n[Nm]", lambda j: f"{arm.tau_max[j]:.3g}"),
+        ("ready\n[rad]", lambda j: f"{ready.q[j]:.3f}"),
+    )
+    return tabulated(f"{arm.name}: {model.n} joints, end-effector {arm.ee_body}", columns, range(model.n), note, 1)
 
 
 def ready_said(ready: Ready) -> str:

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from pretouch.cli.arms import arm_model
 from pretouch.control.path import Circle
 from pretouch.control.path import Path as ArmPath
 from pretouch.control.posture import brought_to
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import load_keys
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import load_skin, paper_skin
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import skin_for
 from pretouch.serving.fci.arm import ArmSetup, ServedArm
 from pretouch.serving.fci.options import ServeOptions, drop_of
 from pretouch.serving.fci.pushes import Pushes, push_of, typed_push
@@ -88,7 +88,7 @@ class TypedPushes:
 
 
 def _setup(c: "ServeFci") -> ArmSetup:
-    model = arm_model(c.robot)
+    model = RobotModel(robot_named(c.robot))
     if c.hand and c.scene != "empty":
         raise ParameterError(f"--hand needs --scene empty: {c.scene} is the scene of an experiment.")
     if not 0 < c.stiffness <= _STIFFEST:
@@ -123,7 +123,7 @@ def _units(c: "ServeFci", model: RobotModel) -> UnitsSetup | None:
         raise HardwareError(f"--units is {c.units!r}: give address and port of the receiver, such as 127.0.0.1:7337.")
     if not c.keys:
         raise HardwareError("--units needs --keys, the file with the keys that the receiver has.")
-    skin = load_skin(Path(c.skin), model) if c.skin else paper_skin(model)
+    skin = skin_for(model, c.skin)
     return UnitsSetup(skin, load_keys(Path(c.keys)), (host, int(port)))
 
 

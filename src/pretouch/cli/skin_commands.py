@@ -1,7 +1,7 @@
 """What can be said after `pretouch skin`: one dataclass a command, its docstrings are the help."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
@@ -16,7 +16,7 @@ class Coverage:
     skin: tyro.conf.Positional[str] = ""
     """Skin file; by default the seven units that come with the package, or the skin in the arm's folder."""
     arm: str = "panda"
-    """panda, fr3, or the folder of an arm that `pretouch robot import` wrote."""
+    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
     workspace: str = "paths"
     """Postures to average over: circle, line, paths (both of the paper's), joints (their whole range), or opposite
     corners x,y,z,x,y,z of a box of hand positions [m]."""
@@ -73,8 +73,8 @@ class Monitor:
     """Skin file whose units to watch; by default all in the file of keys."""
     units: str = ""
     """Names of the units to watch, separated by commas."""
-    arm: Literal["panda", "fr3"] = "panda"
-    """The arm of the skin file."""
+    arm: str = "panda"
+    """The arm of the skin file: panda, fr3, a name that another package adds, or the folder of an imported arm."""
     posture: str = ""
     """Joint positions [rad], separated by commas, of the arm that stands still: with --skin, units whose readings
     contradict the model are named. Nothing but the arm may be near."""
@@ -165,8 +165,8 @@ class Simulate:
     """File of the units' keys, created if it is missing. `pretouch skin monitor` needs the same file."""
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
-    arm: Literal["panda", "fr3"] = "panda"
-    """The arm."""
+    arm: str = "panda"
+    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
     host: str = HOST
     """Name or address of the receiver."""
     port: int = PORT

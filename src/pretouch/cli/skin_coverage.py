@@ -19,12 +19,10 @@ from pretouch.coverage.suggest import Suggestions, suggest
 from pretouch.coverage.ways import Ways
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.extras import FIGURES
-from pretouch.importing.folder import SKIN
 from pretouch.perception.scene_filter import floor_and_pedestal
-from pretouch.robot.description import fr3, panda
-from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin, load_skin, paper_skin, save_skin
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Coverage as Asked
@@ -67,19 +65,11 @@ def skin_coverage(command: "Asked") -> None:
         console.print(f"Numbers: {command.json}", markup=False, soft_wrap=True)
 
 
-def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path | None]:
-    """Return the arm, its skin, and the skin's file if one was named."""
-    folder = None if command.arm in ("panda", "fr3") else Path(command.arm)
-    if folder is None:
-        model = RobotModel(panda() if command.arm == "panda" else fr3())
-    else:
-        model = RobotModel(load_description(folder))
-    if command.skin:
-        return model, load_skin(command.skin, model), Path(command.skin)
-    if folder is None:
-        return model, paper_skin(model), None
-    own = (folder if folder.is_dir() else folder.parent) / SKIN
-    return model, load_skin(own, model), own
+def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path]:
+    """Return the arm, its skin, and the skin's file."""
+    model = RobotModel(robot_named(command.arm))
+    source = Path(command.skin or skin_file(model.description))
+    return model, load_skin(source, model), source
 
 
 def _params(command: "Asked") -> CoverageParams:
@@ -90,7 +80,7 @@ def _params(command: "Asked") -> CoverageParams:
     )  # fmt: skip
 
 
-def _check_outputs(command: "Asked", source: Path | None) -> None:
+def _check_outputs(command: "Asked", source: Path) -> None:
     """Refuse, before anything is computed, what could not be done or would be lost."""
     if command.suggest < 0:
         raise SkinError(f"--suggest is {command.suggest}: give 1 or more, or leave it out.")
@@ -109,7 +99,7 @@ def _check_outputs(command: "Asked", source: Path | None) -> None:
     places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
     given = [(what, Path(text)) for what, text in places if text]
     for i, (what, place) in enumerate(given):
-        others = [other for _, other in given[:i]] + ([source] if source else [])
+        others = [other for _, other in given[:i]] + [source]
         if any(same_file(other, place) or same_file(place, other) for other in others):
             raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
     for what, place in given:

@@ -8,21 +8,25 @@ from pretouch.coverage.measuring import Setting
 from pretouch.coverage.suggest import Suggestions
 from pretouch.coverage.ways import Ways
 from pretouch.sensing.skin import Skin
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.types import BoolArray
 
 
 def link_table(found: Coverage, setting: Setting) -> TextTable:
     """Show the shares of each link and of the arm."""
     p = setting.params
-    rows = tuple(
-        (one.name, f"{1e4 * one.area_m2:.0f}", *_percent(one.ways), *_percent(one.surface))
-        for one in (*found.links, found.arm)
+    columns = (
+        ("link", lambda one: one.name),
+        ("area\n[cm^2]", lambda one: f"{1e4 * one.area_m2:.0f}"),
+        ("ways\n[%]", lambda one: f"{100 * one.ways.value:.1f}"),
+        ("95 %", lambda one: _bounds(one.ways)),
+        ("surface\n[%]", lambda one: f"{100 * one.surface.value:.1f}"),
+        ("95 %", lambda one: _bounds(one.surface)),
     )
-    return TextTable(
+    return tabulated(
         f"Seen in time: {setting.model.description.name}, {setting.postures} postures of {setting.workspace}",
-        ("link", "area\n[cm^2]", "ways\n[%]", "95 %", "surface\n[%]", "95 %"),
-        rows,
+        columns,
+        (*found.links, found.arm),
         f"A ball of {100 * p.object_radius_m:g} cm radius approaches a point in a straight line at"
         f" {p.object_speed_m_s:g} m/s, and the arm moves towards it at {p.arm_speed_m_s:g} m/s: it must be seen"
         f" {p.warning_m:.2f} m before contact. Paths: share of the free paths to the surface that are seen in time."
@@ -35,20 +39,17 @@ def unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
     """Show what each unit sees, and what would be lost without it; `sees` (K, S, W)."""
     weight = ways.surface.area[ways.point] * ways.free
     weight /= max(float(weight.sum()), 1e-12)
-    units = sees.sum(axis=0)
-    rows = tuple(
-        (
-            name,
-            skin.units[k].link,
-            f"{100 * float((weight * sees[k]).sum()):.2f}",
-            f"{100 * float((weight * (sees[k] & (units == 1))).sum()):.2f}",
-        )
-        for k, name in enumerate(skin.ids)
+    alone = sees.sum(axis=0) == 1
+    columns = (
+        ("unit", lambda k: skin.ids[k]),
+        ("link", lambda k: skin.units[k].link),
+        ("ways\n[%]", lambda k: f"{100 * float((weight * sees[k]).sum()):.2f}"),
+        ("alone\n[%]", lambda k: f"{100 * float((weight * (sees[k] & alone)).sum()):.2f}"),
     )
-    return TextTable(
+    return tabulated(
         "What each unit sees",
-        ("unit", "link", "ways\n[%]", "alone\n[%]"),
-        rows,
+        columns,
+        range(len(skin)),
         "Share of all free paths to the arm. Alone: paths that no other unit sees, which would be lost without this"
         " unit.",
     )
@@ -56,20 +57,17 @@ def unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
 
 def suggestion_table(suggested: Suggestions, before: Coverage, after: Coverage) -> TextTable:
     """Show the places of the new units, and what they change."""
-    rows = tuple(
-        (
-            one.unit.id,
-            one.unit.link,
-            _vector(one.unit.T_link_sensor[:3, 3], 3),
-            _vector(one.unit.T_link_sensor[:3, 2], 2),
-            f"{100 * one.gain:.2f}",
-        )
-        for one in suggested.chosen
+    columns = (
+        ("unit", lambda one: one.unit.id),
+        ("link", lambda one: one.unit.link),
+        ("position\n[m]", lambda one: _vector(one.unit.T_link_sensor[:3, 3], 3)),
+        ("beam", lambda one: _vector(one.unit.T_link_sensor[:3, 2], 2)),
+        ("gain\n[%]", lambda one: f"{100 * one.gain:.2f}"),
     )
-    return TextTable(
+    return tabulated(
         f"{len(suggested.chosen)} more units: {_said(before.arm.ways)} before, {_said(after.arm.ways)} after",
-        ("unit", "link", "position\n[m]", "beam", "gain\n[%]"),
-        rows,
+        columns,
+        suggested.chosen,
         f"Chosen one by one from {suggested.candidates} positions, each where it adds most. Gains are measured on the"
         " paths used for choosing, before and after on others. No choice of as many positions could add more than"
         f" {100 * suggested.most:.1f} %; this greedy choice adds at least 63 % (1 - 1/e) of the optimum.",
@@ -86,8 +84,8 @@ def spot_lines(spots: tuple[BlindSpot, ...], most: int) -> list[str]:
     return said + ([f"  and {len(spots) - most} smaller ones"] if len(spots) > most else [])
 
 
-def _percent(share: Share) -> tuple[str, str]:
-    return f"{100 * share.value:.1f}", f"{100 * share.low:.0f}-{100 * share.high:.0f}"
+def _bounds(share: Share) -> str:
+    return f"{100 * share.low:.0f}-{100 * share.high:.0f}"
 
 
 def _said(share: Share) -> str:

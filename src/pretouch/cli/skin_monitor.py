@@ -15,7 +15,6 @@ import numpy as np
 from rich.console import Console
 from rich.live import Live
 
-from pretouch.cli.arms import arm_model
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_record import record
 from pretouch.cli.skin_table import line, thrown_away, view
@@ -31,6 +30,7 @@ from pretouch.hardware.receiver import SkinReceiver
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import load_skin
 from pretouch.signals import Terminated
 from pretouch.types import FloatArray
@@ -99,7 +99,7 @@ def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[tuple[str, .
         if not ids:
             raise HardwareError(f"{command.keys} holds no unit: `pretouch skin provision` or `skin keys` adds one.")
         return ids, None
-    model = arm_model(command.arm)
+    model = RobotModel(robot_named(command.arm))
     skin = load_skin(Path(command.skin), model)
     if not command.posture:
         return skin.ids, None

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.cli.arms import arm_model
 from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.profiles import profile as find_profile
-from pretouch.sensing.skin import Skin, load_skin, paper_skin
+from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import Skin, skin_for
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import ChannelParams, NetworkParams
 from pretouch.serving.simulate import run, run_motion
@@ -39,8 +40,8 @@ def simulate_units(command: "Simulate") -> None:
     )
     fleet = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=c.reboot_every)
     profile = find_profile(c.profile)
-    model = arm_model(c.arm)
-    skin = load_skin(Path(c.skin), model) if c.skin else paper_skin(model)
+    model = RobotModel(robot_named(c.arm))
+    skin = skin_for(model, c.skin)
     options = SimulateOptions(
         model, skin, keys_for(keys_file(c.keys), skin), c.host, c.port, fleet, profile=profile, hand=c.hand,
         silenced=frozenset(words(c.silenced)), stuck=frozenset(words(c.stuck)), seed=c.seed, duration_s=c.duration,

@@ -4,10 +4,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from rich.console import Group, RenderableType
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from pretouch.cli.tables import grid
 from pretouch.hardware.findings import Finding
 from pretouch.hardware.health import UnitHealth, status_name
 from pretouch.hardware.monitor import MonitorUpdate
@@ -42,14 +42,10 @@ def view(update: MonitorUpdate, rejected: Mapping[str, int], notes: Sequence[str
 
 def table(units: Sequence[UnitHealth], found: Sequence[Finding]) -> Table:
     """Return one row per unit, coloured by the worst that was found of it."""
-    shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    for i, name in enumerate(_COLUMNS):
-        # a long name is broken: 80 columns hold all else
-        shown.add_column(escape(name), justify="left" if i < 2 else "right", no_wrap=i > 0, overflow="fold")
     worst = {f.unit: f.level for f in sorted(found, key=lambda f: f.level, reverse=True)}
-    for unit in units:
-        shown.add_row(*map(escape, _cells(unit)), style=_STYLES.get(worst.get(unit.unit, ""), ""))
-    return shown
+    styles = [_STYLES.get(worst.get(unit.unit, ""), "") for unit in units]
+    # a long name is broken: 80 columns hold all else
+    return grid(_COLUMNS, map(_cells, units), left=(0, 1), whole=1, styles=styles)
 
 
 def _cells(unit: UnitHealth) -> tuple[str, ...]:

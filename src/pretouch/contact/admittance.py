@@ -55,10 +55,12 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         doing, near = self._doing(inputs.mode, inputs.detection.armed), self._near(inputs)
         mass, clamp = self._moved(state, doing, body, inputs), state.clamp
         q, dt = inputs.robot.q_commanded, body.period
+        # a clamp that is found stands: the arm opens out of it, and no other is looked for
         if doing == "react" and self.clamp is not None and not clamp.torque:
             clamp = self._pinched(clamped(clamp, mass.torque, mass.velocity, q, dt, self.clamp), body, inputs)
         elif doing == "task" and self.pinch is not None:
             clamp = gone(clamp, q, dt)
+        # what the tank holds beyond its start is the least energy that the contact has given
         place = self._placed(state.place, doing, mass.tank - self.start_energy_j, near, dt, inputs)
         state = AdmittanceState(mass, clamp_init(q) if inputs.resume else clamp, place)
         return self._events(state, doing, near, inputs), state
@@ -78,7 +80,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             p = self._way_out
             way, clamp = opened(state.clamp, state.mass.torque, inputs.robot.q_commanded, body.period, p)
             fastest = fastest_point(kin, model.moved_by, model.body.arrays, way)
-            qd = way * min(1.0, p.open_m_s / fastest) if fastest > 0 else way
+            qd = way * min(1.0, p.open_m_s / fastest) if fastest > 0 else way  # never beyond the place in one period
             state = replace(state, clamp=clamp, mass=replace(state.mass, velocity=np.zeros(len(qd))))
         if doing == "soft" and not qd.any():
             return None, state
@@ -145,6 +147,8 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         doing = self._doing(inputs.mode, inputs.detection.armed)
         torque = _residual(state.mass, inputs) - state.mass.mean[1]
         band = dead_band(model.description.tau_max, self)
+        # What was felt before the onset: the last sample, or in a soft hold the filtered torque. A stiff hold remembers
+        # none, and the sample stands for itself.
         before = {"soft": state.mass.steady[0], "still": torque}.get(doing, state.mass.torque)
         mass = begun(state.mass, model, kin, torque, before, band, self)
         # what the arm ran into pushes against its motion; what pushes it on has come by itself
@@ -154,6 +158,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             kinetic = 0.5 * float(command @ model.mass_matrix(inputs.robot.q) @ command)
             point, near = kin.position[model.ee], self._near(inputs)
             place = count_contact(state.place, inputs.path_phase, point, near, kinetic, self.give_up)
+        # only the arm's own task closes a gap on something: without a motion there is no self-clamping to be found
         came = command if doing == "task" else np.zeros(len(torque))
         clamp = self._pinched(clamp_begun(state.clamp, inputs.robot.q_commanded, came), body, inputs)
         return AdmittanceState(mass, clamp, place)
@@ -180,6 +185,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         # an arm that holds softly sticks to static friction
         sticks = doing == "soft" and self.static_friction_nm > 0 and not mass.sliding.any()
         events = {} if sticks else contact_event(inputs.detection)
+        # one of these at most, the first that holds; giving up is told beside it
         if clamp.torque:
             events[Event.CLAMPED if clamp.open else Event.OPENING] = _caught(clamp)
         elif doing == "react" and self._waits(state, near, inputs.detection.lasting):

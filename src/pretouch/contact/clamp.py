@@ -1,6 +1,6 @@
 """Caught between two things: what opposes the way the arm yields, or pushes two of its links apart; and the way out.
 
-Design 7.5.
+See docs/explanation/reaction.md.
 """
 
 from dataclasses import replace
@@ -69,6 +69,7 @@ def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
 
     Where it has been moved meanwhile, by a reaction or by hand, the way begins anew.
     """
+    # farther from one mark than the task goes until the next: something else has moved the arm
     if np.abs(q - state.path[0]).max() > _MOVED_RAD:
         return replace(state, marked=0.0, path=np.tile(q, (_MARKS, 1)))
     if state.marked + dt < _APART_S:
@@ -101,20 +102,25 @@ def clamped(
         params: parameters.
     """
     p, speed = params, float(np.sqrt(velocity @ velocity))
+    # the part of the torque along the motion in joint space, negative against it
     along = float(torque @ state.course)
     opposed = state.opposed + dt if along < -p.torque_nm else 0.0
+    # `pushed` counts on while a torque opposes, which may begin at the end of the window
     soon = state.pushed < _WINDOW_S + _OPPOSED_S
     course, pushed, turns, turned = state.course, state.pushed + dt, state.turns, state.turned + dt
+    # the arm follows a push: it moves, half of a clamp's torque or more drives it, and no clamp is being timed
     if speed > _COURSE_RAD_S and torque @ velocity > 0.5 * p.torque_nm * speed and not (soon and opposed > 0):
         reversed_ = bool(velocity @ course < 0)
         turns = (turns if turned < _TURN_S else 0) + 1 if reversed_ else turns
         course, pushed, turned = velocity / speed, 0.0, 0.0 if reversed_ else turned
+    # 1e-9, for sums of periods are not exact
     caught = (soon and opposed >= _OPPOSED_S - 1e-9) or turns >= _TURNS
     trail, marked = state.trail, state.marked + dt
     if marked >= _APART_S:
         trail, marked = np.vstack((q[None], trail[:-1])), 0.0
     return ClampState(
         course, pushed, opposed, turns, turned, trail, marked,
+        # never 0, which says that there is no clamp: two reversals may be found at a small torque
         max(abs(along), p.torque_nm) if caught else 0.0, 0.0, False, state.path, state.came, state.between, state.force,
     )  # fmt: skip
 
@@ -136,6 +142,7 @@ def opened(
         params: parameters.
     """
     trail = state.trail
+    # past the places that are reached, and those that lead back into what is caught
     while len(trail) > 1 and (np.abs(trail[0] - q).max() < _NEAR_RAD or _closes(state, trail[0] - q)):
         trail = trail[1:]
     way = trail[0] - q
@@ -144,6 +151,7 @@ def opened(
     against = length > 0 and float(torque @ way) < -params.torque_nm * length
     opposed = state.opposed + dt if against else 0.0
     over = state.opening + dt > params.open_s or opposed >= _OPPOSED_S - 1e-9 or float(np.abs(way).max()) < _NEAR_RAD
+    # to the place within one period: the caller slows that down to `open_m_s`
     return way / dt, ClampState(
         state.course, state.pushed, opposed, state.turns, state.turned, trail, state.marked, state.torque,
         state.opening + dt, state.open or over, state.path, state.came, state.between, state.force,

@@ -39,6 +39,7 @@ def together(*cues: Cues) -> Cues:
     if len(cues) == 1:
         return cues[0]
     return Cues(
+        # likelihood ratios of sensors that err independently
         np.prod([c.gain for c in cues], axis=0),
         np.concatenate([c.link for c in cues]),
         np.concatenate([c.point for c in cues]),

@@ -32,6 +32,7 @@ def reaction_velocity(force: FloatArray, compliance: float, speed_max: float) ->
     """
     velocity = compliance * force
     speed = float(np.sqrt(velocity @ velocity))
+    # scaled as a whole: clipping each axis would turn the motion away from the force
     return velocity if speed <= speed_max else velocity * (speed_max / speed)
 
 
@@ -108,6 +109,7 @@ class DecayingVelocity(Reaction, name="decay"):
 
     def announced(self, period: float) -> str:
         """Say how fast and how far the arm goes with a push."""
+        # the distance is the area under the linear decay: half of the speed times its time
         decay = self.decay_cycles * period
         return (
             f"When pushed, it yields in the direction of the push, at up to {self.speed_max_m_s:g} m/s and for"

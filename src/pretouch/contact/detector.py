@@ -13,6 +13,7 @@ from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import (
+    NOT_TOUCHED,
     Contact,
     FloatArray,
     ImuReadings,
@@ -21,7 +22,6 @@ from pretouch.types import (
     Thresholds,
     Touched,
     TouchReadings,
-    untouched,
 )
 from pretouch.values import value
 
@@ -85,7 +85,7 @@ class Detection:
     """Whether the sample is to be learnt as free motion."""
     lasting: bool = False
     """Whether it is being found out if what is felt is a load or an error of the estimate: the arm waits for that."""
-    touched: Touched = field(default_factory=untouched)
+    touched: Touched = field(default_factory=lambda: NOT_TOUCHED)
     """Where the arm is touched; empty where nothing is felt or the profile does not localise."""
     clear: tuple[FloatArray, FloatArray] | None = None
     """Residual (n,), averaged over the time in which it stands out most [Nm], and the covariance (n, n) that it has in
@@ -139,12 +139,13 @@ class Detector(Part, group="pretouch.detectors"):
 
 def no_torques(body: Body, sample: Sample) -> Detection | None:
     """Return what a detector by torques says where there are none, or None where there are."""
-    if not math.isnan(sample.robot.tau_ext.sum()):
+    if not math.isnan(sample.robot.tau_ext.sum()):  # NaN if one of them is
         return None
     return Detection(Thresholds(np.full((6, 3), np.nan)), None, False, np.full(body.model.n, np.nan), 0.0)
 
 
 def strongest(force: FloatArray, bands: Thresholds) -> Contact:
     """Return a contact with the axes whose equivalent band is passed, or else the one with the largest part."""
+    # the bands are of one sample: where the test decided by a longer mean it may be that no axis passes its own
     share = np.abs(force) / (bands.upper - bands.mean)
     return Contact(force, share >= min(1.0, float(share.max())))

@@ -28,11 +28,13 @@ def force_map_into(J: FloatArray, W: FloatArray) -> None:
     A, L, unit, y, x = np.empty((6, 6)), np.zeros((6, 6)), np.zeros(6), np.empty(6), np.empty(6)
     for i in range(6):
         for k in range(i + 1):
+            # J J^T + d^2 I, of which `factor` reads the lower triangle only
             A[i, k] = _DAMPING**2 if i == k else 0.0
             for j in range(J.shape[1]):
                 A[i, k] += J[i, j] * J[k, j]
     factor(A, L)
     for i in range(3):
+        # x = A^-1 e_i, a row of A^-1 too, for A is symmetric
         unit[i] = 1.0
         forward(L, unit, y)
         backward(L, y, x)

@@ -40,6 +40,7 @@ def write_hypotheses(
     # before it, half for a force at the middle of a link
     weight[:n] = 0.0
     for body in range(len(moved_by)):
+        # in a serial chain the joints that move a link are the first so many, so their number says which
         before = moved_by[body].sum()
         if before:
             weight[before - 1] = max(weight[before - 1], 0.5 / n * touch_gain[body])

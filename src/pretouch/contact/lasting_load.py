@@ -44,6 +44,7 @@ def stands_out(residual: FloatArray, S: FloatArray, samples: int) -> bool:
     n = len(residual)
     C, L = np.empty((n, n)), np.zeros((n, n))
     _spread_of_mean(S, samples, _UNKNOWN_ALONE_NM, C)
+    # r^T C^-1 r is chi-square with n degrees of freedom in free motion: mean n, deviation sqrt(2 n)
     return bool(factor(C, L) and forward(L, residual, np.empty(n)) > n + _ALONE_DEVIATIONS * np.sqrt(2.0 * n))
 
 
@@ -61,6 +62,7 @@ def still_explains(
         largest = max(largest, abs(unit[j] * lasting[0]))
     for j in range(len(residual)):
         rest = residual[j] - _torque_of(lasting, unit, J, j)
+        # what lasts was found from a mean like this one: the difference of both has twice the variance of one
         allowed = _DEVIATIONS**2 * 2.0 * S[j, j] / samples + _CHANGE_NM**2
         if moving:  # the mean is of another posture than this one
             allowed += (_CHANGE_PART * largest) ** 2
@@ -73,6 +75,7 @@ def still_explains(
 @compiled
 def _torque_of(lasting: FloatArray, unit: FloatArray, J: FloatArray, j: int) -> float:
     """Torque on a joint of what has lasted, in this posture [Nm]."""
+    # rows 3 and 4 of J turn about x and y: a weight has no moment about z, the vertical
     moments = _GRAVITY * (J[3, j] * lasting[1] + J[4, j] * lasting[2])
     return float(lasting[0] * unit[j] + moments + lasting[3 + j])
 
@@ -110,6 +113,7 @@ def find_lasting(
     joint, step, rest = _one_joint(residual, S, samples)
     if is_load(residual, learnt, unit, J, S, samples):
         misfit = fit_load(residual, unit, J, S, samples, load)
+    # the whole offset is bounded, not the step: pushes that are taken for steps cannot add up
     if joint >= 0 and abs(offset[joint] + step) <= _OFFSETS * offset_prior and rest < misfit:
         lasting[3 + joint] = step
         return True
@@ -130,6 +134,7 @@ def _one_joint(residual: FloatArray, S: FloatArray, samples: int) -> tuple[int, 
     square = forward(L, residual, y)
     for j in range(n):
         unit[j] = 1.0
+        # a = L^-1 e_j, y = L^-1 r: the joint alone explains (a . y)^2 / a . a of y . y, by the torque a . y / a . a
         size, along = forward(L, unit, a), 0.0
         unit[j] = 0.0
         for i in range(n):
@@ -146,7 +151,9 @@ def is_load(
     """Whether a weight at the end-effector, or one less, explains a lasting residual; arguments as `find_lasting`."""
     n, change, whole = len(residual), np.empty(3), np.empty(3)
     misfit = fit_load(residual, unit, J, S, samples, change)
+    # the change has either sign, as a load can be put down; what hangs there then cannot weigh less than nothing
     fit_load(residual + learnt, unit, J, S, samples, whole)
+    # moments of a centre that is too far off; a load below 0.1 kg may have those of 0.1 kg
     if abs(change[1]) + abs(change[2]) > 2.0 * _FAR_M * max(abs(change[0]), 0.1):
         return False
     few = misfit < n + _DEVIATIONS * np.sqrt(2.0 * n)
@@ -165,6 +172,7 @@ def fit_load(
     _spread_of_mean(S, samples, _UNKNOWN_NM, C)
     if not factor(C, L):
         return np.inf
+    # ridge regression of the whitened residual on the weight and both of its moments
     forward(L, unit, a[0])
     for k in range(2):  # what its centre off the axis adds: moments about the horizontal axes
         forward(L, J[3 + k] * _GRAVITY, a[1 + k])
@@ -174,10 +182,11 @@ def fit_load(
             b[i] += a[i, j] * y[j]
             for k in range(3):
                 G[i, k] += a[i, j] * a[k, j]
+        # prior deviations: the largest load, and that load as far off as it may be
         G[i, i] += 1.0 / (MOST_KG if i == 0 else MOST_KG * _FAR_M) ** 2
     if not factor(G, K):
         return np.inf
-    explained = forward(K, b, u)
+    explained = forward(K, b, u)  # b^T (G + P)^-1 b
     backward(K, u, load)
     return float(square - explained)
 
@@ -188,7 +197,7 @@ def _spread_of_mean(S: FloatArray, samples: int, unknown: float, C: FloatArray) 
     for i in range(len(S)):
         for j in range(len(S)):
             C[i, j] = S[i, j] / samples
-        C[i, i] += unknown**2
+        C[i, i] += unknown**2  # an error of the mean does not average out
 
 
 @compiled
@@ -203,11 +212,13 @@ def learn_lasting(
     n, load = x.shape[0], x.shape[1] - 1
     weights, covariance, kg = known.weights, known.covariance, lasting[0]
     for j in range(n):
+        # the torque itself: the residual is what the mean has left of it
         torque = residual[j]
         for a in range(load + 1):
             torque += weights[j, a] * x[j, a]
         weights[j, load] += kg
         weights[j, 0] += lasting[3 + j]
+        # the load's moments have no feature: the offsets take them up, as they are in this posture
         if kg != 0.0:
             covariance[j, 0, 0] += widen
             covariance[j, load, load] += (_LOAD_KG + _LOAD_PART * abs(kg)) ** 2
@@ -227,5 +238,6 @@ def weight_part(weights: FloatArray, x: FloatArray, part: WeightPart) -> None:
     n, load = x.shape[0], x.shape[1] - 1
     for j in range(n):
         offset[j], unit[j], learnt[j] = weights[j, 0] * x[j, 0], x[j, load], weights[j, 0] * x[j, 0]
+        # without friction, features 1 to PLAIN - 1, which cannot be weight
         for a in range(PLAIN, load + 1):
             learnt[j] += weights[j, a] * x[j, a]

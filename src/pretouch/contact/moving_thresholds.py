@@ -41,6 +41,7 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
             obstacles: what is near.
         """
         parts, o = np.empty((6, 3)), obstacles
+        # NaN crosses no threshold: without an estimate nothing is a contact
         compared = _NONE if force is None else window.newest if self.compare == "filtered" else force
         found, share = _compare.flat(
             window.sums, window.count, compared, ee_position, o.point, o.ee_distance,
@@ -48,7 +49,7 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
         )  # fmt: skip
         limits, contact = Thresholds(parts), None
         if found and armed:
-            contact = Contact(compared - limits.mean, crossed(compared, limits))
+            contact = Contact(compared - limits.mean, crossed(compared, limits))  # F_ext = F_reading - mu, eq. 12
         return Detection(limits, contact, armed, _NONE, 0.0 if force is None else share)
 
     def largest_missed_n(self, body: Body, speed: float) -> float:
@@ -83,6 +84,7 @@ def _compare(
     for i in range(3):
         found = found or compared[i] > parts[0, i] or compared[i] < parts[1, i]
         off = compared[i] - parts[2, i]
+        # on the lower side both are negative: the part of the band is positive on either
         band = parts[0, i] - parts[2, i] if off > 0.0 else parts[1, i] - parts[2, i]
         largest = max(largest, off / band)
     return found, largest

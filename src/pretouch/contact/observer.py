@@ -27,7 +27,7 @@ class ObserverState:
 
 def observer_init(mass_matrix: FloatArray, qd: FloatArray) -> ObserverState:
     """Start with zero residual at the given mass matrix (n, n) and joint velocities (n,) [rad/s]."""
-    return ObserverState(np.zeros(len(qd)), mass_matrix @ qd, mass_matrix)
+    return ObserverState(np.zeros(len(qd)), mass_matrix @ qd, mass_matrix)  # p in the integral, so that r begins at 0
 
 
 def observe(
@@ -76,8 +76,8 @@ def _observe(
     for i in range(n):
         for j in range(n):
             momentum[i] += M[i, j] * qd[j]
-            rate[i] += (M[i, j] - before.mass_matrix[i, j]) * qd[j]
-    # implicit in r, so that the discrete low-pass is stable for any gain
+            rate[i] += (M[i, j] - before.mass_matrix[i, j]) * qd[j]  # dM/dt qd dt
+    # r = K (p - integral of tau - bias + dM/dt qd + r), implicit in r: the discrete low-pass is stable for any gain
     grown = before.integral + (tau - bias) * dt + rate
     residual = gain * (momentum - grown) / (1.0 + gain * dt)
     return residual, grown + residual * dt
@@ -95,4 +95,5 @@ def wrench_from_torques(
     squares, vectors = np.linalg.eigh(jacobian @ jacobian.T)
     if squares[0] < smallest_singular_value**2 or squares[0] <= 0:
         return None
+    # F = (J J^T + d^2 I)^-1 J tau, by the eigenvectors of J J^T
     return np.asarray(vectors @ ((vectors.T @ (jacobian @ tau_ext)) / (squares + damping**2)))

@@ -95,4 +95,5 @@ def contact_event(detection: Detection) -> dict[Event, str]:
 
 def new_contact(inputs: ReactionInputs, mode: ModeState) -> Contact | None:
     """Return the contact that a reaction begins with in a step that ends in a mode, None where none begins."""
-    return inputs.detection.contact if mode.mode is Mode.REACT is not inputs.mode.mode else None
+    begins = mode.mode is Mode.REACT and inputs.mode.mode is not Mode.REACT
+    return inputs.detection.contact if begins else None

@@ -118,7 +118,7 @@ def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, grow
     for j in range(n):
         x[j, 0], x[j, 1], x[j, 2] = 1.0, np.tanh(speed[j] / _SLOW), np.tanh(speed[j] / _FAST)
         x[j, 3] = speed[j]
-    for m in range(-1, len(mass)):
+    for m in range(-1, len(mass)):  # -1: 1 kg at the end-effector, the payload
         last, link = PLAIN + n, m
         if m < 0:
             link = ee
@@ -127,7 +127,7 @@ def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, grow
             last = -1
             for j in range(n):
                 if moved_by[m, j]:
-                    last = PLAIN + j
+                    last = PLAIN + j  # links that no joint parts share a feature, one relative error of mass
             if last < 0 or mass[m] <= 0.0:
                 continue
             for i in range(3):
@@ -145,7 +145,7 @@ def _carried(
     torque: FloatArray,
 ) -> None:  # fmt: skip
     """Write the torques (n,) of weight and inertia of 1 kg at a point; `V` (n, 3) is overwritten."""
-    ax, ay, az = 0.0, 0.0, _GRAVITY
+    ax, ay, az = 0.0, 0.0, _GRAVITY  # held against gravity, a mass is as if accelerated upwards
     for j in range(len(growth)):
         V[j] = 0.0
         if moved[j]:
@@ -153,9 +153,10 @@ def _carried(
             V[j, 0] = axis[j, 1] * z - axis[j, 2] * y
             V[j, 1] = axis[j, 2] * x - axis[j, 0] * z
             V[j, 2] = axis[j, 0] * y - axis[j, 1] * x
+            # J qdd only: what the velocities add to the acceleration is left out
             ax, ay, az = ax + V[j, 0] * growth[j], ay + V[j, 1] * growth[j], az + V[j, 2] * growth[j]
     for j in range(len(growth)):
-        torque[j] = -(V[j, 0] * ax + V[j, 1] * ay + V[j, 2] * az)
+        torque[j] = -(V[j, 0] * ax + V[j, 1] * ay + V[j, 2] * az)  # by the load on the joints: -J^T (g + a)
 
 
 @compiled
@@ -167,7 +168,7 @@ def mean_and_doubt(
     for j in range(n):
         mean[j], doubt[j] = 0.0, 0.0
         for a in range(f):
-            if x[j, a] != 0.0:
+            if x[j, a] != 0.0:  # it is 0 for the links before the joint
                 mean[j] += weights[j, a] * x[j, a]
                 part = 0.0
                 for b in range(f):
@@ -192,7 +193,7 @@ def least_squares_step(
         total += x[a] * gain[a]
         error -= w[a] * x[a]
     for a in range(f):
-        w[a] += gain[a] / total * error
+        w[a] += gain[a] / total * error  # gain = P x, total = x^T P x + noise
         for b in range(f):
             P[a, b] -= gain[a] * gain[b] / total
             P[a, b] *= 1.0 - forget
@@ -236,7 +237,7 @@ def add_sample(
         S[i, i] += doubt[i]
     if not factor(S, L):
         return
-    trust = (tails + n) / (tails + forward(L, residual, y))
+    trust = (tails + n) / (tails + forward(L, residual, y))  # Student's weight, less than 1 for an outlier
     backward(L, y, z)
     unit, start = np.zeros(n), n + n * f
     for i in range(n):
@@ -253,7 +254,7 @@ def add_sample(
         block[start + n + i] += max(jitter - doubt[i] - floor**2, 0.0)
         block[start + 2 * n + i] += S[i, i]
     block[-2] += 1.0
-    block[-1] = moving
+    block[-1] = moving  # a block is of the kind of its last sample
 
 
 @compiled
@@ -306,10 +307,10 @@ def learn_block(block: FloatArray, learnt: Learnt, pace: Pace) -> None:
     for j in range(n):
         for a in range(f):
             x[a] = block[n + j * f + a] / samples
-        noise = block[start + 2 * n + j] / samples**2
+        noise = block[start + 2 * n + j] / samples**2  # of a mean: the sum of variances / N^2
         least_squares_step(weights[j], covariance[j], x, block[j] / samples, noise, prior, pace.forget)
     seen[k] += samples
-    gain = max(samples / (pace.first + seen[k]), pace.least_gain)
+    gain = max(samples / (pace.first + seen[k]), pace.least_gain)  # a mean with the prior, then an exponential one
     for part in range(2):
         ceiling = pace.most_torque if part else pace.most_velocity
         for j in range(n):

@@ -23,5 +23,6 @@ def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> Residua
     share = np.zeros(len(prior))
     share[:PLAIN], share[-1] = _DRIFT**2 * gone, gone
     left = np.sqrt(1.0 - share)
+    # scaled from both sides, by which it stays positive definite: of each variance a share is replaced by the prior's
     covariance = model.covariance * (left[:, None] * left) + np.diag(share * prior)
     return replace(model, covariance=covariance)

@@ -31,6 +31,7 @@ _SINGULAR = 1e-6
 
 def alarm_level(p: SequentialParams, period: float) -> float:
     """Return ln A for the chosen rate of false alarms, at one sample a period [s]."""
+    # A is the number of samples in which one false alarm is allowed
     return max(1.0, math.log(3600.0 / period / p.false_alarms_per_hour) - p.slack_nats)
 
 
@@ -46,6 +47,7 @@ def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> in
     for k in range(len(_LENGTHS)):
         if _LENGTHS[k] > count:
             break
+        # a longer window goes on with the sum of the shorter one
         while taken < _LENGTHS[k]:
             taken += 1
             for j in range(n):
@@ -97,6 +99,7 @@ def judge(
             z[i] = means[k, n - 1 - i]
             for j in range(i + 1):
                 S0[i, j] = S[n - 1 - i, n - 1 - j] / _LENGTHS[k]
+            # unlike the noise, not divided by the length of the window
             S0[i, i] += doubt[n - 1 - i]
         if not factor(S0, L):
             continue
@@ -107,6 +110,7 @@ def judge(
         for h in range(n + len(J)):
             link, size, explained, one_sided = h, 3, 0.0, 1.0
             if h < n:
+                # a wrench explains any torques of the first n - h joints; the others, the beginning of y, stay noise
                 link, size, explained = n - 1 - h, n - h, square - behind
                 behind += y[h] ** 2
             if weight[link] <= 0.0:
@@ -114,6 +118,7 @@ def judge(
             if h >= n:
                 explained, one_sided = explained_by_force(L, pivot, y, J[h - n], joints[h - n], away[h - n], scratch)
             ratio = log_ratio(alone, square, explained, size, n, gain, widened, tails)
+            # the windows share the weight alike
             part = weight[link] * np.exp(min(ratio, _LARGEST)) * one_sided / len(_LENGTHS)
             total += part
             if part > best:
@@ -132,6 +137,7 @@ def log_ratio(
     `alone` = ln(1 + square / tails) and `widened` = ln(1 + g) are the same for many contacts.
     With many degrees of freedom this is ((1 + g)^-size exp(g / (1 + g) explained))^(1/2).
     """
+    # in the directions of a contact the spread is 1 + g times as large: 1 / (1 + g) of what they explain is left
     rest = square - gain / (1.0 + gain) * explained
     return 0.5 * (tails + n) * (alone - np.log1p(rest / tails)) - 0.5 * size * widened
 
@@ -162,7 +168,7 @@ def explained_by_force(
         g20, g21, g22 = g20 + a2 * a0, g21 + a2 * a1, g22 + a2 * a2
     # the Cholesky factor c of J S^-1 J^T, and u = c^-1 b
     regular = _SINGULAR * (g00 + g11 + g22)
-    if not regular > 0.0:
+    if not regular > 0.0:  # no joint moves the point, or it is NaN
         return 0.0, 1.0
     c00 = 1.0 / np.sqrt(g00 + regular)
     c10, c20 = g10 * c00, g20 * c00
@@ -180,4 +186,5 @@ def explained_by_force(
     v1 = (away[1] - c10 * v0) * c11
     v2 = (away[2] - c20 * v0 - c21 * v1) * c22
     along, deviation = u0 * v0 + u1 * v1 + u2 * v2, np.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+    # 2 Phi(along / deviation): a prior on one side only is twice as dense there
     return explained, 1.0 + math.erf(along / deviation / math.sqrt(2.0))

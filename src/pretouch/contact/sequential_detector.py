@@ -119,6 +119,7 @@ def sequential_step(
     """
     m, n, robot, o = state.model, model.n, seen.robot, seen.obstacles
     residual, speed, force, bands = np.empty(n), np.empty(n), np.empty(3), np.empty((6, 3))
+    # zeros, for windows that are not whole yet are not written
     means, covariance, model_variance = np.zeros((len(LENGTHS), n)), np.empty((n, n)), np.empty(n)
     ring, block, queue, prior = state.ring.copy(), m.block.copy(), m.queue, _NONE
     weights, weights_covariance, noise, learnt = m.weights, m.covariance, m.spread, m.seen

@@ -59,11 +59,13 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
     def step(self, state: SequentialTestState, body: Body, sample: Sample) -> tuple[Detection, SequentialTestState]:
         """Hold one sample of the torques against free motion, and learn from it if nothing can be a contact."""
         model, period, location = body.model, body.period, state.localisation
+        # first, for units are heard without torques too: how long a sensor has been stuck counts on
         cues, remembered = self._heard(state.cues, body, sample)
         found = no_torques(body, sample)
         if found is not None:
             return found, SequentialTestState(state.test, localisation_init() if location else None, remembered)
         said = no_cues(len(model.links)) if cues is None else cues
+        # while a unit is touched free motion is not learnt, whatever the test says
         alone = sample.watched and not len(said.link)
         seen = Observation(sample.kin, sample.robot, sample.obstacles, said)
         felt, test = sequential_step(state.test, model, seen, sample.reacting, alone, period, self)
@@ -107,6 +109,7 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         """
         model, q, qd = body.model, body.model.description.q_ready, np.full(body.model.n, speed)
         kin, fresh, said = model.kinematics(q), sequential_init(model, self), no_cues(len(model.links))
+        # with the delayed velocities at the present ones nothing accelerates
         state, J = replace(fresh, model=replace(fresh.model, speed=qd)), model.ee_jacobian(kin)[:3]
 
         def is_felt(force: FloatArray) -> bool:
@@ -115,7 +118,7 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
             felt, _ = sequential_step(state, model, seen, False, False, body.period, self)
             return felt.log_likelihood_ratio >= 1.0
 
-        latest = 0.0
+        largest = 0.0
         for axis in np.eye(3):
             if not is_felt(_LARGEST_N * axis):
                 return np.inf
@@ -123,8 +126,8 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
             while high - low > _TO_N:
                 middle = 0.5 * (low + high)
                 low, high = (low, middle) if is_felt(middle * axis) else (middle, high)
-            latest = max(latest, high)
-        return latest
+            largest = max(largest, high)
+        return largest
 
 
 _LARGEST_N, _TO_N = 1000.0, 0.1

@@ -66,6 +66,7 @@ def touch_settings(model: RobotModel, skin: Skin, p: TouchSensorParams) -> Touch
     unit, link = skin.touching, skin.link[skin.touching]
     radius = np.array([touch.radius for _, touch in patches])
     area = np.array([surface_area(model.capsules, int(i)) for i in link])
+    # s: the patch, taken as flat, of the link's surface
     share = np.minimum(np.pi * radius**2 / area, 1.0)
     return TouchSettings(
         unit, link, skin.T_link_sensor[unit, :3, 3].copy(), np.hypot(radius / 2, skin.position_sigma[unit]),
@@ -75,6 +76,7 @@ def touch_settings(model: RobotModel, skin: Skin, p: TouchSensorParams) -> Touch
 
 def gain_of(share: FloatArray, p: TouchSensorParams) -> FloatArray:
     """Return G (M,) of units whose patches cover these shares (M,) of their links."""
+    # p: false touches an hour times how long each lasts
     false = min(1.0, p.false_touches_per_hour * p.false_touch_s / 3600.0)
     return np.asarray(share / false + 1.0 - share)
 
@@ -84,7 +86,7 @@ def surface_area(capsules: Capsules, link: int) -> float:
     own = capsules.of_links(np.array([link]))
     length = np.linalg.norm(own.b - own.a, axis=1)
     area = float((2 * np.pi * own.radius * length + 4 * np.pi * own.radius**2).sum())
-    return area if area > 0.0 else np.inf
+    return area if area > 0.0 else np.inf  # so that s = 0 and G = 1
 
 
 @dataclass(frozen=True)
@@ -132,11 +134,13 @@ def said_by(
         said = fresh & readings.contact[settings.unit]
     believed = np.flatnonzero(said & (account < p.patience_s))
     if said.any() or account.any():
+        # filled by all that is said, believed or not: a sensor that stays stuck is never believed again
         filled = np.where(said, account + period, account - p.forgiveness * period)
         state = TouchState(np.clip(filled, 0.0, p.patience_s))
     if readings is None or not len(believed):
         return None, state
     link, gain = settings.link[believed], np.ones(len(kin.position))
+    # several touched units of one link count once, by the largest gain
     np.maximum.at(gain, link, settings.gain[believed])
     point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], settings.place[believed])
     force = readings.force[settings.unit[believed]]

@@ -36,9 +36,11 @@ def side_distances(
     positive, negative = np.full(3, np.inf), np.full(3, np.inf)
     for k in range(len(points)):
         for i in range(3):
+            # By the object's distance, not by its part along the axis: one straight at -y lowers thresholds of x and z
+            # too, on the side to which it is a little off (docs/explanation/paper.md, axis leakage).
             if points[k, i] > ee_position[i]:
                 positive[i] = min(positive[i], ee_distance[k])
-            elif points[k, i] < ee_position[i]:
+            elif points[k, i] < ee_position[i]:  # level with the end-effector it is on neither side
                 negative[i] = min(negative[i], ee_distance[k])
     return positive, negative
 
@@ -92,6 +94,7 @@ def threshold_parts(
         f_sigma = noise_force(sigma[i], p.f_std_n, p.sigma_max_n)
         f_positive = obstacle_force(positive[i], p.f_d_n, p.d_max_m, p.d_min_m)
         f_negative = obstacle_force(negative[i], p.f_d_n, p.d_max_m, p.d_min_m)
+        # eq. 9: what is on the negative side pushes to the positive one, and lowers the upper threshold
         parts[0, i] = mean[i] + p.f_base_n + f_sigma - f_negative
         parts[1, i] = mean[i] - p.f_base_n - f_sigma + f_positive
         parts[2, i], parts[3, i], parts[4, i], parts[5, i] = mean[i], sigma[i], f_positive, f_negative

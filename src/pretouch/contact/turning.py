@@ -49,6 +49,7 @@ def turning_doubt(M: FloatArray, growth: FloatArray, turning: FloatArray, doubt:
     for j in range(n):
         hard = 0.0
         for k in range(n):
+            # the torque on joint j by the acceleration of joint k; of several the squares add up
             hard += (M[j, k] * max(0.0, abs(growth[k]) - _HARD_RAD_S2)) ** 2
         turning[0, j] = max(hard, _KEEP * turning[0, j])
         doubt[j] += min(turning[1, j] * turning[0, j], _MOST_NM2)
@@ -66,10 +67,12 @@ def learn_turning(
         return
     for j in range(len(doubt)):
         x, value, variance = turning[0, j], turning[1, j], turning[2, j]
+        # fading towards the prior by the time since the last mean
         variance += _SAMPLES * forget * (_PRIOR**2 - variance)
         if x > _LEAST_NM2:
             expected = S[j, j] / _SAMPLES + doubt[j]
             square = min(means[_WINDOW, j] ** 2, _OUTLIER * expected)
+            # a scalar Kalman step: `expected` has the slope x, and the square of a Gaussian the variance 2 expected^2
             gain = variance * x / (variance * x**2 + 2.0 * expected**2)
             value += gain * (square - expected) * (1.0 if square > expected else _FALL)
             variance -= gain * x * variance

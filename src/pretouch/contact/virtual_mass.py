@@ -63,6 +63,7 @@ def learnt(state: VirtualMass, residual: FloatArray, dt: float, params: Admittan
     Of two filters in a row the second takes in little of what has only begun: of a torque that has lasted for 60 ms
     less than one part in a hundred.
     """
+    # the mean of all samples at first, an exponential one from T / dt samples on
     weight = max(1.0 - math.exp(-dt / _MEAN_S), 1.0 / (state.samples + 1))
     none, mean, torque = np.zeros(len(residual)), np.empty((2, len(residual))), np.empty(len(residual))
     _learn(state.mean, residual, weight, mean, torque)
@@ -95,7 +96,7 @@ def begun(
         lesser = np.where(torque * before > 0, np.sign(torque) * np.minimum(np.abs(torque), np.abs(before)), 0.0)
         least = np.maximum(band, _KEEPS * params.static_friction_nm)
     drive = np.where(np.abs(lesser) > least, _shrunk(lesser, band), 0.0)
-    velocity = drive / params.damping_nm_s
+    velocity = drive / params.damping_nm_s  # where M dv/dt = d - D v is 0
     energy = 0.5 * params.inertia_kg_m2 * float(velocity @ velocity)
     if energy > params.start_energy_j:
         velocity = velocity * math.sqrt(params.start_energy_j / energy)
@@ -124,6 +125,7 @@ def yielded(
     """
     p, torque = params, residual - state.mean[1]
     velocity, side, sliding, steady = np.empty_like(band), np.empty_like(band), np.empty_like(band), state.steady.copy()
+    # the estimate is a low pass of the force u, y = keep y_before + (1 - keep) u; `_yield` solves that for u
     keep = math.exp(-dt / p.lag_s) if p.lag_s > 0 else 0.0
     # just after a contact the filters still lag, and the detector has found a push already
     at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
@@ -220,6 +222,7 @@ def _yield(
     for i in range(n):
         steady[0, i] += weight * (torque[i] - steady[0, i])
         steady[1, i] += weight * (steady[0, i] - steady[1, i])
+        # stick and slip: what tears a joint loose has to show in two values, less keeps it moving
         lasts = abs(steady[0, i]) > max(band[i], _KEEPS * friction)
         starts = _both(steady[0, i], steady[1, i], friction) or _both(torque[i], before[i], at_once * friction)
         sliding[i] = 1.0 if friction == 0.0 or starts or (loose[i] > 0.0 and lasts) else 0.0
@@ -230,22 +233,27 @@ def _yield(
         # the least energy that it gave, whichever of the two is true and whatever is wrong within the dead band
         power += min(torque[i] * v[i], acted * v[i]) - band[i] * abs(v[i])
         felt, now = _beyond(torque[i], band[i]), _beyond(acted, band[i])
+        # the lesser of both, and nothing where they disagree: a force that has ended no longer drives the arm
         drive = 0.0
         if felt * now > 0.0 and sliding[i] > 0.0:
             drive = felt if abs(felt) < abs(now) else now
+        # against the push the joint has yielded to: what a release leaves in the estimate, unless well beyond the band
         if drive * side[i] < 0.0:
             least = _REVERSE_BAND * band[i]
             far = min(abs(torque[i]), abs(acted)) > least
             drive = drive if far else 0.0
+        # M (v' - v) / dt = d - D v', implicit: the kinetic energy grows by d v' dt at most, for any dt
         velocity[i] = (inertia * v[i] + dt * drive) / (inertia + dt * damping)
         sides[i] = side[i]
         if drive != 0.0:
             sides[i] = np.sign(drive)
+        # undriven, a joint stops that the arm does not move that way, or that has all but stopped
         elif velocity[i] * command[i] <= 0.0 or (friction > 0.0 and abs(velocity[i]) < _REST_RAD_S):
             velocity[i] = 0.0
         elif abs(velocity[i]) > abs(command[i]):
             # nothing drives it: it is never asked for more than it does
             velocity[i] = command[i]
+    # passivity observer; the cap keeps a long push from paying for a long motion after it
     tank = min(tank + dt * power, _TANK_MAX_J)
     if tank < 0.0:
         # no more to give: only what takes energy may move
@@ -285,6 +293,7 @@ def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays,
         k = link[c]
         for end in (a[c], b[c]):
             point = rotation[k] @ end + position[k]
+            # v = sum of qd_j a_j x (p - p_j) over the joints that move the link
             vx, vy, vz = 0.0, 0.0, 0.0
             for j in range(len(qd)):
                 if moved_by[k, j]:

@@ -74,6 +74,7 @@ def window_std(sums: FloatArray, count: int) -> FloatArray:
     std = np.zeros(3)
     if count > 1:
         for i in range(3):
+            # (S2 - S1^2 / N) / (N - 1), which rounding may take below 0
             std[i] = np.sqrt(max(0.0, (sums[_SQUARES, i] - sums[_TOTAL, i] ** 2 / count) / (count - 1)))
     return std
 
@@ -90,7 +91,7 @@ def weighted_value(
     value = reading.copy()
     for i in range(len(value)):
         if abs(reading[i] - mean[i]) > lambda_ * std[i]:
-            value[i] = alpha * reading[i] + (1 - alpha) * last[i]
+            value[i] = alpha * reading[i] + (1 - alpha) * last[i]  # x_{t-1} as it entered, not as it was read
     return value
 
 
@@ -99,6 +100,7 @@ def add_force(state: WindowState, reading: FloatArray | None, p: WindowParams) -
     if reading is None:
         return state
     k, at = divmod(state.next, _CHUNK)
+    # the step is pure, and copies of the ring only what it writes to
     chunk, size = state.chunks[k].copy(), state.size
     # Once a turn the sums are taken afresh, so that rounding errors never add up: O(1) on average. That is before the
     # next value and not after the last one, for what a step says of its window is of the running sums.
@@ -122,6 +124,7 @@ def add_to(
 ) -> None:  # fmt: skip
     """Change the chunk, at an index, and the sums (4, 3) as `add_force` says, for a window of `count` values so far."""
     x = reading
+    # not before: the sigma of few values is near 0, and eq. 8 would take most readings for outliers
     if full:
         x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), alpha, lambda_)
     for i in range(3):

@@ -9,9 +9,7 @@ from pathlib import Path
 from pretouch.errors import RobotModelError
 from pretouch.importing.robot_import import MJCF, Imported
 from pretouch.robot.description_file import FILE, description_text
-from pretouch.sensing.skin import save_skin
-
-SKIN = "skin.toml"
+from pretouch.sensing.skin import OWN_SKIN, save_skin
 
 
 def write_folder(found: Imported, folder: Path, force: bool = False) -> Path | None:
@@ -53,7 +51,7 @@ def _fill(found: Imported, folder: Path) -> None:
     description = replace(found.description, mjcf=folder / MJCF)
     (folder / FILE).write_text(description_text(description), encoding="utf-8")
     if len(found.skin):
-        save_skin(found.skin, folder / SKIN)
+        save_skin(found.skin, folder / OWN_SKIN)
     os.chmod(folder, 0o755)  # noqa: S103  a folder as any other
 
 

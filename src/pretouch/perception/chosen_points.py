@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry
+from pretouch.compiled import ByName, compiled, entry, inlined
 from pretouch.groups import CapsuleArrays, Chain
 from pretouch.perception.closest import ClosestArrays, closest, to_axis
 from pretouch.perception.closing import follow_points
@@ -12,10 +12,10 @@ from pretouch.perception.obstacles import HEARD, SEEN, USED
 from pretouch.robot.vectors import dot
 from pretouch.types import FloatArray, IntArray
 
-_FARTHEST = 100.0
-"""A coordinate [m] from here on is none: another unit, or a broken message."""
-_LARGEST_SIGMA = 1.0
-"""A standard deviation [m] above this is none."""
+FARTHEST = 100.0
+"""A coordinate [m] from here on is implausible: another unit, or a broken message."""
+LARGEST_SIGMA = 1.0
+"""A standard deviation [m] above this is implausible."""
 _ONE_INSTANT = 1e-3
 """Stamps that differ by less [s] are taken as one: in that time no arm moves by more than 2 mm."""
 _APART = 0.5
@@ -25,7 +25,7 @@ _UNKNOWN, _OBSTACLE, _EXPLAINED, _HIDDEN = range(4)
 
 @compiled
 def usable(stamp: FloatArray, point: FloatArray, sigma: FloatArray) -> tuple[int, int]:
-    """How many of M points are such as a source can see, and how many show nothing, for they hold a NaN."""
+    """How many of M points are plausible, and how many show nothing, for they hold a NaN."""
     good = nothing = 0
     for m in range(len(stamp)):
         if np.isnan(point[m, 0]) or np.isnan(point[m, 1]) or np.isnan(point[m, 2]):
@@ -38,9 +38,9 @@ def usable(stamp: FloatArray, point: FloatArray, sigma: FloatArray) -> tuple[int
 @compiled
 def _is_point(stamp: float, point: FloatArray, m: int, sigma: float) -> bool:
     for i in range(3):
-        if not abs(point[m, i]) < _FARTHEST:
+        if not abs(point[m, i]) < FARTHEST:
             return False
-    return bool(0.0 <= sigma <= _LARGEST_SIGMA and np.isfinite(stamp))
+    return bool(0.0 <= sigma <= LARGEST_SIGMA and np.isfinite(stamp))
 
 
 class KeptPoints(NamedTuple):
@@ -96,6 +96,25 @@ class PointNumbers(NamedTuple):
     closing_memory_s: float
 
 
+class _Candidates(NamedTuple):
+    """M points that stand for election."""
+
+    point: FloatArray
+    """(M, 3) [m]."""
+    sigma: FloatArray
+    """(M,) [m]."""
+    stamp: FloatArray
+    """(M,) when each was measured [s]."""
+    known: IntArray
+    """(M,) what is known of each."""
+    first: IntArray
+    """(M,) the first of the places of its nearest link."""
+    direction: FloatArray
+    """(M, 3) from that link."""
+    gap: FloatArray
+    """(M,) distance from it, less the point's spread [m]."""
+
+
 @entry
 def take_points(
     old: KeptPoints, new: ByName[PointSet], now: float, place: IntArray, there: Placed, chain: Chain, posed: float,
@@ -115,27 +134,52 @@ def take_points(
         posed: instant of that posture [s].
         p: parameters.
     """
-    last, times, motion, kept_sigma = old
-    heard, stamp, point, sigma = new
-    arm_link, arm_ends, arm_radius = there.arm_link, there.arm_ends, there.arm_radius
-    other_ends, other_radius, planes = there.other_ends, there.other_radius, there.planes
-    persistence, hidden, margin = p.outside_persistence_s, p.outside_hidden_s, p.outside_margin_m
-    sigmas, kept = p.spread_sigmas, p.outside_points
-    ends = np.empty_like(arm_ends)
-    move_ends(arm_ends, arm_link, chain, posed - heard, ends)
-    placed_for, room = heard, len(stamp) + len(last)
+    # where the arm was when the points were measured: it may have moved by more than the margin since
+    ends = np.empty_like(there.arm_ends)
+    move_ends(there.arm_ends, there.arm_link, chain, posed - new.heard, ends)
+    found = _candidates(old, new, now, place, there, ends, p)
+    chosen = np.full(len(old.point), -1, np.int64)
+    _elect(found, chosen, there, ends, new.heard, chain, posed, p)
+
+    points, stamps = np.zeros((len(chosen), 3)), np.full(len(chosen), new.heard)
+    taken = np.zeros(len(chosen), np.bool_)
+    for k in range(len(chosen)):
+        if chosen[k] >= 0:
+            m = chosen[k]
+            points[k], stamps[k], taken[k] = found.point[m], found.stamp[m], found.known[m] == _OBSTACLE
+    if p.closing_speed:
+        follow_points(old.motion, old.point, old.times[SEEN], points, stamps, taken, p.closing_memory_s)
+    for k in range(len(chosen)):
+        old.times[HEARD, k] = new.heard
+        if chosen[k] >= 0:
+            old.point[k], old.sigma[k], old.times[USED, k] = points[k], found.sigma[chosen[k]], stamps[k]
+            # a hidden point was not seen again: the arm is in front of it, so it is taken to be there still
+            old.times[SEEN, k] = stamps[k] if taken[k] else new.heard
+            if p.closing_speed and not taken[k]:
+                old.motion[0, k], old.motion[1, k] = points[k], 0.0
+
+
+@inlined
+def _candidates(
+    old: KeptPoints, new: PointSet, now: float, place: IntArray, there: Placed, ends: FloatArray, p: PointNumbers
+) -> _Candidates:
+    """The kept points that the arm hides and the new ones that are young enough, each with its nearest link."""
+    persistence, sigmas = p.outside_persistence_s, p.spread_sigmas
+    room, count = len(new.stamp) + len(old.point), 0
     near, spread, when = np.empty((room, 3)), np.empty(room), np.empty(room)
-    known, count = np.full(room, _UNKNOWN), 0
-    for k in range(len(last)):
-        u = sigmas * kept_sigma[k]
-        if now - times[USED, k] <= hidden and now - times[SEEN, k] <= persistence:
-            gap_of_arm = _gap(last, k, ends, arm_radius)
-            if -u <= gap_of_arm <= margin + u:
-                near[count], spread[count], when[count], known[count] = last[k], kept_sigma[k], times[USED, k], _HIDDEN
+    known = np.full(room, _UNKNOWN)
+    for k in range(len(old.point)):
+        u = sigmas * old.sigma[k]
+        if now - old.times[USED, k] <= p.outside_hidden_s and now - old.times[SEEN, k] <= persistence:
+            # within what the filter takes for the arm, no source can show the point; inside the arm it cannot be
+            gap_of_arm = _gap(old.point, k, ends, there.arm_radius)
+            if -u <= gap_of_arm <= p.outside_margin_m + u:
+                near[count], spread[count], when[count] = old.point[k], old.sigma[k], old.times[USED, k]
+                known[count] = _HIDDEN
                 count += 1
-    for m in range(len(stamp)):
-        if _is_point(stamp[m], point, m, sigma[m]) and 0.0 <= now - stamp[m] <= persistence:
-            near[count], spread[count], when[count] = point[m], sigma[m], stamp[m]
+    for m in range(len(new.stamp)):
+        if _is_point(new.stamp[m], new.point, m, new.sigma[m]) and 0.0 <= now - new.stamp[m] <= persistence:
+            near[count], spread[count], when[count] = new.point[m], new.sigma[m], new.stamp[m]
             count += 1
     near = near[:count]
     body_point, link, gap = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
@@ -144,44 +188,42 @@ def take_points(
     closest(there.body, near, ClosestArrays(body_point, link, direction, gap))
     for m in range(count):
         gap[m] -= sigmas * spread[m]
+        link[m] = p.outside_points * place[link[m]]
+    return _Candidates(near, spread, when, known, link, direction, gap)
 
-    chosen = np.full(len(kept_sigma), -1, np.int64)
-    for rank in range(kept):
-        for m in range(count):
-            first = kept * place[link[m]]
+
+@inlined
+def _elect(
+    found: _Candidates, chosen: IntArray, there: Placed, ends: FloatArray, placed_for: float, chain: Chain,
+    posed: float, p: PointNumbers,
+) -> None:  # fmt: skip
+    """Write the candidate of each place to `chosen`: of each link the nearest, then the nearest apart from it.
+
+    A candidate is compared with arm and fixtures only once it would win: a cloud has hundreds that never do.
+    `ends` are those of the arm at `placed_for`, and change with the stamp of the candidate.
+    """
+    for rank in range(p.outside_points):
+        for m in range(len(found.point)):
+            first = found.first[m]
             best = chosen[first + rank]
-            if known[m] == _EXPLAINED or (best >= 0 and not gap[m] < gap[best]):
+            if found.known[m] == _EXPLAINED or (best >= 0 and not found.gap[m] < found.gap[best]):
                 continue
-            if not _is_apart(direction, m, chosen[first : first + rank]):
+            if not _is_apart(found.direction, m, chosen[first : first + rank]):
                 continue
-            if known[m] == _UNKNOWN:
-                if not abs(when[m] - placed_for) < _ONE_INSTANT:
-                    placed_for = when[m]
-                    move_ends(arm_ends, arm_link, chain, posed - placed_for, ends)
-                within = margin + sigmas * spread[m]
-                known[m] = _OBSTACLE
+            if found.known[m] == _UNKNOWN:
+                if not abs(found.stamp[m] - placed_for) < _ONE_INSTANT:
+                    placed_for = found.stamp[m]
+                    move_ends(there.arm_ends, there.arm_link, chain, posed - placed_for, ends)
+                within = p.outside_margin_m + p.spread_sigmas * found.sigma[m]
+                found.known[m] = _OBSTACLE
                 if (
-                    _on_capsules(near, m, ends, arm_radius, within)
-                    or _on_capsules(near, m, other_ends, other_radius, within)
-                    or _on_planes(near, m, planes, within)
+                    _on_capsules(found.point, m, ends, there.arm_radius, within)
+                    or _on_capsules(found.point, m, there.other_ends, there.other_radius, within)
+                    or _on_planes(found.point, m, there.planes, within)
                 ):
-                    known[m] = _EXPLAINED
+                    found.known[m] = _EXPLAINED
                     continue
             chosen[first + rank] = m
-
-    points, stamps, taken = np.zeros((len(chosen), 3)), np.full(len(chosen), heard), np.zeros(len(chosen), np.bool_)
-    for k in range(len(chosen)):
-        if chosen[k] >= 0:
-            points[k], stamps[k], taken[k] = near[chosen[k]], when[chosen[k]], known[chosen[k]] == _OBSTACLE
-    if p.closing_speed:
-        follow_points(motion, last, times[SEEN], points, stamps, taken, p.closing_memory_s)
-    for k in range(len(chosen)):
-        times[HEARD, k] = heard
-        if chosen[k] >= 0:
-            last[k], kept_sigma[k], times[USED, k] = points[k], spread[chosen[k]], stamps[k]
-            times[SEEN, k] = stamps[k] if taken[k] else heard
-            if p.closing_speed and not taken[k]:
-                motion[0, k], motion[1, k] = points[k], 0.0
 
 
 @compiled

@@ -39,6 +39,7 @@ def closest_points(
     a, b = placed(body, kin)
     count = len(point)
     body_point, link, distance = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
+    # a copy: where `closest` finds no direction the last one stays in it
     direction, ee_distance = last_direction.astype(np.float64), np.empty(count)
     closest(CapsuleArrays(body.link, a, b, body.radius), point, ClosestArrays(body_point, link, direction, distance))
     distances(point, ee_position, ee_distance)
@@ -85,16 +86,19 @@ def closest(capsules: CapsuleArrays, point: FloatArray, found: ClosestArrays) ->
         best, nearest, at, axial = np.inf, -1, 0.0, 0.0
         for i in range(-1, len(radius)):
             c = first if i < 0 else i
+            # No capsule is nearer than the sphere round it. Squares need no root; where `best` is negative, inside a
+            # capsule, they may leave out too few, never too many.
             if i >= 0 and (c == first or gap2[c] > (best + spheres[3, c]) ** 2):
                 continue
             along, from_axis = to_axis(point, k, a, b, c)
             gap = from_axis - radius[c]
+            # a tie goes to the lower index, whichever was first; `nearest < 0` names one even for a point that is NaN
             if nearest < 0 or gap < best or (gap == best and c < nearest):
                 best, nearest, at, axial = gap, c, along, from_axis
         distance[k], on_link[k] = best, link[nearest]
         for i in range(3):
             foot = a[nearest, i] + at * (b[nearest, i] - a[nearest, i])
-            if axial > _ON_AXIS:
+            if axial > _ON_AXIS:  # on the axis all directions across are alike: the last one stays
                 direction[k, i] = (point[k, i] - foot) / axial
             body_point[k, i] = foot + radius[nearest] * direction[k, i]
 
@@ -108,6 +112,7 @@ def bounds(a: FloatArray, b: FloatArray, radius: FloatArray) -> FloatArray:
         for i in range(3):
             spheres[i, c] = (a[c, i] + b[c, i]) / 2
             length2 += (b[c, i] - a[c, i]) ** 2
+        # larger by more than rounding, so that what is left out changes no bit of the answer
         spheres[3, c] = (np.sqrt(length2) / 2 + radius[c]) * (1 + 1e-12) + 1e-12
     return spheres
 
@@ -127,6 +132,7 @@ def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> 
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = point[k, 0] - a[c, 0], point[k, 1] - a[c, 1], point[k, 2] - a[c, 2]
     length2 = ux * ux + uy * uy + uz * uz
+    # the foot of the perpendicular, brought into the segment; a ball has no axis
     along = 0.0 if length2 == 0 else min(1.0, max(0.0, (x * ux + y * uy + z * uz) / length2))
     x, y, z = x - along * ux, y - along * uy, z - along * uz
     return along, np.sqrt(x * x + y * y + z * z)

@@ -39,11 +39,13 @@ def follow_points(
         dt, away2 = stamp[k] - last_stamp[k], 0.0
         for i in range(3):
             away2 += (points[k, i] - last[k, i]) ** 2
+        # not the first reading, whose dt is infinite, nor one after three memories: e^-3 of the old weight is left then
         known = not np.isnan(motion[0, k, 0]) and 0.0 < dt <= 3.0 * memory
         if not known or away2 > (FASTEST * dt + _JUMP) ** 2:
             for i in range(3):
                 motion[0, k, i], motion[1, k, i] = points[k, i], 0.0
             continue
+        # The gains of the steady state, from the second reading on: two noisy points alone would give any velocity.
         theta = np.exp(-dt / memory)
         for i in range(3):
             foreseen = motion[0, k, i] + dt * motion[1, k, i]
@@ -77,16 +79,21 @@ def reckon(
     last, last_stamp, motion = before
     position, rotation = sensors.position, sensors.rotation
     for k in range(len(distance)):
+        # `measured` has raised what is nearer to `least`, and NaN is passed over
         if not distance[k] <= least:
             continue
         dt, ahead, nearing = stamp[k] - last_stamp[k], 0.0, 0.0
         if 0.0 <= dt <= within:
             for i in range(3):
+                # height of the last point along the beam as it is now, and speed of that point against the beam
                 ahead += rotation[k, i, 2] * (last[k, i] - position[k, i])
                 if not np.isnan(motion[1, k, i]):
                     nearing -= rotation[k, i, 2] * motion[1, k, i]
+            # Slower may be the estimate's error for a thing at rest, 2.5 % of which err by more (anticipation.md). That
+            # the arm itself comes nearer is in the sensor's pose already.
             if nearing > _ON_ITS_OWN:
                 ahead -= dt * nearing
+        # the reading holds all the same: between the sensor and `least`
         ahead = min(max(ahead, 0.0), least)
         for i in range(3):
             points[k, i] = position[k, i] + rotation[k, i, 2] * ahead
@@ -102,5 +109,5 @@ def closing_speeds(motion: FloatArray, unit: IntArray, direction: FloatArray, ou
         k, speed = unit[m], 0.0
         if not np.isnan(motion[0, k, 0]):
             for i in range(3):
-                speed -= motion[1, k, i] * direction[m, i]
+                speed -= motion[1, k, i] * direction[m, i]  # -v . u, u from the body to the object
         out[m] = min(max(speed, -FASTEST), FASTEST)

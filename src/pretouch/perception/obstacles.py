@@ -73,6 +73,7 @@ def poses(
     for k in range(len(link)):
         m = link[k]
         for i in range(3):
+            # row i of R_O_link; written out, for calling a linear algebra library for 3 x 3 numbers is slow
             x, y, z = link_rotation[m, i, 0], link_rotation[m, i, 1], link_rotation[m, i, 2]
             for j in range(3):
                 rotation[k, i, j] = x * T_link_sensor[k, 0, j] + y * T_link_sensor[k, 1, j] + z * T_link_sensor[k, 2, j]
@@ -91,7 +92,7 @@ def locate(position: FloatArray, rotation: FloatArray, distance: FloatArray) -> 
     point = np.empty((len(distance), 3))
     for k in range(len(distance)):
         for i in range(3):
-            point[k, i] = position[k, i] + rotation[k, i, 2] * distance[k]
+            point[k, i] = position[k, i] + rotation[k, i, 2] * distance[k]  # R [0 0 d]^T is d times R's third column
     return point
 
 
@@ -116,7 +117,9 @@ def is_evidence(readings: RangeReadings, distance: FloatArray) -> BoolArray:
     return tells_anything(readings.distance, readings.status, distance)
 
 
+# UM2356: 6 is a valid range whose wrap-around was not checked, 11 one of several pulses merged into one
 _SHOWN = tuple(int(s) for s in (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED))
+# something is there, but the distance that comes with it is not used
 _NEAR = (int(RangeStatus.MIN_RANGE), int(RangeStatus.MIN_CLIPPED))
 _NO_TARGET = tuple(
     int(s) for s in (RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED)
@@ -129,6 +132,7 @@ def tells_anything(distance: FloatArray, status: IntArray, shown: FloatArray) ->
     """Answer of `is_evidence`; `shown` (K,) is that of `measured_distance`."""
     tells = np.empty(len(status), np.bool_)
     for k in range(len(status)):
+        # a number beyond the data sheet's range is no distance, but the sensor is at work; infinity and NaN are faults
         far = status[k] in _SHOWN and np.isfinite(distance[k]) and distance[k] > MAX_DISTANCE
         tells[k] = not np.isnan(shown[k]) or far or status[k] in _NO_TARGET
     return tells
@@ -141,7 +145,7 @@ def measured(distance: FloatArray, status: IntArray, shown: FloatArray) -> None:
         shown[k] = np.nan
         if status[k] in _NEAR:
             shown[k] = MIN_DISTANCE
-        elif status[k] in _SHOWN and 0 <= distance[k] <= MAX_DISTANCE:
+        elif status[k] in _SHOWN and 0 <= distance[k] <= MAX_DISTANCE:  # false for NaN
             shown[k] = max(distance[k], MIN_DISTANCE)
 
 
@@ -195,9 +199,11 @@ def take_in(point: FloatArray, times: FloatArray, new: NewReadings, now: float, 
     stamp, points, fresh, shows, tells = new
     for k in range(len(stamp)):
         if fresh[k]:
+            # a failure is used up but not heard, so it ages the unit as silence does
             times[USED, k] = stamp[k]
             if tells[k]:
                 times[HEARD, k] = stamp[k]
+            # a reading that is too old on arrival shows nothing: its point would be given up in this very step
             if shows[k] and now - stamp[k] <= persistence:
                 times[SEEN, k] = stamp[k]
                 for i in range(3):
@@ -217,5 +223,5 @@ def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
     """Answer of `is_fresh`."""
     fresh = np.empty(len(stamp), np.bool_)
     for k in range(len(stamp)):
-        fresh[k] = used[k] < stamp[k] <= now
+        fresh[k] = used[k] < stamp[k] <= now  # false for NaN, and for -inf: never heard
     return fresh

@@ -74,9 +74,11 @@ def see_outside(
         state = outside_init(model, params.outside_points)
     ends = placed_ends(model.body.link, model.body.a, model.body.b, kin.position, kin.rotation)
     body = CapsuleArrays(model.body.link, ends[0], ends[1], model.body.radius)
+    # a source gives the same set until it has a newer one: each is taken in once
     if points is not None and state.heard < points.heard <= now:
         state = _taken(state, points, body, setup, kin, robot, now)
     before = state.tracks
+    # of the tracks `_shown` changes the directions alone
     count, direction = len(state.sigma), before.direction.copy()
     indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
     silence = params.outside_silent_after_s if params.keep_while_silent else 0.0
@@ -110,6 +112,7 @@ def outside_silence(state: OutsideState | None, unfit: str, now: float, params: 
         return 1.0, ""
     if unfit:
         return 0.0, unfit
+    # where no source was ever heard of, none is missed
     silence = -math.inf if state is None else now - state.heard
     if silence <= params.outside_slow_after_s:
         return 1.0, ""
@@ -131,6 +134,7 @@ def _taken(
     tracks, sigma = TrackState(old.point.copy(), old.direction, old.times.copy(), motion), state.sigma.copy()
     place = np.full(len(model.links), -1, dtype=np.int64)
     place[moving_links(model)] = np.arange(len(sigma) // params.outside_points)
+    # the whole arm explains points, the base too, while only links that move have places for them
     arm_ends = placed_ends(arm.link, arm.a, arm.b, kin.position, kin.rotation)
     other_ends = placed_ends(others.link, others.a, others.b, kin.position, kin.rotation)
     take_points(
@@ -190,22 +194,26 @@ def _shown(
     ee_distance, body_distance = scalars[0], scalars[1]
     found = 0
     for p in range(len(sigma)):
+        # nothing was heard since the point was seen, and silence is no free space
         unanswered = times[HEARD, p] <= times[SEEN, p]
         if now - times[SEEN, p] <= (max(persistence, silence) if unanswered else persistence):
             place[found] = p
             near[found], direction[found] = point[p], last_direction[p]
             if np.isnan(direction[found, 0]):
+                # any unit vector will do: it stays only for a point on a capsule's axis, see `closest`
                 direction[found, 0], direction[found, 1], direction[found, 2] = 0.0, 0.0, 1.0
             found += 1
     near, direction = near[:found], direction[:found]
     closest(body, near, ClosestArrays(body_point, link, direction, body_distance))
     distances(near, ee, ee_distance)
     if params.closing_speed:
+        # by place: afterwards `place` becomes the index behind those of the skin's units
         closing_speeds(motion, place[:found], direction, scalars[2])
     nearest = np.inf
     for m in range(found):
         p = place[m]
         last_direction[p] = direction[m]
+        # eqs. 5-7 know penetration; eq. 3 makes a speed factor of the other distance, so that one ends at 0
         body_distance[m] -= sigmas * sigma[p]
         ee_distance[m] = max(0.0, ee_distance[m] - sigmas * sigma[p])
         nearest = min(nearest, ee_distance[m])

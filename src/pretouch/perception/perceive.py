@@ -127,11 +127,14 @@ def perceive(
     params, count = setup.params, len(setup.skin)
     if not params.enabled or count == 0:
         return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0), state
+    # a step is pure: what compiled code writes to is copied first
     motion = state.motion.copy() if params.closing_speed else state.motion
     tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy(), motion)
     moving = robot if params.place_at_stamp else None
     distance = np.empty(count)
     indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
+    # The fields of _Tracks, _Readings, Instant, _Room and Kinematics in their order, which nothing checks, then those
+    # that stay the same. Given as groups they would cost 1 us more (docs/explanation/design.md).
     found, nearest, oldest = _perceive.flat(
         tracks.point, tracks.direction, tracks.times, tracks.motion,
         readings.stamp, readings.distance, readings.status,
@@ -210,6 +213,7 @@ def _perceive(
     fresh, any_fresh = newer(times[USED], readings.stamp, now), False
     for k in range(len(fresh)):
         any_fresh = any_fresh or fresh[k]
+    # casting cones is what a new reading costs: a step without one leaves it out
     if any_fresh:
         _take_readings(tracks, kin, scene, skin, readings, p, instant, NewShown(distance, fresh))
 
@@ -220,6 +224,7 @@ def _perceive(
     ee_distance, body_distance = room.scalars[0], room.scalars[1]
     found = 0
     for k in range(len(unit)):
+        # nothing was heard since the point was seen: silence is no free space, and keeps it for `silence_s`
         unanswered = times[HEARD, k] <= times[SEEN, k]
         if now - times[SEEN, k] <= (max(p.persistence_s, p.silence_s) if unanswered else p.persistence_s):
             unit[found] = k
@@ -235,6 +240,7 @@ def _perceive(
     closest(placed_capsules(scene.body, kin), near, ClosestArrays(body_point, link, direction, body_distance))
     distances(near, kin.position[scene.ee], ee_distance)
     if p.sigmas > 0:
+        # only the distances: direction and body point stay those of the point of eq. 1
         bring_nearer(body_distance, ee_distance, near, unit, p.sigmas, skin, kin)
     if p.estimates:
         closing_speeds(tracks.motion, unit[:found], direction, room.scalars[2])
@@ -267,6 +273,7 @@ def _take_readings(
     position, rotation = poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
     sensors = Sensors(position, rotation, skin.link)
     tells, shows = tells_anything(readings.distance, readings.status, distance), np.empty(len(distance), np.bool_)
+    # a return expected before `ends`, up to `margin_m` behind the reading, explains it: nothing is seen through a body
     ends = distance + p.margin_m
     for k in range(len(shows)):
         shows[k] = not np.isnan(distance[k])
@@ -277,16 +284,18 @@ def _take_readings(
     if instant.moves:
         # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
         chain = Chain(kin.anchor, kin.axis, scene.moved_by, instant.qd)
+        # changes `position` and `rotation`, the arrays of `sensors`, for all that follows
         move_back(sensors, readings.stamp, chain, instant.posed, p.persistence_s)
     if p.filters:
         leave_out(shows, fresh, ends, sensors, placed_capsules(scene.others, kin), scene.rays)
         leave_out_planes(shows, fresh, ends, position, rotation, scene.planes, scene.rays)
     points = locate(position, rotation, distance)  # eq. 1
+    # both look at what was seen last, before `take_in` overwrites it
     if p.reckons:
         before = LastSeen(tracks.point, times[SEEN], tracks.motion)
         reckon(points, distance, readings.stamp, before, sensors, MIN_DISTANCE, 3 * p.persistence_s)
     if p.estimates:
-        taken = fresh & shows & (now - readings.stamp <= p.persistence_s)
+        taken = fresh & shows & (now - readings.stamp <= p.persistence_s)  # by `take_in`
         follow_points(tracks.motion, tracks.point, times[SEEN], points, readings.stamp, taken, p.memory_s)
     new = NewReadings(readings.stamp, points, fresh, shows, tells)
     take_in(tracks.point, times, new, now, p.persistence_s)
@@ -311,4 +320,5 @@ def silent_units(
         return 1.0, ""
     silent = np.flatnonzero(now - state.heard >= params.silent_after_s).tolist()
     names = ", ".join(skin.ids[k] + _FAILURES.get(int(status[k]), "") for k in silent)
+    # from 1 at `slow_after_s` to 0 at `silent_after_s`; the silence of a unit never heard is infinite
     return max(0.0, (params.silent_after_s - silence) / (params.silent_after_s - params.slow_after_s)), names

@@ -60,6 +60,7 @@ def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:
         capsules=Capsules(
             link=np.zeros(1, np.int64),
             a=np.array([[0.0, 0.0, floor]]),
+            # the rounded top ends at the origin, where the arm begins
             b=np.array([[0.0, 0.0, -radius]]),
             radius=np.array([radius]),
         ),
@@ -104,6 +105,7 @@ def leave_out(
     spheres = bounds(capsules.a, capsules.b, capsules.radius)
     for k in range(len(shows)):
         if fresh[k] and shows[k]:
+            # `ends` twice: nothing farther explains the reading, and the first return within is enough
             shows[k] = capsule_return(sensors, k, capsules, spheres, rays, ends[k], ends[k]) > ends[k]
 
 
@@ -142,13 +144,15 @@ def capsule_return(
     least = np.inf
     for c in range(len(link)):
         reach = spheres[3, c] + _ROUNDING
-        if link[c] == own or far2[c] > (within + reach) ** 2:
+        if link[c] == own or far2[c] > (within + reach) ** 2:  # a unit does not see its own link
             continue
         # the cone can meet the sphere only if it is ahead, and if cos l - sin z <= reach as in `_cone_meets`
         along = spheres[0, c] * bx + spheres[1, c] * by + spheres[2, c] * bz - start
+        # the test below is squared: `inside` is positive where along >= -reach, for sin < 1
         inside = reach + _SIN * along
         if along < -reach or (far2[c] - along * along) * (_COS * _COS) > inside * inside:
             continue
+        # rays cost most: they are cast only at what passes both tests
         if _cone_meets(sensors, k, capsules, c, within):
             least = min(least, _cast(sensors, k, capsules, c, rays, enough))
             if least <= enough:
@@ -165,12 +169,13 @@ def plane_return(
     for m in range(len(planes)):
         normal = planes[m]
         height = normal[0] * position[k, 0] + normal[1] * position[k, 1] + normal[2] * position[k, 2] - normal[3]
+        # seen from its free side only; no ray comes to the plane in less than the height over it
         if 0 <= height <= within:
             for i in range(len(rays)):
                 rotate(rotation[k], rays[i], ray)
                 rate = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
                 if rate < 0:
-                    least = min(least, -height / rate)
+                    least = min(least, -height / rate)  # height + t rate = 0
     return least if least <= within else np.inf
 
 
@@ -188,7 +193,7 @@ def _cone_meets(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, withi
     x, y, z = a[c, 0] - position[k, 0], a[c, 1] - position[k, 1], a[c, 2] - position[k, 2]
     bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
     start, rise = x * bx + y * by + z * bz, ux * bx + uy * by + uz * bz
-    if max(start, start + rise) < -reach:
+    if max(start, start + rise) < -reach:  # all of it is behind the sensor
         return False
     if to_axis(position, k, a, b, c)[1] > within + reach:
         return False
@@ -200,11 +205,13 @@ def _cone_meets(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, withi
         _COS * np.sqrt(across) - _SIN * start,
         _COS * np.sqrt(max(0.0, across + 2 * mixed + slope)) - _SIN * (start + rise),
     )
+    # The slope vanishes where l cos grows as fast as z sin. With spread <= 0 it does so nowhere: the axis is closer to
+    # the beam's direction than the edge of the cone is, and the least value is at an end.
     spread = _COS * _COS * slope - _SIN * _SIN * rise * rise
     if slope > 0 and spread > 0:
         middle = -mixed / slope
         off = np.sqrt(max(0.0, across - mixed * mixed / slope))
-        s = middle + _SIN * rise * off / np.sqrt(slope * spread)
+        s = middle + _SIN * rise * off / np.sqrt(slope * spread)  # (s - middle)^2 slope spread = (sin rise off)^2
         if 0 < s < 1:
             l2 = max(0.0, across + s * (2 * mixed + s * slope))
             least = min(least, _COS * np.sqrt(l2) - _SIN * (start + s * rise))
@@ -229,6 +236,7 @@ def _cast(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, rays: Float
         R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
         R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
     )
+    # a . a, a . o and o . o are the same for all rays
     aa, ao, oo = ux * ux + uy * uy + uz * uz, ux * x + uy * y + uz * z, x * x + y * y + z * z
     if _inside(aa, ao, oo, radius):
         return 0.0
@@ -256,20 +264,22 @@ def ray_capsule(p: FloatArray, ray: FloatArray, a: FloatArray, b: FloatArray, ra
 def _inside(aa: float, ao: float, oo: float, radius: float) -> bool:
     """Whether a point lies in a capsule; aa, ao and oo are products of its axis a and the point's offset o from it."""
     along = 0.0 if aa == 0 else min(1.0, max(0.0, ao / aa))
-    return bool(oo - along * (2 * ao - along * aa) <= radius * radius)
+    return bool(oo - along * (2 * ao - along * aa) <= radius * radius)  # |o - s a|^2 <= r^2
 
 
 @compiled
 def _from_outside(aa: float, ao: float, oo: float, ar: float, rest: float, radius: float) -> float:
     """Answer of `ray_capsule` outside of it; as for `_inside`, and with the ray r, ar = a . r and rest = o . r."""
     best = np.inf
+    # the endless cylinder round the axis: quad t^2 + 2 half_b t + (aa oo - ao^2 - r^2 aa) = 0 with |r| = 1
     quad = aa - ar * ar
-    if quad > 1e-12 * aa:
+    if quad > 1e-12 * aa:  # else along the axis, or a ball: only the end spheres can be met
         half_b = aa * rest - ao * ar
         disc = half_b * half_b - quad * (aa * oo - ao * ao - radius * radius * aa)
         if disc < -1e-9 * quad * aa:
             return best  # past the whole cylinder, and the spheres at its ends with it
         t = (-half_b - np.sqrt(max(disc, 0.0))) / quad
+        # met between both ends, 0 < a . (o + t r) < a . a; a start on the surface may be rounded to behind it
         if disc >= 0 and t >= -_ROUNDING and 0 < ao + t * ar < aa:
             best = max(t, 0.0)
     for end in range(2):
@@ -277,6 +287,7 @@ def _from_outside(aa: float, ao: float, oo: float, ar: float, rest: float, radiu
         half_b = rest - end * ar
         disc = half_b * half_b - (oo - end * (2 * ao - aa) - radius * radius)
         if disc >= 0:
+            # from outside: where the nearer root is behind, so is the whole sphere
             t = -half_b - np.sqrt(disc)
             if 0 <= t < best:
                 best = t

@@ -64,6 +64,7 @@ def ways_free(
     for w in range(len(start)):
         free[w] = True
         for m in range(len(planes)):
+            # the height of the centre over the plane is linear along the way: it is least at one of its ends
             height, rise = -planes[m, 3], 0.0
             for i in range(3):
                 height += planes[m, i] * start[w, i]
@@ -71,6 +72,7 @@ def ways_free(
             free[w] &= height + min(0.0, length * rise) >= radius
         for c in range(len(thickness)):
             if free[w] and c != own[w]:
+                # the ball meets it where its centre is within both radii: a ray against a capsule grown by the ball's
                 reach = max(thickness[c] + radius - _TOUCHING_M, 0.0)
                 free[w] = ray_capsule(start[w], way[w], a[c], b[c], reach) > length
 
@@ -103,9 +105,11 @@ def ways_seen(
             seen[k, w] = False
             if not free[w]:
                 continue
+            # from the unit the centre is at p + s u: |p + s u|^2 = p . p + s (2 p . u + s), depth linear in s
             x, y, z = start[w, 0] - ox, start[w, 1] - oy, start[w, 2] - oz
             ux, uy, uz = way[w, 0], way[w, 1], way[w, 2]
             along, offset2 = x * ux + y * uy + z * uz, x * x + y * y + z * z
+            # where it comes nearest within the stretch, at s = -p . u or an end, it must be in reach at all
             closest = min(max(-along, near), far)
             if offset2 + closest * (2 * along + closest) > reach * reach:
                 continue
@@ -120,7 +124,7 @@ def ways_seen(
                         break
                 else:
                     in_row = 0
-                    if last - i <= run:
+                    if last - i <= run:  # too few places are left for `run` + 1 in a row
                         break
 
 
@@ -138,14 +142,17 @@ def in_view(depth: float, distance2: float, radius: float, limit: float, light: 
         limit: farthest reading that counts [m].
         light: square of the distance at which something that fills the cone, as slanted as a ball, is just seen [m^2].
     """
-    if distance2 <= radius * radius:
+    if distance2 <= radius * radius:  # the unit is inside the ball
         return True
+    # the mean height of a half-ball over its disc is 2/3 of the radius
     read = np.sqrt(distance2) - 2.0 / 3.0 * radius
     if depth <= 0 or read > limit:
         return False
+    # the ball is taken for a disc across the beam at the depth of its centre: both circles lie in that plane
     cone, aside = depth * _TAN, np.sqrt(max(0.0, distance2 - depth * depth))
     if aside >= cone + radius:
         return False
+    # light A / d^2 >= 1 with A = common area / cone area, multiplied out
     return bool(light * common_area(radius, cone, aside) >= np.pi * cone * cone * read * read)
 
 
@@ -154,9 +161,10 @@ def common_area(r: float, R: float, apart: float) -> float:
     """Area [m^2] that two circles of radii r and R [m] share, whose centres are `apart` [m]."""
     if apart >= r + R:
         return 0.0
-    if apart <= abs(R - r):
+    if apart <= abs(R - r):  # one lies inside the other
         least = min(r, R)
         return np.pi * least * least
+    # two sectors, their half angles by the law of cosines, less the kite of both centres and both crossings
     first = min(1.0, max(-1.0, (apart * apart + r * r - R * R) / (2 * apart * r)))
     second = min(1.0, max(-1.0, (apart * apart + R * R - r * r) / (2 * apart * R)))
     kite = (r + R - apart) * (apart + r - R) * (apart - r + R) * (apart + r + R)

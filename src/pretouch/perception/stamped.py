@@ -28,9 +28,11 @@ def move_back(sensors: Sensors, stamp: FloatArray, chain: Chain, posed: float, l
     v, w, turned = np.empty(3), np.empty(3), np.empty(3)
     for k in range(len(unit_link)):
         age = min(posed - stamp[k], longest)
+        # measured after the posture: how the arm goes on is not known
         if not age > 0.0:
             continue
         v[:], w[:] = 0.0, 0.0
+        # v = sum of qd_j a_j x (p - p_j) and w = sum of qd_j a_j, over the joints that move the link
         for j in range(len(qd)):
             if moved_by[unit_link[k], j]:
                 x, y, z = position[k, 0] - anchor[j, 0], position[k, 1] - anchor[j, 1], position[k, 2] - anchor[j, 2]
@@ -41,10 +43,10 @@ def move_back(sensors: Sensors, stamp: FloatArray, chain: Chain, posed: float, l
                     w[i] += axis[j, i] * qd[j]
         speed = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
         for i in range(3):
-            position[k, i] -= age * v[i]
-        if speed == 0.0:
+            position[k, i] -= age * v[i]  # p(stamp) = p - age v, to first order
+        if speed == 0.0:  # there is no axis to turn about
             continue
-        # the formula of Rodrigues, about -w
+        # R(stamp) = exp(-age [w]) R by the formula of Rodrigues, column by column
         s, c = math.sin(-age * speed), math.cos(age * speed)
         for i in range(3):
             w[i] /= speed

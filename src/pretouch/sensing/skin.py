@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from pretouch.atomic_write import atomic_write
 from pretouch.errors import SkinError
 from pretouch.groups import SkinArrays
+from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.seat import seat
 from pretouch.sensing.unit import (
@@ -125,13 +126,35 @@ def paper_skin(model: RobotModel) -> Skin:
 
     The paper does not publish its layout; this one is ours, for Panda and FR3. Raises SkinError for another arm.
     """
-    path = PAPER_SKIN.with_name(f"{model.description.name}_seven_units.toml")
+    return load_skin(_seven_units(model.description), model)
+
+
+def _seven_units(arm: RobotDescription) -> Path:
+    path = PAPER_SKIN.with_name(f"{arm.name}_seven_units.toml")
     if not path.is_file():
         raise SkinError(
-            f"There is no skin of seven units for {model.description.name}: write a file like {PAPER_SKIN.name} for it,"
-            " and load it with load_skin."
+            f"The arm {arm.name} comes without a skin: write a file like {PAPER_SKIN.name} for it, or"
+            f" put {OWN_SKIN} beside its model."
         )
-    return load_skin(path, model)
+    return path
+
+
+OWN_SKIN = "skin.toml"
+"""A skin beside the model of an imported arm."""
+
+
+def skin_file(arm: RobotDescription) -> Path:
+    """Return the file of the skin that an arm comes with; SkinError where there is none.
+
+    That is skin.toml beside its model, or else, for Panda and FR3, that of `paper_skin`.
+    """
+    own = arm.mjcf.with_name(OWN_SKIN)
+    return own if own.is_file() else _seven_units(arm)
+
+
+def skin_for(model: RobotModel, file: Path | str = "") -> Skin:
+    """Return the skin of a file, or without one the skin that the arm comes with."""
+    return load_skin(file or skin_file(model.description), model)
 
 
 _KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad", "touch")

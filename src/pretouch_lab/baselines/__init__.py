@@ -1,1 +1,1 @@
-"""What Pretouch is compared with, as parts of a profile by entry points, as anybody else's."""
+"""What Pretouch is compared with: parts by entry points, and the profiles of each benchmark."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 BASE = "pretouch"
 WITHOUT = "without "
-"""Begins the names of these contenders."""
+"""Begins the names of these baselines."""
 
 OFF = {
     "perception.closing_speed": "no",
@@ -49,7 +49,7 @@ class Ablation:
 
     @property
     def name(self) -> str:
-        """Name of the contender."""
+        """Name of the baseline."""
         return f"{WITHOUT}{self.switch}"
 
     @property

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,8 +20,7 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import IntArray, Mode
 from pretouch_lab.benchmarks.workload import UNIT_RATE, Workload
-
-Row = dict[str, Any]
+from pretouch_lab.rows import Row
 
 _SETTLE = 500
 """Cycles after the force window is full in which the arm gets up to speed."""

@@ -7,7 +7,7 @@ from pretouch.text_table import TextTable
 from pretouch_lab.benchmarks.ablations import BASE
 from pretouch_lab.benchmarks.bounds import share_below, short
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.rows import Row
 
 PEAK_ESTIMATE, TRUE_PEAK, SOONER, SHORTER = 5.0, 4.0, 2.0, 0.3
 """Times the peaks are to be smaller and the first contact sooner; part by which a turn is to be shorter."""
@@ -57,9 +57,9 @@ def goals(detection: Row, avoidance: Row) -> list[Goal]:
 
 def goal_table(detection: Row, avoidance: Row) -> TextTable:
     """Return the goals as a table."""
-    told = [part["about"] for part in (detection, avoidance)]
+    abouts = [part["about"] for part in (detection, avoidance)]
     kinds = ", ".join(
-        f"{about['bench']} {'quick' if about['quick'] else 'full'}, {about['seeds']} seeds" for about in told
+        f"{about['bench']} {'quick' if about['quick'] else 'full'}, {about['seeds']} seeds" for about in abouts
     )
     return TextTable(
         "The goals of pretouch", ("goal", "", "measured", "95 % bounds"),
@@ -68,18 +68,18 @@ def goal_table(detection: Row, avoidance: Row) -> TextTable:
     )  # fmt: skip
 
 
-def find(rows: list[Row], contender: str, name: str, seen: bool | None = None) -> Row | None:
-    """Return a contender's row of a scenario, None if there is none."""
-    where = {"contender": contender, "scenario": name, "seen": seen}
+def find(rows: list[Row], baseline: str, name: str, seen: bool | None = None) -> Row | None:
+    """Return a baseline's row of a scenario, None if there is none."""
+    where = {"contender": baseline, "scenario": name, "seen": seen}
     return next((row for row in rows if all(row[key] == value for key, value in where.items())), None)
 
 
 def _false_alarms(rows: list[Row]) -> list[Goal]:
     limit = scenario("contacts")["goal"]["false_alarms_per_hour"]
-    told = {"goal": "all", "goal, nobody near": "nobody near", "goal, somebody standing": "somebody standing near",
+    near = {"goal": "all", "goal, nobody near": "nobody near", "goal, somebody standing": "somebody standing near",
             "goal, somebody passing": "somebody passing"}  # fmt: skip
     found = []
-    for name, text in told.items():
+    for name, text in near.items():
         row, wanted = find(rows, BASE, f"free: {name}"), f"at most {limit:g} false alarm an hour at 0.3 m/s: {text}"
         found.append(Goal(wanted, "-", "-", None) if row is None else Goal(
             wanted, f"{short(row['false_alarms_per_hour'])}/h ({row['false_alarms']} in {row['hours']:.2g} h)",

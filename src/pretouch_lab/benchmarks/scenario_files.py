@@ -1,6 +1,7 @@
 """The scenario files: what is played, fixed with checksums before any detector was built."""
 
 import tomllib
+from collections.abc import Iterator
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -46,6 +47,21 @@ def checksums(folder: Path = FOLDER) -> dict[str, str]:
         raise ExperimentError(f"The checksums in {folder} cannot be read: {error.strerror}: install again.") from error
     pairs = [line.split() for line in lines if line.strip()]
     return {name: digest for digest, name in pairs}
+
+
+def numbered(
+    family: dict[str, Any], entries: list[dict[str, Any]], seeds: SeedRange, quick: bool
+) -> Iterator[tuple[dict[str, Any], int]]:
+    """Give each entry of a family as often as it is played, each time with a seed of its own.
+
+    The n-th of the full run has the n-th seed, in a quick run too.
+    """
+    number = 0
+    for entry in entries:
+        for i in range(entry["full"]):
+            if i < entry["quick"] or not quick:
+                yield entry, seed_of(family, seeds, number)
+            number += 1
 
 
 def seed_of(family: dict[str, Any], seeds: SeedRange, number: int) -> int:

@@ -1,4 +1,4 @@
-"""How contenders look in all figures: one colour and one kind of line each, told apart by the colour-blind too."""
+"""How baselines look in all figures: one colour and one kind of line each, told apart by the colour-blind too."""
 
 from typing import Any
 
@@ -20,39 +20,39 @@ _LOOKS = {
     "paper-off": ("#e69f00", "--", "X"),
     "pretouch": ("#0072b2", "-", "o"),
 }
-"""Colour (Okabe and Ito, 2008), line and marker of each contender."""
+"""Colour (Okabe and Ito, 2008), line and marker of each baseline."""
 _OTHER = ("#b5b500", ":", "h")
 
 
-def colour(contender: str) -> str:
-    """Return a contender's colour."""
-    return _LOOKS.get(contender, _OTHER)[0]
+def colour(baseline: str) -> str:
+    """Return a baseline's colour."""
+    return _LOOKS.get(baseline, _OTHER)[0]
 
 
-def point(contender: str) -> dict[str, Any]:
-    """Return how a contender's point is drawn: hollow where its line is broken."""
-    colour, dashes, marker = _LOOKS.get(contender, _OTHER)
+def point(baseline: str) -> dict[str, Any]:
+    """Return how a baseline's point is drawn: hollow where its line is broken."""
+    colour, dashes, marker = _LOOKS.get(baseline, _OTHER)
     return {"color": colour, "marker": marker, "ls": "", "mfc": "none" if dashes == "--" else colour, "mew": 1.5}
 
 
-def marker(contender: str) -> str:
-    """Return a contender's marker."""
-    return _LOOKS.get(contender, _OTHER)[2]
+def marker(baseline: str) -> str:
+    """Return a baseline's marker."""
+    return _LOOKS.get(baseline, _OTHER)[2]
 
 
-def line(contender: str) -> dict[str, Any]:
-    """Return how a contender's line is drawn: ours is wider, and none is hidden by it."""
-    ours = contender == "pretouch"
+def line(baseline: str) -> dict[str, Any]:
+    """Return how a baseline's line is drawn: ours is wider, and none is hidden by it."""
+    ours = baseline == "pretouch"
     return {
-        "color": colour(contender),
-        "ls": _LOOKS.get(contender, _OTHER)[1],
+        "color": colour(baseline),
+        "ls": _LOOKS.get(baseline, _OTHER)[1],
         "lw": 2.2 if ours else 1.3,
         "zorder": 2.0 if ours else 2.5,
     }
 
 
 def shown(names: list[str]) -> list[str]:
-    """Return the contenders that figures show: ablations are in tables."""
+    """Return the baselines that figures show: ablations are in tables."""
     return [name for name in names if not name.startswith(WITHOUT)]
 
 

@@ -8,11 +8,8 @@ import tyro
 
 from pretouch.cli.words import words
 from pretouch.errors import ParameterError
-from pretouch_lab.cli.bench_avoidance import Avoidance
-from pretouch_lab.cli.bench_both import Both
 from pretouch_lab.cli.bench_calibration import Calibration
-from pretouch_lab.cli.bench_detection import Detection
-from pretouch_lab.cli.bench_localization import Localization
+from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization
 
 
 @dataclass(frozen=True)

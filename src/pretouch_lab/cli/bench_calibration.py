@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 from pretouch.cli.calibrate.options import MotionOptions
 from pretouch.errors import CalibrationError
@@ -19,8 +18,8 @@ class Calibration:
     find_links: bool = False
     """Do not tell the calibration which links the units sit on."""
     motion: MotionOptions = field(default_factory=MotionOptions)
-    arm: Literal["panda", "fr3"] = "panda"
-    """The arm."""
+    arm: str = "panda"
+    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
     json: str = ""
     """File for all numbers."""
     seed: int = 0
@@ -34,21 +33,15 @@ class Calibration:
 def bench_calibration(command: Calibration) -> None:
     """Calibrate random skins, show how far the answers are off, and write them down."""
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
 
     from pretouch.atomic_write import write_json
     from pretouch.calibration.motion.planner import plan_motion
-    from pretouch.cli.arms import arm_model
     from pretouch.cli.calibrate.motion import plan_params
     from pretouch.cli.tables import show
     from pretouch.cli.writing import check_writable, unwritable_said
+    from pretouch.robot.model import RobotModel
+    from pretouch.robot.named import robot_named
+    from pretouch_lab.cli.progress import bar
     from pretouch_lab.studies.calibration.study import study
     from pretouch_lab.studies.calibration.table import tables
 
@@ -59,14 +52,13 @@ def bench_calibration(command: Calibration) -> None:
         raise CalibrationError(f"The seed is {command.seed}: it must be at least 0.")
     if json_file:
         check_writable("file", json_file)
-    model = arm_model(command.arm)
+    model = RobotModel(robot_named(command.arm))
     plan = None if command.motion == MotionOptions() else plan_motion(model, plan_params(command.motion))
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        task = bar.add_task("simulations", total=command.skins * (1 + command.compared))
+    name = "simulations"
+    with bar(Console(stderr=True), name, command.skins * (1 + command.compared)) as advance:
         found = study(
             model, command.skins, command.seed, command.compared, not command.find_links, plan,
-            progress=lambda done, _total: bar.update(task, completed=done),
+            progress=lambda: advance(1, name),
         )  # fmt: skip
     console = Console(highlight=False)
     show(console, tables(found))

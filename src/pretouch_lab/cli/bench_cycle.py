@@ -2,19 +2,18 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from pretouch.atomic_write import write_json
+from pretouch.cli.tables import grid
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError
 from pretouch.realtime import check_wishes
 from pretouch_lab.benchmarks.cycle import CycleRequest, about, measure
 from pretouch_lab.benchmarks.workload import LARGEST_SKIN
-
-Row = dict[str, Any]
+from pretouch_lab.rows import Row
 
 _SPREAD = {"median": "median_us", "99 %": "p99_us", "99.9 %": "p999_us", "largest": "max_us"}
 
@@ -72,28 +71,19 @@ def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
         console.print(f"With {', '.join(idle)} points the arm did not follow its path in every cycle.", markup=False)
 
 
-def _times(rows: list[Row], rate: float) -> Table:
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("points", justify="right")
-    table.add_column("")
-    for name in (*_SPREAD, "overruns", "restricting"):
-        table.add_column(name, justify="right")
+def _times(measured: list[Row], rate: float) -> Table:
+    rows = []
     runs = {"CPU": "", "CPU, all new": "all_new_", f"CPU at {rate:g} Hz": "at_rate_", f"wall at {rate:g} Hz": "wall_"}
-    for row in rows:
+    for row in measured:
         for name, prefix in runs.items():
             took = [f"{row[prefix + key]:.0f}" for key in _SPREAD.values()]
             first = str(row["points"]) if not prefix else ""
             overruns = str(row["overruns"]) if prefix == "wall_" else ""
             restricting = f"{row['restricting_median']:.0f}" if not prefix else ""
-            table.add_row(first, name, *took, overruns, restricting)
-    return table
+            rows.append((first, name, *took, overruns, restricting))
+    return grid(("points", "", *_SPREAD, "overruns", "restricting"), rows, left=(1,))
 
 
 def _shares(rows: list[Row]) -> Table:
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("points", justify="right")
-    for row in rows:
-        table.add_column(str(row["points"]), justify="right")
-    for stage in rows[0]["stages"]:
-        table.add_row(stage, *(f"{100 * row['stages'][stage]:.0f}" for row in rows))
-    return table
+    lines = [(stage, *(f"{100 * row['stages'][stage]:.0f}" for row in rows)) for stage in rows[0]["stages"]]
+    return grid(("points", *(str(row["points"]) for row in rows)), lines, left=())

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from pretouch.atomic_write import write_json
 from pretouch.cli.tables import show
@@ -15,11 +14,9 @@ from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError, PretouchError
 from pretouch_lab.campaign import (
     Request,
-    finished,
-    open_folder,
-    progress_of,
-    run_campaign,
 )
+from pretouch_lab.cli.progress import bar
+from pretouch_lab.engine import missing, rows_of, run_tasks
 from pretouch_lab.registry import summarise, tables
 from pretouch_lab.report import write_report
 
@@ -29,8 +26,7 @@ def run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) ->
     for _, out in parts:
         _check_apart(json_file, out)
     for request, out in parts:
-        request.context()
-        open_folder(request, out)
+        request.open(out)
     check_writable("file", json_file)
     try:
         _play(parts)
@@ -57,7 +53,7 @@ def run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) ->
 
 def _keep(parts: list[tuple[Request, Path]], json_file: Path) -> dict[str, Any]:
     """Write all finished trials and their summary, and return them."""
-    trials = [row for request, out in parts for row in finished(request, out)]
+    trials = [row for request, out in parts for row in rows_of(request.tasks(out))]
     results = {"trials": trials, "summary": summarise(trials)}
     with unwritable_said("file", json_file):
         write_json(results, json_file)
@@ -73,19 +69,18 @@ def _check_apart(json_file: Path, out: Path) -> None:
 
 
 def _play(parts: list[tuple[Request, Path]]) -> None:
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %")
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        so_far = [progress_of(request, out) for request, out in parts]
-        done, total = sum(p.cost_done for p in so_far), sum(p.cost_total for p in so_far)
-        task = bar.add_task("", total=total)
-        bar.update(task, completed=done)
-        left = sum(p.total - p.done for p in so_far)
+    tasks = [(request, out, request.tasks(out)) for request, out in parts]
+    every = [task for _, _, own in tasks for task in own]
+    undone = missing(every)
+    left, total = len(undone), sum(task.cost for task in every)
+    with bar(Console(stderr=True), "", total, total - sum(task.cost for task in undone)) as advance:
+        for request, out, own in tasks:
+            names = ", ".join(request.experiments)
+            advance(0.0, f"{names}; {left} trials left")
 
-        def advance(cost: float) -> None:
-            nonlocal left
-            left -= 1
-            bar.update(task, advance=cost, description=f"{', '.join(request.experiments)}; {left} trials left")
+            def progress(cost: float, names: str = names) -> None:
+                nonlocal left
+                left -= 1
+                advance(cost, f"{names}; {left} trials left")
 
-        for request, out in parts:
-            bar.update(task, description=f"{', '.join(request.experiments)}; {left} trials left")
-            run_campaign(request, out, advance)
+            run_tasks(own, out, progress)

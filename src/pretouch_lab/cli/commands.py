@@ -56,8 +56,8 @@ class Reproduce:
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
     arm: str = ""
-    """Folder of an arm that `pretouch robot import` wrote, for the static experiment; by default the Panda. The paper's
-    paths are scaled and moved into its reach, and the skin is the folder's own."""
+    """Name of an arm, or the folder of an imported one, for the static experiment; by default the Panda. The paper's
+    paths are scaled and moved into its reach, and the skin is the arm's own."""
     world: str = ""
     """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
     draws its own; by default the usual ones."""
@@ -72,9 +72,9 @@ class Reproduce:
         """Run the experiments, with results, recordings, figures and page."""
         from pretouch_lab.campaign import Request
         from pretouch_lab.cli.campaigns import run_all
+        from pretouch_lab.domain_randomisation import folder_part
         from pretouch_lab.paper.whole import whole_paper
         from pretouch_lab.registry import EXPERIMENTS
-        from pretouch_lab.worlds import folder_part
 
         everything = self.experiment == "all"
         request = Request(

@@ -79,32 +79,26 @@ def identify_arm(command: Identify) -> None:
 
 
 def _model(arm: str) -> "RobotModel | None":
-    from pretouch.robot.description import fr3, panda
-    from pretouch.robot.description_file import load_description
     from pretouch.robot.model import RobotModel
+    from pretouch.robot.named import robot_named
 
-    if not arm:
-        return None
-    known = {"panda": panda, "fr3": fr3}
-    return RobotModel(known[arm]() if arm in known else load_description(arm))
+    return RobotModel(robot_named(arm)) if arm else None
 
 
 def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     from rich.console import Console
-    from rich.table import Table
+
+    from pretouch.cli.tables import grid
 
     console = Console(highlight=False, soft_wrap=True, width=20 * (model.n + 2))
     console.print(f"{said}. {found.seconds:.0f} s of free motion are used.", markup=False)
     for note in found.notes:
         console.print(note, markup=False)
-    rows = joint_rows(found, model)
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("")
-    for joint in model.joints:
-        table.add_column(joint, justify="right", no_wrap=True)
-    for name, values, errors, told in rows:
-        table.add_row(name, *(_shown(*each) for each in zip(values, errors, told, strict=True)))
-    console.print(table)
+    rows = [
+        (name, *(_shown(*each) for each in zip(values, errors, identifiable, strict=True)))
+        for name, values, errors, identifiable in joint_rows(found, model)
+    ]
+    console.print(grid(("", *model.joints), rows, whole=1))
     payload, error = float(found.fit.numbers[-2]), float(found.fit.errors[-2])
     console.print(f"Payload {payload:.3f} +- {error:.3f} kg.", markup=False)
     noise = found.noise
@@ -125,9 +119,9 @@ def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     )
 
 
-def _shown(number: float, error: float, told: bool) -> str:
+def _shown(number: float, error: float, identifiable: bool) -> str:
     text = f"{number:.3g} +- {error:.1g}"
-    return text if told else f"({text})"
+    return text if identifiable else f"({text})"
 
 
 def joint_rows(found: "Identified", model: "RobotModel") -> list[tuple[str, Any, Any, Any]]:
@@ -135,17 +129,17 @@ def joint_rows(found: "Identified", model: "RobotModel") -> list[tuple[str, Any,
     import numpy as np
 
     own, errors = found.fit.of_joints(found.fit.numbers), found.fit.of_joints(found.fit.errors)
-    told = found.fit.of_joints(found.known().astype(np.float64)) > 0.5
+    identifiable = found.fit.of_joints(found.known().astype(np.float64)) > 0.5
     ripple, ripple_error, _ = found.ripple()
     n, first = model.n, own.size
     mass = slice(first, first + n)
     steep = np.exp(own[:, 2])
     seen = np.isfinite(found.noise.velocity_rad_s)  # else the noise of velocities is in that of torques
     return [
-        ("offset [Nm]", own[:, 0], errors[:, 0], told[:, 0]),
-        ("friction F1, not compensated [Nm]", own[:, 1], errors[:, 1], told[:, 1]),
-        ("friction F2 [s/rad]", steep, steep * errors[:, 2], told[:, 2]),
-        ("friction F3 [rad/s]", own[:, 3], errors[:, 3], told[:, 3]),
+        ("offset [Nm]", own[:, 0], errors[:, 0], identifiable[:, 0]),
+        ("friction F1, not compensated [Nm]", own[:, 1], errors[:, 1], identifiable[:, 1]),
+        ("friction F2 [s/rad]", steep, steep * errors[:, 2], identifiable[:, 2]),
+        ("friction F3 [rad/s]", own[:, 3], errors[:, 3], identifiable[:, 3]),
         ("ripple [Nm]", ripple, ripple_error, ripple > 3.0 * ripple_error),
         ("mass error of its links", found.fit.numbers[mass], found.fit.errors[mass], found.known()[mass]),
         (
@@ -167,9 +161,9 @@ def _numbers(found: "Identified", model: "RobotModel", source: str) -> dict[str,
         "of_joints": [
             {
                 "name": name, "values": values.tolist(), "standard_errors": errors.tolist(),
-                "told": [bool(t) for t in told],
+                "told": [bool(t) for t in identifiable],
             }
-            for name, values, errors, told in joint_rows(found, model)
+            for name, values, errors, identifiable in joint_rows(found, model)
         ],
         "payload_kg": [float(found.fit.numbers[-2]), float(found.fit.errors[-2])],
         "velocity_noise_rad_s": velocity,

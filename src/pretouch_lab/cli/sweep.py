@@ -69,8 +69,8 @@ def sweep(command: Sweep) -> None:
     from rich.console import Console
 
     from pretouch.cli.tables import show
-    from pretouch_lab.benchmarks.documents import around
-    from pretouch_lab.sweep.document import DOCUMENT, publish, tables, written
+    from pretouch_lab.documents import SENSITIVITY, around
+    from pretouch_lab.sweep.document import publish, tables, written
     from pretouch_lab.sweep.run import opened
 
     sweeps = defined(command)
@@ -78,7 +78,7 @@ def sweep(command: Sweep) -> None:
     docs = Path(command.docs) if command.docs else None
     if docs:
         for one in sweeps:
-            around(docs / DOCUMENT, one.name)  # an hour later would be late
+            around(docs / SENSITIVITY, one.name)  # an hour later would be late
     runs = [opened(one, out) for one in sweeps]
     for note in (note for run in runs for note in run.notes):
         print(note, file=sys.stderr)
@@ -144,8 +144,8 @@ def _play(runs: "list[Run]", command: Sweep) -> None:
     import os
 
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+    from pretouch_lab.cli.progress import bar
     from pretouch_lab.sweep.run import Where, play
 
     console, where = Console(stderr=True), Where(command.processes, command.scheduler)
@@ -155,13 +155,10 @@ def _play(runs: "list[Run]", command: Sweep) -> None:
     console.print(
         f"{wanted} cells to play, about {left / 60:.1f} min of a processor, on {who}.", highlight=False, markup=False
     )
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %")
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console) as bar:
-        shown = bar.add_task("sweep", total=total)
-        bar.update(shown, completed=total - left)
+    with bar(console, "sweep", total, total - left) as advance:
         for run in runs:
-            bar.update(shown, description=run.sweep.name)
-            play(run, where, lambda cost: bar.update(shown, advance=cost))
+            advance(0.0, run.sweep.name)
+            play(run, where, lambda cost, name=run.sweep.name: advance(cost, name))  # type: ignore[misc]
 
 
 def _say_failures(runs: "list[Run]") -> None:

@@ -15,7 +15,7 @@ def arm_toml(found: Identified, model: RobotModel, source: str) -> str:
     n, fitted, noise = model.n, found.fit, found.noise
     own, errors = fitted.of_joints(fitted.numbers), fitted.of_joints(fitted.errors)
     known = found.known()
-    told = fitted.of_joints(known.astype(np.float64)) > 0.5
+    identifiable = fitted.of_joints(known.astype(np.float64)) > 0.5
     kept = 1.0 - found.usual.friction_compensated
     ripple, ripple_error, phase = found.ripple()
     lines = [
@@ -25,11 +25,11 @@ def arm_toml(found: Identified, model: RobotModel, source: str) -> str:
         f"# friction_f1_nm is that, divided by {kept:g}.",
         f"# torque_noise_hz stays at {found.usual.torque_noise_hz:g}: the observer hides it.",
         "# stiffness, damping, rotor inertia and delays stay as they are: a residual does not tell them.",
-        *_field("offsets_nm", own[:, 0], errors[:, 0], told[:, 0]),
-        *_field("friction_f1_nm", own[:, 1] / kept, errors[:, 1] / kept, told[:, 1], at_least=0.0),
-        *_field("friction_f2_s_rad", np.exp(own[:, 2]), np.exp(own[:, 2]) * errors[:, 2], told[:, 2]),
-        *_field("friction_f3_rad_s", own[:, 3], errors[:, 3], told[:, 3]),
-        *_field("ripple_nm", ripple, ripple_error, told[:, 4] & (ripple > 3.0 * ripple_error)),
+        *_field("offsets_nm", own[:, 0], errors[:, 0], identifiable[:, 0]),
+        *_field("friction_f1_nm", own[:, 1] / kept, errors[:, 1] / kept, identifiable[:, 1], at_least=0.0),
+        *_field("friction_f2_s_rad", np.exp(own[:, 2]), np.exp(own[:, 2]) * errors[:, 2], identifiable[:, 2]),
+        *_field("friction_f3_rad_s", own[:, 3], errors[:, 3], identifiable[:, 3]),
+        *_field("ripple_nm", ripple, ripple_error, identifiable[:, 4] & (ripple > 3.0 * ripple_error)),
         *_field("ripple_phases_rad", phase, ripple_error / np.maximum(ripple, 1e-9), np.ones(n, np.bool_)),
         *_masses(found, model, known),
     ]
@@ -65,10 +65,10 @@ def _masses(found: Identified, model: RobotModel, known: BoolArray) -> list[str]
 
 
 def _field(
-    name: str, values: FloatArray, errors: FloatArray, told: BoolArray, at_least: float | None = None
+    name: str, values: FloatArray, errors: FloatArray, identifiable: BoolArray, at_least: float | None = None
 ) -> list[str]:
     shown = values if at_least is None else np.maximum(values, at_least)
-    unsure = [str(j + 1) for j in np.flatnonzero(~told)]
+    unsure = [str(j + 1) for j in np.flatnonzero(~identifiable)]
     said = [f"# joints {', '.join(unsure)}: the recording hardly tells"] if unsure else []
     return ["", f"[plant.{name}]", *said, f"value = {_list(shown)}", f"standard_error = {_list(errors)}"]
 

@@ -1,7 +1,6 @@
 """Paper IV-B: a person holds a hand beside the circle or into it, on one side and then on the other."""
 
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -14,10 +13,10 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.summary import avoidance_summary
 from pretouch_lab.tables import avoidance_tables
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 NAME = "avoidance"
 DEFAULT_RESTRICTIONS = "slack"
@@ -47,30 +46,17 @@ def visits(place: str, seed: int) -> tuple[Visit, ...]:
     )
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     hand = HandSpec()
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=SceneSpec(hand=hand),
-        path=Circle(),
-        seed=seed,
-        world=context.world,
-        plant=context.arm,
-        ranging=context.ranging,
-        recording=context.recording,
-        hand=Visitor(context.model, visits(str(cell.where["place"]), seed)),
+    setup = context.setup(
+        cell, seed, SceneSpec(hand=hand), Circle(), hand=Visitor(context.model, visits(str(cell.where["place"]), seed))
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     steps = record.steps
     off = [float(np.linalg.norm(s.ee_position - s.path_position)) for s in steps]
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         "contact": record.first_contact() is not None,
         "true_peak_n": rounded(float(np.linalg.norm(record.true_force, axis=1).max())),
         "least_gap_m": rounded(float(gaps(record, context.model, hand.radius).min()), 4),

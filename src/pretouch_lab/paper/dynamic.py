@@ -1,7 +1,5 @@
 """Paper IV-C: thirty seconds with a person who pushes the moving arm three times from different directions."""
 
-from typing import Any
-
 import numpy as np
 
 from pretouch.control.path import Circle
@@ -13,10 +11,10 @@ from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import angle_deg, peak, rounded
+from pretouch_lab.rows import Row, angle_deg, peak, rounded
 from pretouch_lab.summary import dynamic_summary
 from pretouch_lab.tables import dynamic_tables
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 NAME = "dynamic"
 DEFAULT_RESTRICTIONS = "slack"
@@ -36,22 +34,10 @@ def cells(grid: Grid) -> list[Cell]:
     ]
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     person, hand = Pusher(context.model, dynamic_pushes(seed)), HandSpec()
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=SceneSpec(hand=hand),
-        path=Circle(),
-        seed=seed,
-        world=context.world,
-        plant=context.arm,
-        ranging=context.ranging,
-        recording=context.recording,
-        hand=person,
-    )
+    setup = context.setup(cell, seed, SceneSpec(hand=hand), Circle(), hand=person)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     true = np.linalg.norm(record.true_force, axis=1)
     beginnings, spans = record.beginnings(), [span for span in person.contacts if span is not None]
@@ -103,9 +89,9 @@ def _touched_estimate(record: Record, spans: list[tuple[float, float]]) -> Float
 
 def _contact(
     record: Record, beginnings: list[tuple[ControlStep, FloatArray]], push: Push, touched: tuple[float, float] | None
-) -> dict[str, Any]:
+) -> Row:
     """Judge how the arm answered one push."""
-    row: dict[str, Any] = {
+    row: Row = {
         "detected": False,
         "delay_s": None,
         "direction_error_deg": None,

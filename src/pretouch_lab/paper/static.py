@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -12,10 +11,10 @@ from pretouch.traces import mean_over
 from pretouch.types import ControlStep
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import peak, rounded
+from pretouch_lab.rows import Row, peak, rounded
 from pretouch_lab.summary import static_summary
 from pretouch_lab.tables import shown_controllers, static_tables
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 NAME = "static"
 DEFAULT_RESTRICTIONS = "off"
@@ -42,27 +41,18 @@ def cells(grid: Grid) -> list[Cell]:
     ]
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     trajectory, side = str(cell.where["trajectory"]), str(cell.where["side"])
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=static_scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed, context.placement),
-        path=static_path(trajectory, side, context.placement),
-        seed=seed,
-        world=context.world,
-        plant=context.arm,
-        ranging=context.ranging,
-        recording=context.recording,
+    setup = context.setup(
+        cell,
+        seed,
+        static_scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed, context.placement),
+        static_path(trajectory, side, context.placement),
     )
     record = play(setup, done_after_contact())
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **results(record, -1.0 if side == "+y" else 1.0, context.model.links),
     }
     return row, record
@@ -81,14 +71,14 @@ def done_after_contact() -> Callable[[ControlStep, Plant], bool]:
     return done
 
 
-def results(record: Record, push: float, links: tuple[str, ...]) -> dict[str, Any]:
+def results(record: Record, push: float, links: tuple[str, ...]) -> Row:
     """Numbers of one trial; `push` is the sign of the force along y by which the object pushes the arm.
 
     The impact speed is the true closing speed of the point of the arm that touches first.
     """
     touch = record.first_contact()
     reactions = record.reactions()
-    row: dict[str, Any] = {
+    row: Row = {
         "contact": touch is not None,
         "touched_link": None,
         "impact_speed_m_s": None,

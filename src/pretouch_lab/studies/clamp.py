@@ -15,11 +15,10 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import peak, rounded
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.rows import Row, cells_of, peak, rounded
 from pretouch_lab.tables import median, plain, share
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 NAME = "clamp"
 DEFAULT_RESTRICTIONS = "off"
@@ -84,21 +83,18 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     )  # fmt: skip
     person = Holder(context.model, (Push(_START_S, np.array([0.0, -1.0, 0.0]), _PUSH_N, held),))
     found, gauge = context.profile(cell), _Gauge()
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
+    setup = context.setup(
+        cell,
+        seed,
+        SceneSpec(hand=HandSpec(), boxes=(board,)),
+        Circle(start_angle=np.pi),
         profile=replace(found, task=replace(found.task, speed_m_s=_SPEED_M_S)),
-        scene=SceneSpec(hand=HandSpec(), boxes=(board,)),
-        path=Circle(start_angle=np.pi),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
         hand=person,
         prepare=gauge.attach,
     )
     end = _START_S + _REACH_S + held + _WATCHED_S
     record = play(setup, lambda step, _: step.stamp >= end)
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row = cell.row(seed)
     return row | results(np.array(gauge.force), record), record
 
 

@@ -3,7 +3,8 @@
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.profiles import profile
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.rows import Row
 from pretouch_lab.studies.impacts.judged import judged
 from pretouch_lab.studies.impacts.tables import summarise, tables
 
@@ -27,7 +28,7 @@ def cells(grid: Grid) -> list[Cell]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
     """Run one trial; return its row of results. Its course is of no use to a figure."""
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row = cell.row(seed)
     return row | judged(context.profile(cell), seed, WAYS[str(cell.where["way"])], FREE_S), None
 
 

@@ -1,9 +1,10 @@
 """Whether cues of units tell better where a contact is: what two ways of feeling the same contacts said of places."""
 
+from collections.abc import Callable
+
 import numpy as np
 
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 
 SIDES = ("without", "with")
 """The two ways in which each contact is felt."""
@@ -11,8 +12,6 @@ LEAST_N, LEAST_S = 15.0, 0.1
 """What a firm contact has at least: force [N] and duration [s]."""
 FIRM, FELT = f"{LEAST_N:g} N, {1000 * LEAST_S:g} ms and more", "all felt"
 """Sets of contacts that are counted."""
-HEADER = ("n", "felt", "right\nbody", "said\ntwo", "both", "median\n[cm]", "90 %\n[cm]")
-"""Of the columns of `columns`."""
 NOTE = (
     "Each pair without, then with. Judged 100 ms after the force began to rise, or at its end if earlier. Felt: a"
     " place was said then. Right body: of all n; link 7, flange and hand are one. Median, 90 %: error of the place, of"
@@ -44,19 +43,28 @@ def compared(said: list[Row]) -> Row:
     }
 
 
-def columns(found: Row) -> tuple[str, ...]:
-    """Return a row of a table of what `compared` returned, see `HEADER`."""
-    without, with_them = (found[side] for side in SIDES)
-    counts = {name: f"{without[name]} / {with_them[name]}" for name in ("felt", "right", "two")}
-    errors = tuple(f"{_cm(without[name])} / {_cm(with_them[name])}" for name in ("p50_m", "p90_m"))
-    return (
-        str(found["contacts"]), counts["felt"], counts["right"], counts["two"], str(found["both"]), *errors
-    )  # fmt: skip
-
-
 def _at(values: list[float], percent: float) -> float | None:
     return rounded(float(np.percentile(values, percent)), 4) if values else None
 
 
-def _cm(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.1f}"
+def _pair(name: str) -> Callable[[Row], str]:
+    return lambda found: " / ".join(str(found[side][name]) for side in SIDES)
+
+
+def _errors(name: str) -> Callable[[Row], str]:
+    def write(found: Row) -> str:
+        return " / ".join("-" if (value := found[side][name]) is None else f"{100 * value:.1f}" for side in SIDES)
+
+    return write
+
+
+COLUMNS = (
+    ("n", lambda found: str(found["contacts"])),
+    ("felt", _pair("felt")),
+    ("right\nbody", _pair("right")),
+    ("said\ntwo", _pair("two")),
+    ("both", lambda found: str(found["both"])),
+    ("median\n[cm]", _errors("p50_m")),
+    ("90 %\n[cm]", _errors("p90_m")),
+)
+"""Of a table of what `compared` returned."""

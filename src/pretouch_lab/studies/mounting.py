@@ -8,15 +8,14 @@ from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import expected_range
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed
 from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.scene import Box, SceneSpec, fixtures
-from pretouch.types import FloatArray
+from pretouch_lab.benchmarks.avoidance.obstacle import Cuboid, nearest
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.metrics import rounded
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper import static
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.mounting_tables import NAME, ROOM, summarise, tables
 from pretouch_lab.trial import Record, Setup, play
 from pretouch_lab.weaknesses import views
@@ -81,23 +80,12 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     believed, refused = misplaced(context.skin, context.model, error, seed)
     empty = side == ROOM
     scene = SceneSpec() if empty else static_scene(trajectory, side, _STIFFNESS_N_PER_M, seed)
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        believed=believed,
-        profile=context.profile(cell),
-        scene=scene,
-        path=views.path(trajectory) if empty else static_path(trajectory, side),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
+    setup = context.setup(
+        cell, seed, scene, views.path(trajectory) if empty else static_path(trajectory, side), believed=believed
     )
     record = play(setup, (lambda step, _: step.stamp >= _ROOM_S) if empty else static.done_after_contact())
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **static.results(record, -1.0 if side == "+y" else 1.0, context.model.links),
         "touch_s": record.first_contact(),
         "missed_fraction": None if empty else missed(record, setup),
@@ -140,19 +128,9 @@ def missed(record: Record, setup: Setup) -> float | None:
 
 def least_gap(record: Record, model: RobotModel, box: Box) -> float:
     """Least true distance [m] between the arm's surface and a box; negative if they meet."""
-    body, least = model.body, np.inf
-    for step in record.steps[::_EVERY]:
-        a, b = placed(body, model.kinematics(step.q))
-        along = a + np.linspace(0.0, 1.0, 51)[:, None, None] * (b - a)
-        least = min(least, float((_outside(along, box) - body.radius).min()))
-    return rounded(least, 4)
-
-
-def _outside(points: FloatArray, box: Box) -> FloatArray:
-    """Distance (...) [m] of points (..., 3) from a box, negative inside of it."""
-    beyond = np.abs(points - box.center) - box.half_size
-    distance: FloatArray = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0)
-    return distance
+    shape = Cuboid(np.array(box.center), np.array(box.half_size))
+    steps = record.steps[::_EVERY]
+    return rounded(min(nearest(model.kinematics(s.q), model.body, shape).distance for s in steps), 4)
 
 
 def _cost(cell: Cell) -> float:

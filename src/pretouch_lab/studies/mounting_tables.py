@@ -1,10 +1,10 @@
 """What misplaced units change, as a summary and as tables."""
 
-from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Row
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import rounded
-from pretouch_lab.tables import number, with_spread
+from collections.abc import Callable
+
+from pretouch.text_table import Column, TextTable, tabulated
+from pretouch_lab.rows import Row, cells_of, grouped, rounded
+from pretouch_lab.tables import hits, number, plain, ranged, with_spread
 
 NAME = "mounting"
 ROOM = "room"
@@ -70,53 +70,51 @@ def error(cell: Row) -> str:
     return "\n".join(parts) or "none"
 
 
-def _names(cell: Row, many: bool) -> tuple[str, str]:
-    controller = f"\n{cell['profile']}\n{cell['restrictions']}" if many else ""
-    return error(cell) + controller, "yes" if cell["told"] == "told" else ""
+def _names(many: bool) -> tuple[Column, ...]:
+    def misplaced(cell: Row) -> str:
+        return error(cell) + (f"\n{cell['profile']}\n{cell['restrictions']}" if many else "")
+
+    return ("error", misplaced), ("told", lambda cell: "yes" if cell["told"] == "told" else "")
 
 
 def _forces(cells: list[Row], many: bool) -> TextTable:
-    shown = ("impact_speed_m_s", *FORCES)
-    rows = tuple(
-        (
-            *_names(cell, many),
-            *(_with_ratio(cell, name, 3 if name == "impact_speed_m_s" else 1) for name in shown),
-            f"{cell['largest_true_20ms_n']:.0f}",
-            _percent(cell["missed_fraction"]),
-            f"{cell['felt']}/{cell['contact_fraction'] * cell['trials']:.0f}",
-            str(cell["false_detections"]),
-        )
-        for cell in cells
+    columns = (
+        *_names(many),
+        ("impact\n[m/s]", _with_ratio("impact_speed_m_s", 3)),
+        *(
+            (label, _with_ratio(name, 1))
+            for name, label in zip(FORCES, ("filtered\n[N]", "raw\n[N]", "peak\n[N]", "true\n20 ms"), strict=True)
+        ),
+        ("most\n[N]", plain("largest_true_20ms_n", ".0f")),
+        ("missed\n[%]", _missed),
+        ("felt", lambda cell: f"{cell['felt']}/{cell['contact_fraction'] * cell['trials']:.0f}"),
+        ("false", plain("false_detections")),
     )
-    return TextTable(
+    return tabulated(
         "Misplaced units, static object: medians of all four places, and ratios to units in their place",
-        ("error", "told", "impact\n[m/s]", "filtered\n[N]", "raw\n[N]", "peak\n[N]", "true\n20 ms", "most\n[N]",
-         "missed\n[%]", "felt", "false"),
-        rows,
+        columns,
+        cells,
         "Each unit sits this far from where the controller believes it to be, in a direction of its own, or is turned"
         " by this angle about an axis of its own; told: the skin file says so as standard deviations. Columns as in the"
         " static tables; below, the median of the ratios trial by trial with their 10-90 %. Most: largest of the true"
         " 20 ms peaks. Missed: of the readings that show the board, those that the controller took for the arm or the"
         " room. Felt: contacts detected, of all contacts. False: detections before the contact.",
-    )  # fmt: skip
+    )
 
 
 def _free(cells: list[Row], many: bool) -> TextTable:
-    rows = tuple(
-        (
-            *_names(cell, many),
-            with_spread(_times(cell["obstacle_fraction"], 100), 1),
-            with_spread(cell["speed_scale"], 2),
-            with_spread(_times(cell["travelled_m_ratio"], 100), 0),
-            str(cell["false_detections"]),
-            f"{100 * cell['refused'] / cell['drawn']:.0f}",
-        )
-        for cell in cells
+    columns = (
+        *_names(many),
+        ("obstacle\n[%]", lambda cell: with_spread(_times(cell["obstacle_fraction"], 100), 1)),
+        ("speed", ranged("speed_scale", 2)),
+        ("way\n[%]", lambda cell: with_spread(_times(cell["travelled_m_ratio"], 100), 0)),
+        ("false", plain("false_detections")),
+        ("refused\n[%]", lambda cell: f"{100 * cell['refused'] / cell['drawn']:.0f}"),
     )
-    return TextTable(
+    return tabulated(
         "Misplaced units, an empty room: what the arm takes itself for, medians and 10-90 %",
-        ("error", "told", "obstacle\n[%]", "speed", "way\n[%]", "false", "refused\n[%]"),
-        rows,
+        columns,
+        cells,
         "Twenty seconds on the circle and on the line with nothing near. Obstacle: control steps in which the"
         " controller believes that there is one: it is the arm or the floor. Speed: mean factor of eqs. 3 and 4. Way:"
         " travelled, of that with units in their place. False: detections. Refused: of all poses that were drawn,"
@@ -125,34 +123,35 @@ def _free(cells: list[Row], many: bool) -> TextTable:
 
 
 def _near(cells: list[Row], many: bool) -> TextTable:
-    rows = tuple(
-        (
-            *_names(cell, many),
-            f"{cell['contact_fraction'] * cell['trials']:.0f}/{cell['trials']}",
-            with_spread(cell["least_gap_m"], 3),
-            _percent(cell["missed_fraction"]),
-            str(cell["false_detections"]),
-        )
-        for cell in cells
+    columns = (
+        *_names(many),
+        ("hit", hits),
+        ("least\n[m]", ranged("least_gap_m", 3)),
+        ("missed\n[%]", _missed),
+        ("false", plain("false_detections")),
     )
-    return TextTable(
+    return tabulated(
         "Misplaced units, restrictions that avoid the object: how near the arm comes, medians and 10-90 %",
-        ("error", "told", "hit", "least\n[m]", "missed\n[%]", "false"),
-        rows,
+        columns,
+        cells,
         "Hard restrictions unless others are named. Hit: trials with contact. Least: true distance of the arm's surface"
         " from the board, in 40 s or until a second after the contact.",
     )
 
 
-def _with_ratio(cell: Row, name: str, digits: int) -> str:
-    ratio = cell[f"{name}_ratio"]
-    below = "" if ratio is None else f"\n{ratio['median']:.2f}\n{ratio['p10']:.1f}-{ratio['p90']:.1f}"
-    return number(cell[name], digits) + below
+def _with_ratio(name: str, digits: int) -> Callable[[Row], str]:
+    def write(cell: Row) -> str:
+        ratio = cell[f"{name}_ratio"]
+        below = "" if ratio is None else f"\n{ratio['median']:.2f}\n{ratio['p10']:.1f}-{ratio['p90']:.1f}"
+        return number(cell[name], digits) + below
+
+    return write
 
 
 def _times(value: Row | None, factor: float) -> Row | None:
     return value and {key: factor * number for key, number in value.items()}
 
 
-def _percent(value: Row | None) -> str:
+def _missed(cell: Row) -> str:
+    value = cell["missed_fraction"]
     return "-" if value is None else f"{100 * value['median']:.1f}\n{100 * value['p90']:.0f}"

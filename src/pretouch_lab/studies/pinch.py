@@ -1,4 +1,4 @@
-"""A limb in the crook of an arm that folds, or on a floor on which the hand comes down: caught between two things."""
+"""A limb in the crook of an arm that folds, or on a floor on which the hand comes down: clamped between two objects."""
 
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -17,11 +17,10 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import peak, rounded
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.rows import Row, cells_of, peak, rounded
 from pretouch_lab.tables import median, plain, share
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 NAME = "pinch"
 DEFAULT_RESTRICTIONS = "off"
@@ -116,19 +115,17 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     kin = model.kinematics(brought_to(model, PLACES[place][0]))
     x, y, z = limb.middle(kin.position, kin.rotation).tolist()
     found = context.profile(cell)
-    setup = Setup(
-        model=model,
-        skin=context.skin,
+    setup = context.setup(
+        cell,
+        seed,
+        SceneSpec(hand=HandSpec(radius=limb.radius, stiffness=40_000.0, mass=2.0, start=(x, y, z))),
+        WayPoints(PLACES[place], closed=True),
         profile=replace(found, task=replace(found.task, speed_m_s=float(cell.where["speed_m_s"]))),
-        scene=SceneSpec(hand=HandSpec(radius=limb.radius, stiffness=40_000.0, mass=2.0, start=(x, y, z))),
-        path=WayPoints(PLACES[place], closed=True),
-        seed=seed,
-        recording=context.recording,
         hand=limb,
         prepare=limb.attach,
     )
     record = play(setup, lambda step, _: step.stamp >= _END_S)
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row = cell.row(seed)
     return row | results(np.array(limb.force), record, _NAMED[place]), record
 
 
@@ -139,7 +136,7 @@ _NAMED = {"crook": _CROOK, "floor": ("hand", "fixture")}
 def results(force: FloatArray, record: Record, named: tuple[str, str]) -> Row:
     """Numbers of one trial, given the force (T,) [N] with which the limb was squeezed at each millisecond."""
     squeezed, last = force > TOUCH_N, record.steps[-1]
-    said = [s.reason for s in record.steps if "aught between two things" in s.reason]
+    said = [s.reason for s in record.steps if "lamped between two objects" in s.reason]
     return {
         "caught": bool(squeezed.any()),
         "peak_20ms_n": rounded(peak(mean_over(force, 20))),

@@ -3,7 +3,8 @@
 from itertools import product
 
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.rows import Row
 from pretouch_lab.studies.tactile_kinds import BESIDE, COUNT, FREE_S, INNER, NAME, NOWHERE, ON_PATCH, PROFILE, WARM_UP_S
 from pretouch_lab.studies.tactile_tables import summarise, tables
 

@@ -1,16 +1,16 @@
 """What came of contacts on arms with touch sensors, and of false touches, as tables."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Row
-from pretouch_lab.groups import grouped
-from pretouch_lab.metrics import rounded
+from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.paper.claims.detectors import rate_bounds
-from pretouch_lab.studies.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
+from pretouch_lab.rows import Row, grouped, rounded
+from pretouch_lab.studies.located import COLUMNS, FELT, FIRM, NOTE, SIDES, chosen, compared
 from pretouch_lab.studies.tactile_kinds import INNER
+from pretouch_lab.tables import plain
 
 
 def summarise(rows: list[Row]) -> Row:
@@ -67,33 +67,27 @@ def tables(part: Row) -> list[TextTable]:
     """What touch changes of delay and missed contacts, and of false alarms."""
     made = []
     if part["cells"]:
-        rows = tuple(
-            (
-                cell["place"], cell["hand"], cell["force_n"] if cell["force_n"] == "all" else f"{cell['force_n']:g}",
-                str(cell["contacts"]), str(cell["felt"]), _ms(cell["felt_ms"]),
-                *(str(cell[f"missed_{name}"]) for name in SIDES), *(_ms(cell[f"delay_{name}_ms"]) for name in SIDES),
-            )
-            for cell in part["cells"]
-        )  # fmt: skip
-        header = (
-            "place", "hand", "force\n[N]", "contacts", "felt", "felt in\n[ms]", "missed\nwithout", "missed\nwith",
-            "delay [ms]\nwithout", "delay [ms]\nwith",
-        )  # fmt: skip
+        columns = (
+            ("place", plain("place")),
+            ("hand", plain("hand")),
+            ("force\n[N]", lambda cell: cell["force_n"] if cell["force_n"] == "all" else f"{cell['force_n']:g}"),
+            ("contacts", plain("contacts")),
+            ("felt", plain("felt")),
+            ("felt in\n[ms]", _ms("felt_ms")),
+            *((f"missed\n{name}", plain(f"missed_{name}")) for name in SIDES),
+            *((f"delay [ms]\n{name}", _ms(f"delay_{name}_ms")) for name in SIDES),
+        )
         note = (
             "Contacts of 0.06 and 0.2 s on an arm on the circle at 0.3 m/s that does not react; profile pretouch"
             " without and with use_touch on the same recorded arms. Felt: contacts that a unit's touch sensor told, and"
             " how long after the force passed 1 N that was heard (median). Delays: medians over the contacts that both"
             f" found. {part['busy']} contacts that began while an earlier alarm was still answered are left out."
         )
-        made.append(TextTable("Contacts with touch sensors and without", header, rows, note, names=3))
+        made.append(tabulated("Contacts with touch sensors and without", columns, part["cells"], note, names=3))
     if part["where"]:
-        made.append(TextTable(
-            "Where contacts are said to be, without touch and with",
-            ("place", "hand", "link", "contacts", *HEADER),
-            tuple((c["place"], c["hand"], c["link"], c["of"], *columns(c)) for c in part["where"]),
-            NOTE,
-            names=4,
-        ))  # fmt: skip
+        where = (*((name, plain(name)) for name in ("place", "hand", "link")), ("contacts", plain("of")), *COLUMNS)
+        title = "Where contacts are said to be, without touch and with"
+        made.append(tabulated(title, where, part["where"], NOTE, names=4))
     if part["free"]:
         made.append(_free(part["free"]))
     return made
@@ -101,21 +95,27 @@ def tables(part: Row) -> list[TextTable]:
 
 def _free(free: Row) -> TextTable:
     """What false touches make of free motion."""
-    rows = tuple(
-        (name, f"{free['hours']:.2f}", str(free["false_touches"]), str(free[name]), f"{low:.1f} to {high:.1f}",
-         f"{1000 * free[name] / max(free['false_touches'], 1):.1f}")
-        for name in SIDES
-        for low, high in [rate_bounds(free[name], max(free["hours"], 1e-9))]
-    )  # fmt: skip
-    return TextTable(
+
+    def bounds(side: str) -> str:
+        return "{:.1f} to {:.1f}".format(*rate_bounds(free[side], max(free["hours"], 1e-9)))
+
+    columns = (
+        ("use of touch", str),
+        ("hours", lambda _: f"{free['hours']:.2f}"),
+        ("false\ntouches", lambda _: str(free["false_touches"])),
+        ("alarms", lambda side: str(free[side])),
+        ("alarms an hour\n95 %", bounds),
+        ("alarms in 1000\nfalse touches", lambda side: f"{1000 * free[side] / max(free['false_touches'], 1):.1f}"),
+    )
+    return tabulated(
         "Free motion with false touches",
-        ("use of touch", "hours", "false\ntouches", "alarms", "alarms an hour\n95 %", "alarms in 1000\nfalse touches"),
-        rows,
+        columns,
+        SIDES,
         "False touches of each unit at 600 an hour, so that they can be counted; a real one is assumed to have one"
         " an hour at most.",
         names=1,
     )
 
 
-def _ms(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0f}"
+def _ms(key: str) -> Callable[[Row], str]:
+    return lambda row: "-" if row[key] is None else f"{row[key]:.0f}"

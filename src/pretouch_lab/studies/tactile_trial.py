@@ -12,17 +12,16 @@ from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.sim.plant import Plant
 from pretouch.sim.touch_sensor import TouchSensorParams, TouchSensors
 from pretouch.types import BoolArray, FloatArray, TouchReadings
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.dense_skin import gap
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, model, path_of, plant_of, record, sensing_of
 from pretouch_lab.benchmarks.detection.contacts import Toucher, Touching, place_on, start_posture
-from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.detection.judge import matched
 from pretouch_lab.benchmarks.detection.replay import replay
 from pretouch_lab.benchmarks.detection.stream import Stream
 from pretouch_lab.benchmarks.localization.judge import said_of
 from pretouch_lab.cell import Cell, Context
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.calibration.random_skin import random_skin
 from pretouch_lab.studies.located import SIDES
 from pretouch_lab.studies.tactile_kinds import (
@@ -35,7 +34,6 @@ from pretouch_lab.studies.tactile_kinds import (
     INNER_LINKS,
     INNER_N,
     KINDS,
-    NAME,
     NOWHERE,
     PROFILE,
     WARM_UP_S,
@@ -163,10 +161,10 @@ def played(cell: Cell, seed: int, context: Context, free_s: float = FREE_S) -> t
     skin = inner_skin(context.skin) if place == INNER else feeling(context.skin)
     course = recorded(skin, place, cell.where["hand"] == "seen", seed, free_s)
     made = {
-        name: replay(course.stream, Contender(name, text, "scale"), model(), course.touch.__getitem__, skin)
+        name: replay(course.stream, Baseline(name, text, "scale"), model(), course.touch.__getitem__, skin)
         for name, text in DETECTORS.items()
     }
-    row: Row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row: Row = cell.row(seed)
     if not course.touches:
         counted = course.stream.stamp >= WARM_UP_S
         row["free"] = {

@@ -15,16 +15,15 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.avoidance.measures import contact
-from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape, nearest
-from pretouch_lab.benchmarks.avoidance.truth import Truth
+from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape
+from pretouch_lab.benchmarks.avoidance.truth import truth_of
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.depth_camera import looking
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import rounded
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper.avoidance import visits
+from pretouch_lab.rows import Row, cells_of, rounded
 from pretouch_lab.tables import median, plain, share
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 NAME = "vision"
 DEFAULT_RESTRICTIONS = "slack"
@@ -97,19 +96,17 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     name, sensing, view = (str(cell.where[key]) for key in ("scene", "sensing", "view"))
     scene, model = scene_of(name, seed), context.model
-    setup = Setup(
-        model=model,
+    setup = context.setup(
+        cell,
+        seed,
+        scene.spec,
+        scene.path,
         skin=Skin([], model) if sensing == "camera" else context.skin,
-        profile=context.profile(cell),
-        scene=scene.spec,
-        path=scene.path,
-        seed=seed,
         hand=Visitor(model, visits("inside", seed)[:1]) if name == "hand" else None,
         camera=None if view == NO_VIEW else looking(np.array(VIEWS[view]), np.array(_LOOKS_AT_M)),
-        recording=context.recording,
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row = cell.row(seed)
     return row | results(record, scene, model, setup.profile.d_max_m), record
 
 
@@ -126,7 +123,7 @@ def results(record: Record, scene: Scene, model: RobotModel, d_max: float) -> Ro
     )
     if scene.object is None:
         return row
-    truth = _truth(record, shapes, model)
+    truth = truth_of(record, model, [shape for shape in shapes if shape is not None])
     row |= {key: value for key, value in contact(record, truth, d_max).items() if key in ("contact", *_MEASURES)}
     shown, times = np.array([bool(true.any()) for true in of_it]), record.times()
     within = truth.distance < _NEAR_M
@@ -144,17 +141,6 @@ def results(record: Record, scene: Scene, model: RobotModel, d_max: float) -> Ro
 def _distances(points: FloatArray, shape: Shape | None) -> FloatArray:
     """Distance (K,) [m] of points (K, 3) from an object's surface; infinite where there is none."""
     return np.full(len(points), np.inf) if shape is None else np.abs(shape.closest(points)[0])
-
-
-def _truth(record: Record, shapes: list[Shape | None], model: RobotModel) -> Truth:
-    """Work out from true joint positions and the object's true place how near they were."""
-    found, of_ee = [], []
-    for step, shape in zip(record.steps, shapes, strict=True):
-        if shape is not None:
-            kin = model.kinematics(step.q)
-            found.append(nearest(kin, model.body, shape))
-            of_ee.append(float(shape.closest(kin.position[model.ee])[0]))
-    return Truth(found, np.array([n.distance for n in found]), np.array(of_ee))
 
 
 _MEASURES = (

@@ -1,5 +1,6 @@
 """The static experiment again, its readings over the wire: what losses, delays and the units' clocks change of it."""
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -8,14 +9,13 @@ from pretouch.profiles import profile
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import network
 from pretouch.sim.paper_scenes import static_path, static_scene
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import rounded
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import static
-from pretouch_lab.tables import number
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.rows import Row, cells_of, rounded
+from pretouch_lab.tables import median, number, plain, share
+from pretouch_lab.trial import Record, play
 
 NAME = "wire"
 
@@ -45,23 +45,16 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     trajectory, side = str(cell.where["trajectory"]), str(cell.where["side"])
     loss = WAYS[str(cell.where["readings"])]
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=static_scene(trajectory, side, _STIFFNESS_N_PER_M, seed),
-        path=static_path(trajectory, side),
-        seed=seed,
-        world=context.world,
+    setup = context.setup(
+        cell,
+        seed,
+        static_scene(trajectory, side, _STIFFNESS_N_PER_M, seed),
+        static_path(trajectory, side),
         wire=None if loss is None else FleetParams(network(loss)),
-        recording=context.recording,
     )
     record = play(setup, static.done_after_contact())
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **static.results(record, -1.0 if side == "+y" else 1.0, context.model.links),
         **coming_in(record),
     }
@@ -73,11 +66,11 @@ def coming_in(record: Record) -> Row:
     ages = np.zeros(0) if record.reading_age is None else record.reading_age[record.times() >= _BEGIN_S].ravel()
     # sequence numbers begin anew with each session: those of units that kept theirs tell what is missing
     steady = [unit for unit in record.traffic if unit.sessions == 1 and unit.sample is not None]
-    told = sum(unit.sample.sequence for unit in steady if unit.sample)
+    sent = sum(unit.sample.sequence for unit in steady if unit.sample)
     return {
         "age_median_s": rounded(float(np.median(ages)), 4) if ages.size else None,
         "age_p99_s": rounded(float(np.percentile(ages, 99)), 4) if ages.size else None,
-        "lost": rounded(1 - sum(unit.accepted for unit in steady) / told, 4) if told else None,
+        "lost": rounded(1 - sum(unit.accepted for unit in steady) / sent, 4) if sent else None,
         "sessions_left": sum(max(0, unit.sessions - 1) for unit in record.traffic),
     }
 
@@ -118,42 +111,42 @@ def tables(part: Row) -> list[TextTable]:
     """What the wire changes of the forces, and how readings came in."""
     cells = part["cells"]
     several = len({(cell["profile"], cell["restrictions"]) for cell in cells}) > 1
-    forces = tuple(
-        (
-            _where(cell, several),
-            cell["readings"],
-            number(cell["impact_speed_m_s"], 3),
-            *(_force(cell, force) for force in FORCES),
-            {True: "within", False: "FAILS"}.get(cell.get("within"), ""),
-        )
-        for cell in cells
+
+    def where(cell: Row) -> str:
+        place = f"{cell['trajectory']}\n{cell['side']}"
+        return f"{place}\n{cell['profile']}\n{cell['restrictions']}" if several else place
+
+    names = ("where", where), ("readings", plain("readings"))
+    forces = (
+        *names,
+        ("impact\n[m/s]", median("impact_speed_m_s", 3)),
+        *(
+            (label, _force(name))
+            for name, label in zip(FORCES, ("filtered\n[N]", "raw\n[N]", "peak\n[N]", "true\n20 ms"), strict=True)
+        ),
+        ("15 %", lambda cell: {True: "within", False: "FAILS"}.get(cell.get("within"), "")),
     )
-    coming = tuple(
-        (
-            _where(cell, several),
-            cell["readings"],
-            "-" if cell["lost"] is None else f"{100 * cell['lost']['median']:.1f}",
-            number(cell["age_median_s"], 0, 1000),
-            number(cell["age_p99_s"], 0, 1000),
-            str(cell["sessions_left"]),
-            f"{cell['held']}/{cell['trials']}",
-            str(cell["false_detections"]),
-        )
-        for cell in cells
-        if cell["trajectory"] == "all"
+    coming = (
+        *names,
+        ("lost\n[%]", median("lost", 1, 100)),
+        ("age\n[ms]", median("age_median_s", 0, 1000)),
+        ("age 99 %\n[ms]", median("age_p99_s", 0, 1000)),
+        ("left", plain("sessions_left")),
+        ("held", share("held")),
+        ("false", plain("false_detections")),
     )
     return [
-        TextTable(
+        tabulated(
             "The static experiment over the wire: median forces, and their ratio to those in process",
-            ("where", "readings", "impact\n[m/s]", "filtered\n[N]", "raw\n[N]", "peak\n[N]", "true\n20 ms", "15 %"),
             forces,
+            cells,
             "Readings: within the process, or over UDP with this loss in either direction. Columns as in the static"
             f" tables. Within: all four medians differ by no more than {100 * TOLERANCE:.0f} % from those in process.",
         ),
-        TextTable(
+        tabulated(
             "How readings came in",
-            ("where", "readings", "lost\n[%]", "age\n[ms]", "age 99 %\n[ms]", "left", "held", "false"),
             coming,
+            [cell for cell in cells if cell["trajectory"] == "all"],
             "Lost: samples that the receiver found missing, of units that kept their session. Age: of a unit's newest"
             " reading at a control step. Left: sessions that a unit left because it heard no beacon for 2 s. Held:"
             " trials with a hold. False: detections before the contact.",
@@ -161,14 +154,12 @@ def tables(part: Row) -> list[TextTable]:
     ]
 
 
-def _where(cell: Row, several: bool) -> str:
-    place = f"{cell['trajectory']}\n{cell['side']}"
-    return f"{place}\n{cell['profile']}\n{cell['restrictions']}" if several else place
+def _force(name: str) -> Callable[[Row], str]:
+    def write(cell: Row) -> str:
+        ratio = cell.get("ratios", {}).get(name)
+        return number(cell[name], 1) if ratio is None else f"{number(cell[name], 1)}\n{ratio:.2f}"
 
-
-def _force(cell: Row, force: str) -> str:
-    ratio = cell.get("ratios", {}).get(force)
-    return number(cell[force], 1) if ratio is None else f"{number(cell[force], 1)}\n{ratio:.2f}"
+    return write
 
 
 EXPERIMENT = Experiment(NAME, cells, trial, lambda _: 7.0, summarise, tables, recorded=False)

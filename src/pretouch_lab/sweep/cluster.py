@@ -1,13 +1,14 @@
 """Jobs on a dask.distributed cluster that is there already, and a sentence in bounded time when it is gone."""
 
 import time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from pretouch.errors import ExperimentError
-from pretouch_lab.sweep.local import TRIES, Done, Lost
+from pretouch_lab.engine import TRIES
 from pretouch_lab.sweep.work import Job, work
 
 if TYPE_CHECKING:  # an extra
@@ -24,19 +25,21 @@ _AHEAD = 4
 """Jobs handed over for each thread of the cluster: enough that none waits, and few where the scheduler goes away."""
 
 
-def run_on_cluster(address: str, jobs: list[Job], done: Done, lost: Lost) -> None:
-    """Play jobs on a cluster, the longest first. Raises ExperimentError where it is not there, or goes away.
+def run_on_cluster(
+    address: str, jobs: list[Job], done: Callable[[Job, object], None], lost: Callable[[Job, str], None]
+) -> None:
+    """Play jobs on a cluster, in their order. Raises ExperimentError where it is not there, or goes away.
 
     A job whose worker is killed is played again by the scheduler itself. Answers are text; nothing of them is run.
     """
     with _client(address) as client:
         watch = _Watch(client, address)
-        waiting = sorted(jobs, key=lambda job: job.cost_s)
+        waiting = deque(jobs)
         finished: SimpleQueue[Future] = SimpleQueue()
         flying: dict[str, tuple[Job, Future]] = {}
         while waiting or flying:
             while waiting and len(flying) < max(1, _AHEAD * watch.threads):
-                job = waiting.pop()
+                job = waiting.popleft()
                 future = client.submit(work, job.written(), pure=False, retries=0)
                 flying[future.key] = (job, future)
                 future.add_done_callback(finished.put)
@@ -95,10 +98,10 @@ class _Watch:
 
     def _ask(self) -> None:
         try:
-            told = self._client.sync(self._client.scheduler.identity, callback_timeout=GONE_S)
+            identity = self._client.sync(self._client.scheduler.identity, callback_timeout=GONE_S)
         except (OSError, TimeoutError, AttributeError, RuntimeError):
             self.gone()
-        self.threads = sum(int(worker["nthreads"]) for worker in told["workers"].values())
+        self.threads = sum(int(worker["nthreads"]) for worker in identity["workers"].values())
 
     def gone(self) -> None:
         """Say that it is."""

@@ -1,21 +1,19 @@
 """What a sweep leaves for readers: numbers, a figure, tables, and its part of docs/results/sensitivity.md."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from pretouch import __version__
 from pretouch.atomic_write import write_json
-from pretouch.text_table import TextTable, markdown
-from pretouch_lab.benchmarks.documents import put, shown
+from pretouch.text_table import Column, TextTable, markdown, tabulated
+from pretouch_lab.documents import SENSITIVITY, draw, put, shown
+from pretouch_lab.engine import failure_said
 from pretouch_lab.experiment import Picture
 from pretouch_lab.sweep.indices import indices
 from pretouch_lab.sweep.results import write_table
 from pretouch_lab.sweep.run import Run
-from pretouch_lab.sweep.store import unwritable
 from pretouch_lab.sweep.work import code
-
-DOCUMENT = "results/sensitivity.md"
-"""In a folder of documents."""
 
 
 def written(run: Run) -> dict[str, Any]:
@@ -28,10 +26,8 @@ def written(run: Run) -> dict[str, Any]:
         "processor_s": round(sum(r.seconds for r in played), 1), "metrics": found,
     }  # fmt: skip
     write_table(run, run.folder / "results.parquet")
-    try:
+    with failure_said(run.folder):
         write_json(about, run.folder / "indices.json")
-    except OSError as error:
-        raise unwritable(run.folder, error) from error
     return about
 
 
@@ -50,39 +46,45 @@ def tables(run: Run, about: dict[str, Any]) -> list[TextTable]:
     """Return a sweep's tables: one of all metrics for indices and correlations, one for each parameter of a grid."""
     if run.sweep.design == "grid":
         return _grid_tables(run, about)
-    sobol, found = run.sweep.design == "sobol", about["metrics"]
     ranges = {one.name: one.written for one in run.sweep.vary}
-    header = ["parameter", "range"]
-    for metric in run.sweep.metrics:
-        header += [f"{metric}:\nfirst", "total"] if sobol else [metric]
     names = [*ranges, *(["seed"] if run.sweep.arms > 1 else [])]
-    lines = []
-    for name in names:
-        line = [name, ranges.get(name, f"{run.sweep.arms} arms")]
-        for metric in run.sweep.metrics:
-            row = next((r for r in found[metric]["rows"] if r["parameter"] == name), None)
-            line += _numbers(row, sobol)
-        lines.append(tuple(line))
-    return [TextTable(_title(run), tuple(header), tuple(lines), _note(run, about))]
+    columns: list[Column] = [
+        ("parameter", str), ("range", lambda name: ranges.get(name, f"{run.sweep.arms} arms")),
+    ]  # fmt: skip
+    for metric in run.sweep.metrics:
+        of = {row["parameter"]: row for row in about["metrics"][metric]["rows"]}
+        if run.sweep.design == "sobol":
+            columns += [(f"{metric}:\nfirst", _index(of, "first")), ("total", _index(of, "total"))]
+        else:
+            columns.append((metric, _correlation(of)))
+    return [tabulated(_title(run), columns, names, _note(run, about))]
 
 
-def _numbers(row: dict[str, Any] | None, sobol: bool) -> list[str]:
-    if row is None:
-        return ["-", "-"] if sobol else ["-"]
-    if sobol:
-        return [f"{row[k]:.2f} ± {row[f'{k}_95']:.2f}" for k in ("first", "total")]
-    return [f"{row['correlation']:.2f} ({row['low']:.2f} to {row['high']:.2f})"]
+def _index(rows: dict[str, Any], key: str) -> Callable[[str], str]:
+    return lambda name: f"{rows[name][key]:.2f} ± {rows[name][f'{key}_95']:.2f}" if name in rows else "-"
+
+
+def _correlation(rows: dict[str, Any]) -> Callable[[str], str]:
+    def write(name: str) -> str:
+        row = rows.get(name)
+        return "-" if row is None else f"{row['correlation']:.2f} ({row['low']:.2f} to {row['high']:.2f})"
+
+    return write
 
 
 def _grid_tables(run: Run, about: dict[str, Any]) -> list[TextTable]:
+    def band(k: int) -> Callable[[tuple[dict[str, Any], ...]], str]:
+        return lambda rows: _band(rows[k])
+
     found, made = about["metrics"], []
     for one in run.sweep.vary:
         by_metric = [[r for r in found[m]["rows"] if r["parameter"] == one.name] for m in run.sweep.metrics]
-        lines = tuple(
-            (_level(rows[0]["level"]), str(max(r["n"] for r in rows)), *map(_band, rows))
-            for rows in zip(*by_metric, strict=True)
+        columns = (
+            (one.name, lambda rows: _level(rows[0]["level"])),
+            ("n", lambda rows: str(max(r["n"] for r in rows))),
+            *((metric, band(k)) for k, metric in enumerate(run.sweep.metrics)),
         )
-        made.append(TextTable(_title(run), (one.name, "n", *run.sweep.metrics), lines, _note(run, about)))
+        made.append(tabulated(_title(run), columns, zip(*by_metric, strict=True), _note(run, about)))
     return made
 
 
@@ -133,13 +135,10 @@ def publish(runs: list[tuple[Run, dict[str, Any]]], out: Path, docs: Path | None
     for run, about in runs:
         drawn = picture(run, about)
         folder = docs / "images" if docs else run.folder
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            drawn.figure.savefig(folder / f"{drawn.name}.png", dpi=120)
-        except OSError as error:
-            raise unwritable(folder, error) from error
+        with failure_said(folder):
+            draw([drawn], folder)
         places.append(folder / f"{drawn.name}.png")
         if docs:
-            put(docs / DOCUMENT, run.sweep.name, "\n\n".join([shown(drawn), *map(markdown, tables(run, about))]))
-            places.append(docs / DOCUMENT)
+            put(docs / SENSITIVITY, run.sweep.name, "\n\n".join([shown(drawn), *map(markdown, tables(run, about))]))
+            places.append(docs / SENSITIVITY)
     return list(dict.fromkeys(places))

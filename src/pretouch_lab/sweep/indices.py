@@ -1,12 +1,10 @@
 """How much each parameter matters: Sobol indices, rank correlations, or the course over a grid, with 95 % intervals."""
 
-from typing import Any
-
 import numpy as np
 from scipy.stats import norm, rankdata
 
 from pretouch.types import FloatArray
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.sweep.definition import Sweep
 from pretouch_lab.sweep.design import SEED, columns, problem
 from pretouch_lab.sweep.results import values_of
@@ -17,8 +15,6 @@ _RESAMPLES = 500
 _DRAWN_WITH = 2021
 _FLAT = 1e-9
 """Spread of a number, as a part of its size, below which it does not vary."""
-
-Row = dict[str, Any]
 
 
 def indices(run: Run) -> Row:

@@ -11,8 +11,8 @@ from pretouch.profiles import Profile
 from pretouch.renamed import path_today
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.cell import Cell, Context
-from pretouch_lab.experiment import Row
 from pretouch_lab.paper import avoidance, dynamic, static
+from pretouch_lab.rows import Row
 from pretouch_lab.sweep.setting import Setting
 
 Numbers = dict[str, float | None]

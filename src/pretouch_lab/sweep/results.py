@@ -8,9 +8,9 @@ import numpy as np
 from pretouch import __version__
 from pretouch.atomic_write import atomic_replacement
 from pretouch.types import FloatArray
+from pretouch_lab.engine import failure_said
 from pretouch_lab.sweep.design import SEED
 from pretouch_lab.sweep.run import Run
-from pretouch_lab.sweep.store import unwritable
 from pretouch_lab.sweep.work import code
 
 
@@ -48,8 +48,5 @@ def write_table(run: Run, path: Path) -> None:
     about = json.dumps({"version": __version__, "code": code(run.sweep.experiment), "sweep": run.sweep.described()})
     arrays = {name: pa.array(values, types.get(name)) for name, values in columns.items()}
     table = pa.table(arrays).replace_schema_metadata({"pretouch": about})
-    try:
-        with atomic_replacement(path) as unfinished:
-            parquet.write_table(table, unfinished)
-    except OSError as error:
-        raise unwritable(path, error) from error
+    with failure_said(path), atomic_replacement(path) as unfinished:
+        parquet.write_table(table, unfinished)

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from pretouch.atomic_write import write_json
 from pretouch.extras import Extra
+from pretouch_lab.engine import failure_said, run_jobs
 from pretouch_lab.sweep.cluster import run_on_cluster
 from pretouch_lab.sweep.definition import Sweep
 from pretouch_lab.sweep.design import Point, points
-from pretouch_lab.sweep.local import run_local
-from pretouch_lab.sweep.store import Damaged, Result, Store, unwritable
-from pretouch_lab.sweep.work import Cell, Job, cell_of, jobs_of
+from pretouch_lab.sweep.store import Damaged, Result, Store
+from pretouch_lab.sweep.work import Cell, Job, cell_of, jobs_of, work
 
 SWEEP = Extra("sweep", ("SALib", "distributed", "pyarrow"), "setup", "pretouch-lab")
 
@@ -81,25 +81,21 @@ def opened(sweep: Sweep, out: Path) -> Run:
             run.results[cell.key] = known
     if run.failed:
         run.notes.append(f"{len(run.failed)} cells of {sweep.name} failed before and are tried again.")
-    try:
+    with failure_said(run.folder):
         run.folder.mkdir(parents=True, exist_ok=True)
         write_json(sweep.described(), run.folder / "sweep.json")
-    except OSError as error:
-        raise unwritable(run.folder, error) from error
     return run
 
 
 def play(run: Run, where: Where, progress: Callable[[float], None]) -> None:
     """Play what is missing; `progress(cost_s)` after each job. However it ends, what was played is kept."""
-    store, jobs = _store(run), run.jobs
+    store, jobs = _store(run), sorted(run.jobs, key=lambda job: -job.cost_s)
     if not jobs:
         return
 
     def keep(cell: Cell, result: Result) -> None:
-        try:
+        with failure_said(run.folder):
             store.keep(cell, result)
-        except OSError as error:
-            raise unwritable(run.folder, error) from error
         run.results[cell.key] = result
 
     def done(job: Job, answer: object) -> None:
@@ -115,7 +111,7 @@ def play(run: Run, where: Where, progress: Callable[[float], None]) -> None:
     if where.scheduler:
         run_on_cluster(where.scheduler, jobs, done, lost)
     else:
-        run_local(jobs, where.processes or os.cpu_count() or 1, done, lost)
+        run_jobs(jobs, lambda job: (work, job.written()), where.processes or os.cpu_count() or 1, done, lost)
 
 
 def _store(run: Run) -> Store:

@@ -1,9 +1,9 @@
 """What one cell of a sweep is played with, made of a base profile and the values of the parameters that are swept.
 
 A parameter has a name with a dot: `GROUP.FIELD` of the profile, `plant.FIELD` of the simulated arm, `plant.kind` for a
-named one, `plant.world` for the arm and range finders that the seed draws of a set of worlds, `sensing.FIELD` of the
-range finders, `skin.units` for so many units spread over the arm, and `scene.FIELD`
-of what the experiment plays.
+named one, `plant.world` for the arm and range finders that the seed draws of a set of the domain randomisation,
+`sensing.FIELD` of the range finders, `skin.units` for so many units spread over the arm, and `scene.FIELD` of what the
+experiment plays.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -139,7 +139,7 @@ def _set(name: str) -> WorldSet:
 
 
 def world_digest(values: Values) -> str | None:
-    """Digest of the set of worlds that values name, which decides what a cell is; None where they name none."""
+    """Digest of the set of domain randomisation that values name, which decides what a cell is; None of none."""
     world = str(values.get(WORLD, USUAL_WORLD))
     return None if world == USUAL_WORLD else _set(world).digest
 

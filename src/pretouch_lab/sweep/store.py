@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from pretouch.atomic_write import write_json
-from pretouch.errors import ExperimentError
 from pretouch_lab.sweep.measures import Measure
 from pretouch_lab.sweep.work import Cell, Job
 
@@ -77,11 +76,13 @@ class Store:
                 raise Damaged("it is no list of results")
         except Damaged as error:
             return [(cell, _failed(f"The worker's answer cannot be read: {error}")) for cell in job.cells]
-        told = {row.get("key"): row for row in rows if isinstance(row.get("key"), str)}
+        by_key = {row.get("key"): row for row in rows if isinstance(row.get("key"), str)}
         found = []
         for cell in job.cells:
             try:
-                result = self._checked(told.get(cell.key, {"reason": "The worker did not tell of it.", "seconds": 0.0}))
+                result = self._checked(
+                    by_key.get(cell.key, {"reason": "The worker did not tell of it.", "seconds": 0.0})
+                )
             except Damaged as error:
                 result = _failed(f"The worker's answer cannot be read: {error}")
             found.append((cell, result))
@@ -123,11 +124,3 @@ def _object(text: str) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise Damaged("it holds no object")
     return found
-
-
-def unwritable(folder: Path, error: OSError) -> ExperimentError:
-    """Return the sentence for results that could not be written."""
-    return ExperimentError(
-        f"Results could not be written to {folder} ({error.strerror or error}): remove the cause, and the same command"
-        " goes on."
-    )

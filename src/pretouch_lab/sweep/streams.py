@@ -7,9 +7,9 @@ import numpy as np
 
 from pretouch.checks import Check, Checked, NonNegative
 from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import Sensing, model
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_stream, touches_of
-from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_stream
 from pretouch_lab.benchmarks.detection.judge import BUSY, PERIOD_S, matched
 from pretouch_lab.benchmarks.detection.replay import begun, replay
@@ -51,9 +51,9 @@ def _sensing(setting: Setting) -> Sensing:
     return Sensing(setting.skin, setting.skin, setting.sensing, _HAND_RADIUS_M)
 
 
-def _detector(setting: Setting) -> Contender:
+def _detector(setting: Setting) -> Baseline:
     by_force = not setting.profile.detect.by_torques
-    return Contender("swept", setting.profile_text, "f_base_n" if by_force else "scale")
+    return Baseline("swept", setting.profile_text, "f_base_n" if by_force else "scale")
 
 
 def _free_stream(setting: Setting) -> Stream:

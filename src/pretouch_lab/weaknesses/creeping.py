@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -10,16 +9,15 @@ from pretouch.control.path import WayPoints
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import peak, rounded
 from pretouch_lab.paper.avoidance import gaps
-from pretouch_lab.tables import number
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.rows import Row, cells_of, grouped, peak, rounded
+from pretouch_lab.tables import median, plain
+from pretouch_lab.trial import Record, play
 
 NAME = "creeping"
 _MODES = ("off", "slack", "hard", "floor")
@@ -58,24 +56,14 @@ def visit(seed: int) -> Visit:
     return Visit(_ARRIVES_S, _LEAVES_S, np.array(_PLACE_M) + np.array(_SPREAD_M) * rng.uniform(-1, 1, 3))
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     hand = HandSpec()
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=SceneSpec(hand=hand),
-        path=path(),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
-        hand=Visitor(context.model, (visit(seed),)),
-    )
+    setup = context.setup(cell, seed, SceneSpec(hand=hand), path(), hand=Visitor(context.model, (visit(seed),)))
     full_speed = setup.profile.task.speed_m_s
     record = play(setup, _done(full_speed))
     gap, towards = gaps(record, context.model, hand.radius), speed_towards(record)
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row = cell.row(seed)
     return row | results(record, gap, towards, full_speed), record
 
 
@@ -96,7 +84,7 @@ def speed_towards(record: Record) -> FloatArray:
     return np.asarray((velocity * ahead).sum(axis=1) / np.linalg.norm(ahead, axis=1))
 
 
-def results(record: Record, gap: FloatArray, towards: FloatArray, full_speed: float) -> dict[str, Any]:
+def results(record: Record, gap: FloatArray, towards: FloatArray, full_speed: float) -> Row:
     """Numbers of one trial from the distance (S,) [m] to the hand and the speed (S,) [m/s] towards it."""
     times, true = record.times(), np.linalg.norm(record.true_force, axis=1)
     there = (times >= _ARRIVES_S) & (times <= _LEAVES_S)
@@ -123,7 +111,7 @@ _MEASURES = (
 )  # fmt: skip
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def summarise(rows: list[Row]) -> Row:
     """Cells of the experiment, each with the median course of the distance, every half second."""
     by = ("profile", "restrictions")
     cells = cells_of(rows, by, _MEASURES, ("contact",), ("contacts", "held"))
@@ -132,39 +120,30 @@ def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {"cells": cells}
 
 
-def tables(part: dict[str, Any]) -> list[TextTable]:
+def tables(part: Row) -> list[TextTable]:
     """Show how near the arm came, when, and what followed."""
-    rows = tuple(
-        (
-            cell["profile"],
-            cell["restrictions"],
-            *(number(cell[f"distance_{k}s_m"], 2) for k in _LOOKS_S),
-            number(cell["least_distance_m"], 3),
-            number(cell["creep_m_s"], 3),
-            f"{100 * cell['contact_fraction']:.0f}",
-            f"{cell['contacts'] / cell['trials']:.1f}",
-            number(cell["true_peak_20ms_n"], 0),
-            number(cell["recovery_s"], 1),
-            str(cell["held"]),
-        )
-        for cell in part["cells"]
+    columns = (
+        ("profile", plain("profile")),
+        ("mode", plain("restrictions")),
+        *((f"{k} s\n[m]", median(f"distance_{k}s_m", 2)) for k in _LOOKS_S),
+        ("least\n[m]", median("least_distance_m", 3)),
+        ("creep\n[m/s]", median("creep_m_s", 3)),
+        ("hit\n[%]", plain("contact_fraction", ".0f", 100)),
+        ("hits", lambda cell: f"{cell['contacts'] / cell['trials']:.1f}"),
+        ("true\n[N]", median("true_peak_20ms_n", 0)),
+        ("back\n[s]", median("recovery_s", 1)),
+        ("held", plain("held")),
     )
-    header = (
-        "profile", "mode", *(f"{k} s\n[m]" for k in _LOOKS_S), "least\n[m]", "creep\n[m/s]", "hit\n[%]", "hits",
-        "true\n[N]", "back\n[s]",
-        "held",
-    )  # fmt: skip
-    return [
-        TextTable(
-            "A hand held still in the way of the line for 30 s: medians",
-            header,
-            rows,
-            "2 s to 30 s: distance of the arm's surface from the hand so long after the hand came. Least: the least in"
-            " these 30 s, negative in contact. Creep: median speed of the end-effector towards the hand in the last"
-            " 10 s. Hit: trials with contact; hits: contacts a trial. True: peak of the true force, 20 ms mean. Back:"
-            " from the hand's departure until 90 % of full speed. Held: trials in which the arm held.",
-        )
-    ]
+    table = tabulated(
+        "A hand held still in the way of the line for 30 s: medians",
+        columns,
+        part["cells"],
+        "2 s to 30 s: distance of the arm's surface from the hand so long after the hand came. Least: the least in"
+        " these 30 s, negative in contact. Creep: median speed of the end-effector towards the hand in the last"
+        " 10 s. Hit: trials with contact; hits: contacts a trial. True: peak of the true force, 20 ms mean. Back:"
+        " from the hand's departure until 90 % of full speed. Held: trials in which the arm held.",
+    )
+    return [table]
 
 
 _LINES = {"off": ("-", "o"), "slack": ("--", "s"), "hard": (":", "^"), "floor": ("-.", "v")}

@@ -21,15 +21,14 @@ from pretouch.sensing.unit import cone_rays
 from pretouch.sim.paper_scenes import static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import MODES, RangeFinders
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep, FloatArray, Mode, QpOutcome
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import peak, rounded, spread
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper import static
-from pretouch_lab.tables import number
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.rows import Row, cells_of, grouped, peak, rounded, spread
+from pretouch_lab.tables import median, plain, share
+from pretouch_lab.trial import Record, play
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -130,24 +129,17 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     scene, sign = static_scene("line", side, _STIFFNESS_N_M, seed), 1.0 if side == "+y" else -1.0
     board = scene.boxes[0]
     start = abs(board.center[1]) - board.half_size[1] - _HAND_HALF_WIDTH_M - gap
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=scene,
+    setup = context.setup(
+        cell,
+        seed,
+        scene,
         # the line of the static experiment, begun on the board's side of the plane y = 0
-        path=line((0.4, start * sign, 0.5), (0.4, 0.5 * sign, 0.5)),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
+        line((0.4, start * sign, 0.5), (0.4, 0.5 * sign, 0.5)),
         prepare=loss.attach,
     )
     record = play(setup, lambda step, _: step.stamp >= begin + WATCHED_S)
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         "gap_m": rounded(gap),
         "units": [context.skin.ids[unit] for unit in loss.facing],
         "lost": loss.lost(),
@@ -268,31 +260,28 @@ def _label(cell: Row, with_mode: bool) -> str:
 def tables(part: Row) -> list[TextTable]:
     """What lost readings change from one step to the next."""
     several = len({cell["restrictions"] for cell in part["cells"]}) > 1
-    rows = tuple(
-        (
-            _label(cell, several) if cell is shown[0] else "",
-            f"{cell['readings']:g}",
-            number(cell["lost"], 0),
-            number(cell["threshold_step_n"], 2),
-            number(cell["limit_step_m_s"], 3),
-            f"{cell['trials_without_rows']}/{cell['trials_with_rows']}",
-            number(cell["command_step"], 2),
-            number(cell["free_step"], 2),
-            number(cell["least_scale"], 2),
-            number(cell["scale_rise"], 4),
-            number(cell["towards_before_m_s"], 3),
-            number(cell["towards_most_m_s"], 3),
-            str(cell["holds"]),
-        )
+    rows = [
+        cell | {"label": _label(cell, several) if cell is shown[0] else ""}
         for shown in _by_profile(part["cells"])
         for cell in shown
+    ]
+    columns = (
+        ("profile\nkept", plain("label")),
+        ("n", plain("readings", "g")),
+        ("lost", median("lost", 0)),
+        ("bound\n[N]", median("threshold_step_n", 2)),
+        ("limit\n[m/s]", median("limit_step_m_s", 3)),
+        ("rows\ngone", share("trials_without_rows", "trials_with_rows")),
+        ("com-\nmand", median("command_step", 2)),
+        ("free\nQP", median("free_step", 2)),
+        ("fac-\ntor", median("least_scale", 2)),
+        ("rise", median("scale_rise", 4)),
+        ("before\n[m/s]", median("towards_before_m_s", 3)),
+        ("most\n[m/s]", median("towards_most_m_s", 3)),
+        ("hold", plain("holds")),
     )
-    header = (
-        "profile\nkept", "n", "lost", "bound\n[N]", "limit\n[m/s]", "rows\ngone", "com-\nmand", "free\nQP",
-        "fac-\ntor", "rise", "before\n[m/s]", "most\n[m/s]", "hold",
-    )  # fmt: skip
     title = f"Readings of a board are lost: medians of the {WATCHED_S:g} s after"
-    return [TextTable(title, header, rows, _NOTE)]
+    return [tabulated(title, columns, rows, _NOTE)]
 
 
 _NOTE = (

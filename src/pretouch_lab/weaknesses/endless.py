@@ -13,12 +13,11 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import peak, rounded
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper import static
+from pretouch_lab.rows import Row, cells_of, peak, rounded
 from pretouch_lab.tables import median, plain, share
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,18 +40,14 @@ def cells(grid: Grid) -> list[Cell]:
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     trajectory, side = str(cell.where["trajectory"]), str(cell.where["side"])
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=static_scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
-        path=static_path(trajectory, side),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
+    setup = context.setup(
+        cell,
+        seed,
+        static_scene(trajectory, side, float(cell.where["stiffness_n_per_m"]), seed),
+        static_path(trajectory, side),
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed, **results(record)}
+    row = {**cell.row(seed), **results(record)}
     return row, record
 
 

@@ -1,7 +1,7 @@
 """Rows that cannot be met: random postures with random points near the body, the QP alone, without a simulation."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -15,13 +15,12 @@ from pretouch.profiles import Profile, profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.types import FloatArray, Obstacles, QpOutcome
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import rounded
-from pretouch_lab.tables import number
+from pretouch_lab.rows import Row, cells_of, grouped, rounded
+from pretouch_lab.tables import median, plain
 
 NAME = "infeasible"
 _COUNTS = (1, 2, 4, 8)
@@ -54,12 +53,12 @@ class Answers:
     """The same from rest."""
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], None]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
     """Try a batch of random postures; return the row of results."""
     rng, params = np.random.default_rng([seed, 43]), context.profile(cell)
     count = int(cell.where["points"])
     found = [_posed(context.model, params, count, rng) for _ in range(_POSTURES)]
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
+    row = cell.row(seed)
     return row | results(found, context.model.links), None
 
 
@@ -140,7 +139,7 @@ def answers(model: RobotModel, params: Profile, q: FloatArray, obstacles: Obstac
     return Answers(link, fastest, failed["velocity"], failed["rest"], slack["velocity"], slack["rest"])
 
 
-def results(found: list[Answers], links: tuple[str, ...]) -> dict[str, Any]:
+def results(found: list[Answers], links: tuple[str, ...]) -> Row:
     """Numbers of one batch, in all and by the link that is nearest to the first point."""
     by_link = {}
     for link, name in enumerate(links):
@@ -176,7 +175,7 @@ _TOTALS = ("postures", "never", "at_once")
 _MEASURES = tuple(f"{box}_{what}_m_s" for box in ("slack", "slack_at_once") for what in ("median", "p90", "largest"))
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def summarise(rows: list[Row]) -> Row:
     """Cells by number of points, and the postures with one point by the link it is nearest to."""
     single = [row for row in rows if row["points"] == 1.0]
     parts = [
@@ -190,59 +189,53 @@ def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {"cells": cells, "links": sorted(links, key=lambda cell: (cell["profile"], cell["link"]))}
 
 
-def tables(part: dict[str, Any]) -> list[TextTable]:
+def tables(part: Row) -> list[TextTable]:
     """Show how often rows cannot be met, by the number of points and by link."""
     made = [_by_count(part["cells"])]
     return [*made, _by_link(part["links"])] if part["links"] else made
 
 
-def _percent(cell: dict[str, Any], name: str) -> str:
-    return f"{100 * cell[name] / cell['postures']:.1f}"
+def _percent(name: str) -> Callable[[Row], str]:
+    return lambda cell: f"{100 * cell[name] / cell['postures']:.1f}"
 
 
-def _by_count(cells: list[dict[str, Any]]) -> TextTable:
-    rows = []
-    for cell in cells:
-        slack = (
-            (number(cell[f"{box}_{what}_m_s"], 4) for what in ("median", "p90")) for box in ("slack", "slack_at_once")
-        )
-        velocity, rest = slack
-        rows.append(
-            (
-                f"{cell['points']:.0f}", cell["profile"], str(cell["postures"]), _percent(cell, "never"),
-                _percent(cell, "at_once"), *velocity, f"{cell['slack_largest_m_s']:.3f}", *rest,
-                f"{cell['slack_at_once_largest_m_s']:.3f}",
-            )
-        )  # fmt: skip
-    return TextTable(
+def _by_count(cells: list[Row]) -> TextTable:
+    columns = (
+        ("points", plain("points", ".0f")),
+        ("profile", plain("profile")),
+        ("n", plain("postures")),
+        ("never\n[%]", _percent("never")),
+        ("at once\n[%]", _percent("at_once")),
+        ("slack\nmedian", median("slack_median_m_s", 4)),
+        ("\n90 %", median("slack_p90_m_s", 4)),
+        ("\nlargest", plain("slack_largest_m_s", ".3f")),
+        ("at once\nmedian", median("slack_at_once_median_m_s", 4)),
+        ("\n90 %", median("slack_at_once_p90_m_s", 4)),
+        ("\nlargest", plain("slack_at_once_largest_m_s", ".3f")),
+    )
+    return tabulated(
         "Points within 0.1 m of the body in random postures: hard rows that cannot be met, and slack instead",
-        (
-            "points", "profile", "n", "never\n[%]", "at once\n[%]", "slack\nmedian", "\n90 %", "\nlargest",
-            "at once\nmedian", "\n90 %", "\nlargest",
-        ),
-        tuple(rows),
+        columns,
+        cells,
         "Never: no joint velocities within their limits meet all rows. At once: none that the accelerations allow from"
         " rest in one period. Slack: by how much [m/s] the worst soft row of a posture is violated; within the velocity"
         " limits, then from rest. Median and 90 % are medians over the batches.",
-    )  # fmt: skip
-
-
-def _by_link(links: list[dict[str, Any]]) -> TextTable:
-    rows = tuple(
-        (
-            cell["link"],
-            cell["profile"],
-            str(cell["postures"]),
-            _percent(cell, "never"),
-            _percent(cell, "at_once"),
-            number(cell["fastest_m_s"], 3),
-        )
-        for cell in links
     )
-    return TextTable(
+
+
+def _by_link(links: list[Row]) -> TextTable:
+    columns = (
+        ("link", plain("link")),
+        ("profile", plain("profile")),
+        ("n", plain("postures")),
+        ("never\n[%]", _percent("never")),
+        ("at once\n[%]", _percent("at_once")),
+        ("fastest\n[m/s]", median("fastest_m_s", 3)),
+    )
+    return tabulated(
         "One point: by the link it is nearest to",
-        ("link", "profile", "n", "never\n[%]", "at once\n[%]", "fastest\n[m/s]"),
-        rows,
+        columns,
+        links,
         "Fastest: the fastest retreat that the joints' velocity limits allow the closest point of the body, median."
         " Eq. 7 asks for up to 0.04 m/s.",
     )

@@ -14,11 +14,10 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.groups import grouped
-from pretouch_lab.metrics import peak, rounded, spread
+from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.rows import Row, grouped, peak, rounded, spread
 from pretouch_lab.tables import median, plain, share
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,23 +72,10 @@ def pushes(held_s: float, seed: int) -> tuple[Push, ...]:
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     person = Holder(context.model, pushes(float(cell.where["held_s"]), seed))
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=SceneSpec(hand=HandSpec()),
-        path=Circle(),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
-        hand=person,
-    )
+    setup = context.setup(cell, seed, SceneSpec(hand=HandSpec()), Circle(), hand=person)
     record = play(setup, lambda step, _: _over(person, step.stamp) or stuck(step))
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         "pushes": judged(record, person),
         "stuck": stuck(record.steps[-1]),
         "held": record.held(),

@@ -1,7 +1,5 @@
 """Eq. 3 slows the arm whatever its direction: what that costs on the way back from an object beside the path's end."""
 
-from typing import Any
-
 import numpy as np
 
 from pretouch.control.path import WayPoints
@@ -9,11 +7,10 @@ from pretouch.sim.scene import Box, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
-from pretouch_lab.groups import cells_of
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.static import least_sensed
+from pretouch_lab.rows import Row, cells_of, rounded
 from pretouch_lab.tables import median, plain
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.trial import Record, play
 
 NAME = "retreating"
 _MODES = ("off", "slack")
@@ -55,23 +52,14 @@ def scene(seed: int) -> SceneSpec:
     return SceneSpec(boxes=(Box("object", center, _HALF_SIZE_M, _STIFFNESS_N_PER_M),))
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=scene(seed),
-        path=path(),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
-    )
+    setup = context.setup(cell, seed, scene(seed), path())
     record = play(setup, lambda step, _: step.path_phase >= _CYCLE_M[1] or step.stamp >= _TIME_LIMIT_S)
-    return {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed, **results(record)}, record
+    return {**cell.row(seed), **results(record)}, record
 
 
-def results(record: Record) -> dict[str, Any]:
+def results(record: Record) -> Row:
     """Numbers of one trial; None for what the arm did not come to do in the time."""
     phase, times = np.array([s.path_phase for s in record.steps]), record.times()
 
@@ -103,7 +91,7 @@ _MEASURES = (
 )  # fmt: skip
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def summarise(rows: list[Row]) -> Row:
     """Cells of the experiment; what the retreat loses is against `blind` with the same seed."""
     blind = {row["seed"]: row for row in rows if row["profile"] == "blind"}
     compared = [row | _lost(row, blind.get(row["seed"])) for row in rows]
@@ -111,7 +99,7 @@ def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {"cells": cells_of(compared, ("profile", "restrictions"), _MEASURES, ("contact",), totals)}
 
 
-def _lost(row: dict[str, Any], blind: dict[str, Any] | None) -> dict[str, Any]:
+def _lost(row: Row, blind: Row | None) -> Row:
     """Time lost on the way back [s], and its share of the cycle; None where there is nothing to compare."""
     back, cycle = row["way_back_s"], row["cycle_s"]
     free = None if blind is None or row["profile"] == "blind" else blind["way_back_s"]
@@ -120,7 +108,7 @@ def _lost(row: dict[str, Any], blind: dict[str, Any] | None) -> dict[str, Any]:
     return {"lost_s": rounded(back - free), "lost_fraction": rounded((back - free) / cycle, 4)}
 
 
-def tables(part: dict[str, Any]) -> list[TextTable]:
+def tables(part: Row) -> list[TextTable]:
     """Show speeds before and after the turn, and what the retreat costs."""
     columns = (
         ("profile", plain("profile")),

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
 from textwrap import fill
-from typing import Any
 
 import numpy as np
 
@@ -17,17 +16,16 @@ from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.pushes import PALM, Push, way_round
 from pretouch.sim.scene import HandSpec, SceneSpec
-from pretouch.text_table import TextTable
+from pretouch.text_table import Column, TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.cell import NAMES_MODE, Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import peak, rounded
 from pretouch_lab.paper import static
 from pretouch_lab.paper.static import least_sensed
-from pretouch_lab.tables import number
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.rows import Row, cells_of, grouped, peak, rounded
+from pretouch_lab.tables import median, plain
+from pretouch_lab.trial import Record, play
 
 NAME = "tuned"
 V_MAX_M_S = (0.04, 0.1, 0.2, 0.4)
@@ -85,36 +83,29 @@ def _tuning(v_max: float, weight: float) -> str:
     return f":restriction.v_max_m_s={v_max:g}:restriction.slack_weight={weight:g}"
 
 
-def base(cell: dict[str, Any]) -> str:
+def base(cell: Row) -> str:
     """Return the name of the profile that a cell tunes."""
     name = str(cell["profile"])
     tuned = cell["restrictions"] == "slack"
     return name.removesuffix(_tuning(cell["v_max_m_s"], cell["slack_weight"])) if tuned else name
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     where = str(cell.where["scene"])
     still = where in static.TRAJECTORIES
     side = static.SIDES[seed % 2]
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=static_scene(where, side, _STIFFNESS_N_PER_M, seed) if still else SceneSpec(hand=HandSpec()),
-        path=static_path(where, side) if still else standing(),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
+    setup = context.setup(
+        cell,
+        seed,
+        static_scene(where, side, _STIFFNESS_N_PER_M, seed) if still else SceneSpec(hand=HandSpec()),
+        static_path(where, side) if still else standing(),
         hand=None if still else person(seed, context.model),
     )
     record = play(setup, _done(_STATIC_S if still else _HAND_S))
     tuning = of_table_i(setup.profile.approach)
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         "v_max_m_s": tuning.v_max_m_s,
         "slack_weight": tuning.slack_weight,
         **results(record, still),
@@ -171,7 +162,7 @@ def _done(limit: float) -> Callable[[ControlStep, Plant], bool]:
     return done
 
 
-def results(record: Record, still: bool) -> dict[str, Any]:
+def results(record: Record, still: bool) -> Row:
     """Numbers of one trial; `still`: the object is static, so that the arm has to come to rest by itself."""
     true, touch = np.linalg.norm(record.true_force, axis=1), record.first_contact()
     times, speed = displacement_speed(record)
@@ -236,12 +227,12 @@ _MEASURES = (
 )  # fmt: skip
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def summarise(rows: list[Row]) -> Row:
     """Cells of the experiment."""
     return {"cells": cells_of(rows, _BY, _MEASURES, ("contact",), ("held",))}
 
 
-def tables(part: dict[str, Any]) -> list[TextTable]:
+def tables(part: Row) -> list[TextTable]:
     """One table for the static object, one for the hand that comes."""
     still = [cell for cell in part["cells"] if cell["scene"] in static.TRAJECTORIES]
     moving = [cell for cell in part["cells"] if cell["scene"] not in static.TRAJECTORIES]
@@ -249,33 +240,35 @@ def tables(part: dict[str, Any]) -> list[TextTable]:
     return [table(cells, many) for table, cells in ((_still, still), (_moving, moving)) if cells]
 
 
-_HEADER = ("scene", "mode", "V_max\n[m/s]", "weight", "n", "hit\n[%]", "impact\n[m/s]", "true\n[N]", "least\n[m]")
 _NAME_WIDTH = 24
 """Characters of the first column at most: the table keeps to 80."""
 
 
-def _common(cell: dict[str, Any], many: bool) -> tuple[str, ...]:
-    off, soft = cell["restrictions"] == "off", cell["restrictions"] in ("slack", "floor")
+def _common(many: bool) -> tuple[Column, ...]:
+    def scene(cell: Row) -> str:
+        return f"{cell['scene']}\n{fill(base(cell).replace(':', ' '), _NAME_WIDTH)}" if many else str(cell["scene"])
+
+    def weight(cell: Row) -> str:
+        return f"{cell['slack_weight']:g}" if cell["restrictions"] in ("slack", "floor") else "-"
+
     return (
-        f"{cell['scene']}\n{fill(base(cell).replace(':', ' '), _NAME_WIDTH)}" if many else cell["scene"],
-        cell["restrictions"],
-        "-" if off else f"{cell['v_max_m_s']:g}",
-        f"{cell['slack_weight']:g}" if soft else "-",
-        str(cell["trials"]),
-        f"{100 * cell['contact_fraction']:.0f}",
-        number(cell["impact_speed_m_s"], 3),
-        number(cell["true_peak_20ms_n"], 0),
-        number(cell["least_sensed_m"], 3),
+        ("scene", scene),
+        ("mode", plain("restrictions")),
+        ("V_max\n[m/s]", lambda cell: "-" if cell["restrictions"] == "off" else f"{cell['v_max_m_s']:g}"),
+        ("weight", weight),
+        ("n", plain("trials")),
+        ("hit\n[%]", plain("contact_fraction", ".0f", 100)),
+        ("impact\n[m/s]", median("impact_speed_m_s", 3)),
+        ("true\n[N]", median("true_peak_20ms_n", 0)),
+        ("least\n[m]", median("least_sensed_m", 3)),
     )
 
 
-def _still(cells: list[dict[str, Any]], many: bool) -> TextTable:
-    return TextTable(
+def _still(cells: list[Row], many: bool) -> TextTable:
+    return tabulated(
         "Restrictions tuned: a static object on the path, 25 N/mm, medians",
-        (*_HEADER, "rest\n[s]", "left\n[mm/s]"),
-        tuple(
-            (*_common(cell, many), number(cell["rest_s"], 1), number(cell["speed_left_m_s"], 2, 1000)) for cell in cells
-        ),
+        (*_common(many), ("rest\n[s]", median("rest_s", 1)), ("left\n[mm/s]", median("speed_left_m_s", 2, 1000))),
+        cells,
         "Weight: of a row's squared violation against the squared task error. Hit: trials with contact in 25 s. Impact:"
         " closing speed at the touch, across the object's face. True: peak of the true force, 20 ms mean. Least:"
         " nearest that the units showed something to the arm's surface; they show none nearer than 4 cm. Without"
@@ -284,11 +277,11 @@ def _still(cells: list[dict[str, Any]], many: bool) -> TextTable:
     )
 
 
-def _moving(cells: list[dict[str, Any]], many: bool) -> TextTable:
-    return TextTable(
+def _moving(cells: list[Row], many: bool) -> TextTable:
+    return tabulated(
         "Restrictions tuned: a hand comes at the standing arm with 0.35 m/s, medians",
-        (*_HEADER, "away\n[m]"),
-        tuple((*_common(cell, many), number(cell["gave_way_m"], 3)) for cell in cells),
+        (*_common(many), ("away\n[m]", median("gave_way_m", 3))),
+        cells,
         "The hand reaches for where the robot's hand stood, and goes no farther. It comes along the beam of a unit,"
         " with 10 N at most. Impact: closing speed at the touch, along the way of the person's hand. Away: how far the"
         " end-effector moved from its place, up to the touch if there is one. Other columns as for a static object.",

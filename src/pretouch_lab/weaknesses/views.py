@@ -1,9 +1,9 @@
 """An empty room: what of the arm itself and of the table the units see, what the filter leaves, and what that costs."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import chain, count
 from textwrap import fill
-from typing import Any
 
 import numpy as np
 
@@ -14,14 +14,13 @@ from pretouch.profiles import Profile, profile
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.scene import SceneSpec, fixtures
-from pretouch.text_table import TextTable
+from pretouch.text_table import Column, TextTable, tabulated
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
-from pretouch_lab.groups import cells_of, grouped
-from pretouch_lab.metrics import rounded
-from pretouch_lab.tables import number
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.rows import Row, cells_of, grouped, rounded
+from pretouch_lab.tables import median, number, plain
+from pretouch_lab.trial import Record, play
 
 NAME = "views"
 SCENES = ("circle", "line", "low", "down")
@@ -75,27 +74,15 @@ def skin(where: str, context: Context) -> Skin:
     return Skin((*context.skin.units, SensorUnit(free, "panda_hand", T)), context.model)
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     where = str(cell.where["scene"])
     context = replace(context, skin=skin(where, context))
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=scene(where),
-        path=path(where),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
-    )
+    setup = context.setup(cell, seed, scene(where), path(where))
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     scale = np.array([s.speed_scale for s in record.steps])
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **seen(record, context, fixtures(setup.scene), setup.profile),
         "travelled_m": rounded(record.steps[-1].path_phase),
         "speed_scale": rounded(float(np.median(scale))),
@@ -115,7 +102,7 @@ def _mean(forces: list[FloatArray]) -> list[float]:
     return [rounded(v) for v in np.mean(forces, axis=0)]
 
 
-def seen(record: Record, context: Context, room: Fixtures, params: Profile) -> dict[str, Any]:
+def seen(record: Record, context: Context, room: Fixtures, params: Profile) -> Row:
     """Shares of the units' readings, over all control steps: with a target, predicted, and left as obstacles.
 
     Predicted is what the filter would leave out with the posture of the step, whether it is on or not: a return from
@@ -160,7 +147,7 @@ _MEASURES = (
 _SIDES = ("obstacle_force_positive_n", "obstacle_force_negative_n")
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def summarise(rows: list[Row]) -> Row:
     """Cells of the experiment; the free way is that of `blind` with the same seed in the same scene."""
     free = {(row["scene"], row["seed"]): row["travelled_m"] for row in rows if row["profile"] == "blind"}
     compared = []
@@ -181,7 +168,7 @@ def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {"cells": cells}
 
 
-def tables(part: dict[str, Any]) -> list[TextTable]:
+def tables(part: Row) -> list[TextTable]:
     """Show what the units see and what it costs, then which unit and which axis it concerns."""
     cells = [cell for cell in part["cells"] if profile(cell["profile"]).perception.enabled]
     many = len({cell["restrictions"] for cell in cells}) > 1
@@ -192,39 +179,36 @@ _NAME_WIDTH = 17
 """Characters of the profile's column at most: the table keeps to 80."""
 
 
-def _label(cell: dict[str, Any], many: bool) -> tuple[str, str]:
+def _names(many: bool) -> tuple[Column, ...]:
     """Scene and profile, the profile with its restriction mode if there are many and without filter if it has none."""
-    name = cell["profile"].removesuffix(_UNFILTERED)
-    mode = [cell["restrictions"]] if many else []
-    filtered = [] if name == cell["profile"] else ["no filter"]
-    return cell["scene"], "\n".join(fill(part, _NAME_WIDTH) for part in [*name.split(":"), *mode, *filtered])
+
+    def controller(cell: Row) -> str:
+        name = cell["profile"].removesuffix(_UNFILTERED)
+        mode = [cell["restrictions"]] if many else []
+        filtered = [] if name == cell["profile"] else ["no filter"]
+        return "\n".join(fill(part, _NAME_WIDTH) for part in [*name.split(":"), *mode, *filtered])
+
+    return ("scene", plain("scene")), ("profile", controller)
 
 
-def _shares(cells: list[dict[str, Any]], many: bool) -> TextTable:
-    rows = tuple(
-        (
-            *_label(cell, many),
-            number(cell["target_fraction"], 1, 100),
-            number(cell["arm_fraction"], 1, 100),
-            number(cell["room_fraction"], 1, 100),
-            number(cell["unpredicted_fraction"], 2, 100),
-            number(cell["cut_fraction"], 1, 100),
-            number(cell["obstacle_fraction"], 2, 100),
-            number(cell["way_fraction"], 0, 100),
-            f"{number(cell['speed_scale'], 2)}\n{number(cell['least_speed_scale'], 2)}",
-            str(cell["false_detections"]),
-            f"{100 * cell['contact_fraction']:.0f}",
-        )
-        for cell in cells
+def _shares(cells: list[Row], many: bool) -> TextTable:
+    columns = (
+        *_names(many),
+        ("target\n[%]", median("target_fraction", 1, 100)),
+        ("arm\n[%]", median("arm_fraction", 1, 100)),
+        ("room\n[%]", median("room_fraction", 1, 100)),
+        ("else\n[%]", median("unpredicted_fraction", 2, 100)),
+        ("cut\n[%]", median("cut_fraction", 1, 100)),
+        ("obst.\n[%]", median("obstacle_fraction", 2, 100)),
+        ("way\n[%]", median("way_fraction", 0, 100)),
+        ("speed\nleast", lambda cell: f"{number(cell['speed_scale'], 2)}\n{number(cell['least_speed_scale'], 2)}"),
+        ("false", plain("false_detections")),
+        ("hit\n[%]", plain("contact_fraction", ".0f", 100)),
     )
-    header = (
-        "scene", "profile", "target\n[%]", "arm\n[%]", "room\n[%]", "else\n[%]", "cut\n[%]", "obst.\n[%]", "way\n[%]",
-        "speed\nleast", "false", "hit\n[%]",
-    )  # fmt: skip
-    return TextTable(
+    return tabulated(
         "An empty room: what the units see of the arm and of the floor, medians",
-        header,
-        rows,
+        columns,
+        cells,
         "Of all readings: target: those with one; arm, room: those the model predicts to be the arm, or floor and"
         " pedestal; else: neither, what the filter leaves; obst.: those the controller took for obstacles, held over"
         " missed readings. Cut is the filter's price: of all views, with a target or not, those in which what is"
@@ -236,17 +220,24 @@ def _shares(cells: list[dict[str, Any]], many: bool) -> TextTable:
     )
 
 
-def _sides(cells: list[dict[str, Any]], many: bool) -> TextTable:
-    rows = []
-    for cell in cells:
+def _sides(cells: list[Row], many: bool) -> TextTable:
+    def lowered(axis: int) -> Callable[[Row], str]:
+        return lambda cell: "\n".join(f"{cell[name][axis]:.2f}" for name in reversed(_SIDES))
+
+    def most(cell: Row) -> tuple[str, float]:
         unit, share = max(cell["obstacle_fraction_of_units"].items(), key=lambda item: item[1])
-        below, above = (cell[name] for name in reversed(_SIDES))
-        pairs = (f"{low:.2f}\n{high:.2f}" for low, high in zip(below, above, strict=True))
-        rows.append((*_label(cell, many), *pairs, unit if share else "-", f"{100 * share:.1f}"))
-    return TextTable(
+        return (unit if share else "-"), share
+
+    columns = (
+        *_names(many),
+        *((f"-{axis}, +{axis}\n[N]", lowered(k)) for k, axis in enumerate("xyz")),
+        ("unit", lambda cell: most(cell)[0]),
+        ("obst.\n[%]", lambda cell: f"{100 * most(cell)[1]:.1f}"),
+    )
+    return tabulated(
         "An empty room: mean lowering of the thresholds, and the unit that shows most of it",
-        ("scene", "profile", "-x, +x\n[N]", "-y, +y\n[N]", "-z, +z\n[N]", "unit", "obst.\n[%]"),
-        tuple(rows),
+        columns,
+        cells,
         "F_obs of eq. 11 for objects on the negative (above) and positive (below) side of each axis, of 4 N at most,"
         " mean over the time. Unit: the one with the most readings taken for obstacles, and their share of its own.",
     )

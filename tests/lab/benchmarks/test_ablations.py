@@ -1,11 +1,13 @@
+from pathlib import Path
+
 import pytest
 
 from pretouch.composition import differences
 from pretouch.errors import ParameterError
 from pretouch.profiles import profile
+from pretouch_lab.baselines.detection import Baseline, ablated
 from pretouch_lab.benchmarks.ablations import OFF, Ablation, ablations
-from pretouch_lab.benchmarks.avoidance.run import Request
-from pretouch_lab.benchmarks.detection.contenders import Contender
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 
 
 def differing(a, b):
@@ -30,8 +32,12 @@ def test_no_switch_is_in_both_benchmarks():
     assert not {a.name for a in of_detection} & {a.name for a in others}
 
 
+def test_only_the_thresholds_are_swept_by_their_base_force():
+    assert [baseline.name for baseline in ablated() if baseline.sweep == "f_base_n"] == ["without detect"]
+
+
 def test_an_unknown_switch_is_an_error_and_not_left_out():
     with pytest.raises(ParameterError, match=r"'detect\.lern' is unknown"):
-        Contender("own", "pretouch:detect.lern=no", "scale").profile  # noqa: B018  # it reads the text
-    with pytest.raises(ParameterError, match=r"'react\.clam' is unknown.* Contenders are blind"):
-        Request(("pretouch:react.clam=no",))
+        Baseline("own", "pretouch:detect.lern=no", "scale").profile  # noqa: B018  # it reads the text
+    with pytest.raises(ParameterError, match=r"'react\.clam' is unknown.* Baselines are blind"):
+        AvoidanceBench(Path(), baselines=("pretouch:react.clam=no",))

@@ -20,24 +20,22 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import Contact, RobotState, Thresholds
+from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.detection import campaign, contacts, free, judge
 from pretouch_lab.benchmarks.detection.arm import AWAY, model
-from pretouch_lab.benchmarks.detection.campaign import Bench, Rows
+from pretouch_lab.benchmarks.detection.campaign import DetectionBench
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, Toucher, Touching, contact_cells, plan
-from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells
 from pretouch_lab.benchmarks.detection.judge import BUSY, matched
-from pretouch_lab.benchmarks.detection.published import document_part, pictures, summary_of
 from pretouch_lab.benchmarks.detection.replay import REST, begun, replay
 from pretouch_lab.benchmarks.detection.results import delays, rate, resolution
 from pretouch_lab.benchmarks.detection.stream import StreamRecorder, load_stream, save_stream
 from pretouch_lab.benchmarks.detection.tables import reached
-from pretouch_lab.benchmarks.store import read_rows, run_tasks
 from pretouch_lab.ghost import Ghost
 
 HAND = 10
-PAPER = Contender("paper", "paper", "f_base_n")
+PAPER = Baseline("paper", "paper", "f_base_n")
 SIDE = np.array([0.0, -1.0, 0.0])
 
 
@@ -85,7 +83,7 @@ def test_a_replay_finds_what_the_controller_found_in_the_closed_loop(closed_loop
 
 def test_a_replay_of_ours_has_the_evidence_of_the_closed_loop_step_by_step(our_loop):
     steps, stream = our_loop
-    made = replay(stream, CONTENDERS[-1], model())
+    made = replay(stream, BASELINES[-1], model())
     armed = [i for i, step in enumerate(steps) if step.armed]
     assert any(step.contact is not None for step in steps)
     np.testing.assert_array_equal(made.statistic[armed], [steps[i].evidence for i in armed])
@@ -94,7 +92,7 @@ def test_a_replay_of_ours_has_the_evidence_of_the_closed_loop_step_by_step(our_l
 @pytest.mark.parametrize("name", ["paper", "pretouch"])
 def test_the_first_motion_of_an_answer_is_with_the_push(name, closed_loop, our_loop):
     _, stream = closed_loop if name == "paper" else our_loop
-    made = replay(stream, Contender(name, name, "scale"), model())
+    made = replay(stream, Baseline(name, name, "scale"), model())
     moving = np.flatnonzero(np.isfinite(made.motion).all(axis=1))
     assert len(moving) == len(made.onsets()) == 1
     kin = model().kinematics(stream.robot["q"][moving[0]])
@@ -153,10 +151,10 @@ def test_a_stream_gives_back_what_the_controller_was_given(closed_loop, tmp_path
 def test_the_sweep_of_one_replay_is_what_each_value_would_find_itself(closed_loop):
     _, stream = closed_loop
     for text in ("paper", "paper:threshold.compare=raw", "blind"):
-        made = replay(stream, Contender(text, text, "f_base_n"), model())
+        made = replay(stream, Baseline(text, text, "f_base_n"), model())
         assert made.onsets() == made.onsets(10.0)
         for value in (6.0, 14.0):
-            own = Contender("own", f"{text}:threshold.f_base_n={value}", "f_base_n")
+            own = Baseline("own", f"{text}:threshold.f_base_n={value}", "f_base_n")
             assert made.onsets(value) == replay(stream, own, model()).onsets()
 
 
@@ -284,14 +282,14 @@ def test_delays_are_of_what_was_detected_and_busy_contacts_apart():
     assert delays([None])["median_delay_s"] is None
 
 
-def test_every_contender_is_a_profile_with_its_own_value_on_its_curve():
-    every = (*CONTENDERS, *ablated())
-    assert len({contender.name for contender in every}) == len(every)
-    for contender in every:
-        assert contender.default in judge.sweep_values(contender)
+def test_every_baseline_is_a_profile_with_its_own_value_on_its_curve():
+    every = (*BASELINES, *ablated())
+    assert len({baseline.name for baseline in every}) == len(every)
+    for baseline in every:
+        assert baseline.default in judge.sweep_values(baseline)
 
 
-def test_a_run_leaves_rows_for_every_contender_and_goes_on_after_a_kill(tmp_path, monkeypatch):
+def test_a_run_leaves_rows_for_every_baseline_and_goes_on_after_a_kill(tmp_path, monkeypatch):
     for module in (free, judge, campaign):
         monkeypatch.setattr(module, "warm_up_s", lambda: 1.5)
     monkeypatch.setattr(campaign, "free_cells", lambda *_: [FreeCell("nominal", "circle", 0.3, "standing", 1000, 1.0)])
@@ -299,25 +297,24 @@ def test_a_run_leaves_rows_for_every_contender_and_goes_on_after_a_kill(tmp_path
     cell = ContactCell("nominal", "seven", 0.3, 1000, 1)
     monkeypatch.setattr(campaign, "contact_cells", lambda *_: [cell])
     monkeypatch.setattr(contacts, "plan", lambda *_: [touching(1.8)])
-    bench, costs = Bench(tmp_path, quick=True, seeds="development"), []
-    for tasks in (bench.streams(), [*bench.free(), *bench.contacts()]):
-        run_tasks(tasks, tmp_path, costs.append, processes=1)
-    replays = 2 * len(CONTENDERS) + len(ablated())  # the contacts are not those that ablations are given
+    bench, costs = DetectionBench(tmp_path, quick=True, seeds="development"), []
+    bench.run(costs.append, processes=1)
+    replays = 2 * len(BASELINES) + len(ablated())  # the contacts are not those that ablations are given
     assert len(costs) == 2 + replays
     bench.free()[1].file.unlink()
-    for tasks in (bench.streams(), [*bench.free(), *bench.contacts()]):
-        run_tasks(tasks, tmp_path, costs.append, processes=1)
+    bench.run(costs.append, processes=1)
     assert len(costs) == 3 + replays
-    rows = Rows(read_rows(bench.free()), read_rows(bench.contacts()), [])
+    rows = bench.rows()
     contact = rows.contacts[0]["contacts"][0]
     assert contact["delay_s"] < 0.2
     assert contact["towards"] is False
     assert contact["feelable"]
-    results = json.loads(json.dumps(summary_of(bench, rows), allow_nan=False))
+    found = bench.found()
+    results = json.loads(json.dumps(found.json, allow_nan=False))
     keys = {"contender", "scenario", "seen", "false_alarms_per_hour", "median_delay_s", "p95_delay_s", "missed",
             "contacts", "peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_time_s"}  # fmt: skip
     assert all(keys <= set(row) for row in results["rows"])
-    assert "Contact detection: the goals" in document_part(results, pictures(results, rows))
+    assert "Contact detection: the goals" in found.section()
     assert resolution(rows).startswith(
         "0.00028 h of free motion. No false alarm in the 0.00028 h at the goal's speed means fewer than"
     )

@@ -2,23 +2,23 @@ import pytest
 
 from pretouch_lab.benchmarks.avoidance.losses import losses
 from pretouch_lab.benchmarks.avoidance.paired import paired
+from pretouch_lab.benchmarks.bench import EMPTY
 from pretouch_lab.benchmarks.bounds import median_bounds, share_below
 from pretouch_lab.benchmarks.front import front_table
 from pretouch_lab.benchmarks.goals import goal_table, goals
-from pretouch_lab.benchmarks.store import EMPTY
 
 MEASURES = ("peak_estimate_n", "true_peak_20ms_n", "clamping_force_n", "first_contact_s", "cycle_time_s")
 
 
-def trial(contender, seed, family="static", **measures):
-    names = {"family": family, "scenario": family, "contender": contender, "seed": seed, "timed": family == "person"}
+def trial(baseline, seed, family="static", **measures):
+    names = {"family": family, "scenario": family, "contender": baseline, "seed": seed, "timed": family == "person"}
     return {**names, "contact": False, **dict.fromkeys(MEASURES), **measures}
 
 
-def part_of(rows, measure, reference="blind", contender="pretouch"):
+def part_of(rows, measure, reference="blind", baseline="pretouch"):
     (found,) = [
         p for p in paired(rows)
-        if (p["measure"], p["reference"], p["contender"]) == (measure, reference, contender)
+        if (p["measure"], p["reference"], p["contender"]) == (measure, reference, baseline)
     ]  # fmt: skip
     return found["part"], found["trials"]
 
@@ -124,12 +124,12 @@ def test_the_table_of_the_first_page_has_who_it_is_about():
     assert table.rows[3][1:] == ("0.4", "30 (0/90)", "30 (0/90)", "5.0", "5.0", "5.0", "5.0")
 
 
-def test_every_cell_another_contender_wins_is_shown():
-    def cell(contender, **medians):
+def test_every_cell_another_baseline_wins_is_shown():
+    def cell(baseline, **medians):
         names = ("true_peak_20ms_n", "clamping_force_n", "cycle_time_s", "tracking_rms_m", "jerk_rms_rad_s3", "held_s",
                  "livelock_s", "least_distance_m", "speed_m_s")  # fmt: skip
         usual = dict.fromkeys(names, 1.0) | medians
-        return {"scenario": "drdo", "contender": contender, **{k: {"median": v} for k, v in usual.items()}}
+        return {"scenario": "drdo", "contender": baseline, **{k: {"median": v} for k, v in usual.items()}}
 
     table = losses([
         cell("pretouch", cycle_time_s=None), cell("ding", least_distance_m=1.2, true_peak_20ms_n=0.96),

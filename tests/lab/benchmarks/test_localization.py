@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pretouch.types import Touched, untouched
+from pretouch.types import NOT_TOUCHED, Touched
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell, planned, touched_cells
 from pretouch_lab.benchmarks.localization.judge import Said, _one, _two, name_of
 from pretouch_lab.benchmarks.localization.limit import LINK_M, position_limit
 from pretouch_lab.benchmarks.localization.motion import wandering
-from pretouch_lab.benchmarks.localization.results import TWO, rows_of, tables_of
+from pretouch_lab.benchmarks.localization.results import TWO, rows_by_body, tables_of
 
 LEARNT = np.stack([np.stack([np.full(7, 0.25), np.full(7, 0.01)])] * 2)
 
@@ -82,13 +82,13 @@ def test_a_contact_is_judged_by_its_body_and_its_place():
         np.array([touch.link]), (at + np.array([0.0, 0.03, 0.0]))[None], np.ones((1, 3)), np.ones(1), np.ones(1)
     )
     wrong = Touched(np.array([model().ee]), at[None], np.ones((1, 3)), np.ones(1), np.ones(1))
-    row = _one(touch, said_of(untouched(), right, untouched(), untouched(), wrong))
+    row = _one(touch, said_of(NOT_TOUCHED, right, NOT_TOUCHED, NOT_TOUCHED, wrong))
     assert row["right"]
     assert row["error_m"] == pytest.approx(0.03)
     assert not row["right_end"]
     assert row["taken_for_end"] == "hand"
     assert row["error_end_m"] == 0.0
-    missed = _one(touch, said_of(untouched(), untouched()))
+    missed = _one(touch, said_of(NOT_TOUCHED, NOT_TOUCHED))
     assert (missed["felt"], missed["right"], missed["error_m"]) == (False, False, None)
 
 
@@ -98,11 +98,11 @@ def test_two_contacts_are_matched_with_the_nearer_ones():
         np.array([b.link, a.link]), np.array([true_place(b), true_place(a) + np.array([0.02, 0.0, 0.0])]),
         np.ones((2, 3)), np.ones(2), np.ones(2),
     )  # fmt: skip
-    row = _two(a, b, said_of(untouched(), untouched(), both))
+    row = _two(a, b, said_of(NOT_TOUCHED, NOT_TOUCHED, both))
     assert row["two"]
     assert row["right"]
     assert sorted(row["errors_m"]) == [0.0, pytest.approx(0.02)]
-    assert not _two(a, b, said_of(untouched(), untouched(), untouched()))["two"]
+    assert not _two(a, b, said_of(NOT_TOUCHED, NOT_TOUCHED, NOT_TOUCHED))["two"]
 
 
 def test_torques_tell_most_of_the_hand_and_hardly_anything_of_the_first_links():
@@ -123,11 +123,11 @@ def test_torques_tell_most_of_the_hand_and_hardly_anything_of_the_first_links():
 def test_rows_say_what_was_found():
     touch = touching("hand")
     at = Touched(np.array([touch.link]), true_place(touch)[None] + 0.01, np.ones((1, 3)), np.ones(1), np.ones(1))
-    found = [_one(touch, said_of(untouched(), at, at, at, at)), _one(touch, said_of(untouched()))]
-    pair = _two(touch, touching("link4"), said_of(untouched()))
+    found = [_one(touch, said_of(NOT_TOUCHED, at, at, at, at)), _one(touch, said_of(NOT_TOUCHED))]
+    pair = _two(touch, touching("link4"), said_of(NOT_TOUCHED))
     one = {"contacts": 1, "skin": "none", "found": found, "median_s": 0.0004, "p99_s": 0.001}
     two = {"contacts": 2, "skin": "none", "found": [pair], "median_s": 0.0004, "p99_s": 0.002}
-    rows = rows_of([one, two])
+    rows = rows_by_body([one, two])
     assert [row["link"] for row in rows] == ["hand", TWO]
     first = rows[0]
     assert (first["skin"], first["contacts"], first["felt"], first["right_link"]) == ("none", 2, 1, 0.5)

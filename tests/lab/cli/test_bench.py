@@ -4,18 +4,18 @@ from pathlib import Path
 import pytest
 
 from pretouch import cli
+from pretouch_lab.benchmarks.bench import Bench
 from pretouch_lab.benchmarks.detection import campaign
-from pretouch_lab.benchmarks.documents import begin_mark, end_mark
-from pretouch_lab.cli import bench_both
+from pretouch_lab.cli import benchmarks
+from pretouch_lab.cli.benchmarks import BenchOptions
+from pretouch_lab.documents import begin_mark, end_mark
 
 
 @pytest.fixture
 def nothing_to_do(monkeypatch):
-    def run_bench(bench, progress):
-        bench.open()
-        return campaign.Rows([], [], [])
-
-    monkeypatch.setattr(campaign, "run_bench", run_bench)
+    monkeypatch.setattr(Bench, "every", lambda _: [])
+    monkeypatch.setattr(Bench, "run", lambda *_: None)
+    monkeypatch.setattr(campaign.DetectionBench, "rows", lambda _: campaign.Rows([], [], []))
 
 
 def test_bench_detection_writes_numbers_figures_and_document(nothing_to_do, capsys, tmp_path):
@@ -31,7 +31,7 @@ def test_bench_detection_writes_numbers_figures_and_document(nothing_to_do, caps
         assert (docs / "images" / f"bench-detection-{name}.png").stat().st_size > 1000
     assert "development seeds, quick run" in (docs / "results" / "benchmarks.md").read_text()
     assert cli.main(given) == 2
-    assert "holds a run with another seeds: give another --out" in capsys.readouterr().err
+    assert "holds a run with seeds = 'development', not 'published': give another --out" in capsys.readouterr().err
 
 
 def test_a_document_without_a_place_for_the_tables_is_refused_before_anything_is_run(capsys, tmp_path):
@@ -45,17 +45,17 @@ def test_a_document_without_a_place_for_the_tables_is_refused_before_anything_is
 @pytest.fixture
 def nothing_measured(monkeypatch):
     def leaves_nothing(name):
-        def bench(command):
+        def run(command):
             about = {"bench": name, "quick": command.quick, "seeds": command.seeds}
             folder = Path(command.out)
             folder.mkdir(parents=True)
             results = {"about": about, "rows": [], "paired": [], "families": []}
             (folder / "results.json").write_text(json.dumps(results))
 
-        return bench
+        return run
 
     for name in ("detection", "avoidance"):
-        monkeypatch.setattr(bench_both, f"bench_{name}", leaves_nothing(name))
+        monkeypatch.setattr(benchmarks, name.capitalize(), type(name, (BenchOptions,), {"run": leaves_nothing(name)}))
 
 
 def test_bench_both_says_which_goals_were_reached_and_writes_the_documents(nothing_measured, capsys, tmp_path):
@@ -81,9 +81,8 @@ def test_bench_both_refuses_a_first_page_without_a_place_for_the_table(capsys, t
 
 
 def test_bench_localization_writes_numbers_and_its_document(monkeypatch, capsys, tmp_path):
-    from pretouch_lab.benchmarks.localization import campaign as localization
-
-    monkeypatch.setattr(localization, "run_bench", lambda bench, progress: [])
+    monkeypatch.setattr(Bench, "every", lambda _: [])
+    monkeypatch.setattr(Bench, "run", lambda bench, _: bench.open())
     docs, out = tmp_path / "docs", tmp_path / "run"
     document = docs / "results" / "localization.md"
     document.parent.mkdir(parents=True)

@@ -39,7 +39,7 @@ def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, m
 
     def study(model, skins, seed, compared, links_known, plan, progress):
         asked.append((model.description.name, skins, seed, compared, links_known, plan))
-        progress(1, 1)
+        progress()
         return Study([Trial(0, OURS, OURS, [ROW], 1.5)], {OURS: 60.0})
 
     monkeypatch.setattr(study_module, "study", study)

@@ -3,6 +3,7 @@ import json
 import pytest
 
 from pretouch import cli
+from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
 from pretouch_lab.cli.commands import new_folder
 
@@ -25,8 +26,11 @@ def run(capsys, *args):
         (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("reproduce", "static", "--out", "/dev/null/x"), "/dev/null/x cannot be used"),
         (("reproduce", "static", "--out", "OUT", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
-        (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "cannot be written (Is a directory): give another file."),
-        (("reproduce", "static", "--out", "OUT", "--json", "x" * 256), "cannot be written (File name too long): give another file."),
+        (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "written (Is a directory): give another file"),
+        (
+            ("reproduce", "static", "--out", "OUT", "--json", "x" * 256),
+            "written (File name too long): give another file",
+        ),
         (("demo", "--seeds", "0"), "The number of seeds is 0"),
         (("bench", "cycle", "--points", "7,x"), "The numbers of points are '7,x': give whole numbers"),
         (("bench", "cycle", "--points", ""), "The numbers of points are '': give whole numbers"),
@@ -60,22 +64,14 @@ def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
     assert not out.exists()
 
 
-def _row(request, out):
-    from pretouch.atomic_write import write_json
-    from pretouch_lab.campaign import trial_file
-
-    cell, seed = request.tasks()[0]
-    row = {"experiment": cell.experiment, **cell.where, "profile": cell.profile, "seed": seed}
-    write_json(row, trial_file(out, cell, seed))
-
-
 @pytest.mark.parametrize("error", [RuntimeError("crash"), ExperimentError("full"), KeyboardInterrupt()])
 def test_finished_trials_are_kept_whatever_ends_a_run(capsys, tmp_path, monkeypatch, error):
-    def play(request, out, _progress):
-        _row(request, out)
+    def play(tasks, _out, _progress):
+        tasks[0].file.parent.mkdir(parents=True)
+        write_json(tasks[0].about, tasks[0].file)
         raise error
 
-    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_campaign", play)
+    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_tasks", play)
     monkeypatch.setattr("pretouch_lab.cli.campaigns.summarise", len)
     args = ("reproduce", "static", "--out", str(tmp_path))
     if isinstance(error, RuntimeError):
@@ -92,10 +88,10 @@ def test_results_that_cannot_be_written_at_the_end_are_said(capsys, tmp_path, mo
     def full(_value, _path):
         raise OSError(28, "No space left on device")
 
-    def play(request, out, _progress):
+    def play(_tasks, _out, _progress):
         monkeypatch.setattr("pretouch_lab.cli.campaigns.write_json", full)
 
-    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_campaign", play)
+    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_tasks", play)
     code, said = run(capsys, "reproduce", "static", "--out", str(tmp_path))
     assert code == 2
     assert "results.json cannot be written (No space left on device)" in said.err

@@ -14,7 +14,7 @@ from pretouch.profiles import profile
 from pretouch.recording.run_record import MODES, RunRecord, TrueForces
 from pretouch.sensing.skin import Skin
 from pretouch.types import Contact, Mode
-from pretouch_lab.campaign import Request, open_folder, recording_file
+from pretouch_lab.campaign import Request, recording_file
 from pretouch_lab.cell import Cell
 from pretouch_lab.cli import figure as cli_figure
 from pretouch_lab.cli.figure import draw_figure
@@ -195,7 +195,7 @@ def run_folder(recorded, tmp_path_factory):
     out = tmp_path_factory.mktemp("demo")
     for part, names in (("static", ("force-difference",)), ("people", ("circle", "interaction", "close-up"))):
         request = Request(("static",), seeds=1)
-        open_folder(request, out / part)
+        request.open(out / part)
         for cell in (cell for name in names for cell in CATALOGUE[name].cells("paper")):
             copy(recorded[0], recording_file(out / part, cell, 0))
     return out
@@ -270,7 +270,7 @@ def test_what_cannot_be_drawn_is_said_in_a_sentence(run_folder, tmp_path, monkey
 @pytest.mark.usefixtures("nothing_played")
 def test_a_damaged_run_is_named(tmp_path):
     (cell,) = CATALOGUE["close-up"].cells("paper")
-    open_folder(Request(("static",), seeds=1), tmp_path)
+    Request(("static",), seeds=1).open(tmp_path)
     recording_file(tmp_path, cell, 0).write_bytes(b"no recording")
     with pytest.raises(RecordingError, match="is not an MCAP file"):
         draw_figure("close-up", tmp_path, tmp_path / "x.png")

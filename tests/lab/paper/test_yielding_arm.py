@@ -56,7 +56,7 @@ def test_pushed_against_a_board_it_opens_and_holds(panda_model, paper_skin):
     record, _, _ = pushed(panda_model, paper_skin, profile(SLOW), held_s=1.0, until=5.0, boxes=(board,))
     last = record.steps[-1]
     assert last.mode is Mode.HOLD
-    assert "caught between two things" in last.reason
+    assert "clamped between two objects" in last.reason
     free = record.true_time > last.stamp - 0.5
     assert np.linalg.norm(record.true_force[free], axis=1).max() < 5.0, "it does not lean on the board"
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from pretouch.checks import Check, Checked, NonNegative
-from pretouch_lab.sweep import cluster, local
+from pretouch_lab.sweep import cluster
+from pretouch_lab.sweep import run as here
 from pretouch_lab.sweep import work as jobs
 from pretouch_lab.sweep.definition import Asked, Sweep, sweep_of
 from pretouch_lab.sweep.measures import Measure, Numbers
@@ -56,7 +57,7 @@ ISHIGAMI = Measure(
 def register(patch: pytest.MonkeyPatch) -> None:
     """Make the function an experiment, here and in workers."""
     patch.setitem(MEASURES, ISHIGAMI.name, ISHIGAMI)
-    for engine in (local, cluster):
+    for engine in (here, cluster):
         patch.setattr(engine, "work", work)
 
 

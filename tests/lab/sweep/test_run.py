@@ -10,7 +10,8 @@ import pytest
 from pyarrow import parquet
 
 from pretouch.errors import ExperimentError
-from pretouch_lab.sweep import local, work
+from pretouch_lab import engine
+from pretouch_lab.sweep import work
 from pretouch_lab.sweep.definition import Asked, sweep_of
 from pretouch_lab.sweep.document import picture, tables, written
 from pretouch_lab.sweep.results import values_of
@@ -138,7 +139,7 @@ def test_a_worker_of_another_version_is_refused(tmp_path):
 
 def test_results_that_cannot_be_written_are_an_error_and_what_was_is_kept(tmp_path):
     (tmp_path / "ishigami").write_text("a file in the place of the folder")
-    with pytest.raises(ExperimentError, match=r"could not be written to .*the same command goes on"):
+    with pytest.raises(ExperimentError, match=r"could not be written to .*the same command with the same --out"):
         opened_ishigami(tmp_path)
 
 
@@ -155,7 +156,7 @@ def test_a_cell_whose_worker_is_killed_is_played_again(tmp_path):
 
 
 def test_a_cell_whose_worker_is_killed_each_time_is_given_up_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr(local, "TRIES", 1)
+    monkeypatch.setattr(engine, "TRIES", 1)
     run = opened_ishigami(tmp_path, samples=2)
     kills = iter([_kill_one_worker])
     play(run, HERE, lambda _: next(kills, lambda: None)())

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 from scipy.spatial.transform import Rotation
 
@@ -15,6 +14,7 @@ from pretouch.calibration.observability import Observability
 from pretouch.calibration.result import Calibration, Finding, Place, UnitCalibration
 from pretouch.calibration.skin_of import skin_of
 from pretouch.cli.calibrate.outputs import Outputs
+from pretouch.cli.tables import grid
 from pretouch.cli.writing import unwritable_said
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
@@ -58,13 +58,9 @@ def give(answer: Answer, outputs: Outputs) -> int:
 
 
 def _table(answer: Answer) -> Table:
-    shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    for i, name in enumerate(_COLUMNS):
-        shown.add_column(escape(name), justify="left" if i in _TEXT else "right", no_wrap=i > 1, overflow="fold")
-    for unit in answer.calibration.units:
-        style = "" if unit.accepted else "bold red"
-        shown.add_row(*map(escape, _cells(unit)), style="yellow" if unit.accepted and unit.findings else style)
-    return shown
+    units = answer.calibration.units
+    styles = ["bold red" if not unit.accepted else "yellow" if unit.findings else "" for unit in units]
+    return grid(_COLUMNS, map(_cells, units), left=_TEXT, whole=2, styles=styles)
 
 
 def _cells(unit: UnitCalibration) -> tuple[str, ...]:

@@ -16,7 +16,6 @@ from pretouch.calibration.motion.perform import PerformParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.report import report_on
 from pretouch.calibration.motion.route import approach
-from pretouch.cli.arms import arm_model
 from pretouch.cli.calibrate.motion import planned
 from pretouch.cli.calibrate.outputs import Outputs, check_free, same_file
 from pretouch.cli.calibrate.recording import Sources, calibrate_recording
@@ -29,7 +28,8 @@ from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import load_skin, paper_skin
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import skin_for
 from pretouch.serving.simulated_arm import CATCH_UP_S, SimulatedArm, SimulateOptions
 from pretouch.signals import Terminated
 
@@ -51,7 +51,7 @@ def calibrate_live(command: "Calibrate", outputs: Outputs) -> int:
     if not command.live.units_host:
         raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
     place = _recording_place(command, outputs)
-    model, again = arm_model(command.arm), _again(command, place)
+    model, again = RobotModel(robot_named(command.arm)), _again(command, place)
     with _session(command, model) as session:
         ways = _ways(session, model, command.motion)
         if not command.live.yes:
@@ -85,7 +85,7 @@ def _recording_place(command: "Calibrate", outputs: Outputs) -> Path:
 @contextmanager
 def _session(command: "Calibrate", model: RobotModel) -> Iterator[Session]:
     """Hear the units of a simulated arm."""
-    skin = load_skin(Path(command.skin), model) if command.skin else paper_skin(model)
+    skin = skin_for(model, command.skin)
     keys = keys_for(keys_file(command.live.keys), skin)
     host = command.live.units_host
     with NetworkSkin(skin.ids, keys, host, command.live.units_port) as source:

@@ -7,10 +7,10 @@ from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import plan_motion
 from pretouch.calibration.motion.report import report_on
-from pretouch.cli.arms import arm_model
 from pretouch.cli.calibrate.outputs import check_free
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 
 if TYPE_CHECKING:
     from pretouch.cli.calibrate.options import Calibrate, MotionOptions
@@ -36,7 +36,7 @@ def write_motion(command: "Calibrate") -> None:
     place = Path(command.plan)
     check_free("motion", place, command.replace)
     check_writable("file", place)
-    model = arm_model(command.arm)
+    model = RobotModel(robot_named(command.arm))
     plan, params = planned(model, command.motion)
     with unwritable_said("file", place):  # first, for nobody may read on what is printed
         plan.save(place)

@@ -83,8 +83,8 @@ class Calibrate:
     """File for all numbers."""
     replace: bool = False
     """Overwrite existing files."""
-    arm: Literal["panda", "fr3"] = "panda"
-    """The arm."""
+    arm: str = "panda"
+    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
     seed: int = 0
     """Seed of everything that is random in a simulation."""
 
@@ -155,9 +155,10 @@ def calibrate_skin(command: Calibrate, mode: Mode) -> int:
 
 
 def _calibrated(command: Calibrate, mode: Mode) -> int:
-    from pretouch.cli.arms import arm_model
     from pretouch.cli.calibrate.outputs import Outputs
     from pretouch.cli.calibrate.recording import Sources, calibrate_recording
+    from pretouch.robot.model import RobotModel
+    from pretouch.robot.named import robot_named
 
     if mode == "plan":
         from pretouch.cli.calibrate.motion import write_motion
@@ -171,4 +172,6 @@ def _calibrated(command: Calibrate, mode: Mode) -> int:
         return calibrate_live(command, outputs)
     c = command.recorded
     joints, skin = (Path(text) if text else None for text in (c.joints, command.skin))
-    return calibrate_recording(arm_model(command.arm), Sources(Path(c.recording), joints, c.topic, skin), outputs)
+    return calibrate_recording(
+        RobotModel(robot_named(command.arm)), Sources(Path(c.recording), joints, c.topic, skin), outputs
+    )

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from pretouch.cli.arms import arm_model
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
@@ -25,7 +24,8 @@ from pretouch.ports import Skin as SkinPort
 from pretouch.profiles import Profile
 from pretouch.profiles import profile as find_profile
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin, load_skin, paper_skin
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import Skin, skin_for
 from pretouch.session.arm import Arm
 from pretouch.session.confirmations import Identity, state_folder
 from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of
@@ -86,7 +86,7 @@ class RunSetup:
 def run_setup(command: "Run") -> RunSetup:
     """Read files and parameters; what does not fit together is an error."""
     units, task, profile = command.units, command.task, find_profile(command.task.profile)
-    model = arm_model(command.robot.arm)
+    model = RobotModel(robot_named(command.robot.arm))
     if command.robot.robot == "franka":
         model = RobotModel(planned(model.description, LimiterParams()))
     if units.no_skin:
@@ -97,7 +97,7 @@ def run_setup(command: "Run") -> RunSetup:
             )
         skin = Skin((), model)
     else:
-        skin = load_skin(FilePath(units.skin), model) if units.skin else paper_skin(model)
+        skin = skin_for(model, units.skin)
     by_torques = profile.detect.by_torques or profile.react.by_torques
     if command.robot.robot == "ros2" and by_torques:
         raise ParameterError(

@@ -6,9 +6,8 @@ from matplotlib.figure import Figure
 
 from pretouch_lab.benchmarks import style
 from pretouch_lab.benchmarks.avoidance.trade import TRADE, trade, trade_points
-from pretouch_lab.benchmarks.store import Row
 from pretouch_lab.experiment import Picture
-from pretouch_lab.groups import grouped
+from pretouch_lab.rows import Row, grouped
 
 _HELD_M = 0.01
 """Way below which the hand was held [m]."""
@@ -17,7 +16,7 @@ _SIDE_BY_SIDE = ("srdo", "drdo")
 
 
 def figures(summary: Row, rows: list[Row]) -> list[Picture]:
-    """Draw what forces are paid for with, distances over time, and what each contender came to in each scenario."""
+    """Draw what forces are paid for with, distances over time, and what each baseline came to in each scenario."""
     names = style.shown(list(dict.fromkeys(cell["contender"] for cell in summary["cells"])))
     rows = [row for row in rows if row["contender"] in names]
     drawn = []
@@ -41,7 +40,7 @@ def _distances(rows: list[Row], names: list[str]) -> Figure:
     """Draw distance over time for the two scenes of an obstacle that moves in, side by side."""
     figure = Figure(figsize=(10, 4), layout="constrained")
     panels: list[Axes] = list(figure.subplots(1, 2, sharey=True))
-    told = {"srdo": "srdo: the hand is held", "drdo": "drdo: the hand runs the circle"}
+    titles = {"srdo": "srdo: the hand is held", "drdo": "drdo: the hand runs the circle"}
     for ax, family in zip(panels, _SIDE_BY_SIDE, strict=True):
         group = [row for row in rows if row["family"] == family]
         first = {row["contender"]: row for row in reversed(group) if row["seed"] == group[0]["seed"]}
@@ -49,7 +48,7 @@ def _distances(rows: list[Row], names: list[str]) -> Figure:
             course = first[name]["course"]
             ax.plot(course["time_s"], 1000 * np.array(course["distance_m"]), label=name, **style.line(name))
         ax.axhline(0.0, color="0.4", lw=0.8, zorder=0)
-        ax.set_title(told[family], fontsize=10)
+        ax.set_title(titles[family], fontsize=10)
         ax.set_xlabel("time [s]")
         style.plain(ax)
     panels[0].set_ylabel("distance [mm], negative in contact")

@@ -8,31 +8,30 @@ from pretouch.control.path import Path
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.benchmarks.avoidance.measures import started
 from pretouch_lab.benchmarks.avoidance.setting import Setting
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.trial import Record
 
 _EVERY = 10
 """Control steps between two that are looked at."""
 
 
-def livelocks(record: Record, setting: Setting, told: dict[str, Any] | None) -> Row:
+def livelocks(record: Record, setting: Setting, limits: dict[str, Any] | None) -> Row:
     """How often and how long [s] the path's phase grows by less than `advance_m` in `within_s` while nothing blocks it.
 
     Nothing blocks it if the obstacle is farther than `clear_m` from the next `ahead_m` of the path all that time.
     """
     row: Row = {"livelocks": None, "livelock_s": None}
-    if told is None:
+    if limits is None:
         return row
     chosen = range(started(record.steps), len(record.steps), _EVERY)
     if len(chosen) < 2:
         return row | {"livelocks": 0, "livelock_s": 0.0}
     steps = [record.steps[i] for i in chosen]
     clear = np.array([
-        _clear(setting, record.hand_position[i], step.path_phase, told) for i, step in zip(chosen, steps, strict=True)
+        _clear(setting, record.hand_position[i], step.path_phase, limits) for i, step in zip(chosen, steps, strict=True)
     ])  # fmt: skip
     phase, period = np.array([s.path_phase for s in steps]), steps[1].stamp - steps[0].stamp
-    stuck = stuck_for(phase, clear, round(told["within_s"] / period), told["advance_m"])
+    stuck = stuck_for(phase, clear, round(limits["within_s"] / period), limits["advance_m"])
     begun = np.count_nonzero(stuck[1:] & ~stuck[:-1]) + int(stuck[0])
     return {"livelocks": int(begun), "livelock_s": rounded(float(stuck.sum() * period))}
 
@@ -50,7 +49,7 @@ def stuck_for(phase: FloatArray, clear: BoolArray, width: int, advance: float) -
     return stuck
 
 
-def _clear(setting: Setting, hand: FloatArray, phase: float, told: dict[str, Any]) -> bool:
+def _clear(setting: Setting, hand: FloatArray, phase: float, limits: dict[str, Any]) -> bool:
     path: Path = setting.setup.path
-    ahead = np.array([path.point(phase + s) for s in np.linspace(0.0, told["ahead_m"], 11)])
-    return bool(setting.shape(hand).closest(ahead)[0].min() > told["clear_m"])
+    ahead = np.array([path.point(phase + s) for s in np.linspace(0.0, limits["ahead_m"], 11)])
+    return bool(setting.shape(hand).closest(ahead)[0].min() > limits["clear_m"])

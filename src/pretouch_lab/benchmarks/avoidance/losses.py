@@ -1,9 +1,8 @@
-"""Where another contender does better than `pretouch`: every cell of it."""
+"""Where another baseline does better than `pretouch`: every cell of it."""
 
 from pretouch.text_table import TextTable
 from pretouch_lab.benchmarks.ablations import BASE
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.groups import grouped
+from pretouch_lab.rows import Row, grouped
 
 _LESS = (
     ("true_peak_20ms_n", "true 20 ms [N]", 1.0, 1),
@@ -20,7 +19,7 @@ _NOTICED = 0.05
 
 
 def losses(cells: list[Row]) -> TextTable:
-    """Return each measure of each scenario whose median is better for another contender by more than 5 %."""
+    """Return each measure of each scenario whose median is better for another baseline by more than 5 %."""
     lines = []
     for key, group in grouped(cells, ("scenario",)):
         ours = next((cell for cell in group if cell["contender"] == BASE), None)
@@ -31,7 +30,7 @@ def losses(cells: list[Row]) -> TextTable:
                 continue
             own = _text(ours[name], factor, digits)
             shown = {cell["contender"]: _text(cell[name], factor, digits) for cell in better}
-            said = ", ".join(f"{contender} {text}" for contender, text in shown.items() if text != own)
+            said = ", ".join(f"{baseline} {text}" for baseline, text in shown.items() if text != own)
             if said:
                 lines.append((key["scenario"], label, own, said))
     return TextTable(

@@ -1,10 +1,9 @@
-"""Contenders held against a reference on the same seeds, trials without a contact or an end included."""
+"""Baselines held against a reference on the same seeds, trials without a contact or an end included."""
 
 import numpy as np
 
 from pretouch_lab.benchmarks.bounds import finite, median_bounds
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.groups import grouped
+from pretouch_lab.rows import Row, grouped
 
 FORCES = ("peak_estimate_n", "true_peak_20ms_n", "clamping_force_n")
 TIMES = ("first_contact_s", "cycle_time_s")
@@ -14,10 +13,10 @@ REFERENCES = ("blind", "paper", "paper-off")
 
 
 def paired(rows: list[Row]) -> list[Row]:
-    """Return for each contender and reference the median part of the reference's measure that the contender has.
+    """Return for each baseline and reference the median part of the reference's measure that the baseline has.
 
     A family's scenarios and seeds count together, with 95 % bounds on the median. A force counts where the reference
-    touched; a contender without contact has none of it. A time counts where either came to an end; what did not is
+    touched; a baseline without contact has none of it. A time counts where either came to an end; what did not is
     infinite, in the result None.
     """
     found = []
@@ -42,7 +41,7 @@ def _pairs(rows: list[Row], group: list[Row], reference: str) -> list[tuple[Row,
 
 
 def _part(theirs: Row, mine: Row, measure: str) -> float | None:
-    """Return the contender's measure by the reference's; None where it does not count."""
+    """Return the baseline's measure by the reference's; None where it does not count."""
     if measure in FORCES:
         return (mine[measure] or 0.0) / theirs[measure] if theirs["contact"] and theirs[measure] else None
     if measure == "cycle_time_s" and not mine["timed"]:

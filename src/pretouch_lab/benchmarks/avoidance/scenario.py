@@ -22,12 +22,12 @@ class Scenario:
     family: str
     text: str
     """What happens, in a sentence."""
-    says: Table
+    params: Table
     """The file's keys, with what this scenario has in place of them."""
     count: int
-    """Trials of each contender in a full run."""
+    """Trials of each baseline in a full run."""
     quick: int
-    """Trials of each contender in a quick run."""
+    """Trials of each baseline in a quick run."""
 
     def seeds(self, seeds: SeedRange, quick: bool) -> list[int]:
         """Return the seeds of a run's trials."""
@@ -47,15 +47,15 @@ def scenarios() -> dict[str, Scenario]:
     """Return all scenarios by their names; a file that was changed since is an ExperimentError."""
     found: dict[str, Scenario] = {}
     for family in FAMILIES:
-        told = _family(family)
-        shared = {key: value for key, value in told.items() if key not in _FAMILY_ONLY}
-        for variant in told["variant"]:
+        given = _family(family)
+        shared = {key: value for key, value in given.items() if key not in _FAMILY_ONLY}
+        for variant in given["variant"]:
             own = {key: value for key, value in variant.items() if key not in ("name", "count", "quick")}
-            says = {**shared, **{key: _over(shared.get(key), value) for key, value in own.items()}}
+            params = {**shared, **{key: _over(shared.get(key), value) for key, value in own.items()}}
             name = variant["name"]
             if name in found:
                 raise ExperimentError(f"There are two scenarios {name!r}: give each its own name.")
-            found[name] = Scenario(name, told["family"], told["text"], says, variant["count"], variant["quick"])
+            found[name] = Scenario(name, given["family"], given["text"], params, variant["count"], variant["quick"])
     return found
 
 

@@ -54,11 +54,11 @@ def skin(name: str) -> Skin:
 
 def setting(scenario: Scenario, profile: Profile, seed: int) -> Setting:
     """Make the setting of a trial."""
-    says, model = scenario.says, arm()
-    path = path_of(says["path"])
-    placed = _obstacle(says, seed)
-    units = skin(says["skin"])
-    error = says.get("misplaced")
+    params, model = scenario.params, arm()
+    path = path_of(params["path"])
+    placed = _obstacle(params, seed)
+    units = skin(params["skin"])
+    error = params.get("misplaced")
     setup = Setup(
         model=model,
         skin=units,
@@ -67,27 +67,27 @@ def setting(scenario: Scenario, profile: Profile, seed: int) -> Setting:
         scene=placed.scene,
         path=path,
         seed=seed,
-        plant=plant_of(says.get("plant", {})),
-        ranging=RangeFinderParams(**says.get("ranging", {})),
+        plant=plant_of(params.get("plant", {})),
+        ranging=RangeFinderParams(**params.get("ranging", {})),
         hand=placed.hand,
         person=placed.person,
     )
-    return Setting(setup, placed.shape, _done(says, path))
+    return Setting(setup, placed.shape, _done(params, path))
 
 
-def path_of(told: Table) -> Path:
+def path_of(given: Table) -> Path:
     """Return the path a scenario tells of."""
-    if told["kind"] == "held":
-        x, y, z = told["point"]
+    if given["kind"] == "held":
+        x, y, z = given["point"]
         return line((x, y, z), (x, y, z + _HELD_M))
-    if "side" in told:
-        return static_path(told["kind"], told["side"])
+    if "side" in given:
+        return static_path(given["kind"], given["side"])
     return Circle()
 
 
-def plant_of(told: Table) -> PlantParams:
+def plant_of(given: Table) -> PlantParams:
     """Return the arm's errors; `friction_factor` is that of all joints' friction."""
-    own, usual = dict(told), PlantParams()
+    own, usual = dict(given), PlantParams()
     factor = own.pop("friction_factor", 1.0)
     return replace(usual, friction_f1_nm=tuple(factor * f for f in usual.friction_f1_nm), **own)
 
@@ -102,19 +102,19 @@ class _Placed:
     person: PersonArm = field(default_factory=PersonArm)
 
 
-def _obstacle(says: Table, seed: int) -> _Placed:
-    told = says["obstacle"]
-    stiffness = told["contact_stiffness_n_m"]
-    match told["kind"]:
+def _obstacle(params: Table, seed: int) -> _Placed:
+    given = params["obstacle"]
+    stiffness = given["contact_stiffness_n_m"]
+    match given["kind"]:
         case "board":
-            way = says["path"]
+            way = params["path"]
             return _standing(static_scene(way["kind"], way["side"], stiffness, seed).boxes[0])
         case "box":
-            (x, y, z), (a, b, c) = told["center"], told["half_size"]
+            (x, y, z), (a, b, c) = given["center"], given["half_size"]
             return _standing(Box("object", (x, y, z), (a, b, c), stiffness))
         case "visitor":
-            return _visiting(told, seed)
-    return _walking(told, seed)
+            return _visiting(given, seed)
+    return _walking(given, seed)
 
 
 def _standing(box: Box) -> _Placed:
@@ -122,40 +122,42 @@ def _standing(box: Box) -> _Placed:
     return _Placed(SceneSpec(boxes=(box,)), lambda _: shape)
 
 
-def _visiting(told: Table, seed: int) -> _Placed:
+def _visiting(given: Table, seed: int) -> _Placed:
     """Place a person who holds a hand beside the path or into it on one side, as in the paper's experiment."""
     rng = np.random.default_rng([seed, 21])
     side = rng.choice([-1.0, 1.0])
-    place = np.array([told["x_m"], side * told["y_m"], told["z_m"]]) + told["spread_m"] * rng.uniform(-1, 1, 3)
-    spec = HandSpec(told["radius_m"], told["mass_kg"], told["contact_stiffness_n_m"])
-    script = Visitor(arm(), (Visit(told["arrive_s"], told["leave_s"], place),))
+    place = np.array([given["x_m"], side * given["y_m"], given["z_m"]]) + given["spread_m"] * rng.uniform(-1, 1, 3)
+    spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"])
+    script = Visitor(arm(), (Visit(given["arrive_s"], given["leave_s"], place),))
     return _Placed(SceneSpec(hand=spec), lambda hand: Ball(hand, spec.radius), script)
 
 
-def _walking(told: Table, seed: int) -> _Placed:
+def _walking(given: Table, seed: int) -> _Placed:
     """Place a person or a hand that comes straight in and stays; the seed draws speed, time and perhaps the side."""
     rng = np.random.default_rng([seed, 20])
-    side = rng.choice([-1.0, 1.0]) if told.get("both_sides") else 1.0
-    begin, end = (np.array(told[key]) * [1.0, side, 1.0] for key in ("from", "to"))
-    speed, start = rng.uniform(*told["speed_m_s"]), rng.uniform(*told["start_s"])
+    side = rng.choice([-1.0, 1.0]) if given.get("both_sides") else 1.0
+    begin, end = (np.array(given[key]) * [1.0, side, 1.0] for key in ("from", "to"))
+    speed, start = rng.uniform(*given["speed_m_s"]), rng.uniform(*given["start_s"])
     x, y, z = begin.tolist()
-    spec = HandSpec(told["radius_m"], told["mass_kg"], told["contact_stiffness_n_m"], (x, y, z))
+    spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"], (x, y, z))
     return _Placed(
         SceneSpec(hand=spec),
         lambda hand: Ball(hand, spec.radius),
-        Walker(begin, end, speed, start, told["force_max_n"]),
-        PersonArm(2.0 * speed, told["spring_n_m"], told["damping_n_s_m"]),
+        Walker(begin, end, speed, start, given["force_max_n"]),
+        PersonArm(2.0 * speed, given["spring_n_m"], given["damping_n_s_m"]),
     )
 
 
-def _done(says: Table, path: Path) -> Callable[[ControlStep, Plant], bool]:
+def _done(params: Table, path: Path) -> Callable[[ControlStep, Plant], bool]:
     """End at the time limit, a while after the first touch, or after so many turns, as the scenario says."""
-    after, turns = says.get("after_contact_s", np.inf), says.get("turns", np.inf)
+    after, turns = params.get("after_contact_s", np.inf), params.get("turns", np.inf)
 
     def done(step: ControlStep, plant: Plant) -> bool:
         touched = plant.touches[0].time if plant.touches else np.inf
         return (
-            step.stamp >= says["duration_s"] or step.stamp >= touched + after or step.path_phase >= turns * path.length
+            step.stamp >= params["duration_s"]
+            or step.stamp >= touched + after
+            or step.path_phase >= turns * path.length
         )
 
     return done

@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from pretouch import __version__
 from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
 from pretouch_lab.benchmarks.avoidance.paired import REFERENCES, paired
-from pretouch_lab.benchmarks.store import EMPTY, Row
-from pretouch_lab.groups import grouped
-from pretouch_lab.metrics import rounded
+from pretouch_lab.benchmarks.bench import EMPTY, Bench
+from pretouch_lab.rows import Row, grouped, rounded
 
 SPREAD = (
     "least_distance_m", "true_peak_20ms_n", "true_peak_n", "clamping_force_n", "peak_estimate_n", "impact_speed_m_s",
@@ -37,7 +35,7 @@ def summarise(rows: list[Row]) -> Row:
     """Bring trials together.
 
     Returns:
-        `cells`, one for each scenario and contender; `families`, all scenarios of a family together; `ablations`, cells
+        `cells`, one for each scenario and baseline; `families`, all scenarios of a family together; `ablations`, cells
         of `pretouch` with each switch off alone and as it is, on the same seeds; `ratios` to each reference; `paired`.
     """
     whole = [row for row in rows if not row["contender"].startswith(WITHOUT)]
@@ -62,7 +60,7 @@ def _ablated(rows: list[Row]) -> list[Row]:
 
 
 def _cell(key: Row, group: list[Row]) -> Row:
-    """Summarise the trials of one contender in one scenario."""
+    """Summarise the trials of one baseline in one scenario."""
     reasons: Counter[str] = Counter()
     for row in group:
         reasons.update(row["hold_reasons"])
@@ -91,7 +89,7 @@ def spread(values: list[Any]) -> dict[str, float | int | None] | None:
 
 
 def _ratios(rows: list[Row]) -> list[Row]:
-    """Ratios reference / contender over the seeds that both have, for every scenario, and where both are above 0."""
+    """Ratios reference / baseline over the seeds that both have, for every scenario, and where both are above 0."""
     of = {(row["scenario"], row["contender"], row["seed"]): row for row in rows}
     found = []
     for reference in REFERENCES:
@@ -113,13 +111,10 @@ _MEDIANS = ("peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_tim
 """Keys all benchmarks share, of which the rows have the median over the seeds."""
 
 
-def results(summary: Row, seeds: str, quick: bool, world: str = "") -> Row:
-    """Return what the JSON file holds: what was run, a row for each contender and scenario, and ratios to some."""
-    about: Row = {"bench": "avoidance", "version": __version__, "quick": quick, "seeds": seeds}
-    if world:
-        about["world"] = world
+def results(summary: Row, bench: Bench) -> Row:
+    """Return what the JSON file holds: what was run, a row for each baseline and scenario, and ratios to some."""
     kept = {key: summary[key] for key in ("families", "ablations", "ratios", "paired")}
-    return {"about": about, "rows": json_rows(summary), **kept}
+    return {"about": bench.about(), "rows": json_rows(summary), **kept}
 
 
 def json_rows(summary: Row) -> list[Row]:

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 
 from pretouch_lab.benchmarks import style
-from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.rows import Row
 
 TRADE = (
     "Force at a board of 25 N/mm against the time of a turn beside a person 0.4 m away, median and 10-90 %;"
@@ -14,14 +14,14 @@ _OPEN = 1.1
 
 
 def trade_points(summary: Row) -> dict[str, tuple[Row, Row]]:
-    """Return for each contender its cells of the boards and of the person."""
+    """Return for each baseline its cells of the boards and of the person."""
     of = {(cell["family"], cell["contender"]): cell for cell in summary["families"]}
     names = style.shown([name for family, name in of if family == "static"])
     return {name: (of["static", name], of["person", name]) for name in names if ("person", name) in of}
 
 
 def trade(summary: Row) -> Figure:
-    """Draw each contender as a point; at the right edge those whose turn did not end, at 0 N those without contact."""
+    """Draw each baseline as a point; at the right edge those whose turn did not end, at 0 N those without contact."""
     points = trade_points(summary)
     ends = [p["cycle_time_s"]["p90"] or p["cycle_time_s"]["median"] for _, p in points.values()]
     open_s = _OPEN * max((end for end in ends if end is not None), default=10.0)

@@ -8,33 +8,34 @@ import numpy as np
 
 from pretouch.atomic_write import write_json
 from pretouch.profiles import profile
+from pretouch_lab.baselines.avoidance import profile_text
 from pretouch_lab.benchmarks.avoidance import measures
-from pretouch_lab.benchmarks.avoidance.contenders import profile_text
 from pretouch_lab.benchmarks.avoidance.livelock import livelocks
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import Setting, setting
 from pretouch_lab.benchmarks.avoidance.truth import Truth, truth_of
-from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.rows import Row
 from pretouch_lab.trial import Record, play
 
 _D_MAX_M = 0.8
 _COURSE_EVERY = 5
 
 
-def measured(record: Record, made: Setting, says: Row) -> Row:
+def measured(record: Record, made: Setting, params: Row) -> Row:
     """Return all measures of a trial, without its names."""
-    setup, truth = made.setup, truth_of(record, made)
-    held = says["path"]["kind"] == "held"
+    setup = made.setup
+    truth = truth_of(record, setup.model, map(made.shape, record.hand_position))
+    held = params["path"]["kind"] == "held"
     return {
-        **measures.contact(record, truth, says["obstacle"].get("d_max_m", _D_MAX_M)),
+        **measures.contact(record, truth, params["obstacle"].get("d_max_m", _D_MAX_M)),
         **measures.tracking(record, setup.path.length, held),
         **measures.smoothness(record, setup.profile.task.control_period_s),
         **measures.dexterity(record, truth, setup.model),
         **measures.holds(record),
         **measures.reactions(record),
         **measures.seen(record, truth, made),
-        **livelocks(record, made, says.get("livelock")),
-        "timed": "turns" in says,
+        **livelocks(record, made, params.get("livelock")),
+        "timed": "turns" in params,
         "duration_s": round(record.steps[-1].stamp, 3),
         "course": course(record, truth),
     }
@@ -55,16 +56,16 @@ def course(record: Record, truth: Truth) -> dict[str, list[float]]:
     }
 
 
-def play_trial(scenario: Scenario, contender: str, seed: int, world: str = "") -> Row:
-    """Play a trial of a contender, in the world that its seed draws of a set if one is named, and return its row."""
-    made = setting(scenario, profile(profile_text(contender)), seed)
+def play_trial(scenario: Scenario, baseline: str, seed: int, world: str = "") -> Row:
+    """Play a trial of a baseline, as its seed draws it of a set if one is named, and return its row."""
+    made = setting(scenario, profile(profile_text(baseline)), seed)
     record = play(replace(made.setup, world=world), made.done)
-    names: Row = {"contender": contender, "scenario": scenario.name, "family": scenario.family, "seed": seed}
+    names: Row = {"contender": baseline, "scenario": scenario.name, "family": scenario.family, "seed": seed}
     if world:
         names["world"] = world
-    return {**names, **measured(record, made, scenario.says)}
+    return {**names, **measured(record, made, scenario.params)}
 
 
-def keep_trial(name: str, contender: str, seed: int, world: str, file: Path) -> None:
+def keep_trial(name: str, baseline: str, seed: int, world: str, file: Path) -> None:
     """Play a trial of the scenario of a name, and write its row to a file."""
-    write_json(play_trial(scenarios()[name], contender, seed, world), file)
+    write_json(play_trial(scenarios()[name], baseline, seed, world), file)

@@ -23,10 +23,10 @@ from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.stream import PROFILE, Stream, StreamRecorder
 from pretouch_lab.benchmarks.scenario_files import scenario, scenario_path
+from pretouch_lab.domain_randomisation import Parts, randomised
 from pretouch_lab.ghost import Ghost
 from pretouch_lab.paper.claims.free_run import Standing
 from pretouch_lab.trial import SETTLE_S
-from pretouch_lab.worlds import Parts, in_world
 
 AWAY = np.array([0.0, 0.0, 4.0])
 """Where the ghost is while it is not there [m]: no unit sees so far."""
@@ -91,7 +91,11 @@ class Alone:
     end_s: float
     """When it ends [s]."""
     world: str = ""
-    """Set of worlds of which the seed draws one, or none."""
+    """Set of the domain randomisation of which the seed draws one, or none."""
+    start: FloatArray | None = None
+    """Joint positions (n,) in which it begins [rad]; None: those in which its path does."""
+    controller: Callable[..., Controller] = Controller
+    """Makes its controller, as `Controller` is made."""
 
 
 Prepare = Callable[[Plant], Callable[[float], FloatArray]]
@@ -104,14 +108,15 @@ def record(
     """Let an arm run until its end and return its stream; `look(plant, ghost, cycle)` sees each cycle."""
     found, sensing = profile(PROFILE), what.sensing
     known = None if sensing.believed is sensing.skin else sensing.believed
-    parts = in_world(what.world, what.seed, model(), Parts(what.plant, sensing.ranging, sensing.skin, known))
+    parts = randomised(what.world, what.seed, model(), Parts(what.plant, sensing.ranging, sensing.skin, known))
     task = replace(found.task, speed_m_s=what.speed_m_s or _RETURN_M_S)
     start = (float(AWAY[0]), float(AWAY[1]), float(AWAY[2]))
     scene = SceneSpec(ghost=GhostSpec(what.ghost_radius, start))
-    plant = Plant(model(), scene, parts.plant, brought_to(model(), what.path.point(0.0)), what.seed)
+    begin = brought_to(model(), what.path.point(0.0)) if what.start is None else what.start
+    plant = Plant(model(), scene, parts.plant, begin, what.seed)
     finders = RangeFinders(plant, parts.skin, parts.ranging, what.seed)
     ghost = Ghost(plant, prepare(plant))
-    controller = Controller(
+    controller = what.controller(
         model(), parts.skin if parts.believed is None else parts.believed, fixtures(scene), what.path,
         replace(found, task=task),
     )  # fmt: skip

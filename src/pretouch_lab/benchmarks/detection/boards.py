@@ -9,11 +9,11 @@ import numpy as np
 from pretouch.atomic_write import write_json
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import Sensing, model, sensing_of
-from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper import static
+from pretouch_lab.rows import rounded
 from pretouch_lab.trial import Record, Setup, play
 
 COST_S = 1.0
@@ -30,7 +30,7 @@ class BoardCell:
     sensing: str
     seed: int
     world: str = ""
-    """Set of worlds of which the seed draws one, or none."""
+    """Set of the domain randomisation of which the seed draws one, or none."""
 
     @property
     def name(self) -> str:
@@ -56,9 +56,9 @@ def board_cells(seeds: SeedRange, quick: bool) -> list[BoardCell]:
     ]
 
 
-def meet_board(cell: BoardCell, contender: Contender, file: Path) -> None:
+def meet_board(cell: BoardCell, baseline: Baseline, file: Path) -> None:
     """Run one trial and keep its row."""
-    sensing, found = _seven(cell), contender.profile
+    sensing, found = _seven(cell), baseline.profile
     setup = Setup(
         model=model(),
         skin=sensing.skin,
@@ -74,7 +74,7 @@ def meet_board(cell: BoardCell, contender: Contender, file: Path) -> None:
     push = -1.0 if cell.side == "+y" else 1.0
     row = {
         **{name: value for name, value in asdict(cell).items() if name != "world" or value},
-        "contender": contender.name,
+        "contender": baseline.name,
         **static.results(record, push, model().links),
         "clamping_n": clamping_n(record),
     }

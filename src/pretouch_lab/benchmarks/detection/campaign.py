@@ -4,20 +4,21 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 from pretouch.profiles import profile
+from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
+from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
-from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells, record_free, warm_up_s
 from pretouch_lab.benchmarks.detection.judge import judge_contacts, judge_free
+from pretouch_lab.benchmarks.detection.results import Rows
 from pretouch_lab.benchmarks.detection.stream import PROFILE
-from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario
-from pretouch_lab.benchmarks.store import Row, Task, open_bench, read_rows, run_tasks
+from pretouch_lab.benchmarks.scenario_files import scenario
+from pretouch_lab.engine import Task, rows_of
 from pretouch_lab.result_key import result_key
-from pretouch_lab.worlds import told
 
-NAME = "detection"
 _RECORD: dict[str, Callable[..., None]] = {"free": record_free, "contacts": record_contacts}
 """What records the streams of a family."""
 _CONTACT_S = 3.5
@@ -30,19 +31,24 @@ ABLATED_ARMS = 2
 
 
 @dataclass(frozen=True)
-class Bench:
-    """What of the detection benchmark is run."""
+class DetectionBench(Bench):
+    """The detection benchmark."""
 
-    out: Path
-    """Folder for everything that is kept."""
-    quick: bool = False
-    seeds: SeedRange = "published"
-    world: str = ""
-    """Set of worlds of which each arm's seed draws its own, or none: the arms of the published tables."""
+    name: ClassVar[str] = "detection"
 
-    def open(self) -> None:
-        """Make the folder or take it up."""
-        open_bench(self.out, NAME, {"quick": self.quick, "seeds": self.seeds, **told(self.world)})
+    def stages(self) -> list[list[Task]]:
+        """Return the streams to record, then what is made of them and the trials in the closed loop."""
+        return [self.streams(), [*self.free(), *self.contacts(), *self.boards()]]
+
+    def rows(self) -> Rows:
+        """Return the rows of what is done."""
+        return Rows(rows_of(self.free()), rows_of(self.contacts()), rows_of(self.boards()))
+
+    def found(self) -> Found | None:
+        """See `Bench`."""
+        from pretouch_lab.benchmarks.detection.published import found
+
+        return found(self, self.rows())
 
     def streams(self) -> list[Task]:
         """Return the streams to record."""
@@ -60,39 +66,35 @@ class Bench:
         """Return the replays on streams of free motion."""
         return [
             Task(
-                self._row("free", cell.name, contender, record_free, judge_free),
-                partial(judge_free, cell, contender, self._stream(cell)),
-                _replay_cost(contender) * _free_s(cell),
+                self._row("free", cell.name, baseline, record_free, judge_free),
+                partial(judge_free, cell, baseline, self._stream(cell)),
+                _replay_cost(baseline) * _free_s(cell),
             )
             for cell in self._free()
-            for contender in self._replayed(cell)
+            for baseline in self._replayed(cell)
         ]
 
     def contacts(self) -> list[Task]:
         """Return the replays on streams with contacts."""
         return [
             Task(
-                self._row("contacts", cell.name, contender, record_contacts, judge_contacts),
-                partial(judge_contacts, cell, contender, self._stream(cell)),
-                _replay_cost(contender) * _contacts_s(cell),
+                self._row("contacts", cell.name, baseline, record_contacts, judge_contacts),
+                partial(judge_contacts, cell, baseline, self._stream(cell)),
+                _replay_cost(baseline) * _contacts_s(cell),
             )
             for cell in self._contacts()
-            for contender in self._replayed(cell)
+            for baseline in self._replayed(cell)
         ]
 
     def boards(self) -> list[Task]:
         """Return the trials in the closed loop."""
         return [
-            Task(self._row("boards", cell.name, contender, meet_board), partial(meet_board, cell, contender), COST_S)
+            Task(self._row("boards", cell.name, baseline, meet_board), partial(meet_board, cell, baseline), COST_S)
             for cell in self._boards()
-            for contender in CONTENDERS
+            for baseline in BASELINES
         ]
 
-    def every(self) -> list[Task]:
-        """Return all work."""
-        return [*self.streams(), *self.free(), *self.contacts(), *self.boards()]
-
-    def _replayed(self, cell: FreeCell | ContactCell) -> tuple[Contender, ...]:
+    def _replayed(self, cell: FreeCell | ContactCell) -> tuple[Baseline, ...]:
         """Return the detectors that are given a cell's stream: ablations only what the goals are about."""
         wanted = cell.kind == "nominal" and cell.speed_m_s == scenario("contacts")["goal"]["speed_m_s"]
         if isinstance(cell, FreeCell):
@@ -100,7 +102,7 @@ class Bench:
             wanted = wanted and cell in same[:ABLATED_ARMS]
         else:
             wanted = wanted and cell.sensing == "nominal"
-        return (*CONTENDERS, *ablated()) if wanted else CONTENDERS
+        return (*BASELINES, *ablated()) if wanted else BASELINES
 
     def _free(self) -> list[FreeCell]:
         return [replace(cell, world=self.world) for cell in free_cells(self.seeds, self.quick)]
@@ -116,28 +118,10 @@ class Bench:
         made_by = result_key(_RECORD[family], profile=profile(PROFILE))
         return self.out / f"streams-{made_by}" / f"{family}_{cell.name}.npz"
 
-    def _row(self, family: str, cell: str, contender: Contender, *made_by: Callable[..., None]) -> Path:
+    def _row(self, family: str, cell: str, baseline: Baseline, *made_by: Callable[..., None]) -> Path:
         """Where a row is kept: elsewhere as soon as the detector, or what it is given, is another."""
-        name = contender.name.replace(" ", "-")
-        return self.out / family / f"{name}-{result_key(*made_by, profile=contender.profile)}" / f"{cell}.json"
-
-
-@dataclass(frozen=True)
-class Rows:
-    """All rows that are there."""
-
-    free: list[Row]
-    contacts: list[Row]
-    boards: list[Row]
-
-
-def run_bench(bench: Bench, progress: Callable[[float], None]) -> Rows:
-    """Do all that is missing, and return the rows; a run that was stopped goes on."""
-    bench.open()
-    free, contacts, boards = bench.free(), bench.contacts(), bench.boards()
-    run_tasks(bench.streams(), bench.out, progress)
-    run_tasks([*free, *contacts, *boards], bench.out, progress)
-    return Rows(read_rows(free), read_rows(contacts), read_rows(boards))
+        name = baseline.name.replace(" ", "-")
+        return self.out / family / f"{name}-{result_key(*made_by, profile=baseline.profile)}" / f"{cell}.json"
 
 
 def _free_s(cell: FreeCell) -> float:
@@ -148,8 +132,8 @@ def _contacts_s(cell: ContactCell) -> float:
     return warm_up_s() + _CONTACT_S * cell.count
 
 
-def _replay_cost(contender: Contender) -> float:
-    return _REPLAY_COST[contender.profile.detect.name]
+def _replay_cost(baseline: Baseline) -> float:
+    return _REPLAY_COST[baseline.profile.detect.name]
 
 
 def _where(cell: FreeCell) -> tuple[str, str, float, str]:

@@ -23,7 +23,7 @@ from pretouch_lab.benchmarks.detection.arm import (
     sensing_of,
 )
 from pretouch_lab.benchmarks.detection.stream import Stream, save_stream
-from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
+from pretouch_lab.benchmarks.scenario_files import SeedRange, numbered, scenario
 
 _TRIES = 400
 _SINK_M = 0.002
@@ -78,7 +78,7 @@ class ContactCell:
     count: int
     """Contacts."""
     world: str = ""
-    """Set of worlds of which the seed draws one, or none."""
+    """Set of the domain randomisation of which the seed draws one, or none."""
 
     @property
     def name(self) -> str:
@@ -87,16 +87,13 @@ class ContactCell:
 
 
 def contact_cells(seeds: SeedRange, quick: bool) -> list[ContactCell]:
-    """Return the cells of the scenario file; the n-th cell of the full run has the n-th seed, in a quick run too."""
-    family, cells, number = scenario("contacts"), [], 0
+    """Return the cells of the scenario file."""
+    family = scenario("contacts")
     count = family["contact"]["quick" if quick else "full"]
-    for cell in family["cell"]:
-        for i in range(cell["full"]):
-            if i < cell["quick"] or not quick:
-                seed = seed_of(family, seeds, number)
-                cells.append(ContactCell(cell["kind"], cell["sensing"], cell["speed_m_s"], seed, count))
-            number += 1
-    return cells
+    return [
+        ContactCell(cell["kind"], cell["sensing"], cell["speed_m_s"], seed, count)
+        for cell, seed in numbered(family, family["cell"], seeds, quick)
+    ]
 
 
 def plan(cell: ContactCell, hand_radius: float, warm_up_s: float | None = None) -> list[Touching]:

@@ -23,7 +23,7 @@ from pretouch_lab.benchmarks.detection.arm import (
     sensing_of,
 )
 from pretouch_lab.benchmarks.detection.stream import Stream, save_stream
-from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
+from pretouch_lab.benchmarks.scenario_files import SeedRange, numbered, scenario
 from pretouch_lab.ghost import Ghost
 
 _HAND_SIDE_M = 0.102
@@ -46,7 +46,7 @@ class FreeCell:
     counted_s: float
     """Time that counts [s], after the warm-up."""
     world: str = ""
-    """Set of worlds of which the seed draws one, or none."""
+    """Set of the domain randomisation of which the seed draws one, or none."""
 
     @property
     def name(self) -> str:
@@ -55,16 +55,13 @@ class FreeCell:
 
 
 def free_cells(seeds: SeedRange, quick: bool) -> list[FreeCell]:
-    """Return the cells of the scenario file; the n-th cell of the full run has the n-th seed, in a quick run too."""
-    family, cells, number = scenario("free"), [], 0
+    """Return the cells of the scenario file."""
+    family = scenario("free")
     counted = float(family["duration"]["quick_s" if quick else "full_s"])
-    for arm in family["arm"]:
-        where = {key: arm[key] for key in ("kind", "path", "speed_m_s", "near")}
-        for i in range(arm["full"]):
-            if i < arm["quick"] or not quick:
-                cells.append(FreeCell(**where, seed=seed_of(family, seeds, number), counted_s=counted))
-            number += 1
-    return cells
+    return [
+        FreeCell(arm["kind"], arm["path"], arm["speed_m_s"], arm["near"], seed, counted)
+        for arm, seed in numbered(family, family["arm"], seeds, quick)
+    ]
 
 
 def warm_up_s() -> float:

@@ -9,29 +9,28 @@ import numpy as np
 from pretouch.atomic_write import write_json
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, Touching, touches_of
-from pretouch_lab.benchmarks.detection.contenders import Contender
 from pretouch_lab.benchmarks.detection.free import FreeCell, warm_up_s
 from pretouch_lab.benchmarks.detection.replay import REST, Replayed, replay
 from pretouch_lab.benchmarks.detection.stream import Stream, load_stream
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 
 PERIOD_S = TaskParams().control_period_s
 BUSY = -1.0
 """In place of a delay: an earlier alarm was still being answered when the contact began."""
 
 
-def sweep_values(contender: Contender) -> list[float]:
-    """Return the values at which a contender's swept parameter is looked at."""
-    return [float(value) for value in scenario("free")["curve"][contender.sweep]]
+def sweep_values(baseline: Baseline) -> list[float]:
+    """Return the values at which a baseline's swept parameter is looked at."""
+    return [float(value) for value in scenario("free")["curve"][baseline.sweep]]
 
 
-def judge_free(cell: FreeCell, contender: Contender, stream: Path, file: Path) -> None:
+def judge_free(cell: FreeCell, baseline: Baseline, stream: Path, file: Path) -> None:
     """Count a detector's alarms in free motion after the warm-up, as it is and at each value of its sweep."""
-    made = replay(load_stream(stream), contender, model())
+    made = replay(load_stream(stream), baseline, model())
     counted = made.stamp >= warm_up_s()
 
     def alarms(onsets: list[int]) -> int:
@@ -39,21 +38,21 @@ def judge_free(cell: FreeCell, contender: Contender, stream: Path, file: Path) -
 
     row: Row = {
         **asdict(cell),
-        "contender": contender.name,
+        "contender": baseline.name,
         "hours": float(counted.sum()) * PERIOD_S / 3600,
         "alarms": alarms(made.onsets()),
-        "sweep": [alarms(made.onsets(value)) for value in sweep_values(contender)],
+        "sweep": [alarms(made.onsets(value)) for value in sweep_values(baseline)],
     }
     write_json(row, file)
 
 
-def judge_contacts(cell: ContactCell, contender: Contender, stream: Path, file: Path) -> None:
+def judge_contacts(cell: ContactCell, baseline: Baseline, stream: Path, file: Path) -> None:
     """Match a detector's alarms with the contacts of a stream, as it is and at each value of its sweep."""
     kept = load_stream(stream)
-    made = replay(kept, contender, model())
+    made = replay(kept, baseline, model())
     touches = touches_of(kept)
     found = matched(touches, made.stamp, made.onsets())
-    swept = [matched(touches, made.stamp, made.onsets(value)) for value in sweep_values(contender)]
+    swept = [matched(touches, made.stamp, made.onsets(value)) for value in sweep_values(baseline)]
     noise = quiet_spread(kept, touches[0].start)
     contacts = [
         {
@@ -64,7 +63,7 @@ def judge_contacts(cell: ContactCell, contender: Contender, stream: Path, file: 
         }
         for k, touch in enumerate(touches)
     ]
-    write_json({**asdict(cell), "contender": contender.name, "contacts": contacts}, file)
+    write_json({**asdict(cell), "contender": baseline.name, "contacts": contacts}, file)
 
 
 Match = tuple[float | None, int | None]

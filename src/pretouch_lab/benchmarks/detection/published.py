@@ -1,13 +1,9 @@
 """What a run of the detection benchmark leaves for readers: numbers, figures, and a part of a document."""
 
-from pathlib import Path
-
-from pretouch import __version__
-from pretouch.text_table import markdown
-from pretouch_lab.benchmarks import documents
-from pretouch_lab.benchmarks.detection.campaign import NAME, Bench, Rows
-from pretouch_lab.benchmarks.detection.contenders import CONTENDERS
+from pretouch_lab.baselines.detection import BASELINES
+from pretouch_lab.benchmarks.bench import Bench, Found, said
 from pretouch_lab.benchmarks.detection.results import (
+    Rows,
     ablation_rows,
     board_rows,
     contact_rows,
@@ -16,9 +12,8 @@ from pretouch_lab.benchmarks.detection.results import (
     resolution,
 )
 from pretouch_lab.benchmarks.detection.tables import detection_tables
-from pretouch_lab.benchmarks.documents import shown
-from pretouch_lab.benchmarks.store import Row
 from pretouch_lab.experiment import Picture
+from pretouch_lab.rows import Row
 
 _PICTURES = {
     "bench-detection-curves": "Delay and missed contacts against false alarms; circles: each detector as it is",
@@ -26,41 +21,23 @@ _PICTURES = {
 }
 
 
+def found(bench: Bench, rows: Rows) -> Found:
+    """Return what a run came to: a row for each detector and scenario, and the curves."""
+    from pretouch_lab.benchmarks.detection.figures import curve_figure, missed_figure
+
+    results = summary_of(bench, rows)
+    figures = (curve_figure(results, BASELINES), missed_figure(rows, BASELINES))
+    pictures = [Picture(name, text, figure) for (name, text), figure in zip(_PICTURES.items(), figures, strict=True)]
+    text = f"{said(results['about'])} {results['resolution']}"
+    return Found(results, detection_tables(results), results["resolution"], pictures, text)
+
+
 def summary_of(bench: Bench, rows: Rows) -> Row:
     """Return what the JSON file holds: what was run, a row for each detector and scenario, and the curves."""
-    known = CONTENDERS
+    known = BASELINES
     return {
-        "about": {
-            "bench": NAME,
-            "version": __version__,
-            "quick": bench.quick,
-            "seeds": bench.seeds,
-            **({"world": bench.world} if bench.world else {}),
-        },
+        "about": bench.about(),
         "resolution": resolution(rows),
         "rows": [*free_rows(rows, known), *contact_rows(rows, known), *board_rows(rows, known), *ablation_rows(rows)],
         "curves": curves(rows, known),
     }
-
-
-def pictures(results: Row, rows: Rows) -> list[Picture]:
-    """Draw the figures."""
-    from pretouch_lab.benchmarks.detection.figures import curve_figure, missed_figure
-
-    figures = (curve_figure(results, CONTENDERS), missed_figure(rows, CONTENDERS))
-    return [Picture(name, text, figure) for (name, text), figure in zip(_PICTURES.items(), figures, strict=True)]
-
-
-def publish(results: Row, drawn: list[Picture], out: Path, docs: Path | None) -> list[Path]:
-    """Write the figures into a run's folder, or a folder of documents, and the part of its document."""
-    return documents.publish(NAME, document_part(results, drawn), drawn, out, docs)
-
-
-def document_part(results: Row, drawn: list[Picture]) -> str:
-    """Return the generated part of the document."""
-    about = results["about"]
-    said = (
-        f"Version {about['version']}, {about['seeds']} seeds, {'quick' if about['quick'] else 'full'} run."
-        f" {results['resolution']}"
-    )
-    return "\n\n".join([said, *map(shown, drawn), *map(markdown, detection_tables(results))])

@@ -10,7 +10,7 @@ from pretouch.perception.closest import no_obstacles
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched, TouchReadings
-from pretouch_lab.benchmarks.detection.contenders import Contender
+from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.stream import Stream
 from pretouch_lab.detector_alone import DetectorAlone
@@ -38,7 +38,7 @@ class Replayed:
     motion: FloatArray
     """(S, n) joint velocities with which the arm would begin to move in answer to an alarm [rad/s], else NaN."""
     statistic: FloatArray
-    """(S,) see `Contender.statistic`."""
+    """(S,) see `Baseline.statistic`."""
     touched: list[Touched]
     """Where the arm was said to be touched in each of these steps."""
 
@@ -57,11 +57,11 @@ def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
 
 
 def replay(
-    stream: Stream, contender: Contender, model: RobotModel, touch: Touches = lambda step: None,
+    stream: Stream, baseline: Baseline, model: RobotModel, touch: Touches = lambda step: None,
     skin: Skin | None = None,
 ) -> Replayed:  # fmt: skip
     """Give a detector each step of a stream, from its beginning, and what units said of a touch."""
-    params = contender.profile
+    params = baseline.profile
     sees = params.perception.enabled
     detector, steps = DetectorAlone(params, model, skin), len(stream.count)
     alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
@@ -72,7 +72,7 @@ def replay(
         kin = model.kinematics(robot.q)
         found = detector.step(kin, robot, near, reacting, sees and watched, touch(i))
         touched[i] = found.touched
-        statistic[i] = contender.statistic(found, detector.window.newest, robot.wrench)
+        statistic[i] = baseline.statistic(found, detector.window.newest, robot.wrench)
         if found.contact is not None:
             alarm[i], force[i] = True, found.contact.force
         begins = first.step(kin, robot, found, near)

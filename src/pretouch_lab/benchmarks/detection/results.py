@@ -1,24 +1,33 @@
 """What all rows of the detection benchmark say together: rates with their bounds, delays, what was missed."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
+from pretouch_lab.benchmarks.bench import EMPTY
 from pretouch_lab.benchmarks.bounds import median_bounds
-from pretouch_lab.benchmarks.detection.campaign import Rows
-from pretouch_lab.benchmarks.detection.contenders import CONTENDERS, Contender, ablated
 from pretouch_lab.benchmarks.detection.judge import BUSY, sweep_values
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import EMPTY, Row
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.claims.detectors import dispersion_of, rate_bounds
+from pretouch_lab.rows import Row, rounded
 
 GOAL_FREE, GOAL_CONTACTS = "free: goal", "contacts: goal"
 """Scenarios of the goals: the usual arm at the goal's speed, whoever is near; contacts the goals of delay are set for,
 on the usual arm with the usual skin."""
 ABLATED_FREE, ABLATED_CONTACTS = "free: ablations", "contacts: ablations"
 """Of those, what ablations were given."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """All rows that are there."""
+
+    free: list[Row]
+    contacts: list[Row]
+    boards: list[Row]
 
 
 def free_scenarios() -> dict[str, Callable[[Row], bool]]:
@@ -55,17 +64,17 @@ def rate(counts: list[int], hours: float) -> Row:
 
 
 def free_rows(
-    rows: Rows, contenders: Iterable[Contender], groups: dict[str, Callable[[Row], bool]] | None = None
+    rows: Rows, baselines: Iterable[Baseline], groups: dict[str, Callable[[Row], bool]] | None = None
 ) -> list[Row]:
-    """Return the false alarms of each contender in each group of cells there are hours of."""
+    """Return the false alarms of each baseline in each group of cells there are hours of."""
     found, groups = [], groups or free_scenarios()
-    for contender in contenders:
-        own = [row for row in rows.free if row["contender"] == contender.name]
+    for baseline in baselines:
+        own = [row for row in rows.free if row["contender"] == baseline.name]
         for name, belongs in groups.items():
             group = [row for row in own if belongs(row)]
             if group:
                 values = rate([row["alarms"] for row in group], sum(row["hours"] for row in group))
-                found.append({**EMPTY, "contender": contender.name, "scenario": name, **values})
+                found.append({**EMPTY, "contender": baseline.name, "scenario": name, **values})
     return found
 
 
@@ -115,27 +124,27 @@ def delays(found: list[float | None]) -> Row:
 
 
 def contact_rows(
-    rows: Rows, contenders: Iterable[Contender], groups: dict[str, Callable[[Row, Row], bool]] | None = None
+    rows: Rows, baselines: Iterable[Baseline], groups: dict[str, Callable[[Row, Row], bool]] | None = None
 ) -> list[Row]:
-    """Return delays and misses of each contender in each group of contacts, seen and not seen by the skin."""
+    """Return delays and misses of each baseline in each group of contacts, seen and not seen by the skin."""
     found = []
-    for contender in contenders:
-        for name, group in grouped(rows, contender.name, groups).items():
+    for baseline in baselines:
+        for name, group in grouped(rows, baseline.name, groups).items():
             for seen in (True, False):
                 some = [contact for contact in group if contact["seen"] is seen]
                 if some:
                     towards = sum(bool(contact["towards"]) for contact in some)
                     values = delays([contact["delay_s"] for contact in some]) | {"towards": towards}
-                    where = {"contender": contender.name, "scenario": name, "seen": seen}
+                    where = {"contender": baseline.name, "scenario": name, "seen": seen}
                     found.append({**EMPTY, **where, **values})
     return found
 
 
 def grouped(
-    rows: Rows, contender: str, groups: dict[str, Callable[[Row, Row], bool]] | None = None
+    rows: Rows, baseline: str, groups: dict[str, Callable[[Row, Row], bool]] | None = None
 ) -> dict[str, list[Row]]:
-    """Return a contender's contacts by the name of their group."""
-    cells = [cell for cell in rows.contacts if cell["contender"] == contender]
+    """Return a baseline's contacts by the name of their group."""
+    cells = [cell for cell in rows.contacts if cell["contender"] == baseline]
     return {
         name: [contact for cell in cells for contact in cell["contacts"] if belongs(cell, contact)]
         for name, belongs in (groups or contact_scenarios(rows)).items()
@@ -144,13 +153,13 @@ def grouped(
 
 def ablation_rows(rows: Rows) -> list[Row]:
     """Return `pretouch` and its ablations on the streams that ablations were given."""
-    names = {contender.name for contender in ablated()}
+    names = {baseline.name for baseline in ablated()}
 
     def given(cells: list[Row]) -> list[Row]:
         seeds = {cell["seed"] for cell in cells if cell["contender"] in names}
         return [cell for cell in cells if cell["seed"] in seeds]
 
-    compared = (CONTENDERS[-1], *ablated())
+    compared = (BASELINES[-1], *ablated())
     part = Rows(given(rows.free), given(rows.contacts), [])
     return [
         *free_rows(part, compared, {ABLATED_FREE: lambda row: True}),
@@ -158,17 +167,17 @@ def ablation_rows(rows: Rows) -> list[Row]:
     ]
 
 
-def board_rows(rows: Rows, contenders: Iterable[Contender]) -> list[Row]:
-    """Return medians of forces and delay of each contender at each kind of board."""
+def board_rows(rows: Rows, baselines: Iterable[Baseline]) -> list[Row]:
+    """Return medians of forces and delay of each baseline at each kind of board."""
     found = []
-    for contender in contenders:
-        own = [row for row in rows.boards if row["contender"] == contender.name]
+    for baseline in baselines:
+        own = [row for row in rows.boards if row["contender"] == baseline.name]
         for name, group in _boards(own).items():
             touched = [row for row in group if row["contact"]]
             felt = [row["detection_delay_s"] for row in touched]
             values: Row = {key: _median(touched, key) for key in ("peak_estimate_n", "true_peak_20ms_n", "clamping_n")}
             falsely = sum(row["false_detections"] for row in group)
-            where = {"contender": contender.name, "scenario": name, "false_alarms": falsely}
+            where = {"contender": baseline.name, "scenario": name, "false_alarms": falsely}
             found.append({**EMPTY, **where, **delays(felt), **values})
     return found
 
@@ -186,15 +195,15 @@ def _median(rows: list[Row], key: str) -> float | None:
     return rounded(float(np.median(values))) if values else None
 
 
-def curves(rows: Rows, contenders: Iterable[Contender]) -> list[Row]:
+def curves(rows: Rows, baselines: Iterable[Baseline]) -> list[Row]:
     """Return delay against false alarms for the contacts and the free motion of the goals, value by value."""
     found, belongs = [], free_scenarios()[GOAL_FREE]
-    for contender in contenders:
-        free = [row for row in rows.free if row["contender"] == contender.name and belongs(row)]
-        contacts = grouped(rows, contender.name)[GOAL_CONTACTS]
+    for baseline in baselines:
+        free = [row for row in rows.free if row["contender"] == baseline.name and belongs(row)]
+        contacts = grouped(rows, baseline.name)[GOAL_CONTACTS]
         hours = sum(row["hours"] for row in free)
-        for k, value in enumerate(sweep_values(contender)):
-            point: dict[str, Any] = {"contender": contender.name, contender.sweep: value}
+        for k, value in enumerate(sweep_values(baseline)):
+            point: dict[str, Any] = {"contender": baseline.name, baseline.sweep: value}
             point |= rate([row["sweep"][k] for row in free], hours) if hours else {}
             for seen, name in ((True, "seen"), (False, "unseen")):
                 some = [contact["sweep_s"][k] for contact in contacts if contact["seen"] is seen]
@@ -207,13 +216,13 @@ def resolution(rows: Rows) -> str:
     """Say what a count of no false alarm would tell."""
     belongs = free_scenarios()[GOAL_FREE]
     most = max(
-        (sum(row["hours"] for row in rows.free if row["contender"] == contender.name and belongs(row))
-         for contender in CONTENDERS),
+        (sum(row["hours"] for row in rows.free if row["contender"] == baseline.name and belongs(row))
+         for baseline in BASELINES),
     )  # fmt: skip
     if most <= 0.0:
         return "There is no free motion at the goal's speed: nothing can be said of false alarms."
     high = rate_bounds(0, most)[1]
-    every = sum(row["hours"] for row in rows.free if row["contender"] == CONTENDERS[-1].name)
+    every = sum(row["hours"] for row in rows.free if row["contender"] == BASELINES[-1].name)
     return (
         f"{every:.2g} h of free motion. No false alarm in the {most:.2g} h at the goal's speed means fewer than"
         f" {high:.2g} an hour (95 %)."

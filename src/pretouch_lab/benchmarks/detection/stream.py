@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.atomic_write import atomic_replacement
 from pretouch.errors import ExperimentError
 from pretouch.loop import Cycle
 from pretouch.profiles import profile
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState
-from pretouch_lab.benchmarks.store import write_arrays
 
 PROFILE = "paper:detect.f_base_n=1000:reduction.enabled=no:restriction.mode=off:perception.closing_speed=yes"
 """Of the arms that are recorded: proximity is sensed, but no force is a contact and nothing near changes the motion.
@@ -99,7 +99,8 @@ def save_stream(stream: Stream, path: Path) -> None:
     arrays: dict[str, FloatArray] = {"reacting": stream.reacting, "watched": stream.watched, "count": stream.count}  # type: ignore[dict-item]
     for part in ("robot", "obstacles", "truth"):
         arrays |= {f"{part}.{name}": values for name, values in getattr(stream, part).items()}
-    write_arrays(arrays, path)
+    with atomic_replacement(path) as unfinished, unfinished.open("wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]  # names of arrays, not `allow_pickle`
 
 
 def load_stream(path: Path) -> Stream:

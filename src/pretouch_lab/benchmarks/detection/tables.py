@@ -1,11 +1,15 @@
 """The detection benchmark as tables of finished text, for the terminal and the document."""
 
-from pretouch.text_table import TextTable
+from collections.abc import Callable
+
+from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
 from pretouch_lab.benchmarks.bounds import short
 from pretouch_lab.benchmarks.detection.results import ABLATED_CONTACTS, ABLATED_FREE, GOAL_CONTACTS, GOAL_FREE
+from pretouch_lab.benchmarks.goals import find
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
+from pretouch_lab.rows import Row
+from pretouch_lab.tables import plain, share
 
 
 def detection_tables(results: Row) -> list[TextTable]:
@@ -37,27 +41,27 @@ def _names(rows: list[Row]) -> list[str]:
     return list(dict.fromkeys(row["contender"] for row in rows))
 
 
-def _find(rows: list[Row], contender: str, name: str, seen: bool | None = None) -> Row | None:
-    where = {"contender": contender, "scenario": name, "seen": seen}
-    return next((row for row in rows if all(row[key] == value for key, value in where.items())), None)
-
-
 def _goals(
     rows: list[Row], names: list[str], title: str, where: tuple[str, str] = (GOAL_FREE, GOAL_CONTACTS), note: str = ""
 ) -> TextTable:
     goal = scenario("contacts")["goal"]
-    lines = []
-    for name in names:
-        free = _find(rows, name, where[0])
-        seen, unseen = (_find(rows, name, where[1], of) for of in (True, False))
-        lines.append(
-            (name, _rate(free), *_delays(seen), *_delays(unseen), _towards(seen, unseen), reached(free, seen, unseen))
-        )
-    return TextTable(
+    found = [
+        (name, find(rows, name, where[0]), *(find(rows, name, where[1], of) for of in (True, False))) for name in names
+    ]
+    columns = (
+        ("detector", lambda row: row[0]),
+        ("false\n[1/h]", lambda row: _rate(row[1])),
+        ("seen\nmedian, 95 % [ms]", lambda row: _delay(row[2])),
+        ("missed", lambda row: _missed(row[2])),
+        ("unseen\nmedian, 95 % [ms]", lambda row: _delay(row[3])),
+        ("missed", lambda row: _missed(row[3])),
+        ("towards\nperson", lambda row: _towards(*row[2:])),
+        ("goals\nreached", lambda row: reached(*row[1:])),
+    )
+    return tabulated(
         title,
-        ("detector", "false\n[1/h]", "seen\nmedian, 95 % [ms]", "missed", "unseen\nmedian, 95 % [ms]", "missed",
-         "towards\nperson", "goals\nreached"),
-        tuple(lines),
+        columns,
+        found,
         f"Goals: at most {goal['false_alarms_per_hour']:g} false alarm an hour in free motion at"
         f" {goal['speed_m_s']:g} m/s, with or without somebody near; median delay at most"
         f" {1000 * goal['seen_delay_s']:g} ms for contacts the skin saw and {1000 * goal['unseen_delay_s']:g} ms for"
@@ -67,7 +71,7 @@ def _goals(
         " touched point would begin to move against the force on it, of all detected: none is the goal. Reached: as"
         f" measured here, whatever the bounds.{note}",
         1,
-    )  # fmt: skip
+    )
 
 
 def reached(free: Row | None, seen: Row | None, unseen: Row | None) -> str:
@@ -86,85 +90,117 @@ def reached(free: Row | None, seen: Row | None, unseen: Row | None) -> str:
 def _equal(curves: list[Row], names: list[str]) -> TextTable:
     """Each detector with the value of its sweep at which it keeps the goal of false alarms, and what it has then."""
     limit = scenario("contacts")["goal"]["false_alarms_per_hour"]
-    lines = []
-    for name in names:
-        points = [point for point in curves if point["contender"] == name and "false_alarms_per_hour" in point]
-        kept = next((point for point in points if point["false_alarms_per_hour"] <= limit), None)
-        if kept is None:
-            lines.append((name, "none", *("-",) * 5))
-            continue
-        value = f"{kept['f_base_n']:g} N" if "f_base_n" in kept else f"x {kept['scale']:g}"
-        lines.append((name, value, _rate(kept), *_delays(kept["seen"]), *_delays(kept["unseen"])))
-    return TextTable(
+    kept: dict[str, Row] = {}
+    for point in curves:
+        if point.get("false_alarms_per_hour", limit + 1.0) <= limit:
+            kept.setdefault(point["contender"], point)
+
+    def at(name: str) -> str:
+        point = kept.get(name, {})
+        return f"{point['f_base_n']:g} N" if "f_base_n" in point else f"x {point['scale']:g}" if point else "none"
+
+    columns = (
+        ("detector", str),
+        ("at", at),
+        ("false\n[1/h]", lambda name: _rate(kept.get(name))),
+        ("seen\nmedian, 95 % [ms]", lambda name: _delay(kept.get(name, {}).get("seen"))),
+        ("missed", lambda name: _missed(kept.get(name, {}).get("seen"))),
+        ("unseen\nmedian, 95 % [ms]", lambda name: _delay(kept.get(name, {}).get("unseen"))),
+        ("missed", lambda name: _missed(kept.get(name, {}).get("unseen"))),
+    )
+    return tabulated(
         "The same with as many false alarms as allowed",
-        ("detector", "at", "false\n[1/h]", "seen\nmedian, 95 % [ms]", "missed", "unseen\nmedian, 95 % [ms]", "missed"),
-        tuple(lines),
+        columns,
+        names,
         f"Each detector at the smallest value of its swept parameter at which it has at most {limit:g} false alarm an"
         " hour: the base force F_b, or a factor on the evidence that makes an alarm. Chosen with hindsight on the same"
         " streams, so it flatters all of them alike.",
         1,
-    )  # fmt: skip
+    )
+
+
+def _groups(rows: list[Row], family: str, without: str) -> dict[tuple[str, bool | None], None]:
+    """Scenarios of a family, each with whether the contacts were seen, in their order."""
+    return dict.fromkeys(
+        (row["scenario"], row["seen"])
+        for row in rows
+        if row["scenario"].startswith(family) and row["scenario"] != without
+    )
 
 
 def _false_alarms(rows: list[Row], names: list[str]) -> TextTable:
-    groups = list(
-        dict.fromkeys(
-            row["scenario"] for row in rows if row["scenario"].startswith("free") and row["scenario"] != ABLATED_FREE
-        )
+    def hours(group: tuple[str, bool | None]) -> str:
+        found = (find(rows, name, group[0]) for name in names)
+        return f"{next((row['hours'] for row in found if row), 0.0):.2g}"
+
+    def of(name: str) -> Callable[[tuple[str, bool | None]], str]:
+        return lambda group: _rate(find(rows, name, group[0]))
+
+    return tabulated(
+        "False alarms per hour of free motion",
+        (
+            ("arms", lambda group: group[0].removeprefix("free: ")),
+            ("hours", hours),
+            *((name, of(name)) for name in names),
+        ),
+        _groups(rows, "free", ABLATED_FREE),
+        "Below: 95 % bounds, Poisson's, wider by how much more the counts of the arms scatter than such counts do.",
+        1,
     )
-    lines = []
-    for group in groups:
-        found = [_find(rows, name, group) for name in names]
-        hours = next((row["hours"] for row in found if row), 0.0)
-        lines.append((group.removeprefix("free: "), f"{hours:.2g}", *(_rate(row) for row in found)))
-    return TextTable(
-        "False alarms per hour of free motion", ("arms", "hours", *names), tuple(lines),
-        "Below: 95 % bounds, Poisson's, wider by how much more the counts of the arms scatter than such counts do.", 1,
-    )  # fmt: skip
 
 
 def _contacts(rows: list[Row], names: list[str]) -> TextTable:
-    groups = dict.fromkeys(
-        (row["scenario"], row["seen"])
-        for row in rows
-        if row["scenario"].startswith("contacts") and row["scenario"] != ABLATED_CONTACTS
-    )
-    lines = []
-    for group, seen in groups:
-        found = [_find(rows, name, group, seen) for name in names]
-        count = next((row["contacts"] + row["busy"] for row in found if row), 0)
-        cells = (
-            "-" if row is None else f"{_ms(row['median_delay_s'])}, {_ms(row['p95_delay_s'])}\n"
-            f"{row['missed']}/{row['contacts']}" for row in found
-        )  # fmt: skip
-        lines.append((group.removeprefix("contacts: "), "seen" if seen else "unseen", str(count), *cells))
-    return TextTable(
+    def count(group: tuple[str, bool | None]) -> str:
+        found = (find(rows, name, *group) for name in names)
+        return str(next((row["contacts"] + row["busy"] for row in found if row), 0))
+
+    def of(name: str) -> Callable[[tuple[str, bool | None]], str]:
+        def write(group: tuple[str, bool | None]) -> str:
+            row = find(rows, name, *group)
+            if row is None:
+                return "-"
+            return f"{_ms(row['median_delay_s'])}, {_ms(row['p95_delay_s'])}\n{row['missed']}/{row['contacts']}"
+
+        return write
+
+    return tabulated(
         "Contacts: median and 95 % of the delay [ms], below what was missed",
-        ("contacts", "", "number", *names), tuple(lines),
+        (
+            ("contacts", lambda group: group[0].removeprefix("contacts: ")),
+            ("", lambda group: "seen" if group[1] else "unseen"),
+            ("number", count),
+            *((name, of(name)) for name in names),
+        ),
+        _groups(rows, "contacts", ABLATED_CONTACTS),
         "Rows of a speed, an arm or a kind of sensing hold the contacts of the goals; tap, push, clamp and all hold"
         " every contact. Contacts that came while a false alarm was being answered are left out of a detector's count.",
         2,
-    )  # fmt: skip
+    )
 
 
 def _boards(rows: list[Row]) -> TextTable:
+    def newtons(key: str) -> Callable[[Row], str]:
+        return lambda row: "-" if row[key] is None else f"{row[key]:.1f}"
+
+    columns = (
+        ("board", lambda row: row["scenario"].removeprefix("board: ")),
+        ("detector", plain("contender")),
+        ("delay\n[ms]", lambda row: _ms(row["median_delay_s"])),
+        ("missed", share("missed", "contacts")),
+        ("peak\n[N]", newtons("peak_estimate_n")),
+        ("true\n20 ms [N]", newtons("true_peak_20ms_n")),
+        ("clamping\n[N]", newtons("clamping_n")),
+        ("false", plain("false_alarms")),
+    )
     chosen = [row for row in rows if row["scenario"].startswith("board")]
-    lines = [
-        (
-            row["scenario"].removeprefix("board: "), row["contender"], _ms(row["median_delay_s"]),
-            f"{row['missed']}/{row['contacts']}", _n(row["peak_estimate_n"]), _n(row["true_peak_20ms_n"]),
-            _n(row["clamping_n"]), str(row["false_alarms"]),
-        )
-        for row in sorted(chosen, key=lambda row: row["scenario"])
-    ]  # fmt: skip
-    return TextTable(
+    return tabulated(
         "Boards in the closed loop: medians",
-        ("board", "detector", "delay\n[ms]", "missed", "peak\n[N]", "true\n20 ms [N]", "clamping\n[N]", "false"),
-        tuple(lines),
+        columns,
+        sorted(chosen, key=lambda row: str(row["scenario"])),
         "The arm runs into a board on circle and line, from both sides, restrictions off, and yields: paper is still"
         " slowed by what is near, pretouch by nothing, so this is its detector and its reaction alone. Peak: of the"
         " estimate. Clamping: mean true force half a second to a second after the touch, the board being where it was.",
-    )  # fmt: skip
+    )
 
 
 def _rate(row: Row | None) -> str:
@@ -174,11 +210,14 @@ def _rate(row: Row | None) -> str:
     return f"{value}\n{low}-{high}"
 
 
-def _delays(row: Row | None) -> tuple[str, str]:
+def _delay(row: Row | None) -> str:
+    return f"{_ms(row['median_delay_s'])}, {_ms(row['p95_delay_s'])}" if row and row["contacts"] else "-"
+
+
+def _missed(row: Row | None) -> str:
     if row is None or not row["contacts"]:
-        return "-", "-"
-    busy = f"\n{row['busy']} busy" if row["busy"] else ""
-    return f"{_ms(row['median_delay_s'])}, {_ms(row['p95_delay_s'])}", f"{row['missed']}/{row['contacts']}{busy}"
+        return "-"
+    return f"{row['missed']}/{row['contacts']}" + (f"\n{row['busy']} busy" if row["busy"] else "")
 
 
 def _towards(*rows: Row | None) -> str:
@@ -189,7 +228,3 @@ def _towards(*rows: Row | None) -> str:
 
 def _ms(value: float | None) -> str:
     return "-" if value is None else f"{1000 * value:.0f}"
-
-
-def _n(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1f}"

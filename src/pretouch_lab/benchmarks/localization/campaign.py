@@ -1,18 +1,20 @@
 """All work of the localisation benchmark: streams to record, and skins to replay them with."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
+from pretouch.errors import ExperimentError
 from pretouch.profiles import profile
+from pretouch_lab.benchmarks.bench import Bench, Found, said
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell, duration_s, record_touched, touched_cells
 from pretouch_lab.benchmarks.localization.judge import PROFILE, WITHOUT, judge_touched
-from pretouch_lab.benchmarks.scenario_files import SeedRange
-from pretouch_lab.benchmarks.store import Row, Task, open_bench, read_rows, run_tasks
+from pretouch_lab.documents import LOCALIZATION
+from pretouch_lab.engine import Task, rows_of
 from pretouch_lab.result_key import result_key
+from pretouch_lab.rows import Row
 
-NAME = "localization"
 _RECORDING_COST, _REPLAY_COST = 0.075, 0.02
 """Processor time of a second of simulation, and of one replayed [s]."""
 SKINS = {"nominal": "32 units", "seven": "seven", "misplaced": "32 units, misplaced"}
@@ -20,17 +22,26 @@ SKINS = {"nominal": "32 units", "seven": "seven", "misplaced": "32 units, mispla
 
 
 @dataclass(frozen=True)
-class Bench:
-    """What of the localisation benchmark is run."""
+class LocalizationBench(Bench):
+    """The localisation benchmark."""
 
-    out: Path
-    """Folder for everything that is kept."""
-    quick: bool = False
-    seeds: SeedRange = "published"
+    name: ClassVar[str] = "localization"
+    document: ClassVar[str] = LOCALIZATION
 
-    def open(self) -> None:
-        """Make the folder or take it up."""
-        open_bench(self.out, NAME, {"quick": self.quick, "seeds": self.seeds})
+    def __post_init__(self) -> None:
+        if self.world:
+            raise ExperimentError(f"The arm of this benchmark is the usual one: leave out --world {self.world}.")
+
+    def stages(self) -> list[list[Task]]:
+        """Return the streams to record, then their replays."""
+        return [self.streams(), self.replays()]
+
+    def found(self) -> Found | None:
+        """See `Bench`."""
+        from pretouch_lab.benchmarks.localization.results import rows_by_body, tables_of
+
+        results: Row = {"about": self.about(), "rows": rows_by_body(rows_of(self.replays()))}
+        return Found(results, tables_of(results), "", [], said(results["about"]))
 
     def streams(self) -> list[Task]:
         """Return the streams to record."""
@@ -51,22 +62,9 @@ class Bench:
                 tasks.append(Task(file, work, _REPLAY_COST * duration_s(cell)))
         return tasks
 
-    def every(self) -> list[Task]:
-        """Return all work."""
-        return [*self.streams(), *self.replays()]
-
     def _cells(self) -> list[TouchedCell]:
         return touched_cells(self.seeds, self.quick)
 
     def _stream(self, cell: TouchedCell) -> Path:
         made_by = result_key(record_touched, profile=profile("paper"))
         return self.out / f"streams-{made_by}" / f"{cell.name}.npz"
-
-
-def run_bench(bench: Bench, progress: Callable[[float], None]) -> list[Row]:
-    """Do all that is missing, and return what came out of each replay; a run that was stopped goes on."""
-    bench.open()
-    replays = bench.replays()
-    run_tasks(bench.streams(), bench.out, progress)
-    run_tasks(replays, bench.out, progress)
-    return read_rows(replays)

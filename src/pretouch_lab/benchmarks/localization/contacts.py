@@ -2,23 +2,19 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from pretouch.loop import run
 from pretouch.profiles import profile
-from pretouch.sim.plant import Plant, PlantClock
-from pretouch.sim.range_finder import RangeFinders
-from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
+from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
-from pretouch_lab.benchmarks.detection.arm import AWAY, model, path_of, plant_of, sensing_of
+from pretouch_lab.benchmarks.detection.arm import Alone, model, path_of, plant_of, record, sensing_of
 from pretouch_lab.benchmarks.detection.contacts import Toucher, Touching, described, place_on
-from pretouch_lab.benchmarks.detection.stream import PROFILE, StreamRecorder, save_stream
+from pretouch_lab.benchmarks.detection.stream import PROFILE, save_stream
 from pretouch_lab.benchmarks.localization.motion import Wandering, WanderingController, wandering
-from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
-from pretouch_lab.ghost import Ghost
-from pretouch_lab.trial import SETTLE_S
+from pretouch_lab.benchmarks.scenario_files import SeedRange, numbered, scenario
 
 _TAIL_S = 0.6
 """Time after the last contact [s]."""
@@ -41,14 +37,12 @@ class TouchedCell:
 
 def touched_cells(seeds: SeedRange, quick: bool) -> list[TouchedCell]:
     """Return the cells of the scenario file; an arm has the same seed, and so the same contacts, with each skin."""
-    family, cells, number = scenario("localization"), [], 0
-    for cell in family["cell"]:
-        for i in range(cell["full"]):
-            if i < cell["quick"] or not quick:
-                seed = seed_of(family, seeds, number)
-                cells += [TouchedCell(cell["contacts"], sensing, seed) for sensing in cell["sensing"]]
-            number += 1
-    return cells
+    family = scenario("localization")
+    return [
+        TouchedCell(cell["contacts"], sensing, seed)
+        for cell, seed in numbered(family, family["cell"], seeds, quick)
+        for sensing in cell["sensing"]
+    ]
 
 
 def duration_s(cell: TouchedCell) -> float:
@@ -100,24 +94,17 @@ def _drawn(
 def record_touched(cell: TouchedCell, file: Path) -> None:
     """Record one cell's stream, with its contacts: `touch.NAME` for each field of `Touching`, of all hands in turn."""
     course, hands = planned(cell)
-    sensing, found = sensing_of(cell.sensing, cell.seed), profile(PROFILE)
-    start = (float(AWAY[0]), float(AWAY[1]), float(AWAY[2]))
-    scene = SceneSpec(ghost=GhostSpec(sensing.hand_radius, start))
+    sensing, speed = sensing_of(cell.sensing, cell.seed), profile(PROFILE).task.speed_m_s
     kind = scenario("localization")["arm"]["kind"]
-    plant = Plant(model(), scene, plant_of(kind), course.at(0.0)[0], cell.seed)
-    finders = RangeFinders(plant, sensing.skin, sensing.ranging, cell.seed)
-    touchers = [Toucher(plant, touches, sensing.hand_radius) for touches in hands]
-    seen: Callable[[float], FloatArray] = touchers[0].hand
-    Ghost(plant, seen)
-    controller = WanderingController(model(), sensing.believed, fixtures(scene), path_of("rest"), found)
-    controller.course = course
-    plant.advance(SETTLE_S)
-    recorder = StreamRecorder(plant)
     end = max(hand[-1].end for hand in hands) + _TAIL_S
-    period = found.task.control_period_s
-    run(
-        controller, plant, finders, PlantClock(plant, period), recorder,
-        lambda step: step.stamp >= end - 0.5 * period,
+    what = Alone(
+        path_of("rest"), speed, plant_of(kind), sensing, sensing.hand_radius, cell.seed, end,
+        start=course.at(0.0)[0], controller=partial(WanderingController, course),
     )  # fmt: skip
+
+    def prepare(plant: Plant) -> Callable[[float], FloatArray]:
+        seen, *_ = [Toucher(plant, touches, sensing.hand_radius) for touches in hands]
+        return seen.hand
+
     touches = [touch for hand in hands for touch in hand]
-    save_stream(replace(recorder.stream(), truth=described(touches, sensing.hand_radius)), file)
+    save_stream(replace(record(what, prepare), truth=described(touches, sensing.hand_radius)), file)

@@ -18,9 +18,8 @@ from pretouch_lab.benchmarks.detection.stream import Stream, load_stream
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell
 from pretouch_lab.benchmarks.localization.limit import position_limit
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
 from pretouch_lab.detector_alone import DetectorAlone
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 
 PROFILE = "pretouch"
 WITHOUT = ("none", "none, nothing learnt")

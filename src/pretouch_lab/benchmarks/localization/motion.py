@@ -1,6 +1,7 @@
 """An arm that wanders between random postures, whatever it feels: localisation has to work in any of them."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -86,7 +87,10 @@ def _free(q: FloatArray) -> bool:
 class WanderingController(Controller):
     """Sees and judges as any other, but moves along a course whatever that says."""
 
-    course: Wandering
+    def __init__(self, course: Wandering, *given: Any) -> None:
+        """Take the course, and what any controller is made of."""
+        super().__init__(*given)
+        self.course = course
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         """Run one control cycle and command the course in place of what it decided."""

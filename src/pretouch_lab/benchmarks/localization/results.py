@@ -1,27 +1,19 @@
 """What all replays of the localisation benchmark say together."""
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
-from pretouch import __version__
-from pretouch.text_table import TextTable
-from pretouch_lab.benchmarks.localization.campaign import NAME, Bench
+from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.benchmarks.store import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
+from pretouch_lab.tables import plain
 
 TWO = "two at once"
 """In place of a link, for two contacts at once."""
 
 
-def summary_of(bench: Bench, replays: list[Row]) -> Row:
-    """Return what the JSON file holds: what was run, and a row for each skin and rigid body."""
-    about = {"bench": NAME, "version": __version__, "quick": bench.quick, "seeds": bench.seeds}
-    return {"about": about, "rows": rows_of(replays)}
-
-
-def rows_of(replays: list[Row]) -> list[Row]:
+def rows_by_body(replays: list[Row]) -> list[Row]:
     """Return a row for each skin and rigid body, and one for two contacts at once."""
     rows = []
     for skin in dict.fromkeys(replay["skin"] for replay in replays):
@@ -72,56 +64,65 @@ def _at(values: list[float], percent: float) -> float | None:
 
 
 def tables_of(results: Row) -> list[TextTable]:
-    """Return the tables of what `summary_of` returned."""
+    """Return the tables of what the JSON file holds."""
     judged = scenario("localization")["judged"]
     singles = [row for row in results["rows"] if row["link"] != TWO]
     pairs = [row for row in results["rows"] if row["link"] == TWO]
-    lines = tuple(
-        (
-            row["skin"], row["link"], str(row["contacts"]), str(row["felt"]), _percent(row["right_link"]),
-            _said(row["taken_for"]), _cm(row["median_error_m"]), _cm(row["p90_error_m"]), _cm(row["median_limit_m"]),
-            str(row["said_two"]), _percent(row["right_link_end"]), _cm(row["median_error_end_m"]),
-            str(row["said_two_end"]),
-        )
-        for row in singles
-    )  # fmt: skip
     rates = ", ".join(f"{skin} {rate:.0f} Hz" for skin, rate in {r["skin"]: r["rate_hz"] for r in singles}.items())
     made = [
-        TextTable(
+        tabulated(
             "Where a contact is said to be",
-            ("skin", "body", "contacts", "felt", "right\nbody", "taken for", "median\n[cm]", "90 %\n[cm]",
-             "limit\n[cm]", "said\ntwo", "right\nat end", "median\nat end [cm]", "two\nat end"),
-            lines,
+            _SINGLES,
+            singles,
             f"Judged {1000 * judged['after_s']:.0f} ms after the force began to rise, or at its end if that is earlier,"
             " and once more at its end. Error: from the true place, both on the body in that posture, of what was felt,"
             " whichever body it was taken for; what was not felt is not right. hand: link 7, flange and hand, which the"
             " same joints move. Limit: what the torques alone could tell at best, the bound of Cramer and Rao, median."
             f" An inference takes so long that 99 of 100 would keep up with: {rates}.",
         )
-    ]  # fmt: skip
+    ]
     if pairs:
-        made.append(TextTable(
-            "Two contacts at once",
-            ("skin", "pairs", "felt", "taken\nfor two", "both bodies\nright", "median\n[cm]", "90 %\n[cm]"),
-            tuple(
-                (row["skin"], str(row["contacts"]), str(row["felt"]), _percent(row["recognised"]),
-                 _percent(row["right_link"]), _cm(row["median_error_m"]), _cm(row["p90_error_m"]))
-                for row in pairs
-            ),
+        note = (
             f"Judged {1000 * judged['pair_after_s']:.0f} ms after the second one began, on two bodies drawn at random."
-            " Errors: of both places, where two were said. The skin sees the hand of the first one only.",
-            1,
-        ))  # fmt: skip
+            " Errors: of both places, where two were said. The skin sees the hand of the first one only."
+        )
+        made.append(tabulated("Two contacts at once", _PAIRS, pairs, note, 1))
     return made
 
 
-def _percent(value: float) -> str:
-    return f"{100 * value:.0f} %"
+def _percent(key: str) -> Callable[[Row], str]:
+    return lambda row: f"{100 * row[key]:.0f} %"
 
 
-def _cm(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.1f}"
+def _cm(key: str) -> Callable[[Row], str]:
+    return lambda row: "-" if row[key] is None else f"{100 * row[key]:.1f}"
 
 
-def _said(taken: dict[str, Any]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in taken.items()) or "-"
+def _taken_for(row: Row) -> str:
+    return ", ".join(f"{name} {count}" for name, count in row["taken_for"].items()) or "-"
+
+
+_SINGLES = (
+    ("skin", plain("skin")),
+    ("body", plain("link")),
+    ("contacts", plain("contacts")),
+    ("felt", plain("felt")),
+    ("right\nbody", _percent("right_link")),
+    ("taken for", _taken_for),
+    ("median\n[cm]", _cm("median_error_m")),
+    ("90 %\n[cm]", _cm("p90_error_m")),
+    ("limit\n[cm]", _cm("median_limit_m")),
+    ("said\ntwo", plain("said_two")),
+    ("right\nat end", _percent("right_link_end")),
+    ("median\nat end [cm]", _cm("median_error_end_m")),
+    ("two\nat end", plain("said_two_end")),
+)
+_PAIRS = (
+    ("skin", plain("skin")),
+    ("pairs", plain("contacts")),
+    ("felt", plain("felt")),
+    ("taken\nfor two", _percent("recognised")),
+    ("both bodies\nright", _percent("right_link")),
+    ("median\n[cm]", _cm("median_error_m")),
+    ("90 %\n[cm]", _cm("p90_error_m")),
+)

@@ -1,7 +1,5 @@
 """How far the thresholds give way to a hand that comes from each direction: eq. 11 against what a skin gives."""
 
-from typing import Any
-
 import numpy as np
 
 from pretouch.control.path import line
@@ -9,10 +7,10 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.claims.anticipation_views import DISTANCES_M, PROFILE, summarise, tables
 from pretouch_lab.paper.claims.approach import DIRECTIONS, PLACE_M, approach
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.rows import Row, rounded
+from pretouch_lab.trial import Record, play
 
 NAME = "anticipation"
 
@@ -28,35 +26,24 @@ def cells(_grid: Grid) -> list[Cell]:
     return [Cell(NAME, PROFILE, {"from": direction, "restrictions": "off"}) for direction in DIRECTIONS]
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     direction = str(cell.where["from"])
     way = approach(context.model, direction, seed)
     x, y, z = PLACE_M
     start = (float(way.start[0]), float(way.start[1]), float(way.start[2]))
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=SceneSpec(hand=HandSpec(start=start)),
-        path=line((x, y, z), (x, y + 0.001, z)),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
-        hand=way,
+    setup = context.setup(
+        cell, seed, SceneSpec(hand=HandSpec(start=start)), line((x, y, z), (x, y + 0.001, z)), hand=way
     )
     record = play(setup, lambda step, _: step.stamp >= way.arrival + _REST_S)
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **results(record),
     }
     return row, record
 
 
-def results(record: Record) -> dict[str, Any]:
+def results(record: Record) -> Row:
     """Numbers of one trial: the thresholds at each distance the hand came through, and where it was seen."""
     distance = [
         float(np.linalg.norm(hand - s.ee_position)) for s, hand in zip(record.steps, record.hand_position, strict=True)
@@ -65,7 +52,7 @@ def results(record: Record) -> dict[str, Any]:
     sensed = [_sensed(s, hand) for s, hand in zip(record.steps, record.hand_position, strict=True)]
     seen = [distance[i] for i in armed if sensed[i] is not None]
 
-    def at(i: int) -> dict[str, Any]:
+    def at(i: int) -> Row:
         return {"true_m": rounded(distance[i]), "sensed_m": sensed[i], **_bounds(record.steps[i])}
 
     passed = [next((i for i in armed if distance[i] <= d), None) for d in DISTANCES_M]

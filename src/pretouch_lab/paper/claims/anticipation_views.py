@@ -1,6 +1,7 @@
 """The approaches of a hand as a summary and as tables: eq. 11 against what a skin gives, and where it leaks."""
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,10 +9,10 @@ from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.contact.thresholds import obstacle_force
 from pretouch.profiles import profile
 from pretouch.sim.scene import HandSpec
-from pretouch.text_table import TextTable
-from pretouch_lab.metrics import rounded, spread
+from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.paper.claims.approach import DIRECTIONS
-from pretouch_lab.tables import number
+from pretouch_lab.rows import Row, rounded, spread
+from pretouch_lab.tables import median, number, share
 
 PROFILE = "paper"
 DISTANCES_M = (0.8, 0.6, 0.4, 0.3, 0.2, 0.15, 0.1)
@@ -32,15 +33,15 @@ def equation_11(true_distance: float) -> float:
     return float(obstacle_force(np.array(true_distance - HandSpec.radius), p.f_d_n, p.d_max_m, p.d_min_m))
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def summarise(rows: list[Row]) -> Row:
     """Cells: the band at each distance, and which bounds were lowered at the nearest point."""
-    groups: dict[str, list[dict[str, Any]]] = {}
+    groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(row["from"], []).append(row)
     return {"cells": [_cell(direction, groups[direction]) for direction in DIRECTIONS if direction in groups]}
 
 
-def _cell(direction: str, group: list[dict[str, Any]]) -> dict[str, Any]:
+def _cell(direction: str, group: list[Row]) -> Row:
     nearest = [row["nearest"] for row in group]
     return {
         "from": direction,
@@ -66,12 +67,12 @@ def _name(bound: str, axis: int) -> str:
     return f"{bound}_{'xyz'[axis]}"
 
 
-def _each_bound(places: list[dict[str, Any]], what: str) -> dict[str, Any]:
+def _each_bound(places: list[Row], what: str) -> Row:
     """Spread over trials of one number of each of the six thresholds."""
     return {_name(b, axis): spread([place[f"{b}_{what}"][axis] for place in places]) for b, axis in BOUNDS}
 
 
-def _place(distance: float, places: list[dict[str, Any]]) -> dict[str, Any]:
+def _place(distance: float, places: list[Row]) -> Row:
     return {
         "distance_m": distance,
         "equation_11_n": rounded(equation_11(distance)),
@@ -83,51 +84,51 @@ def _place(distance: float, places: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def tables(part: dict[str, Any]) -> list[TextTable]:
+def tables(part: Row) -> list[TextTable]:
     """The expected threshold against distance, then all six at the nearest point."""
     return [_against_distance(part), _leakage(part)]
 
 
-def _against_distance(part: dict[str, Any]) -> TextTable:
-    rows = [("eq. 11", "", "", *(f"{equation_11(d):.2f}" for d in DISTANCES_M))]
-    rows += [
-        (
-            DIRECTIONS[cell["from"]],
-            f"{cell['seen']}/{cell['trials']}",
-            number(cell["seen_from_m"], 2),
-            *(number(place["lowered_n"][cell["expected"]], 2) for place in cell["curve"]),
-        )
-        for cell in part["cells"]
-    ]
-    return TextTable(
+def _against_distance(part: Row) -> TextTable:
+    def at(i: int) -> Callable[[Row], str]:
+        return lambda cell: number(cell["curve"][i]["lowered_n"][cell["expected"]], 2)
+
+    columns = (
+        ("from", lambda cell: DIRECTIONS[cell["from"]]),
+        ("seen", share("seen")),
+        ("seen\nfrom [m]", median("seen_from_m", 2)),
+        *((f"{d:g} m", at(i)) for i, d in enumerate(DISTANCES_M)),
+    )
+    made = tabulated(
         "A hand comes to a standing arm: how far the threshold on its side gives way [N]",
-        ("from", "seen", "seen\nfrom [m]", *(f"{d:g} m" for d in DISTANCES_M)),
-        tuple(rows),
+        columns,
+        part["cells"],
         "Medians of F_obs on the hand's side, by the distance of its centre from the end-effector's origin."
         " Eq. 11: if the nearest point of the fist were sensed. Seen: trials in which any unit saw the"
         " hand, and the greatest distance at which one did. Dash: the hand did not come through there, the arm or the"
         " floor is in the way.",
     )
+    exact = ("eq. 11", "", "", *(f"{equation_11(d):.2f}" for d in DISTANCES_M))
+    return replace(made, rows=(exact, *made.rows))
 
 
-def _leakage(part: dict[str, Any]) -> TextTable:
-    rows = tuple(
-        (
-            DIRECTIONS[cell["from"]],
-            number(cell["nearest_m"], 2),
-            *(
-                number(cell["lowered_n"][_name(b, axis)], 1)
-                + ("*" if _name(b, axis) == cell["expected"] else "")
-                + f"\n{cell['trials_lowered'][_name(b, axis)]}/{cell['trials']}"
-                for b, axis in BOUNDS
-            ),
+def _leakage(part: Row) -> TextTable:
+    def of(name: str) -> Callable[[Row], str]:
+        return lambda cell: (
+            number(cell["lowered_n"][name], 1)
+            + ("*" if name == cell["expected"] else "")
+            + f"\n{cell['trials_lowered'][name]}/{cell['trials']}"
         )
-        for cell in part["cells"]
+
+    columns = (
+        ("from", lambda cell: DIRECTIONS[cell["from"]]),
+        ("at [m]", median("nearest_m", 2)),
+        *((f"{'T_u' if b == 'upper' else 'T_l'} {'xyz'[axis]}", of(_name(b, axis))) for b, axis in BOUNDS),
     )
-    return TextTable(
+    return tabulated(
         "The hand at its nearest: how far each of the six thresholds gives way [N]",
-        ("from", "at [m]", *(f"{'T_u' if b == 'upper' else 'T_l'} {'xyz'[axis]}" for b, axis in BOUNDS)),
-        rows,
+        columns,
+        part["cells"],
         "Medians of F_obs; below, in how many trials the threshold gave way. Starred: the one on the hand's side. The"
         " others leak: eq. 11 takes a point for an object on one side of every axis, however little it is off it; the"
         " place of the unit that sees it decides which side.",

@@ -1,20 +1,18 @@
 """Paper V-C, threshold close-up: a person stands on one side of the circle and pushes the arm from the other."""
 
-from typing import Any
-
 import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.profiles import profile
 from pretouch.sim.pushes import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.metrics import rounded, spread
-from pretouch_lab.tables import controller, number
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.rows import Row, rounded, spread
+from pretouch_lab.tables import controller, median, plain, share
+from pretouch_lab.trial import Record, play
 
 NAME = "between"
 DEFAULT_RESTRICTIONS = "slack"
@@ -67,28 +65,15 @@ def interaction(seed: int) -> tuple[Box, Push]:
     return Box("body", center, _BODY_HALF_SIZE_M, _BODY_STIFFNESS_N_PER_M), push
 
 
-def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Record]:
+def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     body, push = interaction(seed)
     person = Pusher(context.model, (push,))
-    setup = Setup(
-        model=context.model,
-        skin=context.skin,
-        profile=context.profile(cell),
-        scene=SceneSpec(boxes=(body,), hand=HandSpec()),
-        path=Circle(),
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
-        hand=person,
-    )
+    setup = context.setup(cell, seed, SceneSpec(boxes=(body,), hand=HandSpec()), Circle(), hand=person)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     touched = person.contacts[0] if person.contacts else None
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         "body_m": rounded(body.center[_Y] - body.half_size[_Y]),
         "push_n": rounded(push.force),
         "push_s": rounded(push.duration),
@@ -97,7 +82,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[dict[str, Any], Reco
     return row, record
 
 
-def results(record: Record, touched: tuple[float, float] | None) -> dict[str, Any]:
+def results(record: Record, touched: tuple[float, float] | None) -> Row:
     """Numbers of one trial; `touched` are touch and release [s] of the push, None if it never touched.
 
     Widths of the band are T_u - mu and mu - T_l of the three axes [N].
@@ -146,15 +131,15 @@ def lowered_on_both_sides(step: ControlStep) -> bool:
     return bool(step.thresholds.obstacle_positive[_Y] > 0 and step.thresholds.obstacle_negative[_Y] > 0)
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def summarise(rows: list[Row]) -> Row:
     """Cells: how far the band along y was narrowed before the push, and whether the push was felt."""
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row["profile"], row["restrictions"]), []).append(row)
     return {"cells": [_cell(*key, group) for key, group in groups.items()]}
 
 
-def _cell(profile: str, restrictions: str, group: list[dict[str, Any]]) -> dict[str, Any]:
+def _cell(profile: str, restrictions: str, group: list[Row]) -> Row:
     return {
         "profile": profile,
         "restrictions": restrictions,
@@ -170,37 +155,22 @@ def _cell(profile: str, restrictions: str, group: list[dict[str, Any]]) -> dict[
     }
 
 
-def tables(part: dict[str, Any]) -> list[TextTable]:
+def tables(part: Row) -> list[TextTable]:
     """How far the band was narrowed from both sides, and what was felt of the push."""
-    rows = tuple(
-        (
-            controller(cell, part["cells"]),
-            *(number(cell[f"{name}_y"], 1) for name in _WIDTHS),
-            f"{cell['both_lowered']}/{cell['trials']}",
-            f"{cell['both_lowered_at_touch']}/{cell['contacts']}",
-            f"{cell['felt']}/{cell['contacts']}",
-            number(cell["detection_delay_s"], 0, 1000),
-            number(cell["filtered_at_detection_n"], 1),
-            str(cell["false_detections"]),
-        )
-        for cell in part["cells"]
+    columns = (
+        ("profile", lambda cell: controller(cell, part["cells"])),
+        *((f"T_{name[0]}\n{name.split('_')[1]}", median(f"{name}_y", 1)) for name in _WIDTHS),
+        ("both\never", share("both_lowered")),
+        ("both at\ntouch", share("both_lowered_at_touch", "contacts")),
+        ("felt", share("felt", "contacts")),
+        ("delay\n[ms]", median("detection_delay_s", 0, 1000)),
+        ("filtered\n[N]", median("filtered_at_detection_n", 1)),
+        ("false", plain("false_detections")),
     )
-    table = TextTable(
+    table = tabulated(
         "A person stands at +y and pushes the arm from -y: medians, thresholds in N",
-        (
-            "profile",
-            "T_u\nfree",
-            "T_u\nleast",
-            "T_l\nfree",
-            "T_l\nleast",
-            "both\never",
-            "both at\ntouch",
-            "felt",
-            "delay\n[ms]",
-            "filtered\n[N]",
-            "false",
-        ),
-        rows,
+        columns,
+        part["cells"],
         "T_u: upper threshold above the window's mean along y; T_l: lower threshold below it. Free: median while"
         " nothing sensed lowers that bound, in trials where it ever is free. Least: before the push. Both: trials in"
         " which objects narrowed the band from above and below at once, ever before the push and when it touched."

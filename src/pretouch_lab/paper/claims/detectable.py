@@ -15,11 +15,11 @@ from pretouch.sensing.skin import Skin
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.metrics import rounded, spread
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper.claims.detectable_views import detectable_tables, draw_detectable
 from pretouch_lab.paper.claims.detectors import TABLE_I, Detector, Windowed, filtered, fixed, raw, raw_twice, windowed
 from pretouch_lab.paper.claims.forces import Event, Shape, apply
+from pretouch_lab.rows import Row, rounded, spread
 from pretouch_lab.trial import Setup, play
 
 NAME = "detectable"
@@ -123,10 +123,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, None]:
     record = play(setup, lambda step, _: step.stamp >= events[-1].end + 2 * _LATE_S)
     course = windowed(record.forces())
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         "answers": answers(course, record.times()[-len(course.force) :], events),
         "held": record.held(),
     }

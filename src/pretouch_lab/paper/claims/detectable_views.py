@@ -1,9 +1,11 @@
 """The smallest forces felt as tables, and the fractions felt as a figure."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Picture, Row, Sources
+from pretouch.text_table import TextTable, tabulated
+from pretouch_lab.experiment import Picture, Sources
+from pretouch_lab.rows import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,24 +34,22 @@ def _judges(cells: dict[Key, Row]) -> list[tuple[str, str]]:
     return list(dict.fromkeys((key[2], key[3]) for key in cells))
 
 
+_NAMES = ("detector", lambda judge: judge[0]), ("object", lambda judge: judge[1])
+
+
 def _forces(cells: dict[Key, Row]) -> TextTable:
-    rows = [
-        (
-            *judge,
-            *(_smallest(cells, motion, shape, judge) for motion in _MOTIONS for shape in ("push", "step")),
-            _by_chance(cells, judge),
-        )
-        for judge in _judges(cells)
-    ]
-    return TextTable(
+    def smallest(motion: str, shape: str) -> Callable[[tuple[str, str]], str]:
+        return lambda judge: _smallest(cells, motion, shape, judge)
+
+    columns = (
+        *_NAMES,
+        *((f"{motion}\n{shape}", smallest(motion, shape)) for motion in _MOTIONS for shape in ("push", "step")),
+        ("chance\n[%]", lambda judge: _by_chance(cells, judge)),
+    )
+    return tabulated(
         "Smallest push (0.2 s) and step (1 s) felt [N]: along an axis / along a diagonal",
-        (
-            "detector",
-            "object",
-            *(f"{motion}\n{shape}" for motion in _MOTIONS for shape in ("push", "step")),
-            "chance\n[%]",
-        ),
-        tuple(rows),
+        columns,
+        _judges(cells),
         "Of the true force, the size from which on 9 of 10 events are felt, - if those of 30 N are not. Slow is"
         " 0.06 m/s, moving 0.3 m/s. Near: F_obs is 4 N on both sides, far: 0 N. Filtered (eq. 8), raw, and raw twice"
         " in a row are held against eq. 9 with F_b 10 N; fixed: the estimate itself against that force, no window."
@@ -74,21 +74,20 @@ def _by_chance(cells: dict[Key, Row], judge: tuple[str, str]) -> str:
 
 
 def _ramps(cells: dict[Key, Row]) -> TextTable:
-    rows = [
-        (
-            *judge,
-            *(
-                text
-                for motion in _MOTIONS
-                for text in (_smallest(cells, motion, "ramp", judge), _reached(cells, motion, judge))
-            ),
-        )
-        for judge in _judges(cells)
-    ]
-    return TextTable(
+    def smallest(motion: str) -> Callable[[tuple[str, str]], str]:
+        return lambda judge: _smallest(cells, motion, "ramp", judge)
+
+    def reached(motion: str) -> Callable[[tuple[str, str]], str]:
+        return lambda judge: _reached(cells, motion, judge)
+
+    columns = (
+        *_NAMES,
+        *(c for m in _MOTIONS for c in ((f"{m}\n[N/s]", smallest(m)), (f"{m}\n[N]", reached(m)))),
+    )
+    return tabulated(
         "Slowest ramp felt [N/s]: axis / diagonal; force when it is felt on an axis [N]",
-        ("detector", "object", *(f"{motion}\n{what}" for motion in _MOTIONS for what in ("[N/s]", "[N]"))),
-        tuple(rows),
+        columns,
+        _judges(cells),
         "A ramp rises to 30 N and is let go. Rate: the one from which on 9 of 10 ramps are felt before they are let"
         " go, - if those of 60 N/s are not. The mean of the window follows a slow ramp, so to all but the fixed"
         " thresholds it is never a contact, however large it grows; what fires by chance now and then seems to feel"

@@ -93,9 +93,9 @@ def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[f
     """
     from scipy.stats import chi2
 
-    told, time = events / dispersion, hours / dispersion
-    low = chi2.ppf(0.025, 2 * told) / 2 if told else 0.0
-    return float(low / time), float(chi2.ppf(0.975, 2 * told + 2) / 2 / time)
+    effective, time = events / dispersion, hours / dispersion
+    low = chi2.ppf(0.025, 2 * effective) / 2 if effective else 0.0
+    return float(low / time), float(chi2.ppf(0.975, 2 * effective + 2) / 2 / time)
 
 
 def dispersion_of(counts: list[int]) -> float:

@@ -3,8 +3,8 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch_lab.experiment import Row
 from pretouch_lab.paper.claims.detectors import TABLE_I
+from pretouch_lab.rows import Row
 
 _AXES = "xyz"
 _LINES, _MARKERS = ("-", "--", ":"), ("o", "s", "^")

@@ -7,8 +7,7 @@ import numpy as np
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.metrics import rounded, spread
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper.claims.detectors import (
     TABLE_I,
     Detector,
@@ -32,6 +31,7 @@ from pretouch_lab.paper.claims.free_run import (
     tally,
 )
 from pretouch_lab.paper.claims.free_tables import free_motion_tables
+from pretouch_lab.rows import Row, rounded, spread
 
 NAME = "free-motion"
 TRAJECTORIES = ("circle", "line")
@@ -70,10 +70,7 @@ def trial(cell: Cell, seed: int, context: Context, duration_s: float = DURATION_
     off = np.array([s.ee_position - s.path_position for s in record.steps if s.armed])
     force = estimates(record)
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **estimate_results(windowed(force)),
         "path_rms_m": rounded(float(np.sqrt((off**2).sum(axis=1).mean())), 5),
         "detections": detections(force),

@@ -13,10 +13,9 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.cell import Cell, Context
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
 from pretouch_lab.paper.claims.detectors import TABLE_I, Windowed, band, dispersion_of, onsets, rate_bounds
-from pretouch_lab.trial import SETTLE_S, Record, Setup, play
+from pretouch_lab.rows import Row, rounded
+from pretouch_lab.trial import SETTLE_S, Record, play
 
 PROFILE = "blind:threshold.f_base_n=1000"
 """Nothing is near, and no force is a contact: the course of the estimate is that of an arm that is left alone."""
@@ -60,15 +59,13 @@ class Solitude:
 def leave_alone(what: Solitude, cell: Cell, seed: int, context: Context) -> Record:
     """Leave a cell's arm alone for as long as that takes; a seed makes one arm."""
     profile = context.profile(cell)
-    setup = Setup(
-        model=context.model,
+    setup = context.setup(
+        cell,
+        seed,
+        SceneSpec(),
+        what.path,
         skin=Skin([], context.model),
         profile=replace(profile, task=replace(profile.task, speed_m_s=what.speed_m_s)),
-        scene=SceneSpec(),
-        path=what.path,
-        seed=seed,
-        world=context.world,
-        recording=context.recording,
         plant=what.plant,
     )
     end = SETTLE_S + profile.window.samples * _PERIOD_S + what.duration_s

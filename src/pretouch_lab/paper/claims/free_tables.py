@@ -1,9 +1,11 @@
 """Tables of the experiments in which nothing touches the arm."""
 
+from collections.abc import Callable
+
 from pretouch.text_table import TextTable, tabulated
-from pretouch_lab.experiment import Row
 from pretouch_lab.paper.claims.detectors import TABLE_I
 from pretouch_lab.paper.claims.free_run import rate_text
+from pretouch_lab.rows import Row
 from pretouch_lab.tables import median, number, plain
 
 
@@ -38,19 +40,19 @@ def _estimate(part: Row) -> TextTable:
 
 
 def _sensitivity(part: Row) -> TextTable:
-    rows = tuple(
-        (
-            f"{cell['speed_m_s']:g}",
-            _axes(cell["f_sigma_n"], 2),
-            _axes(cell["band_n"], 2),
-            *("-" if value is None else _range(value) for value in cell["narrower_n"]),
-        )
-        for cell in part["cells"]
+    def narrower(axis: int) -> Callable[[Row], str]:
+        return lambda cell: "-" if (value := cell["narrower_n"][axis]) is None else _range(value)
+
+    columns = (
+        ("speed\n[m/s]", plain("speed_m_s", "g")),
+        ("F_sigma\nx/y/z", lambda cell: _axes(cell["f_sigma_n"], 2)),
+        ("band\nx/y/z", lambda cell: _axes(cell["band_n"], 2)),
+        *((f"narrower\n{axis}", narrower(k)) for k, axis in enumerate("xyz")),
     )
-    return TextTable(
+    return tabulated(
         "Sensitivity by speed: thresholds of an arm that nothing touches [N]",
-        ("speed\n[m/s]", "F_sigma\nx/y/z", "band\nx/y/z", "narrower\nx", "narrower\ny", "narrower\nz"),
-        rows,
+        columns,
+        part["cells"],
         "F_sigma: eq. 10. Band: F_b + F_sigma of eq. 9 at Table I's F_b, the force above the mean that makes a"
         " contact. Both: medians over the arms of the median in time. Narrower: by how much the band of the same arm"
         " on the same path is less than at the highest speed; median with 10-90 % below.",
@@ -58,18 +60,19 @@ def _sensitivity(part: Row) -> TextTable:
 
 
 def _moving(rates: list[Row]) -> TextTable:
+    def at(force: float) -> Callable[[tuple[str, bool]], str]:
+        return lambda kind: rate_text(_find(rates, kind[0], force, kind[1]))
+
     moving = [rate for rate in rates if rate["detector"] != "fixed"]
-    forces = sorted({rate["force_n"] for rate in moving})
-    kinds = list(dict.fromkeys((rate["detector"], rate["near"]) for rate in moving))
-    rows = tuple(
-        (detector, "near" if near else "far", *(rate_text(_find(rates, detector, force, near)) for force in forces))
-        for detector, near in kinds
+    columns = (
+        ("detector", lambda kind: kind[0]),
+        ("objects", lambda kind: "near" if kind[1] else "far"),
+        *((f"{force:g} N", at(force)) for force in sorted({rate["force_n"] for rate in moving})),
     )
-    hours = rates[0]["hours"]
-    return TextTable(
-        f"False detections per hour in {hours:.2g} hours of motion, by F_b",
-        ("detector", "objects", *(f"{force:g} N" for force in forces)),
-        rows,
+    return tabulated(
+        f"False detections per hour in {rates[0]['hours']:.2g} hours of motion, by F_b",
+        columns,
+        dict.fromkeys((rate["detector"], rate["near"]) for rate in moving),
         "With 95 % bounds below, which count the arms' differences. Filtered: the value of eq. 8 is compared. Alpha"
         " 0.3: the same with a quicker filter than Table I's 0.1. Raw: the estimate itself, as in the authors' code;"
         " raw twice: two samples in a row. Far: F_obs is 0. Near: it is F_d = 4 N on both sides of each axis, so that"
@@ -88,21 +91,21 @@ def _fixed(rates: list[Row]) -> TextTable:
 
 
 def _paths(parts: list[Row]) -> TextTable:
-    detectors = ("filtered", "alpha 0.3", "raw", "raw twice")
     f_base = TABLE_I.f_base_n
-    rows = tuple(
-        (
-            part["trajectory"],
-            _axes(part["cells"][-1]["f_sigma_n"], 2),
-            _axes(part["cells"][0]["narrower_n"], 2),
-            *(rate_text(_find(part["false_detections"], detector, f_base, True)) for detector in detectors),
-        )
-        for part in parts
+
+    def by(detector: str) -> Callable[[Row], str]:
+        return lambda part: rate_text(_find(part["false_detections"], detector, f_base, True))
+
+    columns = (
+        ("path", plain("trajectory")),
+        ("F_sigma\nx/y/z", lambda part: _axes(part["cells"][-1]["f_sigma_n"], 2)),
+        ("narrower\nx/y/z", lambda part: _axes(part["cells"][0]["narrower_n"], 2)),
+        *((detector, by(detector)) for detector in ("filtered", "alpha 0.3", "raw", "raw twice")),
     )
-    return TextTable(
+    return tabulated(
         f"What the path changes: F_sigma, and false detections per hour at F_b {f_base:g} N near objects",
-        ("path", "F_sigma\nx/y/z", "narrower\nx/y/z", *detectors),
-        rows,
+        columns,
+        parts,
         "F_sigma: at the highest speed [N]. Narrower: by how much it is less at the lowest [N]. The line turns back"
         " at both ends at once, the circle never does: it is at turns that friction makes forces of nothing.",
     )
@@ -131,15 +134,14 @@ def _noise(part: Row) -> TextTable:
 
 
 def _noise_rates(part: Row) -> TextTable:
-    kinds = list(dict.fromkeys(_kind(rate) for cell in part["cells"] for rate in cell["false_detections"]))
-    rows = tuple(
-        (f"{cell['noise_factor']:g}", *(rate_text(_find(cell["false_detections"], *kind)) for kind in kinds))
-        for cell in part["cells"]
-    )
-    return TextTable(
+    def of(kind: tuple[str, float, bool]) -> Callable[[Row], str]:
+        return lambda cell: rate_text(_find(cell["false_detections"], *kind))
+
+    kinds = dict.fromkeys(_kind(rate) for cell in part["cells"] for rate in cell["false_detections"])
+    return tabulated(
         "Robustness to noise: false detections per hour",
-        ("noise\nfactor", *(_heading(*kind) for kind in kinds)),
-        rows,
+        (("noise\nfactor", plain("noise_factor", "g")), *((_heading(*kind), of(kind)) for kind in kinds)),
+        part["cells"],
         "With 95 % bounds below, which count the arms' differences. Filtered: the paper's. No F_sigma: with F_std 0."
         " Raw: the estimate itself against the paper's thresholds. Far: F_obs is 0. Near: it is F_d = 4 N on both"
         " sides of each axis. Fixed: the estimate of each axis against a force, without a window. Each detection"

@@ -8,8 +8,7 @@ from pretouch.control.path import Circle
 from pretouch.sim.plant_params import Joints, PlantParams
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Row, Sources
-from pretouch_lab.metrics import rounded, spread
+from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper.claims.detectors import TABLE_I, filtered, fixed, raw, steady, windowed
 from pretouch_lab.paper.claims.free_run import (
     DURATION_S,
@@ -22,6 +21,7 @@ from pretouch_lab.paper.claims.free_run import (
     tally,
 )
 from pretouch_lab.paper.claims.free_tables import noise_tables
+from pretouch_lab.rows import Row, rounded, spread
 
 NAME = "noise"
 FACTORS = (1.0, 2.0, 3.0, 4.0, 6.0)
@@ -53,10 +53,7 @@ def trial(cell: Cell, seed: int, context: Context, duration_s: float = DURATION_
     what = Solitude(Circle(), plant=noisy(float(cell.where["noise_factor"])), duration_s=duration_s)
     force = estimates(leave_alone(what, cell, seed, context))
     row = {
-        "experiment": NAME,
-        **cell.where,
-        "profile": cell.profile,
-        "seed": seed,
+        **cell.row(seed),
         **estimate_results(windowed(force)),
         "detections": detections(force),
     }

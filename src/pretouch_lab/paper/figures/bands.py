@@ -1,19 +1,18 @@
 """Width of the thresholds' band against the distance of a hand from six directions."""
 
-from typing import Any
-
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pretouch_lab.paper.claims.approach import DIRECTIONS
 from pretouch_lab.paper.figures.marks import AXES, labels
+from pretouch_lab.rows import Row
 
 _STYLES = {"upper": ("-", "tab:red"), "lower": ("--", "tab:blue")}
 _MARKERS = "osd"
 """Of the axes x, y and z."""
 
 
-def band_figure(cells: list[dict[str, Any]]) -> Figure:
+def band_figure(cells: list[Row]) -> Figure:
     """Medians of the six widths at each distance, one panel a direction, with what eq. 11 promises dashed.
 
     Distances are of the hand's centre from the end-effector's origin; eq. 11 is for the nearest point of the fist.
@@ -35,7 +34,7 @@ def band_figure(cells: list[dict[str, Any]]) -> Figure:
     return figure
 
 
-def _panel(axes: Axes, cell: dict[str, Any]) -> None:
+def _panel(axes: Axes, cell: Row) -> None:
     places = [place for place in cell["curve"] if place["trials"]]
     for name in places[0]["width_n"] if places else ():
         bound, axis = name.split("_")

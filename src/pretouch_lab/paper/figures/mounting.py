@@ -5,8 +5,8 @@ from operator import itemgetter
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch_lab.experiment import Row
 from pretouch_lab.paper.figures.marks import labels
+from pretouch_lab.rows import Row
 
 _BOARD = (
     ("true_peak_20ms_n_ratio", "-", "o", "black", "true 20 ms peak"),

@@ -1,7 +1,5 @@
 """How far an answer is from where a unit truly sits, and how far it says it may be."""
 
-from typing import Any
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -9,8 +7,7 @@ from pretouch.calibration.result import Place
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray
-
-Row = dict[str, Any]
+from pretouch_lab.rows import Row
 
 _TURN, _SHIFT = slice(0, 3), slice(3, 6)
 

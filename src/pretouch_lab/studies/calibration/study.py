@@ -2,8 +2,6 @@
 
 import os
 from collections.abc import Callable
-from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -18,12 +16,13 @@ from pretouch.errors import ExperimentError
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch_lab.studies.calibration.errors import NOT_FOUND, Row, error_row, place_row, pose_error
+from pretouch_lab.engine import run_jobs
+from pretouch_lab.rows import Row
+from pretouch_lab.studies.calibration.errors import NOT_FOUND, error_row, place_row, pose_error
 from pretouch_lab.studies.calibration.random_skin import random_skin
 from pretouch_lab.studies.calibration.simulated import DATA_SHEET, clock_errors, simulate
 from pretouch_lab.studies.calibration.swings import watanabe_plan
 from pretouch_lab.studies.calibration.watanabe import watanabe
-from pretouch_lab.workers import interrupt_held_back, workers
 
 OURS, WATANABE = "pretouch", "Watanabe et al."
 """Names of methods and of motions."""
@@ -88,7 +87,7 @@ class Study:
 
 def study(
     model: RobotModel, skins: int = 20, seed: int = 0, compared: bool = True, links_known: bool = True,
-    plan: Plan | None = None, processes: int | None = None, progress: Callable[[int, int], None] = lambda *_: None,
+    plan: Plan | None = None, processes: int | None = None, progress: Callable[[], None] = lambda: None,
 ) -> Study:  # fmt: skip
     """Calibrate random skins in simulation.
 
@@ -100,7 +99,7 @@ def study(
         links_known: whether the calibration is told each unit's link, or has to find it. Watanabe et al. are told.
         plan: our motion, if not the one that is planned by default.
         processes: that compute at once; None: one a processor.
-        progress: called with how many simulations are done, of how many.
+        progress: called after each simulation.
     """
     if skins < 1:
         raise ExperimentError(f"The number of skins is {skins}: give at least 1.")
@@ -114,20 +113,19 @@ def study(
     return Study(made, {motion: planned.duration for motion, planned in plans.items()})
 
 
-def _run(tasks: "list[_Task]", processes: int, progress: Callable[[int, int], None]) -> list[Trial]:
+def _run(tasks: "list[_Task]", processes: int, progress: Callable[[], None]) -> list[Trial]:
     """Run all tasks in parallel processes; the trials come in the order of the tasks."""
-    try:
-        with workers(processes) as pool:
-            with interrupt_held_back():
-                futures = [pool.submit(task.run) for task in tasks]
-            for done, future in enumerate(as_completed(futures), 1):
-                future.result()
-                progress(done, len(tasks))
-            return [trial for future in futures for trial in future.result()]
-    except BrokenProcessPool as error:
-        raise ExperimentError(
-            "A worker process was killed, for want of memory perhaps: use fewer processes."
-        ) from error
+    made: dict[int, list[Trial]] = {}
+
+    def done(task: _Task, trials: list[Trial]) -> None:
+        made[id(task)] = trials
+        progress()
+
+    def lost(_task: _Task, reason: str) -> None:
+        raise ExperimentError(f"{reason} Use fewer processes.")
+
+    run_jobs(tasks, lambda task: (_Task.run, task), processes, done, lost)
+    return [trial for task in tasks for trial in made[id(task)]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """Contacts that no unit saw coming, by simulation: a skin, with suggested units, and with units put anywhere."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -18,15 +19,21 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.bounds import share_below
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Row
-from pretouch_lab.groups import grouped
-from pretouch_lab.metrics import rounded
-from pretouch_lab.studies.coverage.comers import EVERY_S, PARKED, START_S, Comers, Coming
-from pretouch_lab.trial import Record, Setup, play
+from pretouch_lab.experiment import Experiment
+from pretouch_lab.rows import Row, grouped, rounded
+from pretouch_lab.studies.coverage.approaching import (
+    EVERY_S,
+    PARKED,
+    START_S,
+    ApproachingObstacle,
+    ApproachingObstacles,
+)
+from pretouch_lab.tables import plain
+from pretouch_lab.trial import Record, play
 
 NAME = "coverage"
 SKINS = ("own", "suggested", "random")
@@ -77,24 +84,25 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     model, params = context.model, CoverageParams()
     skin = skin_of(str(cell.where["skin"]), model, context.skin, seed)
     surface = surface_of(model, POINTS, float(np.random.default_rng([seed, 54]).uniform()))
-    comers = Comers(model, skin, surface, params, COUNT, seed)
+    approaching = ApproachingObstacles(model, skin, surface, params, COUNT, seed)
     found, speed = context.profile(cell), ARMS[str(cell.where["arm"])]
     if speed is not None:
         found = replace(found, task=replace(found.task, speed_m_s=speed))
     parked = (float(PARKED[0]), float(PARKED[1]), float(PARKED[2]))
-    setup = Setup(
-        model=model,
+    setup = context.setup(
+        cell,
+        seed,
+        SceneSpec(ghost=GhostSpec(params.object_radius_m, parked)),
+        Circle(start_angle=float(np.random.default_rng([seed, 55]).uniform(0, 2 * np.pi))),
         skin=skin,
         profile=found,
-        scene=SceneSpec(ghost=GhostSpec(params.object_radius_m, parked)),
-        path=Circle(start_angle=float(np.random.default_rng([seed, 55]).uniform(0, 2 * np.pi))),
-        seed=seed,
-        recording=context.recording,
-        prepare=comers.attach,
+        prepare=approaching.attach,
     )
-    record = play(setup, lambda step, _: step.stamp >= comers.end)
-    row = {"experiment": NAME, **cell.where, "profile": cell.profile, "seed": seed}
-    return row | results(comers.came, record, params) | {"predicted": _predicted(model, context.skin, skin)}, record
+    record = play(setup, lambda step, _: step.stamp >= approaching.end)
+    row = cell.row(seed)
+    return row | results(approaching.came, record, params) | {
+        "predicted": _predicted(model, context.skin, skin)
+    }, record
 
 
 def _predicted(model: RobotModel, own: Skin, skin: Skin) -> float | None:
@@ -104,12 +112,12 @@ def _predicted(model: RobotModel, own: Skin, skin: Skin) -> float | None:
     return rounded(1.0 - covered(ways, seen).arm.ways.value)
 
 
-def results(came: list[Coming], record: Record, params: CoverageParams) -> Row:
+def results(came: list[ApproachingObstacle], record: Record, params: CoverageParams) -> Row:
     """Numbers of one trial."""
     points = {round(step.stamp / 0.001): step.obstacles.point for step in record.steps}
-    blind = [not seen_in_time(coming, points, params) for coming in came]
-    towards = [coming.touch_m_s for coming in came if coming.touch_m_s is not None]
-    foreseen = [coming.foreseen for coming in came]
+    blind = [not seen_in_time(obstacle, points, params) for obstacle in came]
+    towards = [obstacle.touch_m_s for obstacle in came if obstacle.touch_m_s is not None]
+    foreseen = [obstacle.foreseen for obstacle in came]
     return {
         "came": len(came),
         "blind": sum(blind),
@@ -120,13 +128,13 @@ def results(came: list[Coming], record: Record, params: CoverageParams) -> Row:
     }
 
 
-def seen_in_time(coming: Coming, points: dict[int, FloatArray], params: CoverageParams) -> bool:
+def seen_in_time(obstacle: ApproachingObstacle, points: dict[int, FloatArray], params: CoverageParams) -> bool:
     """Whether the controller had a sensed point on the ball while there was still way left to brake.
 
     `points` (M, 3) [m] are those of each control step, by its number in milliseconds.
     """
     needed = params.braking_m + _DRIVES_S * params.closing_m_s
-    for number, (left, center) in coming.track.items():
+    for number, (left, center) in obstacle.track.items():
         sensed = points.get(number)
         if left >= needed and sensed is not None and len(sensed):
             gap = np.linalg.norm(sensed - center, axis=1) - params.object_radius_m
@@ -154,25 +162,28 @@ def summarise(rows: list[Row]) -> Row:
 
 def tables(part: Row) -> list[TextTable]:
     """Blind contacts by simulation, beside what coverage says."""
-    rows = tuple(
+
+    def share(name: str) -> Callable[[Row], str]:
+        return lambda cell: f"{100 * cell[name] / cell['came']:.0f}"
+
+    columns = (
+        ("profile\narm", lambda cell: f"{cell['profile']}\n{cell['arm']}"),
+        ("skin", plain("skin")),
+        ("blind", lambda cell: f"{cell['blind']}/{cell['came']}"),
         (
-            f"{cell['profile']}\n{cell['arm']}",
-            cell["skin"],
-            f"{cell['blind']}/{cell['came']}",
-            f"{100 * cell['blind'] / cell['came']:.0f}\n{100 * cell['blind_low']:.0f}-{100 * cell['blind_high']:.0f}",
-            f"{100 * cell['foreseen_blind'] / cell['came']:.0f}",
-            f"{100 * cell['predicted']:.0f}",
-            f"{100 * cell['agree'] / cell['came']:.0f}",
-            f"{100 * cell['fast'] / cell['came']:.0f}",
-            "-" if cell["towards_m_s"] is None else f"{1000 * cell['towards_m_s']:.0f}",
-        )
-        for cell in part["cells"]
+            "blind\n[%]",
+            lambda c: f"{100 * c['blind'] / c['came']:.0f}\n{100 * c['blind_low']:.0f}-{100 * c['blind_high']:.0f}",
+        ),
+        ("foreseen\n[%]", share("foreseen_blind")),
+        ("circle\n[%]", plain("predicted", ".0f", 100)),
+        ("agree\n[%]", share("agree")),
+        ("fast\n[%]", share("fast")),
+        ("towards\n[mm/s]", lambda c: "-" if c["towards_m_s"] is None else f"{1000 * c['towards_m_s']:.0f}"),
     )
-    header = ("blind", "blind\n[%]", "foreseen\n[%]", "circle\n[%]", "agree\n[%]", "fast\n[%]", "towards\n[mm/s]")
-    table = TextTable(
+    table = tabulated(
         f"Contacts that no unit saw in time: the skin, with {MORE} suggested units, with {MORE} anywhere",
-        ("profile\narm", "skin", *header),
-        rows,
+        columns,
+        part["cells"],
         "A ball comes straight at random points of the surface. Blind: no sensed point within 0.1 m of it while there"
         " was way left to brake, 95 % bounds below. Foreseen: what coverage says of the same ways, the arm standing as"
         " when each set out; agree: cases in which both say the same. Circle: what it says of the whole circle. Fast:"

@@ -10,8 +10,7 @@ from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching
 from pretouch_lab.benchmarks.detection.replay import begun
 from pretouch_lab.benchmarks.localization.judge import place_said, said_of
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.impacts.contacts import LOOK, WARM_UP_S, Course, Played, course, plan, play_again
 from pretouch_lab.studies.impacts.kinds import GROUPS, KINDS, LINKS
 

@@ -1,15 +1,15 @@
 """The study of the units' accelerometers: its summary and tables."""
 
+from collections.abc import Callable
 from itertools import product
-from typing import Any
 
 import numpy as np
 
-from pretouch.text_table import TextTable
-from pretouch_lab.experiment import Row
-from pretouch_lab.metrics import rounded
+from pretouch.text_table import TextTable, tabulated
+from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.impacts.kinds import GROUPS, KINDS
-from pretouch_lab.studies.located import FELT, FIRM, HEADER, NOTE, SIDES, chosen, columns, compared
+from pretouch_lab.studies.located import COLUMNS, FELT, FIRM, NOTE, SIDES, chosen, compared
+from pretouch_lab.tables import plain
 
 ALL, LATER = "all", "alarm both ways"
 
@@ -96,77 +96,88 @@ def tables(part: Row) -> list[TextTable]:
     pooled = [cell for cell in part["cells"] if cell["group"] == ALL]
     first = part["cells"][0]["way"] if part["cells"] else ""
     own = [c for c in part["cells"] if c["way"] == first]
+    kind = ("contact", plain("kind"))
     return [
-        TextTable(
+        tabulated(
             "Contacts with the units' accelerometers and without: delay and misses",
-            ("way", "contact", "n", "median\n[ms]", "95 %\n[ms]", "missed", "earlier", "later", "change\n[ms]"),
-            tuple((cell["way"], cell["kind"], *_delays(cell)) for cell in pooled),
+            (("way", plain("way")), kind, *_DELAYS),
+            pooled,
             "Each number without, then with. Way: usual, datagrams every 20 ms and a vibration of 0.3 m/s^2; calm 0.1,"
             " shaken 0.5 m/s^2; at once, datagrams every 2.5 ms. Impact: a hand of 0.6 kg and 75 N/mm at 0.1 to 0.5"
             " m/s. Push: 20 N, risen in 20 to 300 ms. Delay: from the true force passing 1 N. Change: mean of contacts"
             " felt either way.",
         ),
-        TextTable(
+        tabulated(
             f"The same by group of links, way {first}",
-            ("links", "contact", "n", "median\n[ms]", "95 %\n[ms]", "missed", "earlier", "later", "change\n[ms]"),
-            tuple((c["group"], c["kind"], *_delays(c)) for c in own if c["group"] != ALL),
+            (("links", plain("group")), kind, *_DELAYS),
+            [c for c in own if c["group"] != ALL],
             "As above.",
         ),
-        TextTable(
+        tabulated(
             f"The touched link, way {first}",
-            ("links", "contact", "cue", "IMU", "IMU\n+-1", "torques", "torques\n+-1", "both", "both\n+-1"),
-            tuple((c["group"], c["kind"], *_links(c)) for c in own),
+            (("links", plain("group")), kind, *_LINKS),
+            own,
             "Cue: contacts with a gain of 2 or more within 100 ms. IMU: the link with the largest gain is the touched"
             " one, of these. Torques: so is that of the sequential test's best force, 30 ms after its alarm, of the"
             " contacts felt. Both: with the gains of the accelerometers. +-1: or a link next to it.",
         ),
-        TextTable(
+        tabulated(
             "Where contacts are said to be",
-            ("way", "contact", "of", *HEADER),
-            tuple((c["way"], c["kind"], c["of"], *columns(c)) for c in part["where"]),
+            (("way", plain("way")), kind, ("of", plain("of")), *COLUMNS),
+            part["where"],
             f"{NOTE} An impact ends after 10 ms, and little is felt by then. Alarm both ways: contacts that gave one"
             " without and with, each judged 30 ms after its own.",
             names=3,
         ),
-        TextTable(
+        tabulated(
             "Free motion",
-            ("way", "profile", "hours", "alarms\nwithout", "alarms\nwith", "cue\n[%]", "mean\ngain"),
-            tuple(
-                (
-                    f["way"], f["profile"], f"{f['hours']:.2f}", str(f["without"]["alarms"]), str(f["with"]["alarms"]),
-                    f"{100 * f['with']['cued']:.2f}", f"{f['with']['mean_gain']:.2f}",
-                )
-                for f in part["free"]
-            ),
+            _FREE,
+            part["free"],
             "Cue: steps with a gain of 2 or more on any link. Mean gain: over steps and links, 1 without.",
         ),
-    ]  # fmt: skip
+    ]
 
 
-def _delays(cell: Row) -> tuple[str, ...]:
-    change = cell["mean_change_s"]
-    return (
-        str(cell["contacts"]),
-        *(" / ".join(_ms(cell[side][key]) for side in SIDES) for key in ("median_s", "p95_s")),
-        f"{cell['without']['missed']} / {cell['with']['missed']}",
-        str(cell["earlier"]),
-        str(cell["later"]),
-        "-" if change is None else f"{1000 * change:+.1f}",
-    )
+def _both(key: str) -> Callable[[Row], str]:
+    return lambda cell: " / ".join("-" if (v := cell[side][key]) is None else f"{1000 * v:.0f}" for side in SIDES)
 
 
-def _links(cell: Row) -> tuple[str, ...]:
-    with_it, without = cell["with"], cell["without"]
-    shares = (
-        with_it["by_imu"], with_it["by_imu_near"], without["by_both"], without["by_both_near"], with_it["by_both"],
-        with_it["by_both_near"],
-    )  # fmt: skip
-    return (f"{with_it['cued']}/{cell['contacts']}", *(_percent(*share) for share in shares))
+def _change(cell: Row) -> str:
+    return "-" if cell["mean_change_s"] is None else f"{1000 * cell['mean_change_s']:+.1f}"
 
 
-def _percent(some: int, of: int) -> str:
-    return f"{100 * some / of:.0f} %" if of else "-"
+def _shared(side: str, key: str) -> Callable[[Row], str]:
+    def write(cell: Row) -> str:
+        some, of = cell[side][key]
+        return f"{100 * some / of:.0f} %" if of else "-"
+
+    return write
 
 
-def _ms(value: Any) -> str:
-    return "-" if value is None else f"{1000 * value:.0f}"
+_DELAYS = (
+    ("n", plain("contacts")),
+    ("median\n[ms]", _both("median_s")),
+    ("95 %\n[ms]", _both("p95_s")),
+    ("missed", lambda cell: f"{cell['without']['missed']} / {cell['with']['missed']}"),
+    ("earlier", plain("earlier")),
+    ("later", plain("later")),
+    ("change\n[ms]", _change),
+)
+_LINKS = (
+    ("cue", lambda cell: f"{cell['with']['cued']}/{cell['contacts']}"),
+    ("IMU", _shared("with", "by_imu")),
+    ("IMU\n+-1", _shared("with", "by_imu_near")),
+    ("torques", _shared("without", "by_both")),
+    ("torques\n+-1", _shared("without", "by_both_near")),
+    ("both", _shared("with", "by_both")),
+    ("both\n+-1", _shared("with", "by_both_near")),
+)
+_FREE = (
+    ("way", plain("way")),
+    ("profile", plain("profile")),
+    ("hours", plain("hours", ".2f")),
+    ("alarms\nwithout", lambda f: str(f["without"]["alarms"])),
+    ("alarms\nwith", lambda f: str(f["with"]["alarms"])),
+    ("cue\n[%]", lambda f: f"{100 * f['with']['cued']:.2f}"),
+    ("mean\ngain", lambda f: f"{f['with']['mean_gain']:.2f}"),
+)

@@ -1,11 +1,13 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from pretouch.errors import ExperimentError, ParameterError
 from pretouch.profiles import profile
 from pretouch.sim.plant_params import PlantParams
-from pretouch_lab.benchmarks.avoidance.contenders import ABLATED, CONTENDERS, TUNINGS, profile_text
-from pretouch_lab.benchmarks.avoidance.run import Request
+from pretouch_lab.baselines.avoidance import ABLATED, BASELINES, TUNINGS, profile_text
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import plant_of, setting
 
@@ -16,10 +18,10 @@ def test_every_family_has_scenarios_under_their_own_names():
 
 
 def test_a_variant_changes_what_it_says_and_keeps_the_rest():
-    small = scenarios()["small"].says["obstacle"]
+    small = scenarios()["small"].params["obstacle"]
     assert (small["radius_m"], small["mass_kg"]) == (0.02, 0.6)
-    assert scenarios()["dark"].says["ranging"] == {"reflectance": 0.05}
-    assert scenarios()["dark"].says["obstacle"] == scenarios()["drdo"].says["obstacle"]
+    assert scenarios()["dark"].params["ranging"] == {"reflectance": 0.05}
+    assert scenarios()["dark"].params["obstacle"] == scenarios()["drdo"].params["obstacle"]
 
 
 def test_development_and_published_seeds_are_apart():
@@ -58,23 +60,23 @@ def test_friction_of_all_joints_grows_by_one_factor():
     assert plant.friction_compensated == 0.0
 
 
-def test_contenders_and_their_other_tunings_are_profiles():
-    for name in (*CONTENDERS, *ABLATED, *TUNINGS):
+def test_baselines_and_their_other_tunings_are_profiles():
+    for name in (*BASELINES, *ABLATED, *TUNINGS):
         assert profile(profile_text(name))
     assert profile(profile_text("paper-off")).approach is None
 
 
-def test_an_unknown_contender_or_scenario_is_refused_with_those_there_are():
-    with pytest.raises(ParameterError, match="Contenders are blind, flacco"):
-        Request(("nobody",))
+def test_an_unknown_baseline_or_scenario_is_refused_with_those_there_are():
+    with pytest.raises(ParameterError, match="Baselines are blind, flacco"):
+        AvoidanceBench(Path(), baselines=("nobody",))
     with pytest.raises(ExperimentError, match="choose from srdo, drdo"):
-        Request(("blind",), names=("nothing",))
+        AvoidanceBench(Path(), names=("nothing",))
     with pytest.raises(ExperimentError, match="name each once"):
-        Request(("blind", "blind"))
+        AvoidanceBench(Path(), baselines=("blind", "blind"))
 
 
 def test_each_trial_has_its_own_file(tmp_path):
-    tasks = Request((), seeds="development").tasks(tmp_path)
+    tasks = AvoidanceBench(tmp_path, seeds="development").every()
     assert len({t.file for t in tasks}) == len(tasks)
     assert all(t.file.parent == tmp_path / "trials" for t in tasks)
-    assert len(Request((), True, "development").tasks(tmp_path)) < len(tasks) / 5
+    assert len(AvoidanceBench(tmp_path, True, "development").every()) < len(tasks) / 5

@@ -1,8 +1,11 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from pretouch_lab.benchmarks.avoidance.figures import figures
-from pretouch_lab.benchmarks.avoidance.page import section
+from pretouch_lab.benchmarks.avoidance.page import found
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.summary import json_rows, spread, summarise
 from pretouch_lab.benchmarks.avoidance.tables import tables
 
@@ -13,7 +16,7 @@ KEYS = {
 """Keys of the rows that all benchmarks write."""
 
 
-def row(contender, seed, scenario="drdo", family="drdo", **measures):
+def row(baseline, seed, scenario="drdo", family="drdo", **measures):
     """A trial without a contact."""
     numbers = dict.fromkeys(
         (
@@ -32,7 +35,7 @@ def row(contender, seed, scenario="drdo", family="drdo", **measures):
         "hold_reasons": {}, "duration_s": 14.0,
         "course": {"time_s": [0.0, 1.0], "distance_m": [0.4, 0.1], "force_n": [0.0, 0.0], "way_m": [0.0, 0.3]},
     }  # fmt: skip
-    names = {"contender": contender, "scenario": scenario, "family": family, "seed": seed}
+    names = {"contender": baseline, "scenario": scenario, "family": family, "seed": seed}
     return {**names, **numbers, **counts, **absent, **usual, **measures}
 
 
@@ -84,7 +87,7 @@ def test_tables_figures_and_page_say_who_loses():
     assert [line[:3] for line in shown.rows] == [("drdo", "paper", "0/2"), ("drdo", "ding", "2/2")]
     pictures = figures(summary, rows)
     assert [p.name for p in pictures] == ["bench-avoidance-outcome", "bench-avoidance-drdo"]
-    text = section(summary, pictures, "development")
+    text = found(AvoidanceBench(Path("run"), seeds="development"), rows).section()
     assert "4 trials with development seeds" in text
     assert "images/bench-avoidance-drdo.png" in text
     assert "| drdo | ding | 2/2 |" in text

@@ -9,12 +9,12 @@ import pytest
 from pretouch.control.posture import brought_to
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
-from pretouch_lab.benchmarks.avoidance.run import Request, rows_of, run
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import setting
 from pretouch_lab.benchmarks.avoidance.trial import play_trial
 from pretouch_lab.benchmarks.avoidance.truth import truth_of
-from pretouch_lab.benchmarks.store import missing
+from pretouch_lab.engine import missing
 from pretouch_lab.trial import Record
 
 QUICK = [next(s for s in scenarios().values() if s.family == f and s.quick) for f in FAMILIES]
@@ -28,7 +28,8 @@ def test_an_arm_that_does_not_move_in_srdo_has_the_distance_of_its_geometry():
     hands = np.array([walker.goal(t, np.zeros(3), None).position for t in times])
     kin = setup.model.kinematics(q)
     still = SimpleNamespace(q=q)
-    found = truth_of(Record([still] * len(times), np.zeros(0), np.zeros((0, 3)), [], hands), made)
+    record = Record([still] * len(times), np.zeros(0), np.zeros((0, 3)), [], hands)
+    found = truth_of(record, setup.model, map(made.shape, hands))
     aside = np.array([[0.0, 0.0, 1.0]] * len(times))
     exact = closest_points(kin, setup.model.body, np.zeros(3), np.arange(len(times)), hands, aside).body_distance - 0.05
     np.testing.assert_allclose(found.distance, exact, atol=1e-3)
@@ -42,29 +43,29 @@ def test_a_trial_of_every_family_can_be_played(scene):
     row = play_trial(scene, "paper", 1000)
     json.dumps(row, allow_nan=False)
     assert row["solver_failures"] == 0
-    assert row["duration_s"] <= scene.says["duration_s"] + 0.02
+    assert row["duration_s"] <= scene.params["duration_s"] + 0.02
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("contender", ["flacco", "ding"])
-def test_the_published_methods_move_out_of_the_way(contender):
-    row = play_trial(scenarios()["drdo"], contender, 1000)
+@pytest.mark.parametrize("baseline", ["flacco", "ding"])
+def test_the_published_methods_move_out_of_the_way(baseline):
+    row = play_trial(scenarios()["drdo"], baseline, 1000)
     assert row["off_path_max_m"] > 0.05
     assert row["solver_failures"] == row["infeasible"] == 0
 
 
 @pytest.mark.slow
 def test_a_run_that_was_stopped_goes_on(tmp_path):
-    request = Request(("blind",), True, "development", ("srdo", "drdo"))
-    run(request, tmp_path, lambda _: None, processes=1)
-    assert not missing(request.tasks(tmp_path))
-    lost = request.tasks(tmp_path)[0].file
-    kept = request.tasks(tmp_path)[1].file.stat().st_mtime_ns
+    bench = AvoidanceBench(tmp_path, True, "development", baselines=("blind",), names=("srdo", "drdo"))
+    bench.run(lambda _: None, processes=1)
+    assert not missing(bench.every())
+    lost = bench.every()[0].file
+    kept = bench.every()[1].file.stat().st_mtime_ns
     before = json.loads(lost.read_text())
     lost.unlink()
-    assert [row["scenario"] for row in rows_of(request, tmp_path)] == ["drdo"]
+    assert [row["scenario"] for row in bench.rows()] == ["drdo"]
     costs = []
-    run(request, tmp_path, costs.append, processes=1)
+    bench.run(costs.append, processes=1)
     assert len(costs) == 1
     assert json.loads(lost.read_text()) == before
-    assert request.tasks(tmp_path)[1].file.stat().st_mtime_ns == kept
+    assert bench.every()[1].file.stat().st_mtime_ns == kept

@@ -1,14 +1,13 @@
-import json
+from dataclasses import replace
 from functools import partial
 
-import numpy as np
 import pytest
 
 from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
 from pretouch.text_table import TextTable, markdown
-from pretouch_lab.benchmarks.documents import begin_mark, end_mark, put
-from pretouch_lab.benchmarks.store import Task, missing, open_bench, read_rows, run_tasks, write_arrays
+from pretouch_lab.documents import begin_mark, end_mark, put
+from pretouch_lab.engine import Task, missing, open_folder, rows_of, run_tasks
 
 
 def squared(number, file):
@@ -23,7 +22,7 @@ def test_after_a_kill_only_what_is_missing_is_done_again(tmp_path):
     tasks, costs = tasks_in(tmp_path), []
     run_tasks(tasks, tmp_path, costs.append, processes=1)
     assert costs == [2, 1, 0]
-    assert [row["square"] for row in read_rows(tasks)] == [0, 1, 4]
+    assert [row["square"] for row in rows_of(tasks)] == [0, 1, 4]
     tasks[1].file.unlink()
     kept = {task.file: task.file.stat().st_mtime_ns for task in (tasks[0], tasks[2])}
     assert missing(tasks) == [tasks[1]]
@@ -32,31 +31,23 @@ def test_after_a_kill_only_what_is_missing_is_done_again(tmp_path):
     assert kept == {file: file.stat().st_mtime_ns for file in kept}
 
 
-def test_arrays_are_written_whole_or_not_at_all(tmp_path):
-    file = tmp_path / "stream.npz"
-    write_arrays({"robot.q": np.eye(2), "stamp": np.arange(3.0)}, file)
-    assert [path.name for path in tmp_path.iterdir()] == ["stream.npz"]
-    with np.load(file) as kept:
-        np.testing.assert_array_equal(kept["robot.q"], np.eye(2))
+def test_a_damaged_row_is_made_again(tmp_path):
+    task = tasks_in(tmp_path)[1]
+    task.file.parent.mkdir()
+    task.file.write_text("{")
+    assert missing([task]) == [task]
+    run_tasks([task], tmp_path, lambda _: None, processes=1)
+    assert rows_of([task]) == [{"number": 1, "square": 1}]
+    assert missing([replace(task, about={"number": 2})])
 
 
 def test_a_folder_of_another_run_is_refused(tmp_path):
-    open_bench(tmp_path, "detection", {"seeds": "published"})
-    open_bench(tmp_path, "detection", {"seeds": "published"})
-    with pytest.raises(ExperimentError, match="holds a run with another seeds: give another --out"):
-        open_bench(tmp_path, "detection", {"seeds": "development"})
-    about = tmp_path / "run.json"
-    about.write_text(json.dumps({**json.loads(about.read_text()), "scenarios": {}}))
-    with pytest.raises(ExperimentError, match="another scenarios"):
-        open_bench(tmp_path, "detection", {"seeds": "published"})
-
-
-def test_a_damaged_row_is_named(tmp_path):
-    task = tasks_in(tmp_path)[0]
-    task.file.parent.mkdir()
-    task.file.write_text("{")
-    with pytest.raises(ExperimentError, match=r"0\.json is damaged .* delete it and run again"):
-        read_rows([task])
+    open_folder(tmp_path, {"seeds": "published"}, {"the scenario files have": "a"})
+    open_folder(tmp_path, {"seeds": "published"}, {"the scenario files have": "a"})
+    with pytest.raises(ExperimentError, match="holds a run with seeds = 'published', not 'development': give another"):
+        open_folder(tmp_path, {"seeds": "development"}, {"the scenario files have": "a"})
+    with pytest.raises(ExperimentError, match="holds a run, but the scenario files have changed since"):
+        open_folder(tmp_path, {"seeds": "published"}, {"the scenario files have": "b"})
 
 
 def test_only_what_is_between_the_markers_of_a_document_is_replaced(tmp_path):

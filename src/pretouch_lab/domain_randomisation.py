@@ -1,4 +1,4 @@
-"""The world a trial is played in: what its seed draws of a named set, under what the experiment itself varies."""
+"""Domain randomisation of a trial: what its seed draws of a named set, under what the experiment itself varies."""
 
 import re
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from pretouch.sim.range_finder import RangeFinderParams
 
 @dataclass(frozen=True)
 class Parts:
-    """What of a trial a world decides."""
+    """What of a trial the domain randomisation decides."""
 
     plant: PlantParams
     ranging: RangeFinderParams
@@ -30,8 +30,8 @@ def _set(name: str) -> WorldSet:
     return world_set(name)
 
 
-def in_world(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
-    """Return the parts of a trial in the world that its seed draws of a set; as they are with no name.
+def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
+    """Return the parts of a trial as its seed draws them of a set; as they are with no name.
 
     What the parts have otherwise than the usual arm, sensors and skin is what the experiment varies, and stays.
     """
@@ -46,7 +46,7 @@ def in_world(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
 
 
 def folder_part(name: str) -> str:
-    """Return what a folder's name has of a world: nothing of none, so that worlds are kept apart."""
+    """Return what a folder's name has of a set: nothing of none, so that runs with different sets are kept apart."""
     if not name:
         return ""
     if name in SETS:
@@ -55,13 +55,15 @@ def folder_part(name: str) -> str:
     return f"-{safe}-{sha256(name.encode()).hexdigest()[:6]}"
 
 
-def told(name: str) -> dict[str, str | None]:
-    """Return what a run's own file says of its world: the name, and the digest of what it names."""
-    return {"world": name or None, "world_sha256": _set(name).digest if name else None}
+def digest_of(name: str) -> dict[str, str]:
+    """Return the digest of what a name stands for, by the phrase that a run's own file has for it; nothing of none."""
+    return {"the world's file has": world_set(name).digest} if name else {}
 
 
 def sentence(name: str) -> str:
-    """Say in which world something was played, or nothing of the usual one."""
+    """Say with which set something was played, or nothing of the usual arm."""
     return (
-        f"World {name}: other arms and sensors than those of the published tables. {_set(name).about}" if name else ""
+        f"Domain randomisation {name}: other arms and sensors than those of the published tables. {_set(name).about}"
+        if name
+        else ""
     )

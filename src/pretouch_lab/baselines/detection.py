@@ -1,4 +1,4 @@
-"""The detectors that are held against each other: each a profile, so that all go through the same `feel`."""
+"""The detectors that the benchmark of detection compares: each is a profile, so all run through the same code."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -15,7 +15,7 @@ Sweep = Literal["f_base_n", "scale"]
 
 
 @dataclass(frozen=True)
-class Contender:
+class Baseline:
     """A detector by name, and what is swept of it."""
 
     name: str
@@ -53,20 +53,20 @@ class Contender:
         return float(np.max(np.maximum(force - limits.upper, limits.lower - force))) + params.f_base_n
 
 
-CONTENDERS = (
-    Contender("blind", "blind", "f_base_n"),
-    Contender("fixed", "fixed", "scale"),
-    Contender("observer", "observer", "scale"),
-    Contender("paper", "paper", "f_base_n"),
-    Contender("paper-raw", "paper:detect.compare=raw", "f_base_n"),
-    Contender("pretouch", "pretouch", "scale"),
+BASELINES = (
+    Baseline("blind", "blind", "f_base_n"),
+    Baseline("fixed", "fixed", "scale"),
+    Baseline("observer", "observer", "scale"),
+    Baseline("paper", "paper", "f_base_n"),
+    Baseline("paper-raw", "paper:detect.compare=raw", "f_base_n"),
+    Baseline("pretouch", "pretouch", "scale"),
 )
 """The detectors; `pretouch` last."""
 
 
-def ablated() -> tuple[Contender, ...]:
+def ablated() -> tuple[Baseline, ...]:
     """Return `pretouch` with each switch of its detection off alone; the paper's thresholds are swept by F_b."""
     return tuple(
-        Contender(a.name, a.profile_text, "f_base_n" if a.switch == "detection.method" else "scale")
+        Baseline(a.name, a.profile_text, "f_base_n" if a.switch == "detect" else "scale")
         for a in ablations(of_detection=True)
     )

@@ -1,10 +1,10 @@
-"""Who takes part: short names for profiles."""
+"""The methods that the benchmark of avoidance compares: short names for profiles."""
 
 from pretouch.errors import ParameterError
 from pretouch.profiles import profile
 from pretouch_lab.benchmarks.ablations import ablations
 
-CONTENDERS = {
+BASELINES = {
     "blind": "blind",
     "flacco": "flacco",
     "flacco-surface": "flacco:baselines.flacco_size_m=0.1",
@@ -14,7 +14,7 @@ CONTENDERS = {
     "paper-off": "paper:restriction.mode=off",
     "pretouch": "pretouch",
 }
-"""Profile of each contender: the published methods as published, and with another tuning."""
+"""Profile of each baseline: the published methods as published, and with another tuning."""
 ABLATED = {ablation.name: ablation.profile_text for ablation in ablations(of_detection=False)}
 """Profile of `pretouch` with each switch off alone."""
 ABLATED_IN = ("circle +y", "line -y", "person +y")
@@ -27,11 +27,11 @@ TUNINGS = {
 """Further tunings of the published methods, by name only."""
 
 
-def profile_text(contender: str) -> str:
-    """Return the profile a contender stands for; other than by its name it may be given as the profile itself."""
-    text = {**CONTENDERS, **ABLATED, **TUNINGS}.get(contender, contender)
+def profile_text(baseline: str) -> str:
+    """Return the profile a baseline stands for; other than by its name it may be given as the profile itself."""
+    text = {**BASELINES, **ABLATED, **TUNINGS}.get(baseline, baseline)
     try:
         profile(text)
     except ParameterError as error:
-        raise ParameterError(f"{error} Contenders are {', '.join([*CONTENDERS, *TUNINGS])}.") from error
+        raise ParameterError(f"{error} Baselines are {', '.join([*BASELINES, *TUNINGS])}.") from error
     return text

@@ -8,46 +8,45 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
-from pretouch_lab.benchmarks.avoidance.run import Request as Avoidance
-from pretouch_lab.benchmarks.avoidance.run import open_run
-from pretouch_lab.benchmarks.detection.campaign import Bench
-from pretouch_lab.campaign import Request, open_folder
-from pretouch_lab.cli.bench_options import BenchOptions
+from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
+from pretouch_lab.benchmarks.detection.campaign import DetectionBench
+from pretouch_lab.campaign import Request
+from pretouch_lab.cli.benchmarks import BenchOptions
+from pretouch_lab.domain_randomisation import Parts, digest_of, folder_part, randomised, sentence
 from pretouch_lab.paper import static
 from pretouch_lab.report import _about
 from pretouch_lab.studies.mounting import EXACT
-from pretouch_lab.worlds import Parts, folder_part, in_world, sentence, told
 
 MODEL = RobotModel(panda())
 PARTS = Parts(PlantParams(), RangeFinderParams(), paper_skin(MODEL), None)
 
 
 def test_without_a_world_nothing_changes():
-    assert in_world("", 1001, MODEL, PARTS) is PARTS
+    assert randomised("", 1001, MODEL, PARTS) is PARTS
     assert folder_part("") == sentence("") == ""
-    assert told("") == {"world": None, "world_sha256": None}
+    assert digest_of("") == {}
 
 
 def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin():
-    parts = in_world("realistic", 1001, MODEL, PARTS)
+    parts = randomised("realistic", 1001, MODEL, PARTS)
     assert parts.plant != PARTS.plant
     assert parts.ranging != PARTS.ranging
     assert parts.skin is PARTS.skin
     assert (parts.believed.T_link_sensor != PARTS.skin.T_link_sensor).any()
-    again = in_world("realistic", 1001, MODEL, PARTS)
+    again = randomised("realistic", 1001, MODEL, PARTS)
     assert again.plant == parts.plant
     assert (again.believed.T_link_sensor == parts.believed.T_link_sensor).all()
 
 
 def test_what_an_experiment_says_of_its_skin_stays():
     believed = paper_skin(MODEL)
-    assert in_world("stress", 1001, MODEL, replace(PARTS, believed=believed)).believed is believed
+    assert randomised("stress", 1001, MODEL, replace(PARTS, believed=believed)).believed is believed
     assert EXACT.position_mm == 0.0
 
 
 def test_the_nominal_world_plays_as_the_usual_one():
     request = Request(("static",), 1, first_seed=1003)
-    context, cell = request.context(), request.tasks()[0][0]
+    context, cell = request.context(), request.trials()[0][0]
     usual, _ = static.trial(cell, 1003, context)
     assert static.trial(cell, 1003, replace(context, world="nominal"))[0] == usual
     assert static.trial(cell, 1003, replace(context, world="realistic"))[0] != usual
@@ -55,27 +54,25 @@ def test_the_nominal_world_plays_as_the_usual_one():
 
 def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
     usual, other = Request(("static",), 1), Request(("static",), 1, world="stress")
-    open_folder(usual, tmp_path / "a")
+    usual.open(tmp_path / "a")
     with pytest.raises(ExperimentError, match="holds a run with world = None, not 'stress'"):
-        open_folder(other, tmp_path / "a")
-    Bench(tmp_path / "b", world="stress").open()
-    with pytest.raises(ExperimentError, match="another world"):
-        Bench(tmp_path / "b").open()
-    open_run(Avoidance(), tmp_path / "c")
-    with pytest.raises(ExperimentError, match="another world"):
-        open_run(Avoidance(world="stress"), tmp_path / "c")
-    assert "World stress" in _about(other)
-    assert "World" not in _about(usual)
+        other.open(tmp_path / "a")
+    for kind in (DetectionBench, AvoidanceBench):
+        kind(tmp_path / kind.name, world="stress").open()
+        with pytest.raises(ExperimentError, match="holds a run with world = 'stress', not ''"):
+            kind(tmp_path / kind.name).open()
+    assert "Domain randomisation stress" in _about(other)
+    assert "Domain" not in _about(usual)
 
 
 def test_a_world_file_that_changed_is_another_world(tmp_path):
     place = tmp_path / "mine.toml"
     place.write_text("[plant.mass_error]\nvalue = 0.1\n")
     request = Request(("static",), 1, world=str(place))
-    open_folder(request, tmp_path / "run")
+    request.open(tmp_path / "run")
     place.write_text("[plant.mass_error]\nvalue = 0.2\n")
     with pytest.raises(ExperimentError, match="the world's file has changed"):
-        open_folder(request, tmp_path / "run")
+        request.open(tmp_path / "run")
 
 
 def test_folders_are_named_by_their_world():

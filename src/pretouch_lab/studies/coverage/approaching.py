@@ -23,7 +23,7 @@ _BATCH, _BATCHES = 16, 50
 
 
 @dataclass
-class Coming:
+class ApproachingObstacle:
     """One that comes: what was foreseen of it, where it was, and how it met the arm."""
 
     link: int
@@ -41,7 +41,7 @@ class Coming:
     """Speed of the arm's surface towards it when they meet [m/s]; None if the trial ended before."""
 
 
-class Comers:
+class ApproachingObstacles:
     """Moves the ghost of a scene: it follows the link that it comes at, so that they meet whatever the arm does."""
 
     def __init__(
@@ -49,7 +49,7 @@ class Comers:
     ) -> None:
         self._model, self._skin, self._surface, self._params = model, skin, surface, params
         self._rng = np.random.default_rng([seed, 52])
-        self.came: list[Coming] = []
+        self.came: list[ApproachingObstacle] = []
         self.end = START_S + EVERY_S * count
         """When the last one has come [s]."""
         self._count = count
@@ -65,18 +65,18 @@ class Comers:
             return PARKED
         if number == len(self.came):
             self.came.append(self._drawn())
-        coming = self.came[number]
+        obstacle = self.came[number]
         left = self._params.way_m - self._params.closing_m_s * (time - START_S - number * EVERY_S)
-        R, p = self._plant.link_rotation[coming.link], self._plant.link_position[coming.link]
+        R, p = self._plant.link_rotation[obstacle.link], self._plant.link_position[obstacle.link]
         if left <= 0.0:
-            if coming.touch_m_s is None:
-                coming.touch_m_s = self._speed(coming, np.array(R), np.array(p))
+            if obstacle.touch_m_s is None:
+                obstacle.touch_m_s = self._speed(obstacle, np.array(R), np.array(p))
             return PARKED
-        center: FloatArray = p + R @ (coming.center + left * coming.way)
-        coming.track[round(time / self._plant.params.period_s)] = (left, center)
+        center: FloatArray = p + R @ (obstacle.center + left * obstacle.way)
+        obstacle.track[round(time / self._plant.params.period_s)] = (left, center)
         return center
 
-    def _drawn(self) -> Coming:
+    def _drawn(self) -> ApproachingObstacle:
         """Draw a free way to the arm as it stands."""
         q = self._plant.mj_data.qpos[: self._model.n].copy()
         surface, r = self._surface, self._params.object_radius_m
@@ -89,13 +89,13 @@ class Comers:
             sees = seen_by(ways, self._skin.link, self._skin.T_link_sensor)[:, 0, i]
             link, normal = int(ways.surface.link[i]), ways.surface.normal[i]
             along = ways.postures[0].rotation[link].T @ ways.way[0, i]
-            return Coming(link, ways.surface.point[i] + r * normal, normal, along, bool(sees.any()))
+            return ApproachingObstacle(link, ways.surface.point[i] + r * normal, normal, along, bool(sees.any()))
         raise ExperimentError("Nothing can come at the arm where it stands: make the ways shorter.")
 
-    def _speed(self, coming: Coming, R: FloatArray, p: FloatArray) -> float:
+    def _speed(self, obstacle: ApproachingObstacle, R: FloatArray, p: FloatArray) -> float:
         """Speed [m/s] of the arm's surface towards the ball where they meet."""
         data, n = self._plant.mj_data, self._model.n
         kin = self._model.kinematics(data.qpos[:n].copy())
-        at = p + R @ (coming.center - self._params.object_radius_m * coming.normal)
-        velocity = self._model.jacobian(kin, coming.link, at)[:3] @ data.qvel[:n]
-        return float(velocity @ (R @ coming.normal))
+        at = p + R @ (obstacle.center - self._params.object_radius_m * obstacle.normal)
+        velocity = self._model.jacobian(kin, obstacle.link, at)[:3] @ data.qvel[:n]
+        return float(velocity @ (R @ obstacle.normal))

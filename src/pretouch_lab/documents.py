@@ -1,12 +1,13 @@
-"""Tables a benchmark writes into a document, between markers; the text around them is written by hand."""
+"""Tables a run writes into a document, between markers; the text around them is written by hand."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from pretouch.errors import ExperimentError
 from pretouch_lab.experiment import Picture
 
-DOCUMENT = "results/benchmarks.md"
-"""In a folder of documents."""
+BENCHMARKS, LOCALIZATION, SENSITIVITY = (f"results/{name}.md" for name in ("benchmarks", "localization", "sensitivity"))
+"""Generated documents, in a folder of documents."""
 
 
 def begin_mark(part: str) -> str:
@@ -31,16 +32,11 @@ def put(path: Path, part: str, text: str) -> None:
         raise ExperimentError(f"The document {path} cannot be written: {error.strerror}: give another.") from error
 
 
-def publish(part: str, text: str, pictures: list[Picture], out: Path, docs: Path | None) -> list[Path]:
-    """Write figures into a run's folder, or with `docs` into its images, and there a part of the document."""
-    folder = docs / "images" if docs else out / "figures"
+def draw(pictures: Iterable[Picture], folder: Path) -> None:
+    """Write figures into a folder, which is made. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     for picture in pictures:
         picture.figure.savefig(folder / f"{picture.name}.png", dpi=120)
-    if docs is None:
-        return [folder]
-    put(docs / DOCUMENT, part, text)
-    return [folder, docs / DOCUMENT]
 
 
 def shown(picture: Picture) -> str:

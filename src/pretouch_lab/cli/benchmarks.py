@@ -1,0 +1,219 @@
+"""`pretouch bench detection`, `avoidance`, `localization` and `both`: their docstrings are the help."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from pretouch.cli.words import words
+from pretouch.errors import ExperimentError, PretouchError
+
+if TYPE_CHECKING:  # the help is to need none of the heavy packages
+    from pretouch_lab.benchmarks.bench import Bench
+
+
+@dataclass(frozen=True)
+class BenchOptions:
+    """Options of the benchmarks that are published."""
+
+    quick: bool = False
+    """A small part of it; it says what it cannot tell."""
+    seeds: Literal["published", "development"] = "published"
+    """Which simulated arms: those of the published tables, or others to develop with."""
+    world: str = ""
+    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
+    draws its own; by default the arms of the published tables. Results of a world are kept in a folder of its own."""
+    out: str = ""
+    """Folder for results and figures; by default runs/bench or runs/bench-NAME, with -quick if it is."""
+    docs: str = ""
+    """Folder of documents (docs) whose results/benchmarks.md and images are to be made anew; by default none."""
+
+    def folder(self, name: str) -> Path:
+        """Where the results go; `name` is that under runs/."""
+        from pretouch_lab.domain_randomisation import folder_part
+
+        return Path(self.out or f"runs/{name}{folder_part(self.world)}{'-quick' if self.quick else ''}")
+
+    @property
+    def documents(self) -> Path | None:
+        """Folder of documents to be made anew, if any."""
+        if self.docs:
+            self.check_published("--docs")
+        return Path(self.docs) if self.docs else None
+
+    def check_published(self, option: str) -> None:
+        """Refuse to write numbers of other arms where the published ones stand."""
+        if self.world:
+            raise ExperimentError(
+                f"The domain randomisation is {self.world!r}, and {option} writes the published tables, which are of"
+                f" the usual arms: leave out {option}; tables and figures are in the run's folder."
+            )
+
+
+@dataclass(frozen=True)
+class Detection(BenchOptions):
+    """Hold contact detectors against each other: delay against false alarms, what they miss, forces on a board.
+
+    About an hour on two processors, with --quick five minutes. A run that was stopped goes on with the same --out.
+    """
+
+    json: str = ""
+    """File for the numbers; by default results.json in the folder."""
+
+    def run(self) -> None:
+        """Run it, with tables, figures and numbers."""
+        from pretouch_lab.benchmarks.detection.campaign import DetectionBench
+
+        run_bench(DetectionBench(self.folder("bench-detection"), self.quick, self.seeds, self.world), self, self.json)
+
+
+@dataclass(frozen=True)
+class Avoidance(BenchOptions):
+    """How near arms come to people and objects, with what forces, and what it costs to keep clear of them.
+
+    About half an hour on two processors, with --quick three minutes. A run that was stopped goes on with the same
+    --out.
+    """
+
+    json: str = ""
+    """File for the numbers, with a row for each baseline and scenario; by default results.json in the folder."""
+    baselines: Annotated[str, tyro.conf.arg(aliases=["--contenders"])] = ""
+    """Baselines, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
+    profile; by default all, and pretouch with each switch off alone."""
+    scenarios: str = ""
+    """Scenarios, separated by commas; by default all."""
+
+    def run(self) -> None:
+        """Run it, with tables, figures and numbers."""
+        from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
+
+        out, some = self.folder("bench-avoidance"), (words(self.baselines), words(self.scenarios))
+        run_bench(AvoidanceBench(out, self.quick, self.seeds, self.world, *some), self, self.json)
+
+
+@dataclass(frozen=True)
+class Localization(BenchOptions):
+    """Hold where contacts are said to be against where they are: links, places, two at once; with skins and without.
+
+    About twenty minutes on two processors, with --quick three. A run that was stopped goes on with the same --out.
+    """
+
+    docs: str = ""
+    """Folder of documents (docs) whose results/localization.md is to be made anew; by default none."""
+    json: str = ""
+    """File for the numbers; by default results.json in the folder."""
+
+    def run(self) -> None:
+        """Run it, with tables and numbers."""
+        from pretouch_lab.benchmarks.localization.campaign import LocalizationBench
+
+        out = self.folder("bench-localization")
+        run_bench(LocalizationBench(out, self.quick, self.seeds, self.world), self, self.json)
+
+
+@dataclass(frozen=True)
+class Both(BenchOptions):
+    """Run the benchmarks detection and avoidance, and say which goals were reached.
+
+    About an hour and a half on two processors, with --quick ten minutes. A run that was stopped goes on with the same
+    --out.
+    """
+
+    readme: str = ""
+    """Document for the one table, between its marks; by default none."""
+
+    def run(self) -> None:
+        """Run both, with tables, figures and numbers."""
+        run_both(self)
+
+
+def run_bench(bench: "Bench", options: BenchOptions, json: str) -> None:
+    """Run what is missing of a benchmark, and show, write and draw what came out."""
+    from pretouch.cli.writing import check_writable
+    from pretouch_lab.cli.progress import worked
+    from pretouch_lab.documents import around
+    from pretouch_lab.domain_randomisation import sentence
+    from pretouch_lab.engine import missing
+
+    docs, json_file = options.documents, Path(json) if json else bench.out / "results.json"
+    if docs:
+        around(docs / bench.document, bench.name)  # an hour later would be late
+    bench.open()
+    if bench.world:
+        print(sentence(bench.world))
+    check_writable("file", json_file)
+    tasks = bench.every()
+    try:
+        worked(bench.name, tasks, bench.run)
+    except BaseException as error:
+        if bench.shown_unfinished:
+            _report(bench, json_file, docs)
+        if not isinstance(error, PretouchError):
+            done = f"{len(tasks) - len(missing(tasks))} of {len(tasks)} pieces of work are there"
+            print(f"Stopped: {done}; the same command with --out {bench.out} goes on.", file=sys.stderr)
+        raise
+    _report(bench, json_file, docs)
+
+
+def _report(bench: "Bench", json_file: Path, docs: Path | None) -> None:
+    from rich.console import Console
+
+    from pretouch.atomic_write import write_json
+    from pretouch.cli.tables import show
+    from pretouch.cli.writing import unwritable_said
+    from pretouch_lab.documents import draw, put
+
+    found = bench.found()
+    if found is None:
+        return
+    with unwritable_said("file", json_file):
+        write_json(found.json, json_file)
+    console, places = Console(highlight=False), [json_file]
+    show(console, found.tables)
+    if found.pictures:
+        places.append(docs / "images" if docs else bench.out / "figures")
+        with unwritable_said("folder", docs or bench.out):
+            draw(found.pictures, places[-1])
+    if docs:
+        put(docs / bench.document, bench.name, found.section())
+        places.append(docs / bench.document)
+    if found.resolution:
+        console.print(found.resolution, soft_wrap=True, markup=False)
+    for place in places:
+        console.print(f"Written: {place}", soft_wrap=True, markup=False)
+
+
+def run_both(command: Both) -> None:
+    """Run what is missing of both, and show and write what came out of them together."""
+    import json
+
+    from rich.console import Console
+
+    from pretouch.cli.tables import show
+    from pretouch.text_table import markdown
+    from pretouch_lab.benchmarks.front import front_table
+    from pretouch_lab.benchmarks.goals import goal_table
+    from pretouch_lab.documents import BENCHMARKS, around, put
+
+    out, docs = command.folder("bench"), command.documents
+    if command.readme:
+        command.check_published("--readme")
+    readme = Path(command.readme) if command.readme else None
+    parts = ("detection", "avoidance", "goals") if docs else ()
+    places = [(docs / BENCHMARKS, part) for part in parts if docs] + ([(readme, "front")] if readme else [])
+    for document, part in places:
+        around(document, part)  # an hour later would be late
+    given = {"quick": command.quick, "seeds": command.seeds, "docs": command.docs, "world": command.world}
+    Detection(out=str(out / "detection"), **given).run()  # type: ignore[arg-type]  # of both the same
+    Avoidance(out=str(out / "avoidance"), **given).run()  # type: ignore[arg-type]
+    detection, avoidance = (
+        json.loads((out / name / "results.json").read_text(encoding="utf-8")) for name in ("detection", "avoidance")
+    )
+    made = {"goals": goal_table(detection, avoidance), "front": front_table(detection, avoidance)}
+    show(Console(highlight=False), made.values())
+    for document, part in places:
+        if part in made:
+            put(document, part, markdown(made[part]))
+            print(f"Written: {document}")

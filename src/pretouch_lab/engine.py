@@ -1,0 +1,266 @@
+"""One engine for every campaign: tasks that leave one file each, and worker processes that make what is missing.
+
+A file is written whole or not at all, and its name holds the key of what made it (`result_key`): a run that was stopped
+goes on, and takes up nothing that another program or other parameters made.
+"""
+
+import json
+import os
+import signal
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing import active_children, get_context, parent_process
+from pathlib import Path
+from threading import Thread
+from typing import Any, TypeVar
+
+from pretouch import __version__
+from pretouch.atomic_write import write_json
+from pretouch.errors import ExperimentError
+from pretouch.signals import kept_from_children, leave_to_parent, noted
+
+Row = dict[str, Any]
+"""What one task found, as its JSON file holds it."""
+Progress = Callable[[float], None]
+"""Is told the cost of each task that was done."""
+Job = TypeVar("Job")
+
+TRIES = 3
+"""Times a job is tried whose process is killed each time, where it may be tried again."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One piece of work, which leaves one file: a row of results (.json), or arrays."""
+
+    file: Path
+    work: Callable[[Path], None]
+    """Makes the file; runs in another process, so a function of a module or a `partial` of one."""
+    cost: float
+    """Processor time it takes, about [s], or what else the remaining time is told by."""
+    turn: int = 0
+    """Tasks of a lower turn come first; among those of the same, the longest."""
+    about: Row = field(default_factory=dict)
+    """What its row holds at least: a file with something else counts as missing."""
+
+    def row(self) -> Row | None:
+        """Read its row; None where there is none, or a damaged one."""
+        try:
+            row = _object(self.file)
+        except (OSError, _Damaged):
+            return None
+        return row if all(row.get(key) == value for key, value in self.about.items()) else None
+
+    @property
+    def done(self) -> bool:
+        """Whether its file is there, and whole."""
+        return self.file.exists() if self.file.suffix != ".json" else self.row() is not None
+
+
+def missing(tasks: Iterable[Task]) -> list[Task]:
+    """Return the tasks that are not done."""
+    return [task for task in tasks if not task.done]
+
+
+def rows_of(tasks: Iterable[Task]) -> list[Row]:
+    """Read the rows of all tasks that are done, in their order."""
+    return [row for task in tasks if (row := task.row()) is not None]
+
+
+def run_tasks(tasks: Iterable[Task], out: Path, progress: Progress, processes: int | None = None) -> None:
+    """Do what is missing, by default on all processors; however it ends, files of finished tasks stay."""
+    left = sorted(missing(tasks), key=lambda task: (task.turn, -task.cost))
+    with failure_said(out):
+        for folder in {task.file.parent for task in left}:
+            folder.mkdir(parents=True, exist_ok=True)
+        if processes != 1:
+            run_jobs(
+                left, lambda task: (task.work, task.file), processes or os.cpu_count() or 1,
+                lambda task, _: progress(task.cost),
+            )  # fmt: skip
+            return
+        for task in left:
+            task.work(task.file)
+            progress(task.cost)
+
+
+@contextmanager
+def failure_said(out: Path) -> Iterator[None]:
+    """Turn a worker that was killed, or results that could not be written, into an ExperimentError."""
+    try:
+        yield
+    except BrokenProcessPool as error:
+        raise ExperimentError(
+            "A worker process was killed, for want of memory perhaps: the same command with the same --out goes on."
+        ) from error
+    except OSError as error:
+        raise ExperimentError(
+            f"Results could not be written to {out} ({error.strerror or error}): remove the cause, and the same command"
+            " with the same --out goes on."
+        ) from error
+
+
+def open_folder(out: Path, about: Mapping[str, Any], digests: Mapping[str, str], parts: Iterable[str] = ()) -> None:
+    """Make a folder for results, or take one up that a run with the same choices began.
+
+    Args:
+        out: the folder; `run.json` in it says what it holds.
+        about: choices by their names, as JSON can hold them.
+        digests: of files and parameters that the choices only name, by a phrase such as "the skin file has".
+        parts: names of folders to make in it.
+
+    Raises:
+        ExperimentError: for a folder that cannot be used, or that another version or other choices filled.
+    """
+    wanted = json.loads(json.dumps({"version": __version__, **about, "sha256": dict(digests)}))
+    place = out / "run.json"
+    try:
+        for folder in (out, *(out / part for part in parts)):
+            folder.mkdir(parents=True, exist_ok=True)
+        if place.exists():
+            _check_same(_object(place), wanted, out)
+        else:
+            write_json(wanted, place)
+    except OSError as error:
+        raise ExperimentError(f"The folder {out} cannot be used: {error.strerror}: give another --out.") from error
+    except _Damaged as error:
+        raise ExperimentError(f"The file {place} is damaged ({error}): give another --out.") from error
+
+
+def _check_same(found: Row, wanted: Row, out: Path) -> None:
+    """Refuse to go on with a run that other choices began."""
+    for key, value in wanted.items():
+        if key != "sha256" and found.get(key) != value:
+            raise ExperimentError(
+                f"The folder {out} holds a run with {key} = {found.get(key)!r}, not {value!r}:"
+                " give another --out, or the parameters of that run."
+            )
+    before = found.get("sha256")
+    for what, digest in wanted["sha256"].items():
+        if not isinstance(before, dict) or before.get(what) != digest:
+            raise ExperimentError(f"The folder {out} holds a run, but {what} changed since: give another --out.")
+
+
+class _Damaged(Exception):
+    """A JSON file holds something else than an object."""
+
+
+def _object(path: Path) -> Row:
+    """Read a JSON file that holds an object."""
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:  # not UTF-8, not JSON, brackets too deep
+        raise _Damaged(error) from error
+    if not isinstance(value, dict):
+        raise _Damaged("it holds no object")
+    return value
+
+
+Call = tuple[Callable[[Any], Any], Any]
+"""A function of a module, and what it is given in a worker process."""
+
+
+def run_jobs(
+    jobs: Sequence[Job], call: Callable[[Job], Call], processes: int, done: Callable[[Job, Any], None],
+    lost: Callable[[Job, str], None] | None = None,
+) -> None:  # fmt: skip
+    """Run jobs in worker processes, in their order; `done` is handed each with its answer, as it comes.
+
+    A pool of processes does not tell which of its jobs killed one. With `lost`, those that were running are tried
+    again, each alone, and one whose process is killed each time is handed to it with the reason. Without, a killed
+    process is a BrokenProcessPool.
+    """
+    waiting, suspects = deque(jobs), deque[Job]()
+    killed: Counter[int] = Counter()
+    while waiting or suspects:
+        source, count = (suspects, 1) if suspects else (waiting, processes)
+        try:
+            with workers(min(count, len(source))) as pool:
+                _drain(pool, source, count, call, done)
+        except _Killed as end:
+            if lost is None:
+                raise BrokenProcessPool from end
+            for job in end.jobs:
+                killed[id(job)] += 1
+                if killed[id(job)] >= TRIES:
+                    lost(job, f"The process that played it was killed {TRIES} times, for want of memory perhaps.")
+                else:
+                    suspects.append(job)
+
+
+class _Killed(Exception):
+    """A process was killed while these jobs were running."""
+
+    def __init__(self, jobs: list[Any]) -> None:
+        super().__init__()
+        self.jobs = jobs
+
+
+def _drain(
+    pool: ProcessPoolExecutor, source: deque[Job], count: int, call: Callable[[Job], Call],
+    done: Callable[[Job, Any], None],
+) -> None:  # fmt: skip
+    """Run all jobs of a queue, no more at once than there are processes."""
+    running: dict[Future[Any], Job] = {}
+    while source or running:
+        with interrupt_held_back():
+            while source and len(running) < count:
+                job = source.popleft()
+                try:
+                    function, given = call(job)
+                    running[pool.submit(function, given)] = job
+                except BrokenProcessPool as error:
+                    raise _Killed([job, *running.values()]) from error
+        broken = []
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            job = running.pop(future)
+            try:
+                answer = future.result()
+            except BrokenProcessPool:
+                broken.append(job)
+            else:
+                done(job, answer)
+        if broken:
+            raise _Killed([*broken, *running.values()])
+
+
+@contextmanager
+def workers(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Have so many worker processes; an exception ends them at once, and what they were to do."""
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_start)
+    try:
+        yield pool
+    except BaseException:
+        for process in active_children():
+            process.terminate()
+        pool.shutdown(wait=True, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+@contextmanager
+def interrupt_held_back() -> Iterator[None]:
+    """Hold Ctrl-C back while processes start; they inherit that, so that it finds none of them half imported.
+
+    Here it may come by another thread of a library, which this one's mask does not keep from calling the handler.
+    """
+    with noted(signal.SIGINT), kept_from_children({signal.SIGINT}):
+        yield
+
+
+def _start() -> None:
+    """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
+    leave_to_parent({signal.SIGINT})
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,73 @@
+"""Arms by their names: of the package, of other distributions, and of folders."""
+
+from pathlib import Path
+
+import pytest
+
+from pretouch.errors import RobotModelError, SkinError
+from pretouch.robot import named
+from pretouch.robot.description import RobotDescription, fr3, panda
+from pretouch.robot.description_file import description_text
+from pretouch.robot.model import RobotModel
+from pretouch.robot.named import GROUP, robot_named, robot_names
+from pretouch.sensing.skin import OWN_SKIN, PAPER_SKIN, skin_for
+
+
+@pytest.fixture
+def installed(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
+    """What another distribution names, without installing one."""
+    there: dict[str, object] = {}
+    monkeypatch.setattr(named.plugins, "names", lambda group: tuple(there) if group == GROUP else ())
+    monkeypatch.setattr(named.plugins, "load", lambda group, name: there[name])
+    return there
+
+
+def test_the_packages_arms_have_names():
+    assert robot_names()[:2] == ("panda", "fr3")
+    assert robot_named("panda").mjcf == panda().mjcf
+    assert robot_named("fr3").ee_body == "fr3_hand_tcp"
+
+
+def test_an_arm_of_another_distribution_has_a_name(installed: dict[str, object]):
+    installed["ours"] = fr3
+    assert robot_names() == ("panda", "fr3", "ours")
+    assert robot_named("ours").mjcf == fr3().mjcf
+
+
+def test_a_name_of_the_package_stays_what_it_is(installed: dict[str, object]):
+    installed["panda"] = fr3
+    assert robot_names() == ("panda", "fr3")
+    assert robot_named("panda").name == "panda"
+
+
+def test_what_is_no_description_is_refused(installed: dict[str, object]):
+    installed["ours"] = lambda: 7
+    with pytest.raises(
+        RobotModelError,
+        match=r"arm 'ours' of the entry points pretouch\.robots is 7: make its function return a RobotDescription",
+    ):
+        robot_named("ours")
+
+
+def test_an_unknown_name_is_refused_with_those_there_are():
+    with pytest.raises(RobotModelError, match=r"no arm 'pandora': take one of panda, fr3, or a folder"):
+        robot_named("pandora")
+
+
+def _folder(folder: Path) -> RobotDescription:
+    (folder / "robot.toml").write_text(description_text(panda()))
+    (folder / panda().mjcf.name).write_bytes(panda().mjcf.read_bytes())
+    return robot_named(str(folder))
+
+
+def test_a_folder_is_an_arm_and_the_skin_beside_it_is_its_skin(tmp_path: Path):
+    model = RobotModel(_folder(tmp_path))
+    assert model.description.mjcf.parent == tmp_path
+    assert len(skin_for(model)) == 7  # it is called panda
+    text = PAPER_SKIN.read_text()
+    second = text.index("[[unit]]", text.index("[[unit]]") + 1)
+    (tmp_path / OWN_SKIN).write_text(text[:second])
+    assert len(skin_for(model)) == 1
+    assert len(skin_for(model, PAPER_SKIN)) == 7
+    with pytest.raises(SkinError, match=r"/nowhere\.toml cannot be read"):
+        skin_for(model, "/nowhere.toml")
