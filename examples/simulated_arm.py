@@ -12,7 +12,6 @@ from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
-from pretouch.params import RestrictionParams
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -43,7 +42,7 @@ def main() -> None:
     model = RobotModel(panda())
     path = Circle()
     # with its restrictions the arm would never touch the board; take them away to see it anticipate and react
-    settings = replace(profile("paper"), restriction=RestrictionParams(mode="off"))
+    settings = replace(profile("paper"), approach=None)
     board = Box("board", center=(0.62, -0.27, 0.5), half_size=(0.15, 0.02, 0.12), stiffness=25_000.0)
     room = SceneSpec(boxes=(board,))
     arm = Plant(model, room, PlantParams(), brought_to(model, path.point(0.0)), seed=1)

@@ -36,7 +36,7 @@ def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
     for part in ("sixer: 6 joints, end-effector tool0", "whole arm", "sticks out", "manipulability", "Written: "):
         assert part in printed
     assert "of its capsules most, by" in printed
-    assert "raise restriction.d_repulse_m by as much, or import with --cover" in printed
+    assert "raise approach.d_repulse_m by as much, or import with --cover" in printed
     assert json.loads(numbers.read_text())["whole_arm"]["points"] > 500
     assert main(["robot", "check", str(out)]) == 0
     assert "No problem found" in capsys.readouterr().out

@@ -8,14 +8,14 @@ import pytest
 from pretouch.control.path import Circle, Path, line
 from pretouch.controller import Controller
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES, Profile
+from pretouch.profiles import PROFILES, Profile, with_restriction
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, RangeStatus, RobotState
 
 DT = 0.01
 SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
-HARD = replace(SHORT, restriction=replace(SHORT.restriction, mode="hard"))
+HARD = with_restriction(SHORT, "hard")
 FAULTS = [
     "q", "qd", "q_commanded", "qd_commanded", "wrench", "no wrench", "robot stamp", "step stamp", "stale", "backwards",
     "jump", "distance", "range stamp", "dead",

@@ -100,7 +100,8 @@ def test_names_in_the_notation_exist():
     for owner, name in re.findall(r"`(\w+)\.(\w+)(?:\.min\(\))?`", text):
         if owner[0].isupper() and owner != "RobotModel":
             modules = (
-                "pretouch.types", "pretouch.params", "pretouch.control.reduction", "pretouch.contact.window",
+                "pretouch.types", "pretouch.params", "pretouch.control.reduction",
+                "pretouch.control.approach_restriction", "pretouch.contact.window",
                 "pretouch.contact.residual_model", "pretouch.contact.moving_thresholds",
                 "pretouch.contact.sequential_test", "pretouch.contact.decaying_velocity",
             )  # fmt: skip

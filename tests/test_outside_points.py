@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.near import NearState, near_init, widened
+from pretouch.control.braking import slots_init, widened
 from pretouch.faults import MOST_POINTS, sound_points
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
@@ -113,15 +113,14 @@ def test_points_that_cannot_be_used_are_named(panda_model, paper_skin, points, s
     assert turn(arm, seen(arm.time)).mode is Mode.TRACK
 
 
-def test_room_for_more_units_leaves_the_rows_there_are(panda_model):
-    state = near_init(panda_model, 2)
+def test_room_for_more_units_leaves_the_rows_there_are():
     limit, point = np.arange(4.0), np.arange(12.0).reshape(4, 3)
-    slots = state.slots._replace(link=np.arange(4), limit=limit, point=point)
-    wider = widened(NearState(slots, state.null_velocity, state.blocked), 5)
-    assert wider.slots.link.tolist() == [0, 1, -1, -1, -1, 2, 3, -1, -1, -1]
-    assert (wider.slots.limit[[0, 1, 5, 6]] == limit).all()
-    assert (wider.slots.point[[0, 1, 5, 6]] == point).all()
-    assert widened(wider, 3) is wider
+    wider = widened(slots_init(2)._replace(link=np.arange(4), limit=limit, point=point), 5)
+    assert wider.link.tolist() == [0, 1, -1, -1, -1, 2, 3, -1, -1, -1]
+    assert (wider.limit[[0, 1, 5, 6]] == limit).all()
+    assert (wider.point[[0, 1, 5, 6]] == point).all()
+    same = widened(wider, 3)
+    assert all((a == b).all() and a is not b for a, b in zip(same, wider, strict=True))
 
 
 def frames(now: float, rng: np.random.Generator) -> SeenPoints:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from contextlib import suppress
 from dataclasses import fields, replace
 
 import pytest
@@ -9,6 +10,8 @@ import pytest
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.braking_curve import BrakingCurve
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
     ClampParams,
@@ -16,16 +19,24 @@ from pretouch.params import (
     GiveUpParams,
     PerceptionParams,
     PinchParams,
-    ReductionParams,
     RestrictionParams,
+    SpeedReduction,
     TaskParams,
     ThresholdParams,
     WindowParams,
 )
-from pretouch.profiles import PROFILES, Profile, profile
+from pretouch.profiles import (
+    PROFILES,
+    Profile,
+    profile,
+    restriction_mode,
+    restriction_modes,
+    value_of,
+    with_restriction,
+)
 
 SETS = [
-    PerceptionParams(), TaskParams(), ReductionParams(), RestrictionParams(), ThresholdParams(), FailureParams(),
+    PerceptionParams(), TaskParams(), SpeedReduction(), RestrictionParams(), ThresholdParams(), FailureParams(),
     DecayingVelocity(), Admittance(), ClampParams(), PinchParams(), GiveUpParams(),
 ]  # fmt: skip
 NUMBERS = [
@@ -45,16 +56,16 @@ def name_of(value: object) -> str:
 def test_the_paper_profile_is_table_i():
     p = profile("paper")
     # d_max appears in eqs. 3, 4 and in eq. 11
-    assert (p.reduction.d_max_m, p.detect.d_max_m) == (0.8, 0.8)
+    assert (p.slow.d_max_m, p.detect.d_max_m) == (0.8, 0.8)
     assert p.detect.d_min_m == 0.05
     # 200 cycles at 100 Hz
-    assert (p.reduction.l_max_cycles, p.task.control_period_s) == (200, 0.01)
-    assert p.restriction.v_max_m_s == 0.04
-    assert p.restriction.d_repulse_m == 0.1
-    assert p.restriction.d_crit_m == 0.1
-    assert p.restriction.d_notice_m == 0.6
+    assert (p.task.restore_cycles, p.task.control_period_s) == (200, 0.01)
+    assert p.approach.v_max_m_s == 0.04
+    assert p.approach.d_repulse_m == 0.1
+    assert p.approach.d_crit_m == 0.1
+    assert p.approach.d_notice_m == 0.6
     assert p.window.alpha == 0.1
-    assert p.restriction.beta == -10
+    assert p.approach.beta == -10
     assert p.window.lambda_ == 0.75
     assert p.detect.f_std_n == 3
     assert p.detect.f_d_n == 4
@@ -67,8 +78,8 @@ def test_the_paper_profile_is_table_i():
 def test_blind_is_the_paper_without_proximity():
     paper, blind = profile("paper"), profile("blind")
     assert not blind.perception.enabled
-    assert blind.restriction.mode == "off"
-    same = replace(blind, name="paper", perception=paper.perception, restriction=paper.restriction)
+    assert blind.approach is None
+    same = replace(blind, name="paper", perception=paper.perception, approach=paper.approach)
     assert same == paper
 
 
@@ -145,8 +156,8 @@ def test_ablations_take_one_use_of_proximity_away():
     slowing, moving = profile("slowing-only"), profile("thresholds-only")
     assert slowing.detect.f_d_n == 0.0
     assert replace(slowing, name="paper", detect=paper.detect) == paper
-    assert moving.reduction.enabled is False
-    assert replace(moving, name="paper", reduction=paper.reduction) == paper
+    assert moving.slow is None
+    assert replace(moving, name="paper", slow=paper.slow) == paper
 
 
 def test_a_profile_is_varied_by_its_name():
@@ -155,9 +166,72 @@ def test_a_profile_is_varied_by_its_name():
     assert varied.name == name
     assert varied.window == WindowParams(samples=500)
     assert varied.detect == MovingThresholds(compare="raw")
-    assert varied.reduction == ReductionParams(enabled=False)
-    assert varied.restriction == RestrictionParams(beta=-20.0)
+    assert varied.slow is None
+    assert varied.approach == ApproachRestriction(beta=-20.0)
     assert varied.task == profile("paper").task
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("paper:restriction.mode=off:reduction.enabled=no", "paper:approach=none:slow=none"),
+        ("paper:restriction.mode=hard", "paper:approach.rows=hard"),
+        ("pretouch:restriction.mode=floor:restriction.floor_m_s=0.03",
+         "pretouch:approach=paper:approach.rows=floor:approach.floor_m_s=0.03"),
+        ("paper:restriction.mode=braking:anticipation.margin_m=0.02:anticipation.tangential=yes",
+         "paper:approach=braking:task.blocked_after_s=2:approach.margin_m=0.02:approach.tangential=on"),
+        ("pretouch:restriction.d_notice_m=0.5:anticipation.null_space=no",
+         "pretouch:approach.d_notice_m=0.5:null_space=none"),
+        ("pretouch:anticipation.effective_mass=no:anticipation.closing_speed=no",
+         "pretouch:approach.effective_mass=none:approach.closing_deadband_m_s=none"),
+        ("pretouch:anticipation.body_region=chest:anticipation.null_speed_m_s=0.2",
+         "pretouch:approach.effective_mass.body_region=chest:null_space.speed_m_s=0.2"),
+        ("pretouch:anticipation.blocked_after_s=3:reduction.enabled=yes:reduction.d_max_m=0.5",
+         "pretouch:task.blocked_after_s=3:slow=on:slow.d_max_m=0.5"),
+        ("ding:baselines.ding_notice_m=0.4", "ding:approach.notice_m=0.4"),
+        ("paper:restriction.mode=flacco:baselines.flacco_size_m=0.1", "paper:approach=flacco:approach.size_m=0.1"),
+    ],
+)  # fmt: skip
+def test_what_earlier_versions_called_it_is_the_same(old: str, new: str):
+    assert replace(profile(old), name="") == replace(profile(new), name="")
+    assert profile(new) != profile(new.partition(":")[0])
+
+
+_ONCE = {
+    "reduction": "enabled d_max_m l_max_cycles",
+    "restriction": "mode v_max_m_s beta d_repulse_m d_crit_m d_notice_m floor_m_s slack_weight",
+    "anticipation": "deceleration_m_s2 latency_s margin_m touch_speed_max_m_s retreat_max_m_s effective_mass"
+    " body_region region_force_n force_fraction rotor_inertia_kg_m2 closing_speed closing_deadband_m_s tangential"
+    " tangential_distance_m tangential_speed_m_s tighten_m_s2 loosen_m_s2 null_space null_distance_m null_speed_m_s"
+    " null_joint_rad_s null_rate_rad_s2 blocked_after_s",
+    "baselines": "flacco_v_max_m_s flacco_alpha flacco_rho_m flacco_size_m ding_repulse_m ding_zero_low_m"
+    " ding_zero_high_m ding_notice_m ding_approach_m_s ding_retreat_m_s ding_weighted_m",
+}
+
+
+@pytest.mark.parametrize("old", [f"{group}.{name}" for group, names in _ONCE.items() for name in names.split()])
+def test_every_parameter_of_the_groups_that_parts_replaced_is_found_by_its_old_name(old: str):
+    found = []
+    for name in ("paper", "pretouch", "flacco", "ding"):
+        with suppress(ParameterError):
+            found.append(value_of(profile(name), old))
+    assert any(isinstance(value, bool | float | int | str) for value in found)
+
+
+def test_each_way_to_restrict_the_arm_can_be_chosen_by_its_name():
+    for mode in restriction_modes():
+        assert restriction_mode(with_restriction(profile("pretouch"), mode)) == mode
+    assert {"off", "hard", "slack", "floor", "braking", "flacco", "ding"} <= set(restriction_modes())
+    assert with_restriction(profile("pretouch"), "braking") == profile("pretouch")
+    with pytest.raises(ParameterError, match="'firm' is unknown: choose from off, hard, slack"):
+        with_restriction(profile("paper"), "firm")
+
+
+@pytest.mark.parametrize(("value", "problem"), [(-1.0, "at least 0"), (math.nan, "finite"), ("fast", "a number")])
+def test_a_value_that_may_be_none_is_checked_if_it_is_not(value: object, problem: str):
+    assert BrakingCurve(closing_deadband_m_s=None).closing_deadband_m_s is None
+    with pytest.raises(ParameterError, match=rf"BrakingCurve.closing_deadband_m_s is {value}: it must be {problem}"):
+        BrakingCurve(closing_deadband_m_s=value)  # type: ignore[arg-type]
 
 
 def test_the_order_of_changes_does_not_matter():
@@ -170,7 +244,7 @@ def test_the_order_of_changes_does_not_matter():
     ("name", "words"),
     [
         ("papre:task.speed_m_s=0.1", "The profile 'papre' is unknown"),
-        ("paper:speed=0.1", "The group 'speed' of 'speed=0.1' is unknown: choose from perception, task, reduction,"),
+        ("paper:speed=0.1", "The group 'speed' of 'speed=0.1' is unknown: choose from perception, task, slow,"),
         ("paper:task.sped=0.1", "The parameter 'task.sped' is unknown: choose from speed_m_s,"),
         ("pretouch:anticipation.detour=yes", "The parameter 'anticipation.detour' is gone: the arm no longer goes"),
         ("paper:task.speed_m_s", "has no value: write PATH=VALUE"),
@@ -179,8 +253,8 @@ def test_the_order_of_changes_does_not_matter():
         ("paper:task.speed_m_s=fast", "task.speed_m_s is 'fast': write a number"),
         ("paper:task.speed_m_s=-1", "TaskParams.speed_m_s is -1.0: it must be greater than 0"),
         ("paper:threshold.window_samples=10.5", "window.samples is '10.5': write a whole number"),
-        ("paper:reduction.enabled=0", "reduction.enabled is '0': write yes or no"),
-        ("paper:restriction.mode=firm", "RestrictionParams.mode is 'firm': choose one of off, hard, slack, floor"),
+        ("paper:reduction.enabled=0", "reduction.enabled is '0': choose from yes, no"),
+        ("paper:restriction.mode=firm", "restriction.mode is 'firm': choose from off, hard, slack, floor, braking"),
         ("paper:detect.d_max_m=nan", "MovingThresholds.d_max_m is nan: it must be finite"),
         ("paper:detect=magic", "There is no Detector called 'magic': choose from thresholds, sequential, fixed"),
         ("paper:detect.cues=touch", "The parameter 'detect.cues' is unknown: choose from f_base_n"),

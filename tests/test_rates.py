@@ -17,7 +17,7 @@ def test_what_is_counted_in_cycles_lasts_as_long(rate: float):
     fast = at_rate(PAPER, rate)
     assert fast.task.control_period_s == pytest.approx(1 / rate)
     for counted in (
-        lambda p: p.reduction.l_max_cycles, lambda p: p.window.samples, lambda p: p.react.decay_cycles,
+        lambda p: p.task.restore_cycles, lambda p: p.window.samples, lambda p: p.react.decay_cycles,
     ):  # fmt: skip
         assert counted(fast) * fast.task.control_period_s == pytest.approx(counted(PAPER) * 0.01)
 
@@ -26,8 +26,7 @@ def test_all_else_stays():
     fast = at_rate(PAPER, 1000.0)
     back = replace(
         fast,
-        task=replace(fast.task, control_period_s=0.01),
-        reduction=replace(fast.reduction, l_max_cycles=200),
+        task=replace(fast.task, control_period_s=0.01, restore_cycles=200),
         window=replace(fast.window, samples=100, alpha=0.1),
         react=replace(fast.react, decay_cycles=200),
     )
@@ -60,12 +59,12 @@ def test_weights_at_the_ends_of_their_range_stay(alpha: float):
 def test_counts_stay_whole_and_large_enough():
     few = replace(
         PAPER,
-        reduction=replace(PAPER.reduction, l_max_cycles=1),
+        task=replace(PAPER.task, restore_cycles=1),
         window=replace(PAPER.window, samples=2),
         react=replace(PAPER.react, decay_cycles=1),
     )
     slow = at_rate(few, 25.0)
-    assert (slow.reduction.l_max_cycles, slow.window.samples, slow.react.decay_cycles) == (1, 2, 1)
+    assert (slow.task.restore_cycles, slow.window.samples, slow.react.decay_cycles) == (1, 2, 1)
 
 
 @pytest.mark.parametrize("rate", [20.0, 0.0, -1000.0, float("nan"), float("inf")])

@@ -68,7 +68,7 @@ class Rows:
             mid_joint_gain=TERMS.mid_joint_gain, mid_joint_time_s=TERMS.mid_joint_time,
         )  # fmt: skip
         self.restriction = RestrictionParams(
-            mode="hard", v_max_m_s=TERMS.v_max, beta=TERMS.beta, d_repulse_m=TERMS.d_repulse,
+            rows="hard", v_max_m_s=TERMS.v_max, beta=TERMS.beta, d_repulse_m=TERMS.d_repulse,
             d_crit_m=TERMS.d_crit, d_notice_m=TERMS.d_notice,
         )  # fmt: skip
         self.unit, self.direction = np.arange(count), np.tile([0.0, 0.0, 1.0], (count, 1))
@@ -106,15 +106,15 @@ class Step:
             return
         drawn = 3 * count + 30
         units, distance = _units(self.model, drawn), np.random.default_rng(1).uniform(0.15, 0.5, drawn)
-        self._equip(Skin(units, self.model), distance, "off")
+        self._equip(Skin(units, self.model), distance, "approach=none")
         # only units that never see the arm itself: so each shows a point in every snapshot
         steps = (self.controller.step(self.state, self._inputs(self.time, s))[0] for s in range(len(problem.q)))
         shown = sorted(set.intersection(*(set(step.obstacles.unit.tolist()) for step in steps)))[:count]
-        self._equip(Skin([units[k] for k in shown], self.model), distance[shown], "slack")
+        self._equip(Skin([units[k] for k in shown], self.model), distance[shown], "approach.rows=slack")
 
-    def _equip(self, skin: Skin, distance: Array, restriction: str) -> None:
+    def _equip(self, skin: Skin, distance: Array, rows: str) -> None:
         """Put a skin on the arm with what its units read [m], NaN for no target, and run until the arm tracks."""
-        paper = profile(f"paper:task.orientation=free:restriction.mode={restriction}")
+        paper = profile(f"paper:task.orientation=free:{rows}")
         x = self.model.kinematics(self.problem.q[0]).position[self.model.ee]
         self.controller = Controller(self.model, skin, no_fixtures(), line(tuple(x), (x[0], x[1] + 0.4, x[2])), paper)
         self.distance = distance

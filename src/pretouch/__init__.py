@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from pretouch.contact.sequential_test import SequentialTest as SequentialTest
     from pretouch.contact.window import add_force as add_force
     from pretouch.contact.window import window_init as window_init
+    from pretouch.control.approach_restriction import ApproachRestriction as ApproachRestriction
     from pretouch.control.joint_box import joint_box as joint_box
     from pretouch.control.joint_box import joint_limits as joint_limits
     from pretouch.control.path import Circle as Circle
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from pretouch.loop import Cycle as Cycle
     from pretouch.loop import MonotonicClock as MonotonicClock
     from pretouch.loop import Recorder as Recorder
-    from pretouch.params import RestrictionParams as RestrictionParams
     from pretouch.params import WindowParams as WindowParams
     from pretouch.perception.closest import closest_points as closest_points
     from pretouch.perception.closest import no_obstacles as no_obstacles
@@ -78,11 +78,12 @@ _PLACES = {
     "contact.window": ("add_force", "window_init"),
     "control.joint_box": ("joint_box", "joint_limits"),
     "control.path": ("Circle", "WayPoints", "line"),
+    "control.approach_restriction": ("ApproachRestriction",),
     "control.restriction": ("approach_rows",),
     "controller": ("Controller", "ControllerState"),
     "errors": ("PretouchError", "RecordingError"),
     "loop": ("Cycle", "MonotonicClock", "Recorder"),
-    "params": ("RestrictionParams", "WindowParams"),
+    "params": ("WindowParams",),
     "perception.closest": ("closest_points", "no_obstacles"),
     "perception.scene_filter": ("Fixtures", "no_fixtures"),
     "profiles": ("PROFILES", "Profile", "at_rate", "profile"),

@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass, fields
 from numbers import Integral, Real
-from typing import Annotated, Literal, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import Annotated, Literal, Union, get_args, get_origin, get_type_hints
 
 from pretouch.errors import ParameterError
 
@@ -50,6 +51,9 @@ class Checked:
 
 
 def _check_field(owner: str, name: str, hint: object, value: object) -> None:
+    if get_origin(hint) in (Union, UnionType) and value is not None:
+        for inner in get_args(hint):
+            _check_field(owner, name, inner, value)
     if get_origin(hint) is Literal and value not in get_args(hint):
         raise ParameterError(f"{owner}.{name} is {value!r}: choose one of {', '.join(map(str, get_args(hint)))}.")
     whole = getattr(hint, "__origin__", None) is int

@@ -13,10 +13,11 @@ from pretouch.contact.reaction import ReactionInputs
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.control import path as paths
+from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.near import NearState, near_init, near_motion, widened
+from pretouch.control.motion import MotionState, joint_motion, restriction_on
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
-from pretouch.control.setup import MotionRequest, motion_setup
+from pretouch.control.setup import motion_setup
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import events_of
 from pretouch.faults import (
@@ -54,7 +55,9 @@ class ControllerState:
     reduction: ReductionState
     reaction: object
     path: paths.PathState
-    near: NearState
+    approach: object
+    """What the profile's restriction remembers."""
+    motion: MotionState
     mode: ModeState
     command: FloatArray
     """(n,) last joint velocity command [rad/s]."""
@@ -84,10 +87,14 @@ class Controller:
                 raise SkinError(f"The skin was made for another arm than {model.description.name}: make one for it.")
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
         self._sight = perception_setup(model, skin, fixtures, profile.perception)
-        self._setup = motion_setup(model, self.limits, profile)
+        self._moved = MotionBody(model, len(skin), self.limits, profile.task)
+        self._approach = restriction_on(profile.approach, self._moved)
+        self._setup = motion_setup(self._moved, profile.null_space, profile.failure.solver_iterations)
         self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
         self._detector = profile.detect.on(self.body)
+        self._units = len(skin)
         self._touching = "touch" in profile.detect.reads and len(skin.touching) > 0
+        self._shaken = "imu" in self._detector.reads
         self._mark = mark
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
@@ -106,7 +113,8 @@ class Controller:
             reduction=ReductionState(),
             reaction=self.profile.react.init(self.body, sound.q_commanded),
             path=paths.PathState(),
-            near=near_init(self.model, len(self.skin)),
+            approach=self._approach_init(),
+            motion=MotionState(np.zeros(self.model.n)),
             mode=mode_init(),
             command=sound.qd_commanded,
             rotation_goal=self.model.kinematics(sound.q).rotation[self.model.ee],
@@ -134,26 +142,25 @@ class Controller:
             else self._detector.init(self.body),
             reaction=mine.react.adopted(state.reaction, self.body, theirs.react, robot.q_commanded),
             path=way,
-            near=near_init(self.model, len(self.skin)) if mine.anticipation != theirs.anticipation else state.near,
+            approach=state.approach if mine.approach == theirs.approach else self._approach_init(),
+            motion=state.motion if mine.null_space == theirs.null_space else MotionState(np.zeros(self.model.n)),
             outside=state.outside if same_points else None,
         )
 
+    def _approach_init(self) -> object:
+        """Return what the restriction remembers at first; a part says so itself, whatever works in its place."""
+        return None if self.profile.approach is None else self.profile.approach.init(self._moved)
+
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         """Run one control cycle; to be called once a period, with the state that the step before returned."""
-        p, model, mark = self.profile, self.model, self._mark
-        if len(state.command) != model.n or len(state.tracks.point) != len(self.skin):
+        p, model, units, mark = self.profile, self.model, self._units, self._mark
+        if len(state.command) != model.n or len(state.tracks.point) != units:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         robot, events, watch = examine(
-            state.watch,
-            inputs,
-            state.command,
-            self.limits.period,
-            self.limits.qd_max,
-            p.failure,
-            p.detect.by_torques,
+            state.watch, inputs, state.command, self.limits.period, self.limits.qd_max, p.failure, p.detect.by_torques
         )
-        readings, unfit = sound_readings(inputs.readings, len(self.skin))
-        touches, wrong = sound_touch(inputs.touch, len(self.skin)) if self._touching else (None, "")
+        readings, unfit = sound_readings(inputs.readings, units)
+        touches, wrong = sound_touch(inputs.touch, units) if self._touching else (None, "")
         points, lost = sound_points(inputs.points)
         unfit, now = unfit or wrong, watch.stamp
         mark("state")
@@ -162,7 +169,7 @@ class Controller:
         mark("kinematics")
 
         # what is near: eq. 1 and the closest points of the body
-        known = track_init(len(self.skin)) if Event.TIME_BACKWARDS in events else state.tracks
+        known = track_init(units) if Event.TIME_BACKWARDS in events else state.tracks
         seen, tracks = perceive(known, self._sight, kin, readings, now, robot)
         seen, outside = see_outside(
             state.outside, Event.TIME_BACKWARDS in events, seen, points, self._sight, kin, robot, now
@@ -172,10 +179,10 @@ class Controller:
         mark("perception")
 
         # what is felt: eqs. 8-11
-        watched = p.perception.enabled and len(self.skin) > 0 and heard >= 1.0 and not silent
+        watched = p.perception.enabled and units > 0 and heard >= 1.0 and not silent
         reacting = state.mode.mode is Mode.REACT
         window = add_force(state.window, None if robot.wrench is None else robot.wrench[:3], p.window)
-        imu = sound_imu(inputs.imu, len(self.skin)) if "imu" in self._detector.reads else None
+        imu = sound_imu(inputs.imu, units) if self._shaken else None
         sample = Sample(now, kin, robot, window, state.window.full, seen.obstacles, reacting, watched, touches, imu)
         felt, detector = self._detector.step(state.detector, self.body, sample)
         if reacting and p.window.freeze_while_reacting:
@@ -188,14 +195,14 @@ class Controller:
             state.path.phase, inputs.resume,
         )  # fmt: skip
         answers, react = p.react.sense(state.reaction, self.body, given)
-        events |= answers | events_of(unfit, silent, lost, felt, window.count, state.near.blocked, p)
+        events |= answers | events_of(unfit, silent, lost, felt, window.count, state.motion.blocked, p)
         mode = next_mode(state.mode, events, inputs.resume)
         contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
         mark("mode")
 
         # how fast: eqs. 3-4 on the path, or the reaction
-        slowed = speed_scale(seen.nearest, p.reduction.d_max_m) if p.reduction.enabled else 1.0
-        scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.reduction)
+        slowed = 1.0 if p.slow is None else speed_scale(seen.nearest, p.slow.d_max_m)
+        scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.task.restore_cycles)
         way = paths.follow(self.path, state.path, x, p.task)
         answer, react = p.react.move(react, self.body, given, mode)
         desired, qd = (way.scaled(scale), None) if answer is None else (answer.velocity, answer.qd)
@@ -203,17 +210,17 @@ class Controller:
 
         # how near: eqs. 5-7, and the joint velocities: eq. 2
         touch = None if answer is None else answer.touch_speed
-        room = len(self.skin) + (0 if outside is None else len(outside.sigma))
-        request = MotionRequest(
-            desired, state.rotation_goal, mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch
-        )
-        motion, near = near_motion(widened(state.near, room), self._setup, kin, robot, seen.obstacles, request)
+        room = units + (0 if outside is None else len(outside.sigma))
+        hold = mode.mode is Mode.HOLD and qd is None
+        request = MotionRequest(desired, state.rotation_goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
+        allowed, approach = self._approach.step(state.approach, self._moved, kin, robot, seen.obstacles, request)
+        motion, moving = joint_motion(state.motion, self._setup, kin, robot, seen.obstacles, request, allowed)
         qp = motion.qp
         if qp.outcome in _TROUBLE and (qp.outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)
         mark("motion")
 
-        moved = mode.mode is Mode.REACT
+        reacts = mode.mode is Mode.REACT
         step = ControlStep(
             stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
             ee_position=x, ee_velocity=motion.ee_velocity, path_position=way.point,
@@ -221,7 +228,7 @@ class Controller:
             speed_scale=scale, range_distance=seen.distance, obstacles=seen.obstacles,
             force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
             filtered_force=window.newest, thresholds=felt.thresholds, armed=felt.armed, contact=contact,
-            reaction_velocity=desired if moved else _STILL, restricted=motion.restricted,
+            reaction_velocity=desired if reacts else _STILL, restricted=motion.restricted,
             approach_limit=motion.approach_limit,
             qp=qp, command=qp.qd, residual=felt.residual, evidence=felt.evidence, touched=felt.touched,
         )  # fmt: skip
@@ -229,7 +236,8 @@ class Controller:
             watch=watch, tracks=tracks, window=window, detector=detector, reduction=reduction, reaction=react,
             path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
-            near=near, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal, outside=outside,
+            approach=approach, motion=moving, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal,
+            outside=outside,
         )  # fmt: skip
         mark("record")
         return step, after

@@ -25,6 +25,6 @@ def events_of(
         events.setdefault(Event.NO_FORCE, f"up to {p.failure.force_timeout_s:g} s")
     elif not felt.armed:
         events[Event.WINDOW_FILLING] = f"{samples} of {p.window.samples} samples"
-    if blocked >= p.anticipation.blocked_after_s:
+    if p.task.blocked_after_s is not None and blocked >= p.task.blocked_after_s:
         events[Event.PATH_BLOCKED] = f"{blocked:.1f} s"
     return events

@@ -121,6 +121,19 @@ class SkinArrays(NamedTuple):
     """(K,) standard deviation of its orientation [rad]."""
 
 
+class NearArrays(NamedTuple):
+    """Where the body has something near, of `Obstacles`."""
+
+    link: IntArray
+    """(K,) link that is closest."""
+    body_point: FloatArray
+    """(K, 3) closest point on it [m]."""
+    direction: FloatArray
+    """(K, 3) unit vectors from there to the obstacle."""
+    body_distance: FloatArray
+    """(K,) between them [m]."""
+
+
 class ObstacleArrays(NamedTuple):
     """What the body has near, of `Obstacles`."""
 

@@ -6,7 +6,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, get_args
 
 from pretouch.checks import Checked
 from pretouch.composition import at, changed, from_table
@@ -17,19 +17,22 @@ from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.tactile import TouchSensors
+from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.braking_curve import BrakingCurve
+from pretouch.control.interface import Restriction
 from pretouch.errors import ParameterError
 from pretouch.params import (
-    AnticipationParams,
-    BaselineParams,
     ClampParams,
+    EffectiveMass,
     FailureParams,
     GiveUpParams,
     LocalisationParams,
+    NullSpaceMotion,
     PerceptionParams,
     PinchParams,
-    ReductionParams,
-    RestrictionMode,
-    RestrictionParams,
+    RowKind,
+    SpeedReduction,
+    Tangential,
     TaskParams,
     WindowParams,
 )
@@ -48,9 +51,12 @@ class Profile(Checked):
     """Name shown in tables and files."""
     perception: PerceptionParams = field(default_factory=PerceptionParams)
     task: TaskParams = field(default_factory=TaskParams)
-    reduction: ReductionParams = field(default_factory=ReductionParams)
-    restriction: RestrictionParams = field(default_factory=RestrictionParams)
-    anticipation: AnticipationParams = field(default_factory=AnticipationParams)
+    slow: SpeedReduction | None = field(default_factory=SpeedReduction)
+    """What slows the arm near obstacles (eq. 3); none: nothing but silent units does."""
+    approach: Restriction | None = field(default_factory=ApproachRestriction)
+    """What keeps the body from what is near (eqs. 5-7, or other rows of the QP); none: nothing does."""
+    null_space: NullSpaceMotion | None = None
+    """Whether links before the hand move away from what is near in the null space of the task."""
     window: WindowParams = field(default_factory=WindowParams)
     """The window of the external force: contacts are told once it is full (eq. 8)."""
     detect: Detector = field(default_factory=MovingThresholds)
@@ -58,34 +64,27 @@ class Profile(Checked):
     react: Reaction = field(default_factory=DecayingVelocity)
     """How the arm answers a contact (eq. 12)."""
     failure: FailureParams = field(default_factory=FailureParams)
-    baselines: BaselineParams = field(default_factory=BaselineParams)
+
+    @property
+    def d_max_m(self) -> float:
+        """Distance from the end-effector origin within which something is near it [m]: of eq. 3, or Table I's."""
+        return (self.slow or SpeedReduction()).d_max_m
 
 
 _PAPER = Profile()
-_BLIND = Profile(name="blind", perception=PerceptionParams(enabled=False), restriction=RestrictionParams(mode="off"))
-
-
-def _avoiding(name: RestrictionMode) -> Profile:
-    """Return a published way to avoid obstacles: contacts are felt as without proximity, nothing else slows the arm."""
-    return replace(
-        _PAPER,
-        name=name,
-        reduction=ReductionParams(enabled=False),
-        restriction=RestrictionParams(mode=name),
-        detect=MovingThresholds(f_d_n=0.0),
-    )
+_BLIND = Profile(name="blind", perception=PerceptionParams(enabled=False), approach=None)
 
 
 PROFILES: dict[str, Profile] = {
     "paper": _PAPER,
     "blind": _BLIND,
     "slowing-only": replace(_PAPER, name="slowing-only", detect=MovingThresholds(f_d_n=0.0)),
-    "thresholds-only": replace(_PAPER, name="thresholds-only", reduction=ReductionParams(enabled=False)),
+    "thresholds-only": replace(_PAPER, name="thresholds-only", slow=None),
     "paper-0.5m": replace(
         _PAPER,
         name="paper-0.5m",
-        reduction=ReductionParams(d_max_m=0.5),
-        restriction=RestrictionParams(d_notice_m=0.5),
+        slow=SpeedReduction(d_max_m=0.5),
+        approach=ApproachRestriction(d_notice_m=0.5),
         detect=MovingThresholds(d_max_m=0.5),
     ),
     "pretouch": Profile(
@@ -97,25 +96,22 @@ PROFILES: dict[str, Profile] = {
             keep_while_silent=True,
             outside_points=2,
         ),
-        task=TaskParams(mid_joint_projected=True),
-        reduction=ReductionParams(enabled=False),
-        restriction=RestrictionParams(mode="braking"),
-        anticipation=AnticipationParams(effective_mass=True, closing_speed=True, tangential=True, null_space=True),
+        task=TaskParams(mid_joint_projected=True, blocked_after_s=2.0),
+        slow=None,
+        approach=BrakingCurve(effective_mass=EffectiveMass(), closing_deadband_m_s=0.05, tangential=Tangential()),
+        null_space=NullSpaceMotion(),
         window=WindowParams(freeze_while_reacting=True),
         detect=SequentialTest(cues=(TouchSensors(),), localise=LocalisationParams()),
         react=Admittance(
             soft_hold=True, static_friction_nm=3.0, clamp=ClampParams(), pinch=PinchParams(), give_up=GiveUpParams()
         ),
     ),
-    "flacco": _avoiding("flacco"),
-    "ding": _avoiding("ding"),
 }
 """`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0.
 `slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity each (restrictions are apart from
 both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
 text (section V-C). `pretouch`: ours, each departure from the
-paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md).
-`flacco` and `ding`: published ways to avoid obstacles, to compare with (docs/explanation/baselines.md)."""
+paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
 
 
 def profile_names() -> tuple[str, ...]:
@@ -169,11 +165,31 @@ def value_of(found: Profile, path: str) -> object:
     A switch of an earlier version is True or False, or its text. Raises ParameterError for a parameter there is not.
     """
     if path in SWITCHES:
-        for text, (today, chosen) in SWITCHES[path].items():
-            if changed(found, {today: chosen}) == found:
+        for text, changes in SWITCHES[path].items():
+            if changed(found, changes) == found:
                 return {"yes": True, "no": False}.get(text, text)
-    (today,) = _paths([f"{path}=" if path not in SWITCHES else f"{path}={next(iter(SWITCHES[path]))}"])
+    today, *_ = _paths([f"{path}=" if path not in SWITCHES else f"{path}={next(iter(SWITCHES[path]))}"])
     return at(found, today)
+
+
+def restriction_modes() -> tuple[str, ...]:
+    """Return the names of all ways to restrict the arm's approach: none, the rows of the paper's, and other parts."""
+    others = (name for name in Restriction.choices() if name != ApproachRestriction.name)
+    return ("off", *get_args(RowKind), *others)
+
+
+def restriction_mode(profile: Profile) -> str:
+    """Return which of `restriction_modes` a profile has."""
+    part = profile.approach
+    return "off" if part is None else part.rows if isinstance(part, ApproachRestriction) else part.name
+
+
+def with_restriction(profile: Profile, mode: str) -> Profile:
+    """Return a profile with another of `restriction_modes`; a part that stays keeps its parameters."""
+    if mode not in restriction_modes():
+        raise ParameterError(f"The restriction {mode!r} is unknown: choose from {', '.join(restriction_modes())}.")
+    switch = SWITCHES["restriction.mode"]
+    return changed(profile, switch.get(mode, {"approach": mode}))
 
 
 def profile_from(table: Mapping[str, Any]) -> tuple[Profile, tuple[str, ...]]:
@@ -199,8 +215,9 @@ def at_rate(profile: Profile, rate: float) -> Profile:
     samples, alpha = max(2, round(p.window.samples * more)), 1 - (1 - p.window.alpha) ** (1 / more)
     return p if more == 1 else replace(
         p,
-        task=replace(p.task, control_period_s=1 / rate),
-        reduction=replace(p.reduction, l_max_cycles=max(1, round(p.reduction.l_max_cycles * more))),
+        task=replace(
+            p.task, control_period_s=1 / rate, restore_cycles=max(1, round(p.task.restore_cycles * more))
+        ),
         window=replace(p.window, samples=samples, alpha=alpha),
         react=p.react.stretched(more),
     )  # fmt: skip

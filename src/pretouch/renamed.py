@@ -1,9 +1,10 @@
 """Names of parameters in earlier versions, and what they are today: texts and recordings may hold them."""
 
 from dataclasses import fields
+from typing import get_args
 
 from pretouch.errors import ParameterError
-from pretouch.params import LocalisationParams
+from pretouch.params import LocalisationParams, NullSpaceMotion, RowKind
 
 _REACT = {
     "clamp_nm": "clamp.torque_nm", "open_m_s": "clamp.open_m_s", "open_s": "clamp.open_s",
@@ -32,6 +33,16 @@ _DETECT = (
     "offset_prior_nm", "friction_prior_nm", "mass_prior", "payload_prior_kg", "velocity_prior_rad_s2",
     "torque_prior_nm", "noise_floor_nm", "bias_floor_nm", "still_rad_s", "confirm_samples",
 )  # fmt: skip
+_APPROACH = (
+    "v_max_m_s", "beta", "d_repulse_m", "d_crit_m", "d_notice_m", "floor_m_s", "slack_weight", "deceleration_m_s2",
+    "latency_s", "margin_m", "touch_speed_max_m_s", "retreat_max_m_s", "tighten_m_s2", "loosen_m_s2",
+    "closing_deadband_m_s",
+)  # fmt: skip
+_MASS = ("body_region", "region_force_n", "force_fraction", "rotor_inertia_kg_m2")
+_BASELINES = (
+    "flacco_v_max_m_s", "flacco_alpha", "flacco_rho_m", "flacco_size_m", "ding_repulse_m", "ding_zero_low_m",
+    "ding_zero_high_m", "ding_notice_m", "ding_approach_m_s", "ding_retreat_m_s", "ding_weighted_m",
+)  # fmt: skip
 RENAMED: dict[str, str] = {
     **{old: f"window.{new}" for old, new in _WINDOW.items()},
     "detection.freeze_while_reacting": "window.freeze_while_reacting",
@@ -42,23 +53,50 @@ RENAMED: dict[str, str] = {
     **{f"detection.{old}": f"detect.cues.imu.{new}" for old, new in _IMU.items()},
     **{f"localisation.{f.name}": f"detect.localise.{f.name}" for f in fields(LocalisationParams)},
     **{f"reaction.{old}": f"react.{new}" for old, new in _REACT.items()},
+    "reduction.d_max_m": "slow.d_max_m",
+    "reduction.l_max_cycles": "task.restore_cycles",
+    "anticipation.blocked_after_s": "task.blocked_after_s",
+    **{f"{group}.{name}": f"approach.{name}" for group in ("restriction", "anticipation") for name in _APPROACH},
+    **{f"anticipation.{name}": f"approach.effective_mass.{name}" for name in _MASS},
+    **{f"anticipation.tangential_{name}": f"approach.tangential.{name}" for name in ("distance_m", "speed_m_s")},
+    **{f"anticipation.null_{f.name}": f"null_space.{f.name}" for f in fields(NullSpaceMotion)},
+    **{f"baselines.{name}": f"approach.{name.partition('_')[2]}" for name in _BASELINES},
 }
 """Names of earlier versions, and what each is today."""
 
-SWITCHES: dict[str, dict[str, tuple[str, str]]] = {
-    "detection.method": {name: ("detect", name) for name in ("thresholds", "fixed", "sequential")},
-    "detection.use_proximity": {"yes": ("detect.proximity", "on"), "no": ("detect.proximity", "none")},
-    "detection.use_touch": {"yes": ("detect.cues", "touch"), "no": ("detect.cues", "none")},
-    "detection.use_imu": {"yes": ("detect.cues", "touch,imu"), "no": ("detect.cues", "touch")},
-    "detection.learn": {"yes": ("detect.learn", "watched"), "no": ("detect.learn", "never")},
-    "detection.learn_unseen": {"yes": ("detect.learn", "always"), "no": ("detect.learn", "watched")},
-    "detection.localise": {"yes": ("detect.localise", "on"), "no": ("detect.localise", "none")},
-    "reaction.method": {name: ("react", name) for name in ("decay", "admittance")},
-    "reaction.clamps": {"yes": ("react.clamp", "on"), "no": ("react.clamp", "none")},
-    "reaction.pinches": {"yes": ("react.pinch", "on"), "no": ("react.pinch", "none")},
-    "reaction.gives_up": {"yes": ("react.give_up", "on"), "no": ("react.give_up", "none")},
+
+def _switch(path: str, yes: str = "on", no: str = "none") -> dict[str, dict[str, str]]:
+    return {"yes": {path: yes}, "no": {path: no}}
+
+
+SWITCHES: dict[str, dict[str, dict[str, str]]] = {
+    "detection.method": {name: {"detect": name} for name in ("thresholds", "fixed", "sequential")},
+    "detection.use_proximity": _switch("detect.proximity"),
+    "detection.use_touch": _switch("detect.cues", "touch"),
+    "detection.use_imu": _switch("detect.cues", "touch,imu", "touch"),
+    "detection.learn": _switch("detect.learn", "watched", "never"),
+    "detection.learn_unseen": _switch("detect.learn", "always", "watched"),
+    "detection.localise": _switch("detect.localise"),
+    "reaction.method": {name: {"react": name} for name in ("decay", "admittance")},
+    "reaction.clamps": _switch("react.clamp"),
+    "reaction.pinches": _switch("react.pinch"),
+    "reaction.gives_up": _switch("react.give_up"),
+    "reduction.enabled": _switch("slow"),
+    "restriction.mode": {
+        "off": {"approach": "none"},
+        **{rows: {"approach": "paper", "approach.rows": rows} for rows in get_args(RowKind)},
+        "braking": {"approach": "braking", "task.blocked_after_s": "2"},
+        **{name: {"approach": name} for name in ("flacco", "ding")},
+    },
+    "anticipation.null_space": {
+        "yes": {"null_space": "on", "task.blocked_after_s": "2"},
+        "no": {"null_space": "none"},
+    },
+    "anticipation.effective_mass": _switch("approach.effective_mass"),
+    "anticipation.tangential": _switch("approach.tangential"),
+    "anticipation.closing_speed": _switch("approach.closing_deadband_m_s", "0.05"),
 }
-"""Switches of earlier versions: for each value the change that it is today."""
+"""Switches of earlier versions: for each value the changes that it is today."""
 
 
 _NO_DETOUR = "the arm no longer goes round what blocks its path, which kept it from none of 8 boards. Leave it out."
@@ -73,10 +111,15 @@ REMOVED = {
 """Parameters that earlier versions had, and what to do without each."""
 
 
+def path_today(path: str) -> str:
+    """Return what a parameter or switch of an earlier version is called today; another name as it is."""
+    return next(iter(next(iter(SWITCHES[path].values())))) if path in SWITCHES else RENAMED.get(path, path)
+
+
 def of_today(path: str, text: str) -> dict[str, str]:
     """Return what a change by a name of an earlier version is today: path -> text."""
     if path in SWITCHES:
         if text not in SWITCHES[path]:
             raise ParameterError(f"{path} is {text!r}: choose from {', '.join(SWITCHES[path])}.")
-        return dict([SWITCHES[path][text]])
+        return dict(SWITCHES[path][text])
     return {RENAMED.get(path, path): text}

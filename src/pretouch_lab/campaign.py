@@ -10,8 +10,8 @@ from typing import Literal, cast, get_args
 from pretouch.atomic_write import write_json
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
-from pretouch.params import Orientation, RestrictionMode
-from pretouch.profiles import profile
+from pretouch.params import Orientation
+from pretouch.profiles import profile, restriction_modes
 from pretouch.robot.description_file import description_text
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
@@ -73,7 +73,7 @@ class Request:
         for name in self.profiles:
             profile(name)
         for mode in self.restrictions:
-            _check_choice("restriction mode", mode, get_args(RestrictionMode))
+            _check_choice("restriction mode", mode, restriction_modes())
         if self.orientation is not None:
             _check_choice("orientation", self.orientation, get_args(Orientation))
         _check_choice("choice of trials to record", self.record, get_args(Recorded))
@@ -99,7 +99,7 @@ class Request:
 
     def trials(self) -> list[tuple[Cell, int]]:
         """Every trial once, seed by seed, so that a stopped run has some of each cell."""
-        grid = Grid(self.profiles, cast(tuple[RestrictionMode, ...], self.restrictions), self.stiffness)
+        grid = Grid(self.profiles, self.restrictions, self.stiffness)
         cells = [cell for name in self.experiments for cell in EXPERIMENTS[name].cells(grid)]
         once = list({cell.name: cell for cell in cells}.values())
         return [(cell, seed) for seed in range(self.first_seed, self.first_seed + self.seeds) for cell in once]

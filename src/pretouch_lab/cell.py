@@ -4,11 +4,11 @@ import re
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from pretouch.control.path import Path as TaskPath
-from pretouch.params import Orientation, RestrictionMode
-from pretouch.profiles import Profile, profile
+from pretouch.params import Orientation
+from pretouch.profiles import Profile, profile, restriction_mode, with_restriction
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import Placement
@@ -18,8 +18,10 @@ from pretouch.sim.scene import SceneSpec
 from pretouch_lab.rows import Row
 from pretouch_lab.trial import Setup
 
-_ITS_OWN = ("braking", "flacco", "ding")
-"""Restriction modes that make a profile what it is."""
+_OF_THE_PAPER = ("off", "hard", "slack", "floor")
+"""Restriction modes of the paper's equations; any other makes a profile what it is."""
+NAMES_MODE = re.compile(":(restriction.mode|approach|approach.rows)=")
+"""How the name of a profile names a mode."""
 _SAFE = {"-y": "minus-y", "+y": "plus-y"}
 
 
@@ -28,12 +30,12 @@ class Grid:
     """What a run varies: each experiment makes its cells of that part of it which concerns it."""
 
     profiles: tuple[str, ...]
-    restrictions: tuple[RestrictionMode, ...] = ()
+    restrictions: tuple[str, ...] = ()
     """Restriction modes; none: each experiment's own."""
     stiffness: tuple[float, ...] = (25_000.0,)
     """Contact stiffnesses of static objects [N/m]."""
 
-    def controllers(self, restrictions: RestrictionMode) -> list[tuple[str, str]]:
+    def controllers(self, restrictions: str) -> list[tuple[str, str]]:
         """Profiles with restriction modes; `restrictions` is the experiment's own.
 
         Without proximity the mode is `off`; a profile that is named with a mode keeps it, and so does one whose mode
@@ -42,8 +44,9 @@ class Grid:
         pairs = []
         for name in self.profiles:
             found = profile(name)
-            fixed = not found.perception.enabled or ":restriction.mode=" in name or found.restriction.mode in _ITS_OWN
-            modes = (found.restriction.mode,) if fixed else self.restrictions or (restrictions,)
+            mode = restriction_mode(found)
+            fixed = not found.perception.enabled or bool(NAMES_MODE.search(name)) or mode not in _OF_THE_PAPER
+            modes = (mode,) if fixed else self.restrictions or (restrictions,)
             pairs += [(name, mode) for mode in modes]
         return list(dict.fromkeys(pairs))
 
@@ -101,8 +104,7 @@ class Context:
         """Return a cell's profile with the restriction mode of the cell, if it names one, as this run has it."""
         found = profile(cell.profile)
         if "restrictions" in cell.where:
-            mode = cast(RestrictionMode, cell.where["restrictions"])
-            found = replace(found, restriction=replace(found.restriction, mode=mode))
+            found = with_restriction(found, str(cell.where["restrictions"]))
         return replace(found, task=replace(found.task, orientation=self.orientation or found.task.orientation))
 
     def setup(self, cell: Cell, seed: int, scene: SceneSpec, path: TaskPath, **other: Any) -> Setup:

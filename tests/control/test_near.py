@@ -5,15 +5,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.control.motions import Mover
 from tests.following_arm import DT, Arm
 
 from pretouch.control.braking import braking_cap
+from pretouch.control.interface import MotionRequest, Restricted
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.motion import joint_motion
-from pretouch.control.near import near_init, near_motion
-from pretouch.control.setup import MotionRequest, anticipates, motion_setup
+from pretouch.errors import ParameterError
+from pretouch.params import NullSpaceMotion
 from pretouch.perception.closest import closest_points, no_obstacles
-from pretouch.profiles import PROFILES, Profile, profile
+from pretouch.profiles import PROFILES, Profile, profile, with_restriction
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RobotState
@@ -21,7 +23,8 @@ from pretouch.types import ControlStep, Mode, RobotState
 PRETOUCH = PROFILES["pretouch"]
 LEFT = 0
 """The unit of the paper's skin that looks along +y in the ready posture, the way the arm goes."""
-A = PRETOUCH.anticipation
+A = PRETOUCH.approach
+ACROSS = A.tangential
 
 
 def on_its_way(model: RobotModel, skin: Skin, params: Profile = PRETOUCH) -> Arm:
@@ -63,31 +66,39 @@ def approach(arm: Arm, step: ControlStep, row: int = 0) -> float:
 
 
 def test_the_papers_profile_anticipates_nothing(panda_model: RobotModel, paper_skin: Skin):
-    assert not anticipates(PROFILES["paper"])
-    assert not anticipates(PROFILES["blind"])
-    arm = on_its_way(panda_model, paper_skin, PROFILES["paper"])
+    paper = PROFILES["paper"]
+    assert paper.null_space is paper.task.blocked_after_s is None
+    assert not paper.task.mid_joint_projected
+    arm = on_its_way(panda_model, paper_skin, paper)
+    mover = Mover(panda_model, arm.controller.limits, paper)
+    before = mover.state
     request = MotionRequest(np.array([0.0, 0.3, 0.0]), np.eye(3), tracks=True)
-    setup = motion_setup(panda_model, arm.controller.limits, PROFILES["paper"])
-    given = (setup, panda_model.kinematics(arm.q), arm.robot(), no_obstacles(), request)
-    state = near_init(panda_model, 7)
-    assert setup.near is None
-    motion, after = near_motion(state, *given)
-    assert after is state
-    np.testing.assert_array_equal(motion.qp.qd, joint_motion(*given).qp.qd)
+    mover.step(panda_model.kinematics(arm.q), arm.robot(), no_obstacles(), request)
+    assert mover.state is before
 
 
-def test_every_switch_can_be_turned_off_alone():
-    switches = [
-        "perception.closing_speed", "perception.reckon_below_minimum", "perception.keep_while_silent",
-        "task.mid_joint_projected", "anticipation.effective_mass", "anticipation.closing_speed",
-        "anticipation.tangential", "anticipation.null_space",
-    ]  # fmt: skip
-    for switch in switches:
-        group, field = switch.split(".")
-        assert getattr(getattr(PRETOUCH, group), field) is True
-        assert getattr(getattr(PROFILES["paper"], group), field) is False
-        assert getattr(getattr(profile(f"pretouch:{switch}=no"), group), field) is False
-    assert profile("pretouch:restriction.mode=slack").restriction.mode == "slack"
+def test_every_part_of_ours_can_be_left_out_alone():
+    for switch in ("closing_speed", "reckon_below_minimum", "keep_while_silent"):
+        assert getattr(PRETOUCH.perception, switch) is True
+        assert getattr(PROFILES["paper"].perception, switch) is False
+        assert getattr(profile(f"pretouch:perception.{switch}=no").perception, switch) is False
+    for part in ("effective_mass", "closing_deadband_m_s", "tangential"):
+        assert getattr(A, part) is not None
+        assert getattr(profile(f"pretouch:approach.{part}=none").approach, part) is None
+    assert isinstance(PRETOUCH.null_space, NullSpaceMotion)
+    assert profile("pretouch:null_space=none").null_space is None
+
+
+@pytest.mark.parametrize("shape", [(2, 6), (1, 7)])
+def test_rows_of_a_wrong_shape_are_refused(panda_model: RobotModel, paper_skin: Skin, shape: tuple[int, int]):
+    arm = Arm(panda_model, paper_skin)
+    mover = Mover(panda_model, arm.controller.limits, PROFILES["paper"])
+    request = MotionRequest(np.zeros(3), np.eye(3))
+    allowed = Restricted(np.zeros(shape), np.zeros(2), np.zeros(2, np.int64), 1.0)
+    with pytest.raises(ParameterError, match=r"rows are G .*: G is \(R, 7\), h is \(R,\)"):
+        joint_motion(
+            mover.state, mover.setup, panda_model.kinematics(arm.q), arm.robot(), no_obstacles(), request, allowed
+        )
 
 
 def test_towards_a_wall_the_arm_keeps_the_braking_curve_and_comes_to_touch(panda_model: RobotModel, paper_skin: Skin):
@@ -153,7 +164,7 @@ def test_a_push_away_from_an_obstacle_is_followed_at_once(panda_model: RobotMode
 
 def test_near_a_thing_beside_it_the_arm_does_not_slide_past_at_full_speed(panda_model: RobotModel, paper_skin: Skin):
     speeds = {}
-    for name in ("pretouch", "pretouch:anticipation.tangential=no"):
+    for name in ("pretouch", "pretouch:approach.tangential=none"):
         arm = on_its_way(panda_model, paper_skin, profile(name))
         for _ in range(40):
             # a unit of the hand that looks along x sees something all the time
@@ -161,8 +172,8 @@ def test_near_a_thing_beside_it_the_arm_does_not_slide_past_at_full_speed(panda_
         assert len(step.restricted) == 1
         d = float(step.obstacles.body_distance[0])
         speeds[name] = abs(hand_speed(arm, step)[1])
-    assert speeds["pretouch:anticipation.tangential=no"] > 0.28
-    cap = A.tangential_speed_m_s + d / A.tangential_distance_m * (0.3 - A.tangential_speed_m_s)
+    assert speeds["pretouch:approach.tangential=none"] > 0.28
+    cap = ACROSS.speed_m_s + d / ACROSS.distance_m * (0.3 - ACROSS.speed_m_s)
     assert d < 0.07
     assert speeds["pretouch"] < cap + 0.01
 
@@ -182,9 +193,9 @@ def test_a_path_blocked_for_long_is_said_to_be_and_its_phase_waits(panda_model: 
 def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: RobotModel):
     elbow, gaps = panda_model.link_index("panda_link4"), {}
     limits = joint_limits(panda_model, 0.01, DT)
-    for name in ("pretouch", "pretouch:anticipation.null_space=no"):
+    for name in ("pretouch", "pretouch:null_space=none"):
         params = replace(profile(name), task=replace(profile(name).task, mid_joint_gain=1e-3, mid_joint_time_s=1e5))
-        q, qd, state = panda_model.description.q_ready.copy(), np.zeros(7), near_init(panda_model, 1)
+        q, qd, mover = panda_model.description.q_ready.copy(), np.zeros(7), Mover(panda_model, limits, params, 1)
         start = panda_model.kinematics(q)
         thing = start.position[elbow] + np.array([0.0, 0.2, 0.0])
         for _ in range(100):
@@ -194,20 +205,18 @@ def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: Rob
             )
             robot = RobotState(0.0, q, qd, q, qd, np.zeros(7), None)
             request = MotionRequest(np.zeros(3), start.rotation[panda_model.ee], tracks=True)
-            motion, state = near_motion(state, motion_setup(panda_model, limits, params), kin, robot, near, request)
-            qd = motion.qp.qd
+            qd = mover.step(kin, robot, near, request).qp.qd
             q = q + qd * DT
         gaps[name] = float(near.body_distance[0])
         np.testing.assert_allclose(kin.position[panda_model.ee], start.position[panda_model.ee], atol=1e-3)
-    assert gaps["pretouch"] > gaps["pretouch:anticipation.null_space=no"] + 0.005
+    assert gaps["pretouch"] > gaps["pretouch:null_space=none"] + 0.005
 
 
 def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model: RobotModel, paper_skin: Skin):
     arm = Arm(panda_model, paper_skin)
     wanted = np.array([0.02, -0.01, 0.03, 0.0, 0.01, -0.02, 0.01])
     for params in (PROFILES["paper"], PRETOUCH):
-        motion, _ = near_motion(
-            near_init(panda_model, 7), motion_setup(panda_model, arm.controller.limits, params),
+        motion = Mover(panda_model, arm.controller.limits, params).step(
             panda_model.kinematics(arm.q), arm.robot(), no_obstacles(),
             MotionRequest(np.array([0.0, 0.3, 0.0]), np.eye(3), tracks=True, qd=wanted),
         )  # fmt: skip
@@ -216,7 +225,7 @@ def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model
 
 def test_other_modes_rows_go_with_the_null_space_too(panda_model: RobotModel, paper_skin: Skin):
     for mode in ("off", "slack", "hard"):
-        params = replace(PRETOUCH, restriction=replace(PRETOUCH.restriction, mode=mode))
+        params = with_restriction(PRETOUCH, mode)
         arm = on_its_way(panda_model, paper_skin, params)
         step = arm.run(5, seen={LEFT: 0.3})[-1]
         assert len(step.restricted) == (mode != "off")

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.control.motions import Mover
 from tests.control.test_near import LEFT, PRETOUCH, A, approach, hand_speed, on_its_way, to_wall
 from tests.following_arm import DT, Arm
 
 from pretouch.control.braking import braking_cap
+from pretouch.control.interface import MotionRequest
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.near import near_init, near_motion
-from pretouch.control.setup import MotionRequest, motion_setup
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
@@ -106,8 +106,8 @@ def test_with_things_on_all_sides_the_arm_creeps_and_the_problem_is_solved(panda
 @given(st.integers(0, 10_000))
 def test_in_any_posture_nothing_that_stands_is_met_faster_than_the_curve_allows(panda_model: RobotModel, seed: int):
     rng, model = np.random.default_rng([1000, seed]), panda_model
-    limits, state = joint_limits(model, 0.01, DT), near_init(model, 3)
-    setup = motion_setup(model, limits, PRETOUCH)
+    limits = joint_limits(model, 0.01, DT)
+    mover = Mover(model, limits, PRETOUCH, 3)
     span = limits.q_max - limits.q_min
     # near a limit or a stretched arm as often as not
     q = np.clip(limits.q_min + span * rng.uniform(-0.1, 1.1, 7), limits.q_min, limits.q_max)
@@ -120,7 +120,7 @@ def test_in_any_posture_nothing_that_stands_is_met_faster_than_the_curve_allows(
         near = closest_points(kin, model.body, kin.position[model.ee], np.arange(3), things, np.eye(3))
         robot = RobotState(0.0, q, qd, q, qd, np.zeros(7), None)
         request = MotionRequest(course, start.rotation[model.ee], tracks=True)
-        motion, state = near_motion(state, setup, kin, robot, near, request)
+        motion = mover.step(kin, robot, near, request)
         command = motion.qp.qd
         assert motion.qp.outcome is QpOutcome.SOLVED
         assert np.all(np.abs(command - qd) <= limits.qdd_max * DT + 1e-9)

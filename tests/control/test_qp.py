@@ -43,7 +43,7 @@ def panda_problem(model: RobotModel, seed: int, soft: bool, count: int | None = 
     k = int(rng.integers(0, 12)) if count is None else count
     points = kin.position[rng.integers(2, model.ee + 1, k)] + rng.uniform(-0.6, 0.6, (k, 3))
     obstacles = closest_points(kin, model.body, kin.position[model.ee], np.arange(k), points, np.ones((k, 3)))
-    restriction = RestrictionParams(mode="slack" if soft else "hard")
+    restriction = RestrictionParams(rows="slack" if soft else "hard")
     rows, _ = approach_rows(kin, model.moved_by, obstacles, restriction)
     # moving fast, most scenes leave hard rows no way out: give them more room
     h = rows.h if soft else rows.h + rng.uniform(0, 0.5)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.joint_box import brake, joint_box
 from pretouch.control.path import Circle
 from pretouch.control.qp import Cost, solve
 from pretouch.control.restriction import ApproachRows
 from pretouch.controller import Controller
-from pretouch.params import RestrictionMode
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
@@ -303,11 +303,11 @@ def test_a_solve_beyond_its_budget_is_the_braking_command(soft: bool):
 
 @pytest.mark.parametrize("mode", ["slack", "hard"])
 def test_beyond_its_budget_the_controller_brakes_holds_and_says_so(
-    panda_model: RobotModel, paper_skin: Skin, mode: RestrictionMode
+    panda_model: RobotModel, paper_skin: Skin, mode: str
 ):
     paper = PROFILES["paper"]
     profile = replace(
-        paper, window=replace(paper.window, samples=5), restriction=replace(paper.restriction, mode=mode),
+        paper, window=replace(paper.window, samples=5), approach=ApproachRestriction(rows=mode),
         task=replace(paper.task, acceleration_m_s2=100.0),
     )  # fmt: skip
     hurried = replace(profile, failure=replace(profile.failure, solver_iterations=1))

@@ -8,23 +8,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pretouch.control.reduction import ReductionState, faded_scale, reduce_speed, speed_scale
-from pretouch.params import ReductionParams
 
-SHORT = ReductionParams(d_max_m=0.8, l_max_cycles=4)
+D_MAX = 0.8
 
 
-def faded(fresh: list[float], params: ReductionParams = SHORT) -> list[float]:
+def faded(fresh: list[float], l_max: int = 4) -> list[float]:
     """Factor on the speed for a sequence of fresh factors."""
     state, out = ReductionState(), []
     for factor in fresh:
-        scale, state = reduce_speed(state, factor, params)
+        scale, state = reduce_speed(state, factor, l_max)
         out.append(scale)
     return out
 
 
-def scales(distances: list[float], params: ReductionParams = SHORT) -> list[float]:
+def scales(distances: list[float], l_max: int = 4) -> list[float]:
     """Factor on the speed for a sequence of nearest distances [m], infinite where none is seen."""
-    return faded([speed_scale(d, params.d_max_m) for d in distances], params)
+    return faded([speed_scale(d, D_MAX) for d in distances], l_max)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +47,7 @@ def test_the_speed_comes_back_in_l_max_cycles():
 
 
 def test_table_i_restores_full_speed_after_two_seconds():
-    out = scales([0.2] + [np.inf] * 200, ReductionParams())
+    out = scales([0.2] + [np.inf] * 200, 200)
     assert out[199] < 1.0
     assert out[200] == 1.0
 
@@ -100,7 +99,7 @@ def test_the_factor_rises_no_faster_than_the_fading(distances: list[float]):
     out = scales(distances)
     assert all(0.0 <= scale <= 1.0 for scale in out)
     for before, after in pairwise([1.0, *out]):
-        assert after <= before + (1 - min(out)) / SHORT.l_max_cycles + 1e-12
+        assert after <= before + (1 - min(out)) / 4 + 1e-12
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=30))
@@ -115,7 +114,7 @@ def test_each_factor_is_the_fresh_one_or_on_its_way_up_to_it(fresh: list[float])
 @settings(deadline=None, derandomize=True, max_examples=300)
 def test_the_factor_is_never_above_what_the_nearest_seen_obstacle_allows(distances: list[float]):
     for scale, distance in zip(scales(distances), distances, strict=True):
-        assert scale <= speed_scale(distance, SHORT.d_max_m) + 1e-12
+        assert scale <= speed_scale(distance, D_MAX) + 1e-12
 
 
 @given(st.floats(0.0, 0.79))
@@ -127,7 +126,7 @@ def test_fading_is_monotone(distance: float):
 
 
 def test_a_factor_that_is_no_number_leaves_a_usable_factor():
-    scale, state = reduce_speed(ReductionState(0.5, 2), np.nan, SHORT)
+    scale, state = reduce_speed(ReductionState(0.5, 2), np.nan, 4)
     # 0.5 + 0.5 * 3 / 4: as if nothing were seen
     assert scale == 0.875
     assert np.isfinite(state.scale)

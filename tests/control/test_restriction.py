@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.interface import MotionBody, MotionRequest
+from pretouch.control.joint_box import joint_limits
 from pretouch.control.restriction import approach_limit, approach_rows, velocity_a, velocity_b
-from pretouch.params import RestrictionParams
+from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.robot.model import RobotModel
-from pretouch.types import Obstacles
+from pretouch.types import Obstacles, RobotState
 
 TABLE_I = RestrictionParams()  # V_max 0.04, beta -10, d_repulse 0.1, d_crit 0.1, d_notice 0.6
 # V_max / (1 + e^10) = 0.04 / 22027.4658 and V_max / (1 + e^-10) = 0.04 / 1.0000453999
@@ -54,7 +57,7 @@ def test_the_limit_grows_with_the_distance():
 @pytest.mark.parametrize("mode", ["hard", "slack", "floor"])
 def test_no_distance_overflows(mode: str):
     d = np.linspace(-10, 10, 4001)
-    limit = approach_limit(d, replace(TABLE_I, mode=mode))
+    limit = approach_limit(d, replace(TABLE_I, rows=mode))
     assert not np.any(np.isnan(limit))
     assert np.all(limit >= -0.04)
 
@@ -63,7 +66,7 @@ def test_floor_by_numbers():
     d = np.array([-0.1, 0.05, 0.1, 0.5, 0.6])
     # V_b(0.5): exponent -10 * (2 * 0.4 / 0.5 - 1) = -6;  1 + e^-6 = 1.0024787522
     expected = [0.02, 0.02, 0.02, 0.04 / 1.0024787522, np.inf]
-    np.testing.assert_allclose(approach_limit(d, replace(TABLE_I, mode="floor")), expected, rtol=1e-8)
+    np.testing.assert_allclose(approach_limit(d, replace(TABLE_I, rows="floor")), expected, rtol=1e-8)
 
 
 def around(model: RobotModel, q: np.ndarray, points: np.ndarray) -> Obstacles:
@@ -101,7 +104,7 @@ def test_rows_are_the_derivative_of_the_distance_to_a_fixed_point(panda_model: R
 @pytest.mark.parametrize(("mode", "soft"), [("hard", False), ("slack", True), ("floor", True)])
 def test_rows_belong_to_the_obstacles_within_d_notice(panda_model: RobotModel, mode: str, soft: bool):
     q, obstacles = random_scene(panda_model, 1, reach=1.2)
-    params = replace(TABLE_I, mode=mode)
+    params = replace(TABLE_I, rows=mode)
     rows, which = approach_rows(panda_model.kinematics(q), panda_model.moved_by, obstacles, params)
     np.testing.assert_array_equal(which, np.flatnonzero(obstacles.body_distance < 0.6))
     assert 0 < len(which) < 12
@@ -110,13 +113,27 @@ def test_rows_belong_to_the_obstacles_within_d_notice(panda_model: RobotModel, m
     assert rows.soft is soft
 
 
-def test_off_and_an_empty_surrounding_have_no_rows(panda_model: RobotModel):
-    q, obstacles = random_scene(panda_model, 1, reach=0.3)
-    kin = panda_model.kinematics(q)
-    for mode, near in (("off", obstacles), ("slack", no_obstacles())):
-        rows, which = approach_rows(kin, panda_model.moved_by, near, replace(TABLE_I, mode=mode))
-        assert rows.G.shape == (0, 7)
-        assert len(rows.h) == len(which) == 0
+def test_an_empty_surrounding_has_no_rows(panda_model: RobotModel):
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    rows, which = approach_rows(kin, panda_model.moved_by, no_obstacles(), TABLE_I)
+    assert rows.G.shape == (0, 7)
+    assert len(rows.h) == len(which) == 0
+
+
+@pytest.mark.parametrize("rows", ["hard", "slack", "floor"])
+def test_the_part_returns_the_same_rows_and_its_weight(panda_model: RobotModel, rows: str):
+    q, obstacles = random_scene(panda_model, 1, reach=1.2)
+    part = ApproachRestriction(rows=rows, slack_weight=500.0)
+    body = MotionBody(panda_model, 12, joint_limits(panda_model, 0.01, 0.01), TaskParams())
+    robot = RobotState(0.0, q, np.zeros(7), q, np.zeros(7), np.zeros(7), None)
+    kin, request = panda_model.kinematics(q), MotionRequest(np.zeros(3), np.eye(3))
+    allowed, state = part.step(part.init(body), body, kin, robot, obstacles, request)
+    expected, which = approach_rows(kin, panda_model.moved_by, obstacles, part)
+    np.testing.assert_array_equal(allowed.G, expected.G)
+    np.testing.assert_array_equal(allowed.h, expected.h)
+    np.testing.assert_array_equal(allowed.which, which)
+    assert allowed.weight == (0.0 if rows == "hard" else 500.0)
+    assert state is allowed.velocity is allowed.speeds is None
 
 
 def test_a_retreating_arm_is_not_restricted(panda_model: RobotModel):

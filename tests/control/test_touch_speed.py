@@ -8,20 +8,15 @@ from hypothesis import strategies as st
 
 from pretouch.cholesky import factor
 from pretouch.control.touch_speed import mass_along, touch_limits, touch_speed
-from pretouch.params.anticipation import REGIONS, AnticipationParams
+from pretouch.params.anticipation import REGIONS, BrakingParams, EffectiveMass
 from pretouch.robot.model import RobotModel
 
 UNCAPPED = 100.0
 
 
 def speed(region: str, mass: float, fraction: float = 1.0, force: float = 0.0) -> float:
-    params = AnticipationParams(
-        body_region=region,  # type: ignore[arg-type]
-        force_fraction=fraction,
-        region_force_n=force,
-        touch_speed_max_m_s=UNCAPPED,
-    )
-    return touch_speed(mass, touch_limits(params))
+    felt = EffectiveMass(body_region=region, force_fraction=fraction, region_force_n=force)  # type: ignore[arg-type]
+    return touch_speed(mass, touch_limits(BrakingParams(touch_speed_max_m_s=UNCAPPED, effective_mass=felt)))
 
 
 def test_the_spring_model_by_numbers():
@@ -46,7 +41,7 @@ def test_field_notes_example_comes_back_as_the_force_of_its_speed():
 
 
 def test_the_cap_holds_whatever_the_mass():
-    params = touch_limits(AnticipationParams(touch_speed_max_m_s=0.05, body_region="abdomen"))
+    params = touch_limits(BrakingParams(touch_speed_max_m_s=0.05, effective_mass=EffectiveMass("abdomen")))
     assert touch_speed(1e-3, params) == 0.05
     assert touch_speed(np.inf, params) <= 0.05
 

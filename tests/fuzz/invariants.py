@@ -7,8 +7,9 @@ from functools import cache
 import numpy as np
 
 from pretouch.contact.admittance import Admittance
+from pretouch.control.approach_restriction import ApproachRestriction, notice_m
 from pretouch.params import ClampParams
-from pretouch.profiles import Profile
+from pretouch.profiles import Profile, restriction_mode
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Mode, QpOutcome, Touched
@@ -91,8 +92,8 @@ def check_speed_scale(step: ControlStep, p: Profile) -> None:
     """Eq. 3 bounds the factor, whatever came before, and the factor bounds the speed along the path."""
     if step.mode is Mode.TRACK:
         assert np.linalg.norm(step.desired_velocity) <= step.speed_scale * p.task.speed_m_s * (1 + 1e-9) + 1e-12
-    if p.reduction.enabled and len(step.obstacles.unit):
-        assert step.speed_scale <= step.obstacles.ee_distance.min() / p.reduction.d_max_m + 1e-12
+    if p.slow is not None and len(step.obstacles.unit):
+        assert step.speed_scale <= step.obstacles.ee_distance.min() / p.slow.d_max_m + 1e-12
 
 
 def end_of_braking(speed: np.ndarray, reach: np.ndarray, period: float) -> np.ndarray:
@@ -150,31 +151,30 @@ def check_braking(step: ControlStep, e: Expected, p: Profile, model: RobotModel)
 def check_rows(step: ControlStep, p: Profile, model: RobotModel) -> None:
     """Approach velocities by finite differences: no faster than eq. 7 allows and the reported slack."""
     o, which = step.obstacles, step.restricted
-    if p.restriction.mode in ("flacco", "ding"):
+    mode = restriction_mode(p)
+    if mode in ("flacco", "ding"):
         return
-    off = p.restriction.mode == "off"
-    notice = o.body_distance < p.restriction.d_notice_m
-    assert np.array_equal(which, np.flatnonzero(notice & (not off)))
+    notice = o.body_distance < notice_m(p.approach)
+    assert np.array_equal(which, np.flatnonzero(notice & (mode != "off")))
     if not len(which) or np.abs(step.q).max() > 100.0 or np.abs(step.command).max() > 1e3:
         return  # answers to lies, beyond what differences resolve
-    if p.restriction.mode != "braking":
-        limit = [approach_limit(d, p) for d in o.body_distance[which].tolist()]
-        assert (np.abs(step.approach_limit - limit) <= 1e-9 * p.restriction.v_max_m_s).all()
+    if isinstance(p.approach, ApproachRestriction):
+        limit = [approach_limit(d, p.approach) for d in o.body_distance[which].tolist()]
+        assert (np.abs(step.approach_limit - limit) <= 1e-9 * p.approach.v_max_m_s).all()
     excess = approach_velocity(step, model) - step.approach_limit
     size = 1e-7 * (1.0 + np.abs(step.command).max())
     assert (step.qp.slack >= 0.0).all()
     assert (np.abs(step.qp.slack - np.maximum(excess, 0.0)) <= size).all(), (step.qp.slack, excess)
-    if p.restriction.mode == "hard" and step.qp.outcome is QpOutcome.SOLVED:
+    if mode == "hard" and step.qp.outcome is QpOutcome.SOLVED:
         assert step.qp.slack.max() <= 1e-7
 
 
-def approach_limit(d: float, p: Profile) -> float:
+def approach_limit(d: float, r: ApproachRestriction) -> float:
     """Eq. 7 of the paper at a body distance within d_notice [m]."""
-    r = p.restriction
     near, far = 2.0 * d / r.d_crit_m - 1.0, 2.0 * (d - r.d_crit_m) / (r.d_notice_m - r.d_crit_m) - 1.0
     slope = min(max(r.beta * (near if d < r.d_repulse_m else far), -700.0), 700.0)
     limit = r.v_max_m_s / (1.0 + math.exp(slope)) - (r.v_max_m_s if d < r.d_repulse_m else 0.0)
-    return max(limit, r.floor_m_s) if r.mode == "floor" else limit
+    return max(limit, r.floor_m_s) if r.rows == "floor" else limit
 
 
 def approach_velocity(step: ControlStep, model: RobotModel) -> np.ndarray:

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from pretouch.controller import Controller, ControllerState
+from pretouch.profiles import restriction_mode
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Inputs, QpOutcome, RobotState
@@ -140,7 +141,7 @@ class Course:
         self.machine.reached.update([
             "step", f"arm {self.world.model.description.name}",
             f"mode {step.mode.name}", f"outcome {step.qp.outcome.name}", f"cause {cause}",
-            f"restriction {p.restriction.mode}", f"detection {p.detect.name}", f"reaction {p.react.name}",
+            f"restriction {restriction_mode(p)}", f"detection {p.detect.name}", f"reaction {p.react.name}",
             f"period {p.task.control_period_s}", f"units {len(self.world.skin)}",
             f"sight {self.weather.sight}", f"force {self.weather.feel}", f"slack {bool(tight)}",
             f"slowed {step.speed_scale < 1}", f"on the axis {bool((step.obstacles.body_distance < -0.04).any())}",

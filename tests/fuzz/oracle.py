@@ -178,10 +178,8 @@ class Oracle:
             return self._told(e, step)
         filling = self.samples < self.p.window.samples
         seen = {"silent": bool(e.silent), "no force": e.no_force, "overrun": e.overrun, "filling": filling}
-        # how long the path has been blocked is remembered by the arm's anticipation, and said only while it tracks
-        p = self.p
-        anticipates = p.restriction.mode == "braking" or p.task.mid_joint_projected or p.anticipation.null_space
-        blocked = self.mode is Mode.TRACK and anticipates
+        # how long the path has been blocked is remembered by the arm's motion, and said only while it tracks
+        blocked = self.mode is Mode.TRACK and self.p.task.blocked_after_s is not None
         clear = "path blocked" if blocked and WORDS["path blocked"] in step.reason else "clear"
         return next((cause for cause, here in seen.items() if here), clear)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pretouch.control.path import Circle, line
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES, Profile
+from pretouch.profiles import PROFILES, Profile, with_restriction
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
@@ -27,7 +27,7 @@ READY = MODEL.description.q_ready
 
 
 def restricted(mode: str, **task: object) -> Profile:
-    return replace(SHORT, restriction=replace(SHORT.restriction, mode=mode), task=replace(SHORT.task, **task))
+    return replace(with_restriction(SHORT, mode), task=replace(SHORT.task, **task))
 
 
 profiles = st.sampled_from([

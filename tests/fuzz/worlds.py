@@ -9,6 +9,8 @@ from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
+from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.braking_curve import BrakingCurve
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.params import (
     ClampParams,
@@ -18,12 +20,11 @@ from pretouch.params import (
     PerceptionParams,
     PinchParams,
     ProximityPriorParams,
-    ReductionParams,
-    RestrictionParams,
+    SpeedReduction,
     TaskParams,
     WindowParams,
 )
-from pretouch.params.anticipation import AnticipationParams
+from pretouch.params.anticipation import EffectiveMass, NullSpaceMotion, Tangential
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.profiles import Profile, profile
 from pretouch.robot.body import Capsules
@@ -40,15 +41,16 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
         "spread_sigmas": (2.0, 0.0, 20.0),
     },
     TaskParams: {
-        "speed_m_s": (0.3, 1e-3, 5.0), "acceleration_m_s2": (1.0, 1e-3, 100.0), "position_gain_1_s": (2.0, 0.0, 50.0),
+        "speed_m_s": (0.3, 1e-3, 5.0), "acceleration_m_s2": (1.0, 1e-3, 100.0), "restore_cycles": (20, 1, 10_000),
+        "position_gain_1_s": (2.0, 0.0, 50.0),
         "off_path_m": (0.1, 1e-3, 10.0), "orientation": ("hold", "free"), "orientation_gain_1_s": (1.0, 0.0, 20.0),
         "damping_max": (0.1, 0.0, 10.0), "manipulability_threshold": (0.001, 1e-6, 10.0),
         "mid_joint_gain": (0.001, 1e-6, 1.0), "mid_joint_time_s": (5.0, 0.01, 1e3),
         "control_period_s": (0.01, 0.001), "position_margin_rad": (0.01, 0.0, 0.2),
     },
-    ReductionParams: {"enabled": (True, False), "d_max_m": (0.8, 1e-3, 5.0), "l_max_cycles": (20, 1, 10_000)},
-    RestrictionParams: {
-        "mode": ("slack", "hard", "floor", "off"), "v_max_m_s": (0.04, 1e-4, 2.0), "beta": (-10.0, -1e-3, -1e3),
+    SpeedReduction: {"d_max_m": (0.8, 1e-3, 5.0)},
+    ApproachRestriction: {
+        "rows": ("slack", "hard", "floor"), "v_max_m_s": (0.04, 1e-4, 2.0), "beta": (-10.0, -1e-3, -1e3),
         "d_repulse_m": (0.1, 1e-3, 1.0), "d_crit_m": (0.1, 1e-3), "d_notice_m": (0.6, 0.2, 5.0),
         "floor_m_s": (0.02, 0.0, 1.0), "slack_weight": (1000.0, 1e-2, 1e6),
     },
@@ -73,16 +75,19 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "closing_speed": (True, False), "reckon_below_minimum": (True, False),
         "place_at_stamp": (True, False), "closing_memory_s": (0.09, 0.01, 1.0),
     },
-    TaskParams: {"mid_joint_projected": (True, False)},
-    RestrictionParams: {"mode": ("braking", "braking", "slack", "hard", "floor", "off")},
-    AnticipationParams: {
+    TaskParams: {"mid_joint_projected": (True, False), "blocked_after_s": (2.0, 0.05, None)},
+    BrakingCurve: {
+        "d_notice_m": (0.6, 0.2, 5.0), "slack_weight": (1000.0, 1e-2, 1e6),
         "deceleration_m_s2": (0.6, 0.01, 10.0), "latency_s": (0.06, 0.0, 1.0), "margin_m": (0.01, 0.0, 0.3),
         "touch_speed_max_m_s": (0.05, 1e-3, 1.0), "retreat_max_m_s": (0.1, 0.0, 1.0),
-        "effective_mass": (True, False), "body_region": ("chest", "face"), "region_force_n": (0.0, 1.0, 1e3),
-        "closing_speed": (True, False), "tangential": (True, False), "tighten_m_s2": (3.0, 0.1, 100.0),
-        "loosen_m_s2": (1.0, 0.1, 100.0), "null_space": (True, False), "null_speed_m_s": (0.1, 2.0),
-        "null_joint_rad_s": (0.5, 5.0), "null_rate_rad_s2": (1.0, 100.0), "blocked_after_s": (2.0, 0.05),
+        "effective_mass": (
+            EffectiveMass("chest"), EffectiveMass(), EffectiveMass(region_force_n=1.0),
+            EffectiveMass("chest", region_force_n=1e3), None,
+        ),
+        "closing_deadband_m_s": (0.05, 0.0, None), "tangential": (Tangential(), None),
+        "tighten_m_s2": (3.0, 0.1, 100.0), "loosen_m_s2": (1.0, 0.1, 100.0),
     },
+    NullSpaceMotion: {"speed_m_s": (0.1, 2.0), "joint_rad_s": (0.5, 5.0), "rate_rad_s2": (1.0, 100.0)},
     WindowParams: {"freeze_while_reacting": (True, False)},
     SequentialTest: {
         "false_alarms_per_hour": (1.0, 3600.0),
@@ -144,8 +149,11 @@ def any_profile(rng: np.random.Generator) -> Profile:
     drawn = {name: group(**_drawn(rng, choices[group], usual)) for name, group in groups.items()}
     detector = DETECTORS[int(rng.integers(len(DETECTORS)))] if ours else MovingThresholds
     drawn["detect"] = detector(**_drawn(rng, CHOICES.get(detector, {}) | OURS.get(detector, {}), usual))
-    if not ours:
-        drawn["restriction"] = replace(drawn["restriction"], mode=str(rng.choice(["slack", "hard", "floor", "off"])))
+    drawn |= {"slow": _one_of(rng, usual, SpeedReduction, None), "null_space": None}
+    drawn["approach"] = _one_of(rng, usual, ApproachRestriction, ApproachRestriction, None)
+    if ours:
+        drawn["approach"] = _one_of(rng, usual, BrakingCurve, BrakingCurve, ApproachRestriction, None)
+        drawn["null_space"] = _one_of(rng, usual, NullSpaceMotion, None)
     return Profile(**{**drawn, "name": "fuzzed", "react": any_reaction(rng, ours, usual)})
 
 
@@ -156,6 +164,12 @@ def any_reaction(rng: np.random.Generator, ours: bool, usual: float) -> Reaction
     drawn = {kind: kind(**_drawn(rng, OURS[kind], usual)) for kind in (ClampParams, PinchParams, GiveUpParams)}
     clamp, pinch, give_up = (found if rng.random() < 0.8 else None for found in drawn.values())
     return Admittance(**_drawn(rng, OURS[Admittance], usual), clamp=clamp, pinch=pinch, give_up=give_up)
+
+
+def _one_of(rng: np.random.Generator, usual: float, *kinds: type | None) -> object:
+    """Draw a part, or none, and its parameters; the first kind mostly."""
+    kind = kinds[0] if rng.random() < usual else kinds[rng.integers(len(kinds))]
+    return None if kind is None else kind(**_drawn(rng, CHOICES.get(kind) or OURS[kind], usual))
 
 
 def _drawn(rng: np.random.Generator, choices: dict[str, tuple[object, ...]], usual: float) -> dict[str, object]:

@@ -272,7 +272,7 @@ def test_a_profile_of_another_version_can_be_looked_at_and_not_recomputed(tiny, 
 
 def test_a_profile_that_cannot_be_is_refused(tiny, tmp_path):
     profile = json.loads(decoded(RUN, raw_run(tiny[0])).profile)
-    for group, name, value in (("reduction", "enabled", 1), ("task", "speed_m_s", "fast"), ("task", "speed_m_s", True),
+    for group, name, value in (("approach", "rows", "firm"), ("task", "speed_m_s", "fast"), ("task", "speed_m_s", True),
                                ("task", "speed_m_s", -1.0), ("task", "orientation", 3)):  # fmt: skip
         wrong = {**profile, group: {**profile[group], name: value}}
         place = tmp_path / f"{name}-{value}.mcap"

@@ -53,7 +53,7 @@ def test_a_run_is_recomputed_bit_for_bit(made):
 def test_a_simulated_contact_with_a_board_is_recomputed_bit_for_bit(panda_model, paper_skin, tmp_path):
     path = line((0.4, -0.1, 0.5), (0.4, 0.5, 0.5))
     scene = SceneSpec(boxes=(Box("board", (0.5, 0.27, 0.55), (0.15, 0.02, 0.12), 25_000.0),))
-    profile = replace(PROFILES["paper"], restriction=replace(SHORT.restriction, mode="off"))
+    profile = replace(PROFILES["paper"], approach=None)
     own = controller_of(panda_model, paper_skin, profile, path)
     own.fixtures = fixtures(scene)
     plant = Plant(panda_model, scene, PlantParams(), brought_to(panda_model, path.point(0.0)), 1)

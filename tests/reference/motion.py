@@ -3,7 +3,7 @@
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.params import ReductionParams, RestrictionParams, TaskParams
+from pretouch.params import RestrictionParams, SpeedReduction, TaskParams
 from pretouch.types import Obstacles
 from tests.reference.geometry import Posture
 
@@ -11,14 +11,14 @@ from tests.reference.geometry import Posture
 class Fading:
     """Eqs. 3 and 4: the factor falls at once and rises no faster than from its last fall to 1 in l_max cycles."""
 
-    def __init__(self, params: ReductionParams) -> None:
-        self.params, self.low, self.since = params, 1.0, 0
+    def __init__(self, slow: SpeedReduction | None, l_max: int) -> None:
+        self.slow, self.l_max, self.low, self.since = slow, l_max, 1.0, 0
 
     def factor(self, nearest: float, heard: float) -> float:
         """Let one cycle pass and return the factor; `nearest` [m] may be infinite, `heard` is that of silence."""
-        fresh = min(heard, 1.0, nearest / self.params.d_max_m) if self.params.enabled else heard
+        fresh = min(heard, 1.0, nearest / self.slow.d_max_m) if self.slow else heard
         self.since += 1
-        faded = self.low + (1.0 - self.low) * min(1.0, self.since / self.params.l_max_cycles)
+        faded = self.low + (1.0 - self.low) * min(1.0, self.since / self.l_max)
         if fresh <= faded:
             self.low, self.since = fresh, 0
         return min(fresh, faded)
@@ -84,15 +84,15 @@ def limit(d: float, p: RestrictionParams) -> float:
         value = logistic(d / p.d_crit_m) - p.v_max_m_s
     else:
         value = logistic((d - p.d_crit_m) / (p.d_notice_m - p.d_crit_m))
-    return max(value, p.floor_m_s) if p.mode == "floor" else value
+    return max(value, p.floor_m_s) if p.rows == "floor" else value
 
 
 def approach_rows(
-    posture: Posture, obstacles: Obstacles, p: RestrictionParams
+    posture: Posture, obstacles: Obstacles, p: RestrictionParams | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """G (K', n), h (K',) and which obstacles (K',) they are of."""
     which, G, h = [], [], []
-    for k in range(len(obstacles.unit) if p.mode != "off" else 0):
+    for k in range(len(obstacles.unit) if p else 0):
         bound = limit(float(obstacles.body_distance[k]), p)
         if np.isfinite(bound):
             J = posture.jacobian(int(obstacles.link[k]), obstacles.body_point[k])

@@ -190,15 +190,15 @@ SINGULAR_PLACE = (
 PUSHES: dict[Span, tuple[float, float, float]] = {(30, 45): (0.0, 40.0, 0.0), (70, 75): (-35.0, 0.0, 20.0)}
 
 SHORT = changed(react={"decay_cycles": 25})
-HARD = changed(SHORT, restriction={"mode": "hard"})
-FLOOR = changed(restriction={"mode": "floor"})
-OFF = changed(restriction={"mode": "off"})
+HARD = changed(SHORT, approach={"rows": "hard"})
+FLOOR = changed(approach={"rows": "floor"})
+OFF = replace(QUICK, approach=None)
 FREE = changed(SHORT, task={"orientation": "free"})
-BLIND = replace(SHORT, perception=PROFILES["blind"].perception, restriction=PROFILES["blind"].restriction)
+BLIND = replace(SHORT, perception=PROFILES["blind"].perception, approach=PROFILES["blind"].approach)
 RAW = changed(SHORT, detect={"compare": "raw"})
 FAST = changed(task={"control_period_s": 0.001})
 AT_ONCE = changed(window={"samples": 2})
-HARD_AT_ONCE = changed(AT_ONCE, restriction={"mode": "hard"})
+HARD_AT_ONCE = changed(AT_ONCE, approach={"rows": "hard"})
 GENTLE = changed(AT_ONCE, detect={"compare": "raw"}, react={"compliance_m_s_n": 0.002})
 YIELDS = ("track", "react", "hold", "solved", "skipped", "filling", "A contact of")
 
@@ -216,7 +216,7 @@ SCENES = (
           meets=(*YIELDS, "infeasible", "allow no motion")),
     Scene("hard-128", HARD_AT_ONCE, 128, near=(0.25, 0.7), cycles=25, odd=0.0, seed=7),
     Scene("floor", FLOOR, cycles=80, near=(0.02, 0.6), circle=True),
-    Scene("floor-32", changed(AT_ONCE, restriction={"mode": "floor"}), 32, near=(0.02, 0.4), cycles=40, speed=0.5,
+    Scene("floor-32", changed(AT_ONCE, approach={"rows": "floor"}), 32, near=(0.02, 0.4), cycles=40, speed=0.5,
           seed=4, meets=("solved", "violated")),
     Scene("slack-32", SHORT, 32, near=(0.04, 0.3), cycles=80, pushes=PUSHES, fixtures=table, meets=(*YIELDS, "many")),
     Scene("slack-32-moving", AT_ONCE, 32, near=(0.02, 0.2), cycles=45, speed=0.5, swing=12.0, seed=5, meets=("many",)),
@@ -252,7 +252,7 @@ SCENES = (
     Scene("millisecond", FAST, near=(0.03, 0.5), pushes=PUSHES, swing=40.0, meets=YIELDS),
     Scene("millisecond-32", changed(FAST, window={"samples": 2}), 32, near=(0.02, 0.3), cycles=45,
           speed=0.2, swing=40.0, meets=("many",)),
-    Scene("millisecond-hard", changed(FAST, restriction={"mode": "hard"}), 32, near=(0.15, 0.8), swing=40.0, cycles=70,
+    Scene("millisecond-hard", changed(FAST, approach={"rows": "hard"}), 32, near=(0.15, 0.8), swing=40.0, cycles=70,
           meets=("track", "infeasible")),
 )  # fmt: skip
 
@@ -284,5 +284,5 @@ def singular(seed: int) -> Scene:
     first, fourth, sixth, last = rng.uniform((-2.5, -2.5, 0.5, -2.5), (2.5, -0.5, 3.0, 2.5))
     posture = (first, 0.0, rng.choice([-1, 1]) * np.pi / 2, fourth, 0.0, sixth, last)
     push = {(2, 9): tuple(20.0 * rng.normal(size=3))}
-    profile = changed(GENTLE, perception={"enabled": False}, restriction={"mode": "off"})
+    profile = replace(changed(GENTLE, perception={"enabled": False}), approach=None)
     return Scene(f"singular-{seed}", profile, posture=posture, error=0.0, pushes=push, cycles=6, seed=seed)

@@ -39,7 +39,7 @@ class ReferenceController:
         self.trust = modes.Trust(robot, profile.failure, model.description.qd_max)
         self.eyes = Eyes(model, skin, fixtures, profile.perception)
         self.touch = Touch(profile.detect, profile.window)
-        self.fading = Fading(profile.reduction)
+        self.fading = Fading(profile.slow, profile.task.restore_cycles)
         self.progress = Progress(path, profile.task)
         self.behaviour = modes.Behaviour()
         self.push, self.pushed_for = np.zeros(3), profile.react.decay_cycles
@@ -66,7 +66,7 @@ class ReferenceController:
         reacting = self.behaviour.mode is Mode.REACT
         wanted = self._yielding() if reacting else self.progress.velocity(x) * scale
 
-        G, h, restricted = approach_rows(posture, obstacles, p.restriction)
+        G, h, restricted = approach_rows(posture, obstacles, p.approach)
         problem, stop = self._pose(J, R, wanted, robot, G, h)
         qp = self._answer(problem, stop)
         if qp.outcome is QpOutcome.INFEASIBLE:
@@ -125,7 +125,8 @@ class ReferenceController:
             robot.q_commanded, robot.qd_commanded, model.q_min + margin, model.q_max - margin, arm.qd_max, arm.qdd_max,
             dt,
         )  # fmt: skip
-        weight = None if self.profile.restriction.mode == "hard" else self.profile.restriction.slack_weight
+        part = self.profile.approach
+        weight = None if part is None or part.rows == "hard" else part.slack_weight
         stop = brake(robot.qd_commanded, lower, upper, arm.qdd_max, dt)
         return Problem(H, f, lower, upper, G, h, weight), stop
 

@@ -85,7 +85,7 @@ class Recorder:
 def played(model, skin, profile="paper", side="-y", seed=0, seconds=6.0, until_reaction=None):
     """One trial of the static experiment: what it recorded, and what it left behind by the experiment's own record."""
     used = find_profile(profile)
-    used = replace(used, restriction=replace(used.restriction, mode="off"))
+    used = replace(used, approach=None)
     scene, path = static_scene("line", side, 25_000.0, seed), static_path("line", side)
     plant = Plant(model, scene, PlantParams(), brought_to(model, path.point(0.0)), seed)
     units = RangeFinders(plant, skin, RangeFinderParams(), seed)

@@ -185,15 +185,15 @@ def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: Li
         clock.page.ask(lambda: simulation.move_hand(np.array([1.0, 0.3, 0.3])), "hand", quiet=True)
         clock.turn(0.7)
         assert handle(clock.page, "d_crit [m]").value == typed
-        assert simulation.world.profile.restriction.d_crit_m == 0.1
+        assert simulation.world.profile.approach.d_crit_m == 0.1
     clock.turn(SETTLE_S)
-    assert simulation.world.profile.restriction.d_crit_m == 0.05
+    assert simulation.world.profile.approach.d_crit_m == 0.05
     assert clock.page.notice == ""
 
 
 @pytest.mark.parametrize(
     ("typed", "said"),
-    [("", ""), ("2.5", "Not done: reduction.l_max_cycles is '2.5': write a whole number."),
+    [("", ""), ("2.5", "Not done: task.restore_cycles is '2.5': write a whole number."),
      ("many", "Not done: l_max is 'many': give a number such as 200.")],
 )  # fmt: skip
 def test_what_is_no_value_goes_back_to_the_one_that_holds(clock: Clock, typed: str, said: str) -> None:

@@ -68,8 +68,8 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
         visitor.choose("Profile", "paper")
         visitor.tab("Table I")
         visitor.type("d_crit [m]", 0.9)
-        visitor.wait_for("notice", "Not done: RestrictionParams.d_notice_m")
-        assert simulation.world.profile.restriction.d_crit_m == 0.1
+        visitor.wait_for("notice", "Not done: ApproachRestriction.d_notice_m")
+        assert simulation.world.profile.approach.d_crit_m == 0.1
         visitor.wait_until(lambda: visitor.value("d_crit [m]") == "0.1")
         visitor.type("F_b [N]", 8)
         visitor.wait_until(lambda: simulation.world.profile.name == "paper:detect.f_base_n=8")
@@ -88,7 +88,7 @@ def test_a_number_typed_key_by_key_is_the_one_that_counts(tmp_path: Path) -> Non
         visitor.tab("Controller")
         visitor.tab("Table I")
         visitor.type_slowly("d_crit [m]", "0.05", delay=1.2)  # longer than what counts as typed: 0.0 is refused
-        visitor.wait_until(lambda: simulation.world.profile.name == "paper:restriction.d_crit_m=0.05")
+        visitor.wait_until(lambda: simulation.world.profile.name == "paper:approach.d_crit_m=0.05")
         visitor.type_slowly("F_b [N]", "12")
         visitor.wait_until(lambda: simulation.world.profile.detect.f_base_n == 12.0)
         visitor.field("F_b [N]").fill("")

@@ -54,7 +54,7 @@ def test_a_value_that_is_not_allowed_is_refused_with_the_way_out() -> None:
 @pytest.mark.parametrize(
     ("symbol", "text", "said"),
     [
-        ("l_max", "2.5", r"l_max_cycles is '2\.5': write a whole number"),
+        ("l_max", "2.5", r"restore_cycles is '2\.5': write a whole number"),
         ("d_crit", "0,05", r"d_crit is '0,05': give a number such as 0\.1\."),
         ("F_b", "nan", "f_base_n is nan: it must be finite"),
     ],
@@ -75,7 +75,7 @@ def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
     (f_b,) = (entry for entry in TABLE_1 if entry.symbol == "F_b")
     (l_max,) = (entry for entry in TABLE_1 if entry.symbol == "l_max")
     changed = with_name(l_max.write_text(f_b.write_text(PROFILES["paper"], "8.5"), "150"), "paper")
-    assert changed.name == "paper:reduction.l_max_cycles=150:detect.f_base_n=8.5"
+    assert changed.name == "paper:task.restore_cycles=150:detect.f_base_n=8.5"
     assert profile(changed.name) == changed
     fine = with_name(f_b.write_text(PROFILES["paper"], "8.12345678"), "paper")
     assert profile(fine.name) == fine

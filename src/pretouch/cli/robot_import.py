@@ -114,7 +114,7 @@ def _sticking_out(found: Imported) -> list[str]:
         return []
     return [
         f"Of the moving links {links[worst.link].name} sticks out of its capsules most, by"
-        f" {1000 * worst.sticks_out:.1f} mm: raise restriction.d_repulse_m by as much, or import with --cover."
+        f" {1000 * worst.sticks_out:.1f} mm: raise approach.d_repulse_m by as much, or import with --cover."
     ]
 
 

@@ -13,7 +13,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.types import RobotState
 
-_PROFILES = ("paper", "paper:restriction.mode=hard", "paper:restriction.mode=off", "pretouch")
+_PROFILES = ("paper", "paper:approach.rows=hard", "paper:approach=none", "pretouch")
 _RATE_HZ = 1000.0
 
 

@@ -1,4 +1,4 @@
-"""Restriction mode "braking": how fast the body may come near, so that it could stop, or touch gently.
+"""The braking curve: how fast the body may come near, so that it could stop, or touch gently.
 
 Along the normal the closing speed v, the object's own included, keeps v <= sqrt(v_c^2 + 2 a max(0, d - v tau - m)),
 from which it can brake at a to the touch speed v_c before the object is reached, tau later than measured and m nearer
@@ -18,6 +18,8 @@ from pretouch.groups import Chain, ObstacleArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _TANGENTS = 4
+MOST_ROWS = 2 + 2 * _TANGENTS
+"""Of a unit: of what it sees and one that fades, and those across the normal of each."""
 
 
 class Slots(NamedTuple):
@@ -43,8 +45,20 @@ def slots_init(units: int) -> Slots:
     )
 
 
+def widened(slots: Slots, units: int) -> Slots:
+    """Return a copy of the slots with room for at least so many units, those there were first."""
+    link, limit, across, normal, point = slots
+    half = len(link) // 2
+    if half >= units:
+        return Slots(link.copy(), limit.copy(), across.copy(), normal.copy(), point.copy())
+    wide = slots_init(units)
+    for wider, known in zip(wide, slots, strict=True):
+        wider[:half], wider[units : units + half] = known[:half], known[half:]
+    return wide
+
+
 class BrakingLimits(NamedTuple):
-    """Numbers of the braking curve, of the profile."""
+    """Numbers of the braking curve."""
 
     notice_m: float
     """Body distance from which on nothing is restricted [m]."""

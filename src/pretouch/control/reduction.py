@@ -1,6 +1,5 @@
 """Slowing the end-effector near obstacles: eqs. 3 and 4."""
 
-from pretouch.params import ReductionParams
 from pretouch.values import value
 
 
@@ -27,14 +26,15 @@ def faded_scale(scale: float, l_obs: int, l_max: int) -> float:
     return scale + (1.0 - scale) * min(1.0, l_obs / l_max)
 
 
-def reduce_speed(state: ReductionState, fresh: float, params: ReductionParams) -> tuple[float, ReductionState]:
+def reduce_speed(state: ReductionState, fresh: float, l_max: int) -> tuple[float, ReductionState]:
     """One cycle of eqs. 3 and 4: the factor on the end-effector velocity, and what to remember.
 
     The fresh factor holds at once where it is the smaller one, and rises no faster than eq. 4 lets it: whether the
     nearest obstacle vanished, was seen again farther away, or left another one in view, the speed never jumps up.
-    `fresh` is the factor of eq. 3 for what is seen now, 1 for nothing.
+    `fresh` is the factor of eq. 3 for what is seen now, or less where a unit is silent; 1 for nothing. `l_max` counts
+    the cycles until full speed is restored.
     """
-    faded = faded_scale(state.scale, state.cycles + 1, params.l_max_cycles)
+    faded = faded_scale(state.scale, state.cycles + 1, l_max)
     if fresh <= faded:
         return fresh, ReductionState(fresh, 0)
     return faded, ReductionState(state.scale, state.cycles + 1)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import ByName, compiled, entry, inlined
-from pretouch.groups import ObstacleArrays
+from pretouch.groups import NearArrays
 from pretouch.params import RestrictionParams
 from pretouch.robot.model import Kinematics
 from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles
@@ -46,7 +46,7 @@ def approach_limit(d: FloatArray, params: RestrictionParams) -> FloatArray:
     """Largest approach velocity of the closest point (K,) [m/s], eq. 7 of the paper; infinite: no restriction.
 
     V_a - V_max below d_repulse, V_b from there to d_notice. `d` (K,) [m] is from the body's surface and may be
-    negative. In mode floor the limit never lies below `floor_m_s`.
+    negative. With rows=floor the limit never lies below `floor_m_s`.
     """
     return _limits(d, approach_params(params))
 
@@ -66,7 +66,7 @@ class ApproachParams(NamedTuple):
 def approach_params(params: RestrictionParams) -> ApproachParams:
     """Return what eqs. 5-7 take of the parameters."""
     p = params
-    least = p.floor_m_s if p.mode == "floor" else -np.inf
+    least = p.floor_m_s if p.rows == "floor" else -np.inf
     return ApproachParams(p.v_max_m_s, p.beta, p.d_crit_m, p.d_repulse_m, p.d_notice_m, least)
 
 
@@ -96,11 +96,11 @@ def approach_rows(
     which joint moves which link.
     """
     p, n, count = params, len(kin.anchor), len(obstacles.unit)
-    if p.mode == "off" or count == 0:
+    if count == 0:
         return ApproachRows(np.zeros((0, n)), np.zeros(0), soft=False), np.zeros(0, np.int64)
     G, h, which = np.empty((count, n)), np.empty(count), np.empty(count, np.int64)
-    found = _rows(kin, moved_by, obstacles, approach_params(p), Rows(G, h, which))
-    return ApproachRows(G[:found], h[:found], p.mode in ("slack", "floor")), which[:found]
+    found = _rows(kin, moved_by, obstacles, Rows(G, h, which), approach_params(p))
+    return ApproachRows(G[:found], h[:found], p.rows != "hard"), which[:found]
 
 
 class Rows(NamedTuple):
@@ -115,21 +115,19 @@ class Rows(NamedTuple):
 
 
 @entry
-def _rows(
-    kin: Kinematics, moved_by: BoolArray, obstacles: ByName[ObstacleArrays], p: ApproachParams, rows: Rows
-) -> int:
-    return rows_into(kin, moved_by, obstacles, p, rows)
+def _rows(kin: Kinematics, moved_by: BoolArray, near: ByName[NearArrays], rows: Rows, p: ApproachParams) -> int:
+    return rows_into(kin, moved_by, near, p, rows)
 
 
 @inlined
-def rows_into(kin: Kinematics, moved_by: BoolArray, obstacles: ObstacleArrays, p: ApproachParams, rows: Rows) -> int:
+def rows_into(kin: Kinematics, moved_by: BoolArray, near: NearArrays, p: ApproachParams, rows: Rows) -> int:
     """Write the rows of `approach_rows` and the indices of their obstacles; return how many."""
     anchor, axis = kin.anchor, kin.axis
-    link, point, direction = obstacles.link, obstacles.body_point, obstacles.direction
+    link, point, direction = near.link, near.body_point, near.direction
     G, h, which = rows.G, rows.h, rows.which
     found = 0
     for k in range(len(link)):
-        limit = _limit(obstacles.body_distance[k], p)
+        limit = _limit(near.body_distance[k], p)
         if limit == np.inf:
             continue
         h[found], which[found] = limit, k

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.cholesky import forward
 from pretouch.compiled import compiled
-from pretouch.params.anticipation import REGIONS, AnticipationParams
+from pretouch.params.anticipation import REGIONS, BrakingParams, EffectiveMass
 from pretouch.types import FloatArray
 
 
@@ -23,10 +23,11 @@ class TouchLimits(NamedTuple):
     """Largest speed, whatever the mass [m/s]."""
 
 
-def touch_limits(params: AnticipationParams) -> TouchLimits:
-    """Return what `touch_speed` takes of the parameters."""
-    region = REGIONS[params.body_region]
-    return TouchLimits(params.allowed_force_n, region.stiffness_n_m, region.mass_kg, params.touch_speed_max_m_s)
+def touch_limits(params: BrakingParams) -> TouchLimits:
+    """Return what `touch_speed` takes of the parameters; without an effective mass only the largest speed counts."""
+    mass = params.effective_mass or EffectiveMass()
+    region = REGIONS[mass.body_region]
+    return TouchLimits(mass.allowed_force_n, region.stiffness_n_m, region.mass_kg, params.touch_speed_max_m_s)
 
 
 @compiled

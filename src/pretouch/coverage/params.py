@@ -19,11 +19,11 @@ class CoverageParams(Checked):
     arm_speed_m_s: Positive = 0.3
     """Speed v_a at which the arm moves towards it [m/s]: the task's."""
     deceleration_m_s2: Positive = 0.6
-    """Deceleration a with which the arm brakes [m/s^2] (`AnticipationParams.deceleration_m_s2`)."""
+    """Deceleration a with which the arm brakes [m/s^2] (`BrakingParams.deceleration_m_s2`)."""
     rate_hz: Positive = 50.0
     """Readings of a unit a second [Hz]: VL53L1X, short mode."""
     latency_s: NonNegative = 0.04
-    """Time from a measurement to a motion [s]: `AnticipationParams.latency_s` less the period of a reading."""
+    """Time from a measurement to a motion [s]: `BrakingParams.latency_s` less the period of a reading."""
     range_m: Positive = 1.3
     """Farthest target that fills the cone [m]: VL53L1X, short mode."""
     way_m: Positive = 0.8

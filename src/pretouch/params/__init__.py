@@ -3,14 +3,16 @@
 A profile is a frozen set of them. `replace(profile, ...)` of the standard library makes a variant, checked again.
 """
 
-from pretouch.params.anticipation import AnticipationParams as AnticipationParams
 from pretouch.params.anticipation import BodyRegion as BodyRegion
-from pretouch.params.baselines import BaselineParams as BaselineParams
+from pretouch.params.anticipation import BrakingParams as BrakingParams
+from pretouch.params.anticipation import EffectiveMass as EffectiveMass
+from pretouch.params.anticipation import NullSpaceMotion as NullSpaceMotion
+from pretouch.params.anticipation import Tangential as Tangential
 from pretouch.params.failure import FailureParams as FailureParams
 from pretouch.params.localisation import LocalisationParams as LocalisationParams
-from pretouch.params.near import ReductionParams as ReductionParams
-from pretouch.params.near import RestrictionMode as RestrictionMode
 from pretouch.params.near import RestrictionParams as RestrictionParams
+from pretouch.params.near import RowKind as RowKind
+from pretouch.params.near import SpeedReduction as SpeedReduction
 from pretouch.params.perception import PerceptionParams as PerceptionParams
 from pretouch.params.reaction import AdmittanceParams as AdmittanceParams
 from pretouch.params.reaction import ClampParams as ClampParams

@@ -1,4 +1,4 @@
-"""Parameters of anticipation: what nearness does to motion beyond the paper. Each switch is off in `paper`."""
+"""Parameters of what nearness does to motion beyond the paper: the braking curve, and motion in the null space."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -37,9 +37,48 @@ REGIONS: dict[BodyRegion, Region] = {
 
 
 @dataclass(frozen=True)
-class AnticipationParams(Checked):
-    """What is done before a contact. The braking curve itself is switched on by `restriction.mode=braking`."""
+class EffectiveMass(Checked):
+    """A touch speed that follows from the arm's mass along the normal and from what a body region bears."""
 
+    body_region: BodyRegion = "face"
+    """Which body region's figures the touch speed is for: by default that which gives the least speed, for a unit
+    cannot tell what it sees."""
+    region_force_n: NonNegative = 0.0
+    """Allowed force in place of the region's [N]; 0: the region's own, with its factor for a short contact."""
+    force_fraction: Fraction = 0.25
+    """Part of the allowed force that a touch may reach in the spring model: ours. Half is for what the arm pushes on
+    until it has felt the contact, and half of what is left for figures that public copies disagree on."""
+    rotor_inertia_kg_m2: NonNegative = 0.1
+    """Inertia of each drive as felt at its joint, added to the arm's [kg m^2] (model data of this package)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.force_fraction == 0:
+            raise ParameterError("EffectiveMass.force_fraction is 0, so nothing could be touched: give more.")
+
+    @property
+    def allowed_force_n(self) -> float:
+        """Force that a touch may reach in the spring model [N]."""
+        region = REGIONS[self.body_region]
+        return self.force_fraction * (self.region_force_n or region.force_n * region.transient)
+
+
+@dataclass(frozen=True)
+class Tangential(Checked):
+    """Slowing a point near an object across the normal too."""
+
+    distance_m: Positive = 0.1
+    """Body distance below which it is slowed [m]."""
+    speed_m_s: Positive = 0.1
+    """Speed across the normal at the surface [m/s]; from there it grows linearly to the task's: ours."""
+
+
+@dataclass(frozen=True)
+class BrakingParams(Checked):
+    """The braking curve, in place of eqs. 5-7."""
+
+    d_notice_m: Positive = 0.6
+    """Body distance from which an approach is restricted [m] (Table I)."""
     deceleration_m_s2: Positive = 0.6
     """Deceleration a of the braking curve [m/s^2]: that with which the curve binds the task's 0.3 m/s from about 0.1 m
     on, Table I's d_crit. From 0.15 to 1 it changes the time to a touch by 0.6 s and its force by nothing
@@ -55,58 +94,31 @@ class AnticipationParams(Checked):
     than it was tried. Force against it: docs/explanation/anticipation.md."""
     retreat_max_m_s: NonNegative = 0.1
     """Fastest retreat that an object which comes nearer may ask for [m/s]: ours."""
-    effective_mass: bool = False
-    """Whether the touch speed follows from the arm's mass along the normal and the body region's force; off, it is
-    `touch_speed_max_m_s`."""
-    body_region: BodyRegion = "face"
-    """Which body region's figures the touch speed is for: by default that which gives the least speed, for a unit
-    cannot tell what it sees."""
-    region_force_n: NonNegative = 0.0
-    """Allowed force in place of the region's [N]; 0: the region's own, with its factor for a short contact."""
-    force_fraction: Fraction = 0.25
-    """Part of the allowed force that a touch may reach in the spring model: ours. Half is for what the arm pushes on
-    until it has felt the contact, and half of what is left for figures that public copies disagree on."""
-    rotor_inertia_kg_m2: NonNegative = 0.1
-    """Inertia of each drive as felt at its joint, added to the arm's [kg m^2] (model data of this package)."""
-    closing_speed: bool = False
-    """Whether the object's own closing speed is taken off what an approach may be; needs
-    `perception.closing_speed`."""
-    closing_deadband_m_s: NonNegative = 0.05
-    """Closing speed that is not counted [m/s]: what range noise of 20 mm leaves in the estimate for a thing at rest."""
-    tangential: bool = False
-    """Whether a point near an object is slowed across the normal too."""
-    tangential_distance_m: Positive = 0.1
-    """Body distance below which it is [m]."""
-    tangential_speed_m_s: Positive = 0.1
-    """Speed across the normal at the surface [m/s]; from there it grows linearly to the task's: ours."""
     tighten_m_s2: Positive = 3.0
     """Rate at which a row may slow the arm [m/s^2]. A row appears at the speed the arm has: no step in the command."""
     loosen_m_s2: Positive = 1.0
     """Rate at which a row gives way, when its object is gone or not heard of too [m/s^2]: the task's acceleration."""
-    null_space: bool = False
-    """Whether links before the hand move away from what is near where that leaves the task as it is."""
-    null_distance_m: Positive = 0.25
+    slack_weight: Positive = 1000.0
+    """Weight of a row's squared violation against the squared task error of eq. 2, both in (m/s)^2."""
+    effective_mass: EffectiveMass | None = None
+    """Whether the touch speed follows from the arm's mass; none: it is `touch_speed_max_m_s`."""
+    closing_deadband_m_s: NonNegative | None = None
+    """Closing speed of the object itself that is not counted [m/s]; more is taken off what an approach may be, which
+    needs `perception.closing_speed`. 0.05 is what range noise of 20 mm leaves in the estimate for a thing at rest.
+    None: the object's own speed does not count."""
+    tangential: Tangential | None = None
+    """Whether a point near an object is slowed across the normal too."""
+
+
+@dataclass(frozen=True)
+class NullSpaceMotion(Checked):
+    """Links before the hand move away from what is near where that leaves the task as it is."""
+
+    distance_m: Positive = 0.25
     """Body distance below which they do [m]."""
-    null_speed_m_s: Positive = 0.1
+    speed_m_s: Positive = 0.1
     """Speed of the closest point at no distance, growing with the square of what is missing of it [m/s]."""
-    null_joint_rad_s: Positive = 0.5
+    joint_rad_s: Positive = 0.5
     """Largest such joint velocity (norm) [rad/s]."""
-    null_rate_rad_s2: Positive = 1.0
+    rate_rad_s2: Positive = 1.0
     """Rate at which it changes [rad/s^2]."""
-    blocked_after_s: Positive = 2.0
-    """How long the arm has to be kept from its path before the mode's reason says so [s]."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.body_region not in REGIONS:
-            raise ParameterError(
-                f"AnticipationParams.body_region is {self.body_region!r}: choose from {', '.join(REGIONS)}."
-            )
-        if self.force_fraction == 0:
-            raise ParameterError("AnticipationParams.force_fraction is 0, so nothing could be touched: give more.")
-
-    @property
-    def allowed_force_n(self) -> float:
-        """Force that a touch may reach in the spring model [N]."""
-        region = REGIONS[self.body_region]
-        return self.force_fraction * (self.region_force_n or region.force_n * region.transient)

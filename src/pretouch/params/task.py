@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pretouch.checks import Check, Checked, NonNegative, Positive
+from pretouch.checks import Check, Checked, NonNegative, Positive, PositiveCount
 
 Orientation = Literal["free", "hold"]
 
@@ -16,6 +16,8 @@ class TaskParams(Checked):
     """Largest end-effector speed along the path [m/s] (paper, IV-A)."""
     acceleration_m_s2: Positive = 1.0
     """Rate at which the speed along the path may grow [m/s^2]; slowing is not limited by it."""
+    restore_cycles: PositiveCount = 200
+    """Control cycles l_max of eq. 4 until full speed is back after what slowed the arm is gone (Table I, 100 Hz)."""
     position_gain_1_s: NonNegative = 2.0
     """Velocity towards the path per metre off it [1/s]."""
     off_path_m: Positive = 0.1
@@ -37,6 +39,8 @@ class TaskParams(Checked):
     joint velocities."""
     mid_joint_time_s: Positive = 5.0
     """Time t in which the mid-joint velocity would bring the joints to their middle [s]."""
+    blocked_after_s: Positive | None = None
+    """How long something near has to keep the hand from its path before the mode's reason says so [s]; none: never."""
     control_period_s: Annotated[float, Check(low=1e-4, high=1.0)] = 0.01
     """Period of the controller [s] (paper: 100 Hz)."""
     position_margin_rad: NonNegative = 0.01

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from pretouch.control.approach_restriction import notice_m, of_table_i
 from pretouch.reporting.course import Course
 from pretouch.reporting.numbers import durations, least, least_of_each
 
@@ -48,9 +49,9 @@ def distances(course: Course) -> Distances:
     ]
     ee = least(course.ee_distance)
     lasted, body = durations(course.time), least_of_each(course.link_distance)
-    crit = course.of_runs(lambda run: run.profile.restriction.d_crit_m)
-    notice = course.of_runs(lambda run: run.profile.restriction.d_notice_m)
-    d_max = course.of_runs(lambda run: run.profile.reduction.d_max_m)
+    crit = course.of_runs(lambda run: of_table_i(run.profile.approach).d_crit_m)
+    notice = course.of_runs(lambda run: notice_m(run.profile.approach))
+    d_max = course.of_runs(lambda run: run.profile.d_max_m)
     return Distances(
         body=min(found, key=lambda nearest: nearest.distance, default=None),
         ee=None if ee is None else Nearest("", ee[0], float(course.time[ee[1]])),

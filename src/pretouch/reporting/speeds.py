@@ -33,7 +33,7 @@ class Speeds:
 
 def speeds(course: Course) -> Speeds:
     """Speeds of a recording."""
-    near = course.ee_distance < course.of_runs(lambda run: run.profile.reduction.d_max_m)
+    near = course.ee_distance < course.of_runs(lambda run: run.profile.d_max_m)
     tracking = course.mode == MODES.index(Mode.TRACK)
     factor = course.speed_scale[tracking & np.isfinite(course.speed_scale)]
     return Speeds(

@@ -10,8 +10,7 @@ import numpy as np
 
 from pretouch.composition import differences
 from pretouch.errors import RecordingError
-from pretouch.params import RestrictionMode
-from pretouch.profiles import PROFILES, Profile
+from pretouch.profiles import PROFILES, Profile, restriction_mode, restriction_modes, with_restriction
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
 from pretouch.viewer.action_queue import ActionQueue
@@ -97,8 +96,8 @@ class Controls:
         self._choice(profile, self._choose_profile, "profile", lambda: self._base)
         speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=docs["TaskParams", "speed_m_s"])
         self._number(speed, self._choose_speed, "path speed", lambda: self._profile.task.speed_m_s)
-        mode = gui.add_dropdown("Restrictions", get_args(RestrictionMode), hint=docs["RestrictionParams", "mode"])
-        self._choice(mode, self._choose_restrictions, "restrictions", lambda: self._profile.restriction.mode)
+        mode = gui.add_dropdown("Restrictions", restriction_modes(), hint=docs["Profile", "approach"])
+        self._choice(mode, self._choose_restrictions, "restrictions", lambda: restriction_mode(self._profile))
         with gui.add_folder("Table I", expand_by_default=False):
             for entry in TABLE_1:
                 # as text: of a field for numbers that is emptied, viser tells nobody
@@ -174,8 +173,8 @@ class Controls:
     def _choose_speed(self, speed: float) -> None:
         self._change(replace(self._profile, task=replace(self._profile.task, speed_m_s=float(speed))))
 
-    def _choose_restrictions(self, mode: RestrictionMode) -> None:
-        self._change(replace(self._profile, restriction=replace(self._profile.restriction, mode=mode)))
+    def _choose_restrictions(self, mode: str) -> None:
+        self._change(with_restriction(self._profile, mode))
 
     def _text_of(self, entry: TableEntry) -> str:
         return entry.text(self._profile)

@@ -61,15 +61,15 @@ class TableEntry:
 
 
 TABLE_1: tuple[TableEntry, ...] = (
-    TableEntry("d_max", "m", ("reduction.d_max_m", "detect.d_max_m")),
+    TableEntry("d_max", "m", ("slow.d_max_m", "detect.d_max_m")),
     TableEntry("d_min", "m", ("detect.d_min_m",)),
-    TableEntry("l_max", "cycles", ("reduction.l_max_cycles",)),
-    TableEntry("V_max", "m/s", ("restriction.v_max_m_s",)),
-    TableEntry("d_repulse", "m", ("restriction.d_repulse_m",)),
-    TableEntry("d_crit", "m", ("restriction.d_crit_m",)),
-    TableEntry("d_notice", "m", ("restriction.d_notice_m",)),
+    TableEntry("l_max", "cycles", ("task.restore_cycles",)),
+    TableEntry("V_max", "m/s", ("approach.v_max_m_s",)),
+    TableEntry("d_repulse", "m", ("approach.d_repulse_m",)),
+    TableEntry("d_crit", "m", ("approach.d_crit_m",)),
+    TableEntry("d_notice", "m", ("approach.d_notice_m",)),
     TableEntry("alpha", "", ("window.alpha",)),
-    TableEntry("beta", "", ("restriction.beta",)),
+    TableEntry("beta", "", ("approach.beta",)),
     TableEntry("lambda", "", ("window.lambda_",)),
     TableEntry("F_std", "N", ("detect.f_std_n",)),
     TableEntry("F_d", "N", ("detect.f_d_n",)),
@@ -82,7 +82,8 @@ TABLE_1: tuple[TableEntry, ...] = (
 def field_docs() -> Mapping[tuple[str, str], str]:
     """What the source says of each field of the parameters, by (class, field), on one line; inherited ones too."""
     docs: dict[tuple[str, str], str] = {}
-    for kind in {type(group) for profile in PROFILES.values() for group in groups_of(profile)}:
+    kinds: set[type] = {type(group) for profile in PROFILES.values() for group in groups_of(profile)}
+    for kind in kinds | {Profile}:
         for base in reversed(kind.__mro__):
             docs |= {(kind.__name__, field): said for field, said in _told(base).items()}
     return MappingProxyType(docs)

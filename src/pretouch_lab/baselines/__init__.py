@@ -1,1 +1,1 @@
-"""What Pretouch is compared with: detectors and cues as parts by entry points, and the profiles of each benchmark."""
+"""What Pretouch is compared with: parts by entry points, and the profiles of each benchmark."""

@@ -5,7 +5,6 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
@@ -20,7 +19,7 @@ from pretouch_lab.tables import avoidance_tables
 from pretouch_lab.trial import Record, play
 
 NAME = "avoidance"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 40.0
 _VISITS_S = ((4.0, 14.0), (20.0, 30.0))

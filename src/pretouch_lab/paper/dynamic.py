@@ -3,7 +3,6 @@
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode
 from pretouch.profiles import profile
 from pretouch.sim.paper_scenes import dynamic_pushes
 from pretouch.sim.pushes import Push, Pusher
@@ -18,7 +17,7 @@ from pretouch_lab.tables import dynamic_tables
 from pretouch_lab.trial import Record, play
 
 NAME = "dynamic"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 30.0
 _NOTICE_S = 0.3

@@ -5,7 +5,6 @@ from itertools import product
 
 import numpy as np
 
-from pretouch.params import RestrictionMode
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.traces import mean_over
@@ -18,7 +17,7 @@ from pretouch_lab.tables import shown_controllers, static_tables
 from pretouch_lab.trial import Record, play
 
 NAME = "static"
-DEFAULT_RESTRICTIONS: RestrictionMode = "off"
+DEFAULT_RESTRICTIONS = "off"
 """The paper "purposefully allows contact"; at Table I's values its restrictions forbid it."""
 
 TRAJECTORIES = ("circle", "line")

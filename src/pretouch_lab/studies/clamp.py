@@ -7,7 +7,6 @@ import mujoco
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode
 from pretouch.sim.board import PANDA_SIDE
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.sim.pushes import Holder, Push
@@ -22,7 +21,7 @@ from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, play
 
 NAME = "clamp"
-DEFAULT_RESTRICTIONS: RestrictionMode = "off"
+DEFAULT_RESTRICTIONS = "off"
 """Restricted, the arm keeps away from a board it sees: here it is to be caught."""
 HELD_S = (0.2, 3.0)
 """How long the push lasts [s]: over when the arm reaches the board, or going on."""

@@ -4,7 +4,6 @@ from itertools import product
 
 import numpy as np
 
-from pretouch.params import RestrictionMode
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import expected_range
 from pretouch.profiles import profile
@@ -26,7 +25,7 @@ _ORIENTATIONS_DEG = (1.0, 2.0, 5.0, 10.0, 20.0)
 _CALIBRATED = ((1.0, 0.1), (3.0, 0.5))
 """What a calibration by the units' IMUs leaves."""
 _LARGE = ((10.0, 0.0), (50.0, 0.0), (0.0, 5.0), (0.0, 20.0))
-AVOIDING: RestrictionMode = "hard"
+AVOIDING = "hard"
 """Restrictions that keep the arm off the board, in trials that ask how near it comes."""
 
 _STIFFNESS_N_PER_M = 25_000.0

@@ -8,7 +8,6 @@ import numpy as np
 
 from pretouch.control.path import WayPoints
 from pretouch.control.posture import brought_to
-from pretouch.params import RestrictionMode
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
 from pretouch.sim.hand import HandGoal
@@ -24,7 +23,7 @@ from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, play
 
 NAME = "pinch"
-DEFAULT_RESTRICTIONS: RestrictionMode = "off"
+DEFAULT_RESTRICTIONS = "off"
 """Restricted, an arm whose units see the limb would keep it from being caught."""
 SPEEDS_M_S = (0.1, 0.2)
 """Speeds along the path [m/s]."""

@@ -6,7 +6,6 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle, Path
-from pretouch.params import RestrictionMode
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -27,7 +26,7 @@ from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, play
 
 NAME = "vision"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 SCENES = ("room", "board", "hand")
 SENSING = ("skin", "camera", "both")
 VIEWS = {"front": (1.6, 0.0, 1.0), "behind": (0.5, 1.6, 0.5)}
@@ -108,7 +107,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     )
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     row = cell.row(seed)
-    return row | results(record, scene, model, setup.profile.reduction.d_max_m), record
+    return row | results(record, scene, model, setup.profile.d_max_m), record
 
 
 def results(record: Record, scene: Scene, model: RobotModel, d_max: float) -> Row:

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from pretouch.checks import Checked, Positive
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.errors import ExperimentError
 from pretouch.profiles import Profile
+from pretouch.renamed import path_today
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import avoidance, dynamic, static
@@ -42,9 +44,10 @@ class Measure:
 
     def check(self, name: str) -> None:
         """Refuse a parameter of the profile that cannot change anything here."""
-        group = name.partition(".")[0]
+        today = path_today(name)
+        group = today.partition(".")[0]
         of_profile = group in Profile.__dataclass_fields__
-        if self.groups is not None and of_profile and not {group, name} & set(self.groups):
+        if self.groups is not None and of_profile and not {group, today} & set(self.groups):
             of = f"take one of {', '.join(self.groups)}, or" if self.groups else "take one of scene, or"
             raise ExperimentError(f"The parameter {name} changes nothing in {self.name}: {of} the experiment static.")
 
@@ -123,7 +126,7 @@ _FALSE = {"false_detections": "reactions that nothing caused"}
 
 
 def _static_cost(setting: Setting) -> float:
-    slow = setting.profile.restriction.mode in ("hard", "slack", "floor")
+    slow = isinstance(setting.profile.approach, ApproachRestriction)
     return (1.6 if slow else 0.3) + 0.006 * (setting.units or 7)
 
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.control.path import WayPoints
-from pretouch.params import RestrictionMode
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -21,7 +20,7 @@ from pretouch_lab.tables import median, plain
 from pretouch_lab.trial import Record, play
 
 NAME = "creeping"
-_MODES: tuple[RestrictionMode, ...] = ("off", "slack", "hard", "floor")
+_MODES = ("off", "slack", "hard", "floor")
 
 _ARRIVES_S, _LEAVES_S = 3.0, 33.0
 """The hand stays as long as an arm at 0.02 m/s, the limit of mode `floor`, needs for the 0.6 m of d_notice [s]."""

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.path import line
 from pretouch.control.qp import solve, task_cost
 from pretouch.control.restriction import approach_rows
 from pretouch.control.task import task
-from pretouch.params import RestrictionMode
+from pretouch.perception.closest import no_obstacles
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "dropout"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 READINGS = (0, 1, 2, 3, 5, 10, 20)
 """How many readings in a row are lost."""
@@ -216,10 +217,12 @@ def free_answer(step: ControlStep, upright: FloatArray, params: Profile, model: 
     if step.qp.outcome is QpOutcome.SKIPPED:
         return None
     kin = model.kinematics(step.q)
-    rows, _ = approach_rows(kin, model.moved_by, step.obstacles, params.restriction)
+    part = params.approach  # rows of another part would be other ones
+    approach = part if isinstance(part, ApproachRestriction) else ApproachRestriction(rows="hard")
+    rows, _ = approach_rows(kin, model.moved_by, no_obstacles() if part is None else step.obstacles, approach)
     goal = task(model.ee_jacobian(kin), step.desired_velocity, kin.rotation[model.ee], upright, params.task)
     cost, fastest = task_cost(*goal, step.q, model.q_mid, params.task), model.description.qd_max
-    return solve(cost, -fastest, fastest, rows, params.restriction.slack_weight, np.zeros(model.n)).qd
+    return solve(cost, -fastest, fastest, rows, approach.slack_weight, np.zeros(model.n)).qd
 
 
 _MEASURES = (

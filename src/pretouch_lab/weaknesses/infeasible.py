@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pretouch.control.approach_restriction import of_table_i
 from pretouch.control.joint_box import joint_box, joint_limits
 from pretouch.control.qp import solve, task_cost
 from pretouch.control.reduction import speed_scale
@@ -119,19 +120,20 @@ def answers(model: RobotModel, params: Profile, q: FloatArray, obstacles: Obstac
     The task moves the end-effector along the unit vector `heading` (3,), slowed by eq. 3, without turning it.
     """
     arm, kin, task = model.description, model.kinematics(q), params.task
-    scale = speed_scale(float(obstacles.ee_distance.min()), params.reduction.d_max_m)
+    scale = speed_scale(float(obstacles.ee_distance.min()), params.d_max_m)
     twist = np.concatenate([task.speed_m_s * scale * heading, np.zeros(3)])
     cost = task_cost(model.ee_jacobian(kin), twist, q, model.q_mid, task)
-    hard, _ = approach_rows(kin, model.moved_by, obstacles, replace(params.restriction, mode="hard"))
+    approach = of_table_i(params.approach)
+    hard, _ = approach_rows(kin, model.moved_by, obstacles, replace(approach, rows="hard"))
     limits = joint_limits(model, 0.0, task.control_period_s)
-    rest, weight = np.zeros(model.n), params.restriction.slack_weight
+    rest, weight = np.zeros(model.n), approach.slack_weight
     boxes = {"velocity": (-arm.qd_max, arm.qd_max), "rest": joint_box(q, rest, limits)}
     soft = ApproachRows(hard.G, hard.h, soft=True)
     slack = {name: float(solve(cost, *box, soft, weight, rest).slack.max(initial=0.0)) for name, box in boxes.items()}
     failed = {
         name: solve(cost, *box, hard, weight, rest).outcome is not QpOutcome.SOLVED for name, box in boxes.items()
     }
-    every_row, _ = approach_rows(kin, model.moved_by, obstacles, replace(params.restriction, d_notice_m=1e3))
+    every_row, _ = approach_rows(kin, model.moved_by, obstacles, replace(approach, d_notice_m=1e3))
     fastest = float(np.abs(every_row.G[0]) @ arm.qd_max)
     link = int(obstacles.link[0])
     return Answers(link, fastest, failed["velocity"], failed["rest"], slack["velocity"], slack["rest"])

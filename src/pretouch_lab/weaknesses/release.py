@@ -7,7 +7,6 @@ import numpy as np
 
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode
 from pretouch.profiles import profile
 from pretouch.sim.plant import TOUCH_N
 from pretouch.sim.pushes import FACES, Holder, Push, Pusher, against
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "release"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 HELD_S = (0.3, 1.0, 2.0, 3.0, 4.0)
 """How long each push lasts [s]."""

@@ -3,7 +3,6 @@
 import numpy as np
 
 from pretouch.control.path import WayPoints
-from pretouch.params import RestrictionMode
 from pretouch.sim.scene import Box, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.cell import Cell, Context, Grid
@@ -14,7 +13,7 @@ from pretouch_lab.tables import median, plain
 from pretouch_lab.trial import Record, play
 
 NAME = "retreating"
-_MODES: tuple[RestrictionMode, ...] = ("off", "slack")
+_MODES = ("off", "slack")
 _OWN_PROFILE = "slowing-only"
 """Run beside those asked for: the slow-down without what the thresholds do."""
 

@@ -7,9 +7,9 @@ from textwrap import fill
 
 import numpy as np
 
+from pretouch.control.approach_restriction import of_table_i
 from pretouch.control.path import Path, line
-from pretouch.params import RestrictionMode
-from pretouch.profiles import profile
+from pretouch.profiles import profile, restriction_mode
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import HandGoal, HandScript, point_on_arm
 from pretouch.sim.paper_scenes import static_path, static_scene
@@ -19,7 +19,7 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import Column, TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
-from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.cell import NAMES_MODE, Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper import static
 from pretouch_lab.paper.static import least_sensed
@@ -62,13 +62,13 @@ def cells(grid: Grid) -> list[Cell]:
 
     A profile that is named with a mode is taken as it is, once.
     """
-    tunings: list[tuple[str, RestrictionMode]] = []
+    tunings: list[tuple[str, str]] = []
     for name in grid.profiles:
         found = profile(name)
         if not found.perception.enabled:
             continue
-        if ":restriction.mode=" in name:
-            tunings.append((name, found.restriction.mode))
+        if NAMES_MODE.search(name):
+            tunings.append((name, restriction_mode(found)))
             continue
         values = product(SLACK_WEIGHTS, V_MAX_M_S)
         tunings += [(name + _tuning(v_max, weight), "slack") for weight, v_max in values]
@@ -103,7 +103,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         hand=None if still else person(seed, context.model),
     )
     record = play(setup, _done(_STATIC_S if still else _HAND_S))
-    tuning = setup.profile.restriction
+    tuning = of_table_i(setup.profile.approach)
     row = {
         **cell.row(seed),
         "v_max_m_s": tuning.v_max_m_s,

@@ -123,7 +123,7 @@ def seen(record: Record, context: Context, room: Fixtures, params: Profile) -> R
         "arm_fraction": rounded(of_arm.mean(), 5),
         "room_fraction": rounded((predicted & ~of_arm).mean(), 5),
         "unpredicted_fraction": rounded((targets & ~predicted).mean(), 5),
-        "cut_fraction": rounded((either < params.reduction.d_max_m).mean(), 5),
+        "cut_fraction": rounded((either < params.d_max_m).mean(), 5),
         "obstacle_fraction": rounded(taken.mean(), 5),
         "obstacle_fraction_of_units": dict(
             zip(context.skin.ids, (rounded(v, 5) for v in taken.mean(axis=0)), strict=True)

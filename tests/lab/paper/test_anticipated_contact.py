@@ -12,7 +12,7 @@ from pretouch_lab.paper import static
 from pretouch_lab.trial import Setup, play
 
 SEED = 1000
-A = PROFILES["pretouch"].anticipation
+A = PROFILES["pretouch"].approach
 
 
 @pytest.mark.slow

@@ -21,8 +21,8 @@ def test_each_value_arrives_where_its_name_says():
     }  # fmt: skip
     made = built("paper", StaticScene(), values, 1003)
     assert made.profile.detect.f_base_n == 8.25
-    assert made.profile.restriction.mode == "floor"
-    assert not made.profile.reduction.enabled
+    assert made.profile.approach.rows == "floor"
+    assert made.profile.slow is None
     assert (made.plant.mass_error, made.plant.payload_max_kg) == (0.1, 0.5)
     assert (made.sensing.latency_s, made.sensing.period_s) == (0.1, 0.1)
     assert (len(made.skin), made.scene.side, made.seed) == (3, "+y", 1003)

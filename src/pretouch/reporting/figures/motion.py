@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pretouch.control.approach_restriction import notice_m, of_table_i
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.course import Course
 from pretouch.reporting.figures.marks import BLUE, GREEN, GREY, INK, LINES, RED, draw, legend, panels, plain
@@ -39,8 +40,8 @@ def _distances(axes: Axes, course: Course) -> None:
     for k, unit in enumerate(course.units):
         colour, style = LINES[k % len(LINES)]
         draw(axes, course.time, course.body_distance[:, k], color=colour, ls=style, lw=1.1, label=plain(unit))
-    d_crit = course.of_runs(lambda run: run.profile.restriction.d_crit_m)
-    d_notice = course.of_runs(lambda run: run.profile.restriction.d_notice_m)
+    d_crit = course.of_runs(lambda run: of_table_i(run.profile.approach).d_crit_m)
+    d_notice = course.of_runs(lambda run: notice_m(run.profile.approach))
     draw(axes, course.time, d_notice, color=INK, lw=0.9, ls=(0, (1, 3)), label="d_notice")
     draw(axes, course.time, d_crit, color=RED, lw=0.9, ls=(0, (1, 3)), label="d_crit")
     axes.axhline(0.0, color=INK, lw=0.8)
@@ -58,7 +59,7 @@ def path_figure(course: Course) -> Figure:
     for i, name in enumerate(MODES):
         if np.any(mode == i):
             axes.plot(*_where(ee, mode == i), color=_COLOURS[name], lw=1.5, label=name.name)
-    d_max = course.of_runs(lambda run: run.profile.reduction.d_max_m)
+    d_max = course.of_runs(lambda run: run.profile.d_max_m)
     near = np.flatnonzero(course.ee_distance < d_max)
     point = course.nearest_point[near[:: max(1, len(near) // _SENSED)]]
     if len(point):

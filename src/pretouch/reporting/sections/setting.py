@@ -35,6 +35,8 @@ _RUNS = 30
 """Stretches of one profile and path that are listed."""
 _PROFILE_COLUMNS = 6
 """Profiles that are shown side by side."""
+_ABSENT = "none"
+"""Stands for a parameter of a part that a profile has not."""
 _UNITS = {
     "_m_s_n": "(m/s)/N", "_kg_m2": "kg m²", "_rad_s2": "rad/s²", "_nm_s": "Nm s/rad", "_m_s2": "m/s²",
     "_nm_rad": "Nm/rad", "_rad_s": "rad/s", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_nm": "Nm", "_kg": "kg",
@@ -147,7 +149,7 @@ def unit_of(name: str) -> str:
 def _value(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return f"({', '.join(map(_value, value))})"
     return f"{value:.6g}".replace("-", "−") if isinstance(value, float) else str(value)
 

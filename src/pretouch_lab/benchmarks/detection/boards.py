@@ -63,7 +63,7 @@ def meet_board(cell: BoardCell, baseline: Baseline, file: Path) -> None:
         model=model(),
         skin=sensing.skin,
         believed=None if sensing.believed is sensing.skin else sensing.believed,
-        profile=replace(found, restriction=replace(found.restriction, mode="off")),
+        profile=replace(found, approach=None),
         scene=static_scene(cell.trajectory, cell.side, cell.stiffness_n_per_m, cell.seed),
         path=static_path(cell.trajectory, cell.side),
         seed=cell.seed,

@@ -3,7 +3,6 @@
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.params import RestrictionMode
 from pretouch.profiles import profile
 from pretouch.sim.pushes import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
@@ -16,7 +15,7 @@ from pretouch_lab.tables import controller, median, plain, share
 from pretouch_lab.trial import Record, play
 
 NAME = "between"
-DEFAULT_RESTRICTIONS: RestrictionMode = "slack"
+DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 12.0
 _REACH_M = 0.25

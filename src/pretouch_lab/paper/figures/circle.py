@@ -20,7 +20,7 @@ def circle_figure(trace: RunRecord, profile: Profile) -> Figure:
     plane, course, aside = figure.subplots(3, 1, height_ratios=[1.9, 0.8, 0.6])
     off = np.linalg.norm(trace.ee_position - trace.path_position, axis=1)
     disturbed = slowed(trace) | (off > _OFF_PATH_M)
-    avoiding = disturbed & near(trace, profile.reduction.d_max_m)
+    avoiding = disturbed & near(trace, profile.d_max_m)
     recovering = disturbed & ~avoiding
     _plane(plane, trace, avoiding, recovering, profile)
     course.plot(trace.time, np.linalg.norm(trace.ee_velocity, axis=1), color="black", lw=1, label="speed [m/s]")
@@ -43,7 +43,7 @@ def _plane(axes: Axes, trace: RunRecord, avoiding: BoolArray, recovering: BoolAr
     axes.plot(*_where(ee, ~avoiding & ~recovering), color="black", lw=0.8, label="free")
     axes.plot(*_where(ee, avoiding), color="tab:red", lw=2.2, zorder=4, label="avoidance")
     axes.plot(*_where(ee, recovering), color="tab:green", lw=2.2, ls=(0, (2, 1)), zorder=3, label="recovery")
-    within = np.linalg.norm(trace.sensed_point - ee[:, None], axis=2) < profile.reduction.d_max_m
+    within = np.linalg.norm(trace.sensed_point - ee[:, None], axis=2) < profile.d_max_m
     points = trace.sensed_point[within & avoiding[:, None]][::_POINTS]
     axes.plot(*points[:, 1:].T, "o", color="limegreen", mec="black", mew=0.4, ms=4, ls="", label="sensed objects")
     axes.set_aspect("equal")

@@ -17,8 +17,8 @@ def interaction_figure(trace: RunRecord, units: tuple[str, ...], profile: Profil
     figure = Figure(figsize=(10, 8.4), layout="constrained")
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     distances(top, trace, units)
-    d_max = profile.reduction.d_max_m
-    if profile.reduction.enabled or isinstance(profile.detect, MovingThresholds):
+    d_max = profile.d_max_m
+    if profile.slow is not None or isinstance(profile.detect, MovingThresholds):
         top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"activation, d_max {d_max:g} m")
     top.set(ylim=(0.0, 1.4), title=f"Three pushes in thirty seconds, profile {profile.name}")
     force_with_thresholds(middle, trace, Y, profile)

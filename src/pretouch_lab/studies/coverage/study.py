@@ -47,7 +47,7 @@ COUNT = 24
 _NEAR_M = 0.1
 """A sensed point so near the ball's surface shows the ball [m]."""
 _DRIVES_S = 0.016
-"""Time from a command to a motion [s]: the drives' set-point filter (`AnticipationParams.latency_s`)."""
+"""Time from a command to a motion [s]: the drives' set-point filter (`BrakingParams.latency_s`)."""
 _FAST_M_S = 0.1
 """Speed of the arm towards what it meets that is counted as fast [m/s]."""
 _POSTURES = 40

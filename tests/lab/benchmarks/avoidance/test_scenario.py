@@ -63,7 +63,7 @@ def test_friction_of_all_joints_grows_by_one_factor():
 def test_baselines_and_their_other_tunings_are_profiles():
     for name in (*BASELINES, *ABLATED, *TUNINGS):
         assert profile(profile_text(name))
-    assert profile(profile_text("paper-off")).restriction.mode == "off"
+    assert profile(profile_text("paper-off")).approach is None
 
 
 def test_an_unknown_baseline_or_scenario_is_refused_with_those_there_are():

@@ -5,23 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.control.baselines import (
-    baseline_motion,
-    ding_limit,
-    ding_rows,
-    repulsion,
-    repulsive_velocity,
-    slowed_joints,
-)
+from pretouch.control.interface import MotionRequest
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.setup import MotionRequest, motion_setup
 from pretouch.errors import ParameterError
-from pretouch.params import BaselineParams
 from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.profiles import profile
 from pretouch.types import Obstacles, QpOutcome, RobotState
+from pretouch_lab.baselines.ding import Ding, ding_limit, ding_rows
+from pretouch_lab.baselines.flacco import Flacco, repulsion, repulsive_velocity, slowed_joints
+from tests.control.motions import Mover
 
-P = BaselineParams()
+FLACCO, DING = Flacco(), Ding()
 
 
 def obstacles_at(points, ee=(0.0, 0.0, 0.0)):
@@ -43,34 +37,34 @@ def test_repulsion_of_the_farthest_and_of_deep_penetration_is_finite():
 
 
 def test_the_hand_is_moved_away_from_a_single_point():
-    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.0, 0.2, 0.0]]), P)
+    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.0, 0.2, 0.0]]), FLACCO)
     np.testing.assert_allclose(found, [0.0, -0.2, 0.0], atol=1e-12)
 
 
 def test_of_two_points_the_nearest_gives_the_size_and_both_the_direction():
-    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.2, 0.0, 0.0], [0.0, 0.2, 0.0]]), P)
+    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.2, 0.0, 0.0], [0.0, 0.2, 0.0]]), FLACCO)
     np.testing.assert_allclose(found, -0.2 / np.sqrt(2) * np.array([1.0, 1.0, 0.0]), atol=1e-12)
 
 
 def test_the_size_of_the_hand_is_taken_off_the_distance():
-    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.3, 0.0, 0.0]]), replace(P, flacco_size_m=0.1))
+    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.3, 0.0, 0.0]]), replace(FLACCO, size_m=0.1))
     np.testing.assert_allclose(found, [-0.2, 0.0, 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("points", [[], [[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0]]])
 def test_nothing_or_what_is_on_both_sides_gives_no_repulsion(points):
-    np.testing.assert_allclose(repulsive_velocity(np.zeros(3), obstacles_at(points), P), np.zeros(3), atol=1e-12)
+    np.testing.assert_allclose(repulsive_velocity(np.zeros(3), obstacles_at(points), FLACCO), np.zeros(3), atol=1e-12)
 
 
 def test_joints_are_slowed_towards_the_obstacle_only():
-    lower, upper = slowed_joints(np.array([[0.5, -0.1, 0.0]]), np.array([0.2]), np.array([2.0, 2.0, 2.0]), P)
+    lower, upper = slowed_joints(np.array([[0.5, -0.1, 0.0]]), np.array([0.2]), np.array([2.0, 2.0, 2.0]), FLACCO)
     np.testing.assert_allclose(upper, [1.0, 2.0, 2.0])
     np.testing.assert_allclose(lower, [-2.0, -1.0, -2.0])
 
 
 def test_of_several_points_the_strictest_limit_holds():
     motion, distance = np.array([[1.0, -1.0], [1.0, 1.0]]), np.array([0.2, 0.0])
-    lower, upper = slowed_joints(motion, distance, np.array([2.0, 2.0]), P)
+    lower, upper = slowed_joints(motion, distance, np.array([2.0, 2.0]), FLACCO)
     left = 2.0 * (1 - 0.99752738)
     np.testing.assert_allclose(upper, [left, left], rtol=1e-5)
     np.testing.assert_allclose(lower, [-2.0, -1.0])
@@ -79,21 +73,21 @@ def test_of_several_points_the_strictest_limit_holds():
 def test_ding_limits_by_numbers():
     distance = np.array([-0.1, 0.17, 0.195, 0.22, 0.24, 0.25, 0.275, 0.2999, 0.3, 2.0])
     expected = [-0.2, -0.2, -0.1, 0.0, 0.0, 0.0, 0.1, 0.1996, np.inf, np.inf]
-    np.testing.assert_allclose(ding_limit(distance, P), expected, atol=1e-12)
+    np.testing.assert_allclose(ding_limit(distance, DING), expected, atol=1e-12)
 
 
 def test_ding_rows_by_numbers():
     approach = np.array([[1.0, 0.0], [0.0, 1.0]])
-    rows, which = ding_rows(approach, np.array([0.2, 0.5]), P)
-    assert which.tolist() == [0]
+    rows = ding_rows(approach, np.array([0.2, 0.5]), DING)
+    assert rows.which.tolist() == [0]
     # w = 1/0.2 and 1/0.5
     np.testing.assert_allclose(rows.G, [[1.0, 0.0], [5.0 / 7.0, 2.0 / 7.0]])
     np.testing.assert_allclose(rows.h, [-0.08, 0.0])
-    assert rows.soft
+    assert rows.weight > 0
 
 
 def test_far_obstacles_can_be_kept_out_of_the_weighted_sum():
-    rows, _ = ding_rows(np.eye(2), np.array([0.2, 0.5]), replace(P, ding_weighted_m=0.3))
+    rows = ding_rows(np.eye(2), np.array([0.2, 0.5]), replace(DING, weighted_m=0.3))
     np.testing.assert_allclose(rows.G[-1], [1.0, 0.0])
 
 
@@ -101,7 +95,7 @@ def test_far_obstacles_can_be_kept_out_of_the_weighted_sum():
 def test_no_motion_that_ding_allows_lowers_the_weighted_sum_of_the_distances(distance, seed):
     rng = np.random.default_rng(seed)
     d = np.array(distance)
-    rows, _ = ding_rows(rng.standard_normal((len(d), 7)), d, P)
+    rows = ding_rows(rng.standard_normal((len(d), 7)), d, DING)
     qd = rng.standard_normal(7)
     allowed = qd - max(0.0, rows.G[-1] @ qd) / (rows.G[-1] @ rows.G[-1]) * rows.G[-1]
     C = -rows.G[-1]  # gradient of sum d_i / d_i(now)
@@ -110,9 +104,9 @@ def test_no_motion_that_ding_allows_lowers_the_weighted_sum_of_the_distances(dis
 
 @pytest.mark.parametrize("places", [(0.2, 0.1, 0.25, 0.3), (0.1, 0.2, 0.3, 0.3)])
 def test_distances_of_ding_have_to_grow(places):
-    names = ("ding_repulse_m", "ding_zero_low_m", "ding_zero_high_m", "ding_notice_m")
+    names = ("repulse_m", "zero_low_m", "zero_high_m", "notice_m")
     with pytest.raises(ParameterError, match="they must grow"):
-        BaselineParams(**dict(zip(names, places, strict=True)))
+        Ding(**dict(zip(names, places, strict=True)))
 
 
 class Arm:
@@ -125,6 +119,7 @@ class Arm:
         self.ee = self.kin.position[model.ee]
         self.robot = RobotState(0.0, q, np.zeros(7), q, np.zeros(7), np.zeros(7), None)
         self.limits = joint_limits(model, 0.01, 0.01)
+        self.mover = Mover(model, self.limits, self.profile, 1)
         aside = np.array([[0.0, 1.0, 0.0]])
         points = (self.ee + np.array(offset))[None] if offset is not None else None
         self.obstacles = (
@@ -136,13 +131,11 @@ class Arm:
     def move(self, velocity, hold=False):
         """Answer to a velocity once the acceleration box has let the arm get there."""
         robot = self.robot
+        request = MotionRequest(np.array(velocity), self.kin.rotation[self.model.ee], hold)
         for _ in range(60):
-            qp, which, limit, _, after = baseline_motion(
-                motion_setup(self.model, self.limits, self.profile), self.kin, robot, self.obstacles,
-                MotionRequest(np.array(velocity), self.kin.rotation[self.model.ee], hold),
-            )  # fmt: skip
-            robot = replace(robot, qd=qp.qd, qd_commanded=qp.qd)
-        return qp, which, limit, after
+            motion = self.mover.step(self.kin, robot, self.obstacles, request)
+            robot = replace(robot, qd=motion.qp.qd, qd_commanded=motion.qp.qd)
+        return motion.qp, motion.restricted, motion.approach_limit, motion.ee_velocity_commanded
 
 
 @pytest.mark.parametrize("mode", ["flacco", "ding"])
@@ -166,7 +159,7 @@ def test_ding_retreats_as_fast_as_its_limit_says(panda_model):
     qp, which, limit, _ = arm.move([0.0, 0.3, 0.0])
     assert qp.outcome is QpOutcome.SOLVED
     assert which.tolist() == [0]
-    np.testing.assert_allclose(limit, ding_limit(np.array([d]), P))
+    np.testing.assert_allclose(limit, ding_limit(np.array([d]), DING))
     J = panda_model.jacobian(arm.kin, int(arm.obstacles.link[0]), arm.obstacles.body_point[0])[:3]
     assert arm.obstacles.direction[0] @ J @ qp.qd == pytest.approx(limit[0], abs=5e-3)
 
@@ -180,10 +173,8 @@ def test_a_held_arm_brakes_whatever_is_near(panda_model, mode):
 
 def test_an_arm_at_rest_begins_its_retreat_as_fast_as_its_joints_allow(panda_model):
     arm = Arm(panda_model, "ding", [0.0, 0.15, 0.0])
-    qp, *_ = baseline_motion(
-        motion_setup(panda_model, arm.limits, arm.profile), arm.kin, arm.robot, arm.obstacles,
-        MotionRequest(np.array([0.0, 0.3, 0.0]), arm.kin.rotation[panda_model.ee]),
-    )  # fmt: skip
+    request = MotionRequest(np.array([0.0, 0.3, 0.0]), arm.kin.rotation[panda_model.ee])
+    qp = arm.mover.step(arm.kin, arm.robot, arm.obstacles, request).qp
     J = panda_model.jacobian(arm.kin, int(arm.obstacles.link[0]), arm.obstacles.body_point[0])[:3]
     assert arm.obstacles.direction[0] @ J @ qp.qd < -0.02
     fastest = np.abs(qp.qd) / (0.01 * arm.limits.qdd_max)

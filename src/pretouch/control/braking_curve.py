@@ -1,0 +1,120 @@
+"""The part `braking` of a profile: the rows of `control.braking` in place of eqs. 5-7."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pretouch.cholesky import factor
+from pretouch.compiled import entry, flattened
+from pretouch.control.braking import (
+    MOST_ROWS,
+    BrakingLimits,
+    Mass,
+    Slots,
+    braking_rows,
+    slots_init,
+    widened,
+)
+from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restriction
+from pretouch.control.motion_entry import Allowed, Ended, Fixed, Step, motion_within
+from pretouch.control.restriction import Rows
+from pretouch.control.touch_speed import TouchLimits, touch_limits
+from pretouch.groups import Chain, ObstacleArrays
+from pretouch.params import BrakingParams
+from pretouch.robot.model import Kinematics
+from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState
+
+
+@dataclass(frozen=True)
+class BrakingCurve(BrakingParams, Restriction, name="braking"):
+    """How fast the body may come near, so that it could stop, or touch gently."""
+
+    State = Slots
+
+    def on(self, body: MotionBody) -> Restriction:
+        """Return the same with what compiled code takes of the parameters."""
+        return _OnBody(self, body)
+
+    def init(self, body: MotionBody) -> Slots:
+        """Return the rows with nothing near."""
+        return slots_init(body.units)
+
+    def step(
+        self, state: Slots, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
+        request: MotionRequest,
+    ) -> tuple[CompiledRows, Slots]:  # fmt: skip
+        """Return the rows of `braking_rows`, and how tight each is."""
+        return _OnBody(self, body).step(state, body, kin, robot, obstacles, request)
+
+
+_NO_MASS = np.zeros((0, 0))
+
+
+class _OnBody(Restriction):
+    """A `BrakingCurve` that works for one body."""
+
+    def __init__(self, params: BrakingParams, body: MotionBody) -> None:
+        p, across, mass = params, params.tangential, params.effective_mass
+        self._weight = p.slack_weight
+        self._rotors = None if mass is None else mass.rotor_inertia_kg_m2 * np.eye(body.model.n)
+        self._limits = BrakingLimits(
+            p.d_notice_m, p.deceleration_m_s2, p.latency_s, p.margin_m, p.retreat_max_m_s,
+            np.inf if p.closing_deadband_m_s is None else p.closing_deadband_m_s,
+            -np.inf if across is None else across.distance_m, 0.0 if across is None else across.speed_m_s,
+            body.task.speed_m_s, p.tighten_m_s2, p.loosen_m_s2, body.limits.period,
+        )  # fmt: skip
+        self._numbers = flattened(touch_limits(p), self._limits, self._weight)
+
+    def step(
+        self, state: Slots, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
+        request: MotionRequest,
+    ) -> tuple[CompiledRows, Slots]:  # fmt: skip
+        slots = widened(state, request.units)
+        count, most = len(obstacles.unit), MOST_ROWS * (len(slots.link) // 2)
+        room = np.empty((most, len(robot.q))), np.empty(most), np.empty(count, WHOLE)
+        counts, mass = False, _NO_MASS
+        if self._rotors is not None and count > 0:
+            counts, mass = True, body.model.mass_matrix(robot.q) + self._rotors
+        numbers = self._numbers
+        if request.touch is not None:
+            # a touch speed whatever the mass, and no heed of what moves by itself
+            still = self._limits._replace(deadband_m_s=np.inf)
+            numbers = flattened(TouchLimits(np.inf, 1.0, 1.0, request.touch), still, self._weight)
+        return CompiledRows(
+            _motion, room, self._weight, (obstacles.unit, obstacles.closing_speed, *slots, counts, mass, *numbers)
+        ), slots
+
+
+class _Seen(NamedTuple):
+    """What the rows need to know of obstacles beside where they are."""
+
+    unit: IntArray
+    """(K,) index of the unit that shows each."""
+    closing_speed: FloatArray
+    """(K,) speed of the object itself towards the body [m/s]."""
+
+
+class _Slowing(NamedTuple):
+    """What the rows are made of."""
+
+    touching: TouchLimits
+    limits: BrakingLimits
+    weight: float
+
+
+@entry
+def _motion(
+    step: Step, rows: Rows, fixed: Fixed, seen: _Seen, slots: Slots, mass_counts: bool, mass: FloatArray, p: _Slowing
+) -> Ended:
+    """Change the slots, and write the rows and the answer within them."""
+    kin, near, L = step.kin, step.near, np.eye(len(step.robot.q))
+    obstacles = ObstacleArrays(
+        seen.unit, near.link, near.body_point, near.direction, near.body_distance, seen.closing_speed
+    )
+    chain = Chain(kin.anchor, kin.axis, fixed.arm.moved_by, step.robot.qd_commanded)
+    factored = Mass(mass_counts and factor(mass, L), L)
+    count, found = braking_rows(slots, obstacles, chain, factored, p.touching, p.limits, rows)
+    none = np.empty(0)
+    allowed = Allowed(rows.G[:found], rows.h[:found], rows.which[:count], p.weight, none, none, False)
+    return motion_within(step, allowed, fixed)

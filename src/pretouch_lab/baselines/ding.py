@@ -1,0 +1,101 @@
+"""Ding and Thomas, "Collision avoidance with proximity servoing for redundant serial robot manipulators", ICRA 2020.
+
+Limits on the approach of each closest point, and a weighted sum of the distances that must not fall.
+
+What of it is reproduced, and what not, stands in docs/explanation/baselines.md. The values are those in the code of the
+authors of arXiv 2510.24683, who compare it with their own controller.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pretouch.checks import NonNegative, Positive
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
+from pretouch.errors import ParameterError
+from pretouch.profiles import profile
+from pretouch.robot.model import Kinematics
+from pretouch.types import FloatArray, Obstacles, RobotState
+
+_WEIGHT = 1000.0
+"""Of a row's squared violation, as that of the paper's rows. The rows are soft: as hard ones, which they are in a box
+without acceleration limits, they ask an arm at rest for a retreat that no arm can have reached after one period."""
+_NEAREST_M = 0.01
+"""Least distance that weighs an obstacle [m], so that 1/d stays finite in contact."""
+_LIGHT = 1e-9
+"""Least sum of the weights [1/m]."""
+
+
+@dataclass(frozen=True)
+class Ding(Restriction, name="ding"):
+    """Limits on the approach, and a sum of distances that must not fall."""
+
+    repulse_m: Positive = 0.17
+    """Body distance below which the retreat is fastest [m]."""
+    zero_low_m: Positive = 0.22
+    """Body distance from which no retreat is asked [m]."""
+    zero_high_m: Positive = 0.25
+    """Body distance up to which no approach is allowed [m]."""
+    notice_m: Positive = 0.3
+    """Body distance from which an approach is not limited [m]."""
+    approach_m_s: Positive = 0.2
+    """Largest approach, just within `notice_m` [m/s]."""
+    retreat_m_s: Positive = 0.2
+    """Fastest retreat, below `repulse_m` [m/s]."""
+    weighted_m: NonNegative = 4.0
+    """Body distance up to which an obstacle enters the weighted sum of distances that must not fall [m]: as published
+    all that is seen. With 0.3 it holds where the approach is limited, and with 0 not at all."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        p = self
+        if not p.repulse_m < p.zero_low_m <= p.zero_high_m < p.notice_m:
+            raise ParameterError(
+                "Ding.repulse_m, zero_low_m, zero_high_m, notice_m are"
+                f" {p.repulse_m}, {p.zero_low_m}, {p.zero_high_m}, {p.notice_m}: they must grow."
+            )
+
+    def step(
+        self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
+        request: MotionRequest,
+    ) -> tuple[Restricted, None]:  # fmt: skip
+        """Return rows for the points that are near, and the one of all."""
+        near = zip(obstacles.link, obstacles.body_point, obstacles.direction, strict=True)
+        rows = [d @ body.model.jacobian(kin, int(link), at)[:3] for link, at, d in near]
+        return ding_rows(np.reshape(rows, (-1, body.model.n)), obstacles.body_distance, self), None
+
+
+def ding_limit(distance: FloatArray, params: Ding) -> FloatArray:
+    """Largest approach (K,) [m/s] at body distances (K,) [m], infinite from `notice_m` on; negative: a retreat.
+
+    Piecewise linear: full retreat, none, neither, and the full approach at the outer end.
+    """
+    p = params
+    places = [p.repulse_m, p.zero_low_m, p.zero_high_m, p.notice_m]
+    limit = np.interp(distance, places, [-p.retreat_m_s, 0.0, 0.0, p.approach_m_s])
+    return np.where(distance < p.notice_m, limit, np.inf)
+
+
+def ding_rows(rows: FloatArray, distance: FloatArray, params: Ding) -> Restricted:
+    """Rows G qd <= h, the last of which belongs to no point.
+
+    With C = -rows, how each distance changes with the joints, and w = 1 / d, the last is -w^T C qd <= 0: the weighted
+    sum of the distances must not fall. It is divided by the sum of w, so that its violation is a speed too.
+
+    Args:
+        rows: (K, n) speed of each of K points towards its obstacle per joint velocity [m].
+        distance: (K,) of each point [m].
+        params: distances and speeds.
+    """
+    limit = ding_limit(distance, params)
+    which, seen = np.flatnonzero(np.isfinite(limit)), distance < params.weighted_m
+    weights = seen / np.maximum(distance, _NEAREST_M)
+    weighted = weights @ rows / max(float(weights.sum()), _LIGHT)
+    return Restricted(np.vstack([rows[which], weighted]), np.append(limit[which], 0.0), which, _WEIGHT)
+
+
+DING = replace(
+    profile("paper"), name="ding", slow=None, approach=Ding(), detect=MovingThresholds(f_d_n=0.0)
+)  # fmt: skip
+"""The profile `ding`: contacts are detected as without proximity, and nothing else slows the arm."""
