@@ -196,8 +196,6 @@ def ended(place: Path, how: str, after: float, number: int | None) -> tuple[floa
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM, str(place), how], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env=environment,
-        # a background job of a shell inherits that Ctrl-C is ignored: the program would never end
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:  # fmt: skip
         last = 0.0
         for told in process.stdout:
