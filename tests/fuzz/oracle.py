@@ -125,7 +125,10 @@ class Oracle:
         numbers = np.concatenate((r.q, r.qd, r.q_commanded, r.qd_commanded))
         if not (np.abs(numbers) < LARGEST).all():  # what is no number is not below
             return "unusable"
-        if not (abs(inputs.stamp) < LATEST and abs(r.stamp) < LATEST) or (np.abs(r.qd_commanded) >= 2 * self.qd_max).any():
+        if (
+            not (abs(inputs.stamp) < LATEST and abs(r.stamp) < LATEST)
+            or (np.abs(r.qd_commanded) >= 2 * self.qd_max).any()
+        ):
             return "unusable"
         if inputs.stamp < self.stamp:
             return "backwards"
