@@ -7,6 +7,7 @@ import pytest
 
 from pretouch.control.braking import slots_init, widened
 from pretouch.faults import MOST_POINTS, sound_points
+from pretouch.params import OutsidePoints
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.realtime import warm_up
@@ -46,7 +47,7 @@ def test_a_profile_that_takes_no_points_does_the_same_to_the_bit_with_and_withou
 
 
 def test_pretouch_without_a_source_does_the_same_to_the_bit_whatever_is_kept_of_points(panda_model, paper_skin):
-    off = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside_points=0))
+    off = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=None))
     arms = [Arm(panda_model, paper_skin, profile) for profile in (PRETOUCH, off)]
     for _ in range(150):
         assert same(*(turn(arm, None) for arm in arms))
@@ -177,7 +178,7 @@ def test_a_state_recorded_before_there_were_outside_points_still_opens(panda_mod
 def test_another_number_of_places_begins_anew(panda_model, paper_skin):
     arm = Arm(panda_model, paper_skin, PRETOUCH)
     turn(arm, seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
-    one = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside_points=1))
+    one = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=OutsidePoints(per_link=1)))
     other = controller_of(panda_model, paper_skin, one)
     assert other.adopt(arm.state, arm.controller).outside is None
     arm.state, arm.controller = other.adopt(arm.state, arm.controller), other

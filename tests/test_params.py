@@ -15,8 +15,10 @@ from pretouch.control.braking_curve import BrakingCurve
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
     ClampParams,
+    ClosingSpeed,
     FailureParams,
     GiveUpParams,
+    OutsidePoints,
     PerceptionParams,
     PinchParams,
     RestrictionParams,
@@ -36,7 +38,8 @@ from pretouch.profiles import (
 )
 
 SETS = [
-    PerceptionParams(), TaskParams(), SpeedReduction(), RestrictionParams(), ThresholdParams(), FailureParams(),
+    PerceptionParams(), OutsidePoints(), ClosingSpeed(), TaskParams(), SpeedReduction(), RestrictionParams(),
+    ThresholdParams(), FailureParams(),
     DecayingVelocity(), Admittance(), ClampParams(), PinchParams(), GiveUpParams(),
 ]  # fmt: skip
 NUMBERS = [
@@ -77,7 +80,7 @@ def test_the_paper_profile_is_table_i():
 
 def test_blind_is_the_paper_without_proximity():
     paper, blind = profile("paper"), profile("blind")
-    assert not blind.perception.enabled
+    assert blind.perception is None
     assert blind.approach is None
     same = replace(blind, name="paper", perception=paper.perception, approach=paper.approach)
     assert same == paper
@@ -92,9 +95,15 @@ def test_an_unknown_profile_lists_those_there_are():
         profile("papre")
 
 
+MAY_BE_NONE = {"self_margin_m"}
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, None, "fast"])
 @pytest.mark.parametrize(("params", "name"), NUMBERS, ids=name_of)
 def test_every_number_must_be_a_finite_number(params: object, name: str, value: object):
+    if value is None and name in MAY_BE_NONE:
+        assert getattr(replace(params, **{name: None}), name) is None
+        return
     with pytest.raises(ParameterError, match=rf"{type(params).__name__}\.{name} is {value}: it must be "):
         replace(params, **{name: value})
 
@@ -107,8 +116,7 @@ def test_no_number_but_beta_may_be_negative(params: object, name: str):
 
 @pytest.mark.parametrize(("params", "name"), COUNTS, ids=name_of)
 def test_counts_are_whole_and_not_zero(params: object, name: str):
-    may_be_none = name == "outside_points"
-    for value in (-1 if may_be_none else 0, 100.5):
+    for value in (0, 100.5):
         with pytest.raises(ParameterError, match=name):
             replace(params, **{name: value})
 
@@ -123,6 +131,7 @@ def test_choices_are_listed_when_refused(params: object, name: str):
     ("params", "change", "other"),
     [
         (PerceptionParams(), {"slow_after_s": 0.3}, "silent_after_s"),
+        (OutsidePoints(), {"slow_after_s": 0.4}, "silent_after_s"),
         (RestrictionParams(), {"d_notice_m": 0.1}, "d_crit_m"),
         (ThresholdParams(), {"d_max_m": 0.05}, "d_min_m"),
         (ThresholdParams(), {"f_base_n": 4.0}, "f_d_n"),

@@ -17,6 +17,8 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RobotState
 from tests.following_arm import DT, Arm
 from tests.fuzz.invariants import same
+from tests.golden.script import Script
+from tests.golden.streams import CROOK_NM, FOLDING, HAND, Stream, controller, model
 
 RIGHT = 1  # unit of the paper's skin that looks along -y in the ready posture
 OURS = PROFILES["pretouch"]
@@ -200,6 +202,23 @@ def test_what_holds_it_does_not_keep_a_caught_arm_from_opening(arm: Pushed):
     start = arm.ee()[1]
     arm.run(45, seen={left: 0.04})
     assert arm.ee()[1] - start > 0.02, "though it sees the hand that pushed it on the way back"
+
+
+@pytest.mark.parametrize("change", ["", ":react.clamp=none"])
+def test_self_clamping_is_looked_for_while_a_contact_lasts_whether_other_clamps_are_or_not(change: str):
+    fold = Script(170, start=FOLDING)
+    fold.move(100, 200, {3: -0.2})
+    # a tap on the hand begins the reaction; 0.15 s later something is squeezed in the crook of the arm
+    fold.push(model(), 150, 152, HAND, (0.0, 25.0, 0.0))
+    fold.torque[165:] += CROOK_NM
+    controlled = controller(Stream(f"pretouch{change}", lambda: fold, path=((0.21, 0.0, 0.38), (0.09, 0.0, 0.1))))
+    state, steps = controlled.init(fold.state(0)), []
+    for i in range(170):
+        step, state = controlled.step(state, fold.inputs(i))
+        steps.append(step)
+    assert modes(steps[150:]) == {Mode.REACT}
+    assert "Yielding to a contact" in steps[164].reason
+    assert "panda_link2 and panda_link5" in steps[-1].reason
 
 
 def test_a_gap_of_the_estimate_is_no_push_and_leaves_nothing_behind(arm: Pushed):

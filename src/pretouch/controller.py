@@ -5,17 +5,18 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.contact.detector import Body, Sample
-from pretouch.contact.reaction import ReactionInputs
+from pretouch.contact.detector import Body, Detection, Sample
+from pretouch.contact.reaction import ReactionInputs, ReactionMotion
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.control import path as paths
 from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.motion import MotionState, joint_motion, restriction_on
+from pretouch.control.motion import Motion, MotionState, joint_motion, restriction_on
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.control.setup import motion_setup
 from pretouch.errors import RobotStateError, SkinError
@@ -33,12 +34,22 @@ from pretouch.faults import (
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.perception.obstacles import TrackState, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
-from pretouch.perception.perceive import perceive, perception_setup, silent_units
+from pretouch.perception.perceive import Perception, nothing_seen, perceive, perception_setup, silent_units
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
-from pretouch.robot.model import RobotModel
+from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, FloatArray, Inputs, Mode, QpOutcome, RobotState
+from pretouch.types import (
+    ControlStep,
+    FloatArray,
+    Inputs,
+    Mode,
+    QpOutcome,
+    RangeReadings,
+    RobotState,
+    SeenPoints,
+    TouchReadings,
+)
 from pretouch.values import value
 
 
@@ -86,10 +97,11 @@ class Controller:
             if model.link_index(unit.link) != link:
                 raise SkinError(f"The skin was made for another arm than {model.description.name}: make one for it.")
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
-        self._sight = perception_setup(model, skin, fixtures, profile.perception)
-        self._moved = MotionBody(model, len(skin), self.limits, profile.task)
-        self._approach = restriction_on(profile.approach, self._moved)
-        self._setup = motion_setup(self._moved, profile.null_space, profile.failure.solver_iterations)
+        see = profile.perception
+        self._sight = None if see is None else perception_setup(model, skin, fixtures, see)
+        self._motion_body = MotionBody(model, len(skin), self.limits, profile.task)
+        self._approach = restriction_on(profile.approach, self._motion_body)
+        self._setup = motion_setup(self._motion_body, profile.null_space, profile.failure.solver_iterations)
         self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
         self._detector = profile.detect.on(self.body)
         self._units = len(skin)
@@ -130,7 +142,7 @@ class Controller:
         if len(state.command) != self.model.n or len(state.tracks.point) != len(self.skin):
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.window.samples == theirs.window.samples and type(mine.detect) is type(theirs.detect)
-        same_points = mine.perception.outside_points == theirs.perception.outside_points
+        same_points = _points_per_link(mine) == _points_per_link(theirs)
         way = state.path
         if self.path is not before.path:
             way = paths.joined(self.path, self.model.kinematics(robot.q).position[self.model.ee])
@@ -149,98 +161,157 @@ class Controller:
 
     def _approach_init(self) -> object:
         """Return what the restriction remembers at first; a part says so itself, whatever works in its place."""
-        return None if self.profile.approach is None else self.profile.approach.init(self._moved)
+        return None if self.profile.approach is None else self.profile.approach.init(self._motion_body)
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         """Run one control cycle; to be called once a period, with the state that the step before returned."""
-        p, model, units, mark = self.profile, self.model, self._units, self._mark
-        if len(state.command) != model.n or len(state.tracks.point) != units:
+        p, model, mark = self.profile, self.model, self._mark
+        if len(state.command) != model.n or len(state.tracks.point) != self._units:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
+        given = self._checked(state, inputs)
+        robot, now = given.robot, given.watch.stamp
+        mark("state")
+        kin = model.kinematics(robot.q)
+        mark("kinematics")
+        near = self._perceived(state, given, kin)
+        mark("perception")
+        felt, window, detector = self._detected(state, inputs, given, near, kin)
+        mark("contact")
+
+        # what to do
+        noticed = ReactionInputs(
+            state.mode, kin, robot, felt, near.seen.obstacles, bool(near.silent or near.lost), state.command,
+            state.path.phase, inputs.resume,
+        )  # fmt: skip
+        answers, react = p.react.sense(state.reaction, self.body, noticed)
+        blocked = state.motion.blocked
+        events = given.events | answers | events_of(given.unfit, near.silent, near.lost, felt, window.count, blocked, p)
+        mode = next_mode(state.mode, events, inputs.resume)
+        contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
+        mark("mode")
+
+        # along the path as fast as eqs. 3-4 leave it, or as the reaction says
+        slowed = 1.0 if p.slow is None else speed_scale(near.seen.nearest, p.slow.d_max_m)
+        scale, reduction = reduce_speed(state.reduction, min(near.scale, slowed), p.task.restore_cycles)
+        way = paths.follow(self.path, state.path, kin.position[model.ee], p.task)
+        answer, react = p.react.move(react, self.body, noticed, mode)
+        desired = way.scaled(scale) if answer is None else answer.velocity
+        mark("path")
+        motion, mode, approach, moving = self._moved(state, noticed, near, mode, desired, answer)
+        mark("motion")
+
+        step = ControlStep(
+            stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
+            ee_position=kin.position[model.ee], ee_velocity=motion.ee_velocity, path_position=way.point,
+            path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
+            speed_scale=scale, range_distance=near.seen.distance, obstacles=near.seen.obstacles,
+            force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
+            filtered_force=window.newest, thresholds=felt.thresholds, armed=felt.armed, contact=contact,
+            reaction_velocity=desired if mode.mode is Mode.REACT else _STILL, restricted=motion.restricted,
+            approach_limit=motion.approach_limit, qp=motion.qp, command=motion.qp.qd,
+            residual=felt.residual, evidence=felt.evidence, touched=felt.touched,
+        )  # fmt: skip
+        after = ControllerState(
+            watch=given.watch, tracks=near.tracks, window=window, detector=detector, reduction=reduction,
+            reaction=react, path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
+            if mode.mode is Mode.TRACK else paths.pause(state.path),
+            approach=approach, motion=moving, mode=mode, command=motion.qp.qd.copy(),
+            rotation_goal=state.rotation_goal, outside=near.outside,
+        )  # fmt: skip
+        mark("record")
+        return step, after
+
+    def _checked(self, state: ControllerState, inputs: Inputs) -> "_Given":
+        """Return what of the inputs can be used, and what is wrong with the rest."""
+        p, units = self.profile, self._units
         robot, events, watch = examine(
             state.watch, inputs, state.command, self.limits.period, self.limits.qd_max, p.failure, p.detect.by_torques
         )
         readings, unfit = sound_readings(inputs.readings, units)
         touches, wrong = sound_touch(inputs.touch, units) if self._touching else (None, "")
         points, lost = sound_points(inputs.points)
-        unfit, now = unfit or wrong, watch.stamp
-        mark("state")
-        kin = model.kinematics(robot.q)
-        x = kin.position[model.ee]
-        mark("kinematics")
+        return _Given(robot, events, watch, readings, touches, points, unfit or wrong, lost)
 
-        # what is near: eq. 1 and the closest points of the body
-        known = track_init(units) if Event.TIME_BACKWARDS in events else state.tracks
-        seen, tracks = perceive(known, self._sight, kin, readings, now, robot)
-        seen, outside = see_outside(
-            state.outside, Event.TIME_BACKWARDS in events, seen, points, self._sight, kin, robot, now
-        )
-        heard, silent = silent_units(self.skin, tracks, readings.status, seen.longest_silence, now, p.perception)
-        told, lost = outside_silence(outside, lost, now, p.perception)
-        mark("perception")
+    def _perceived(self, state: ControllerState, given: "_Given", kin: Kinematics) -> "_Near":
+        """Return what is near: eq. 1 and the closest points of the body."""
+        sight, robot, now = self._sight, given.robot, given.watch.stamp
+        if sight is None:
+            return _Near(nothing_seen(given.readings), state.tracks, state.outside)
+        anew = Event.TIME_BACKWARDS in given.events
+        known = track_init(self._units) if anew else state.tracks
+        seen, tracks = perceive(known, sight, kin, given.readings, now, robot)
+        seen, outside = see_outside(state.outside, anew, seen, given.points, sight, kin, robot, now)
+        heard, silent = silent_units(self.skin, tracks, given.readings.status, seen.longest_silence, now, sight.params)
+        told, lost = outside_silence(outside, given.lost, now, sight.params.outside)
+        watched = self._units > 0 and heard >= 1.0 and not silent
+        return _Near(seen, tracks, outside, min(heard, told), watched, silent, lost)
 
-        # what is felt: eqs. 8-11
-        watched = p.perception.enabled and units > 0 and heard >= 1.0 and not silent
+    def _detected(
+        self, state: ControllerState, inputs: Inputs, given: "_Given", near: "_Near", kin: Kinematics
+    ) -> tuple[Detection, WindowState, object]:
+        """Tell a contact from free motion: eqs. 8-11."""
+        robot, before, p = given.robot, state.window, self.profile.window
         reacting = state.mode.mode is Mode.REACT
-        window = add_force(state.window, None if robot.wrench is None else robot.wrench[:3], p.window)
-        imu = sound_imu(inputs.imu, units) if self._shaken else None
-        sample = Sample(now, kin, robot, window, state.window.full, seen.obstacles, reacting, watched, touches, imu)
-        felt, detector = self._detector.step(state.detector, self.body, sample)
-        if reacting and p.window.freeze_while_reacting:
-            window = state.window
-        mark("contact")
-
-        # what to do
-        given = ReactionInputs(
-            state.mode, kin, robot, felt, seen.obstacles, bool(silent or lost), state.command,
-            state.path.phase, inputs.resume,
+        window = add_force(before, None if robot.wrench is None else robot.wrench[:3], p)
+        imu = sound_imu(inputs.imu, self._units) if self._shaken else None
+        sample = Sample(
+            given.watch.stamp, kin, robot, window, before.full, near.seen.obstacles, reacting, near.watched,
+            given.touches, imu,
         )  # fmt: skip
-        answers, react = p.react.sense(state.reaction, self.body, given)
-        events |= answers | events_of(unfit, silent, lost, felt, window.count, state.motion.blocked, p)
-        mode = next_mode(state.mode, events, inputs.resume)
-        contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
-        mark("mode")
+        felt, detector = self._detector.step(state.detector, self.body, sample)
+        return felt, before if reacting and p.freeze_while_reacting else window, detector
 
-        # how fast: eqs. 3-4 on the path, or the reaction
-        slowed = 1.0 if p.slow is None else speed_scale(seen.nearest, p.slow.d_max_m)
-        scale, reduction = reduce_speed(state.reduction, min(heard, told, slowed), p.task.restore_cycles)
-        way = paths.follow(self.path, state.path, x, p.task)
-        answer, react = p.react.move(react, self.body, given, mode)
-        desired, qd = (way.scaled(scale), None) if answer is None else (answer.velocity, answer.qd)
-        mark("path")
-
-        # how near: eqs. 5-7, and the joint velocities: eq. 2
-        touch = None if answer is None else answer.touch_speed
-        room = units + (0 if outside is None else len(outside.sigma))
+    def _moved(
+        self, state: ControllerState, noticed: ReactionInputs, near: "_Near", mode: ModeState, desired: FloatArray,
+        answer: ReactionMotion | None,
+    ) -> tuple[Motion, ModeState, object, MotionState]:  # fmt: skip
+        """Return the joint velocities that come nearest to what is asked: eqs. 5-7 and eq. 2."""
+        qd, touch = (None, None) if answer is None else (answer.qd, answer.touch_speed)
+        room = self._units + (0 if near.outside is None else len(near.outside.sigma))
         hold = mode.mode is Mode.HOLD and qd is None
         request = MotionRequest(desired, state.rotation_goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
-        allowed, approach = self._approach.step(state.approach, self._moved, kin, robot, seen.obstacles, request)
-        motion, moving = joint_motion(state.motion, self._setup, kin, robot, seen.obstacles, request, allowed)
+        kin, robot, obstacles = noticed.kin, noticed.robot, near.seen.obstacles
+        allowed, approach = self._approach.step(state.approach, self._motion_body, kin, robot, obstacles, request)
+        motion, moving = joint_motion(state.motion, self._setup, kin, robot, obstacles, request, allowed)
         qp = motion.qp
         if qp.outcome in _TROUBLE and (qp.outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)
-        mark("motion")
+        return motion, mode, approach, moving
 
-        reacts = mode.mode is Mode.REACT
-        step = ControlStep(
-            stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
-            ee_position=x, ee_velocity=motion.ee_velocity, path_position=way.point,
-            path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
-            speed_scale=scale, range_distance=seen.distance, obstacles=seen.obstacles,
-            force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
-            filtered_force=window.newest, thresholds=felt.thresholds, armed=felt.armed, contact=contact,
-            reaction_velocity=desired if reacts else _STILL, restricted=motion.restricted,
-            approach_limit=motion.approach_limit,
-            qp=qp, command=qp.qd, residual=felt.residual, evidence=felt.evidence, touched=felt.touched,
-        )  # fmt: skip
-        after = ControllerState(
-            watch=watch, tracks=tracks, window=window, detector=detector, reduction=reduction, reaction=react,
-            path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
-            if mode.mode is Mode.TRACK else paths.pause(state.path),
-            approach=approach, motion=moving, mode=mode, command=qp.qd.copy(), rotation_goal=state.rotation_goal,
-            outside=outside,
-        )  # fmt: skip
-        mark("record")
-        return step, after
+
+def _points_per_link(profile: Profile) -> int:
+    return 0 if profile.sight.outside is None else profile.sight.outside.per_link
+
+
+class _Given(NamedTuple):
+    """What a step is given, as far as it can be used."""
+
+    robot: RobotState
+    events: dict[Event, str]
+    watch: Watch
+    readings: RangeReadings
+    touches: TouchReadings | None
+    points: SeenPoints | None
+    unfit: str
+    """What is wrong with readings; '' for nothing."""
+    lost: str
+    """What is wrong with points from outside."""
+
+
+class _Near(NamedTuple):
+    """What is near, and how well it is known."""
+
+    seen: Perception
+    tracks: TrackState
+    outside: OutsideState | None
+    scale: float = 1.0
+    """Factor on the speed for units and outside sources that fall silent."""
+    watched: bool = False
+    """Whether a skin watches, all of its units heard."""
+    silent: str = ""
+    """Units that are silent; '' for none."""
+    lost: str = ""
+    """What is wrong with points of outside sources, silence included."""
 
 
 _STILL = np.zeros(3)

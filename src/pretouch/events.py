@@ -15,7 +15,7 @@ def events_of(
     `blocked` is for how long the path has been so [s].
     """
     events: dict[Event, str] = {}
-    if unfit and p.perception.enabled:
+    if unfit and p.perception is not None:
         events[Event.SKIN_UNFIT] = unfit
     if silent:
         events[Event.SKIN_SILENT] = silent

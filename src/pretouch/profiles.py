@@ -23,11 +23,13 @@ from pretouch.control.interface import Restriction
 from pretouch.errors import ParameterError
 from pretouch.params import (
     ClampParams,
+    ClosingSpeed,
     EffectiveMass,
     FailureParams,
     GiveUpParams,
     LocalisationParams,
     NullSpaceMotion,
+    OutsidePoints,
     PerceptionParams,
     PinchParams,
     RowKind,
@@ -49,7 +51,8 @@ class Profile(Checked):
 
     name: str = "paper"
     """Name shown in tables and files."""
-    perception: PerceptionParams = field(default_factory=PerceptionParams)
+    perception: PerceptionParams | None = field(default_factory=PerceptionParams)
+    """How readings become obstacle points (eq. 1); none: nothing is seen."""
     task: TaskParams = field(default_factory=TaskParams)
     slow: SpeedReduction | None = field(default_factory=SpeedReduction)
     """What slows the arm near obstacles (eq. 3); none: nothing but silent units does."""
@@ -66,13 +69,18 @@ class Profile(Checked):
     failure: FailureParams = field(default_factory=FailureParams)
 
     @property
+    def sight(self) -> PerceptionParams:
+        """Parameters of perception; the paper's where there is none, for pages that show units all the same."""
+        return self.perception or PerceptionParams()
+
+    @property
     def d_max_m(self) -> float:
         """Distance from the end-effector origin within which something is near it [m]: of eq. 3, or Table I's."""
         return (self.slow or SpeedReduction()).d_max_m
 
 
 _PAPER = Profile()
-_BLIND = Profile(name="blind", perception=PerceptionParams(enabled=False), approach=None)
+_BLIND = Profile(name="blind", perception=None, approach=None)
 
 
 PROFILES: dict[str, Profile] = {
@@ -90,11 +98,11 @@ PROFILES: dict[str, Profile] = {
     "pretouch": Profile(
         name="pretouch",
         perception=PerceptionParams(
-            closing_speed=True,
+            closing=ClosingSpeed(),
             reckon_below_minimum=True,
             place_at_stamp=True,
             keep_while_silent=True,
-            outside_points=2,
+            outside=OutsidePoints(),
         ),
         task=TaskParams(mid_joint_projected=True, blocked_after_s=2.0),
         slow=None,

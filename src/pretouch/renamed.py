@@ -38,6 +38,7 @@ _APPROACH = (
     "latency_s", "margin_m", "touch_speed_max_m_s", "retreat_max_m_s", "tighten_m_s2", "loosen_m_s2",
     "closing_deadband_m_s",
 )  # fmt: skip
+_OUTSIDE = ("margin_m", "persistence_s", "hidden_s", "slow_after_s", "silent_after_s")
 _MASS = ("body_region", "region_force_n", "force_fraction", "rotor_inertia_kg_m2")
 _BASELINES = (
     "flacco_v_max_m_s", "flacco_alpha", "flacco_rho_m", "flacco_size_m", "ding_repulse_m", "ding_zero_low_m",
@@ -56,6 +57,8 @@ RENAMED: dict[str, str] = {
     "reduction.d_max_m": "slow.d_max_m",
     "reduction.l_max_cycles": "task.restore_cycles",
     "anticipation.blocked_after_s": "task.blocked_after_s",
+    "perception.closing_memory_s": "perception.closing.memory_s",
+    **{f"perception.outside_{name}": f"perception.outside.{name}" for name in _OUTSIDE},
     **{f"{group}.{name}": f"approach.{name}" for group in ("restriction", "anticipation") for name in _APPROACH},
     **{f"anticipation.{name}": f"approach.effective_mass.{name}" for name in _MASS},
     **{f"anticipation.tangential_{name}": f"approach.tangential.{name}" for name in ("distance_m", "speed_m_s")},
@@ -70,6 +73,13 @@ def _switch(path: str, yes: str = "on", no: str = "none") -> dict[str, dict[str,
 
 
 SWITCHES: dict[str, dict[str, dict[str, str]]] = {
+    "perception.enabled": _switch("perception"),
+    "perception.filter_views": _switch("perception.self_margin_m", "0.06"),
+    "perception.closing_speed": _switch("perception.closing"),
+    "perception.outside_points": {
+        "0": {"perception.outside": "none"},
+        **{str(n): {"perception.outside": "on", "perception.outside.per_link": str(n)} for n in range(1, 33)},
+    },
     "detection.method": {name: {"detect": name} for name in ("thresholds", "fixed", "sequential")},
     "detection.use_proximity": _switch("detect.proximity"),
     "detection.use_touch": _switch("detect.cues", "touch"),

@@ -45,7 +45,7 @@ class Grid:
         for name in self.profiles:
             found = profile(name)
             mode = restriction_mode(found)
-            fixed = not found.perception.enabled or bool(NAMES_MODE.search(name)) or mode not in _OF_THE_PAPER
+            fixed = found.perception is None or bool(NAMES_MODE.search(name)) or mode not in _OF_THE_PAPER
             modes = (mode,) if fixed else self.restrictions or (restrictions,)
             pairs += [(name, mode) for mode in modes]
         return list(dict.fromkeys(pairs))

@@ -78,10 +78,14 @@ def test_the_papers_profile_anticipates_nothing(panda_model: RobotModel, paper_s
 
 
 def test_every_part_of_ours_can_be_left_out_alone():
-    for switch in ("closing_speed", "reckon_below_minimum", "keep_while_silent"):
+    for switch in ("reckon_below_minimum", "keep_while_silent"):
         assert getattr(PRETOUCH.perception, switch) is True
         assert getattr(PROFILES["paper"].perception, switch) is False
         assert getattr(profile(f"pretouch:perception.{switch}=no").perception, switch) is False
+    for part in ("closing", "outside"):
+        assert getattr(PRETOUCH.perception, part) is not None
+        assert getattr(PROFILES["paper"].perception, part) is None
+        assert getattr(profile(f"pretouch:perception.{part}=none").perception, part) is None
     for part in ("effective_mass", "closing_deadband_m_s", "tangential"):
         assert getattr(A, part) is not None
         assert getattr(profile(f"pretouch:approach.{part}=none").approach, part) is None

@@ -99,8 +99,8 @@ class Oracle:
         felt = w is not None and bool(np.isfinite(w).all() and np.abs(w).max() < p.failure.force_max_n)
         self.force_stamp = now if (felt if not p.detect.by_torques else strained) else min(self.force_stamp, now)
         self._hear(inputs, now, now < last)
-        age = now - self.heard if p.perception.enabled and len(self.ids) else np.zeros(0)
-        slow, stop = p.perception.slow_after_s, p.perception.silent_after_s
+        age = now - self.heard if p.perception is not None and len(self.ids) else np.zeros(0)
+        slow, stop = p.sight.slow_after_s, p.sight.silent_after_s
         return Expected(
             not fault, fault, self.q, self.qd, now, w[:3].copy() if felt else None, strained,
             overrun=not fault and now - last > p.failure.overrun_s,
@@ -135,7 +135,7 @@ class Oracle:
         return "stale" if abs(inputs.stamp - r.stamp) > self.p.failure.state_timeout_s else ""
 
     def _hear(self, inputs: Inputs, now: float, forget: bool) -> None:
-        if not self.p.perception.enabled:
+        if self.p.perception is None:
             return
         if forget:
             self.used[:], self.heard[:] = -np.inf, -np.inf

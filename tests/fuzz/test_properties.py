@@ -32,7 +32,7 @@ def restricted(mode: str, **task: object) -> Profile:
 
 profiles = st.sampled_from([
     *map(restricted, ("slack", "hard", "floor", "off")), restricted("hard", control_period_s=0.001),
-    restricted("slack", orientation="free"), replace(SHORT, perception=replace(SHORT.perception, filter_views=False)),
+    restricted("slack", orientation="free"), replace(SHORT, perception=replace(SHORT.perception, self_margin_m=None)),
 ])  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from pretouch.control.braking_curve import BrakingCurve
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.params import (
     ClampParams,
+    ClosingSpeed,
     FailureParams,
     GiveUpParams,
     LocalisationParams,
@@ -36,9 +37,8 @@ from pretouch_lab.baselines.fixed_bounds import FixedBounds
 # for each parameter its usual value and values far to both sides; what a check bounds, up to the bound
 CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
     PerceptionParams: {
-        "enabled": (True, True, True, False), "filter_views": (True, False), "persistence_s": (0.06, 0.005, 1.0),
-        "self_margin_m": (0.06, 0.0, 1.0), "slow_after_s": (0.1, 0.02), "silent_after_s": (0.3, 0.101),
-        "spread_sigmas": (2.0, 0.0, 20.0),
+        "persistence_s": (0.06, 0.005, 1.0), "self_margin_m": (0.06, 0.0, 1.0, None), "slow_after_s": (0.1, 0.02),
+        "silent_after_s": (0.3, 0.101), "spread_sigmas": (2.0, 0.0, 20.0),
     },
     TaskParams: {
         "speed_m_s": (0.3, 1e-3, 5.0), "acceleration_m_s2": (1.0, 1e-3, 100.0), "restore_cycles": (20, 1, 10_000),
@@ -72,8 +72,8 @@ CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
 # the same of what the paper has not: all of these are drawn for half of the worlds
 OURS: dict[type, dict[str, tuple[object, ...]]] = {
     PerceptionParams: {
-        "closing_speed": (True, False), "reckon_below_minimum": (True, False),
-        "place_at_stamp": (True, False), "closing_memory_s": (0.09, 0.01, 1.0),
+        "closing": (ClosingSpeed(), ClosingSpeed(0.01), ClosingSpeed(1.0), None),
+        "reckon_below_minimum": (True, False), "place_at_stamp": (True, False),
     },
     TaskParams: {"mid_joint_projected": (True, False), "blocked_after_s": (2.0, 0.05, None)},
     BrakingCurve: {
@@ -145,10 +145,13 @@ def any_profile(rng: np.random.Generator) -> Profile:
         return replace(named, window=replace(named.window, samples=5))
     ours = rng.random() < 0.6
     groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES or (ours and f.type in OURS)}
+    groups["perception"] = PerceptionParams
     choices = {group: CHOICES.get(group, {}) | (OURS.get(group, {}) if ours else {}) for group in groups.values()}
     drawn = {name: group(**_drawn(rng, choices[group], usual)) for name, group in groups.items()}
     detector = DETECTORS[int(rng.integers(len(DETECTORS)))] if ours else MovingThresholds
     drawn["detect"] = detector(**_drawn(rng, CHOICES.get(detector, {}) | OURS.get(detector, {}), usual))
+    if rng.random() < 0.25 * (1 - usual):
+        drawn["perception"] = None
     drawn |= {"slow": _one_of(rng, usual, SpeedReduction, None), "null_space": None}
     drawn["approach"] = _one_of(rng, usual, ApproachRestriction, ApproachRestriction, None)
     if ours:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pretouch.params import PerceptionParams
+from pretouch.params import ClosingSpeed, OutsidePoints, PerceptionParams
 from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.perception.outside import moving_links, outside_silence, see_outside
 from pretouch.perception.perceive import Perception, perception_setup
@@ -20,7 +20,8 @@ from pretouch.types import RobotState, SeenPoints
 TCP = np.array([0.30689, 0.0, 0.48688])
 """End-effector origin in the ready posture, see `test_model.py` [m]."""
 UNITS = 7
-PARAMS = PerceptionParams(outside_points=2)
+PARAMS = PerceptionParams(outside=OutsidePoints())
+POINTS = OutsidePoints()
 NOTHING = Perception(no_obstacles(), np.full(UNITS, np.nan), np.inf, 0.0)
 
 
@@ -64,7 +65,7 @@ BESIDE = TCP + np.array([0.0, 0.4, 0.0])
 def test_without_a_source_or_a_place_for_it_nothing_is_touched(panda_model):
     robot = RobotState(0.0, *(np.zeros(7) for _ in range(5)), None)
     for params, points in (
-        (PARAMS, None), (PerceptionParams(), points_at(0.0, BESIDE)), (replace(PARAMS, enabled=False), points_at(0.0)),
+        (PARAMS, None), (PerceptionParams(), points_at(0.0, BESIDE)),
     ):  # fmt: skip
         setup = setup_of(panda_model, params, no_fixtures())
         seen, state = see_outside(None, False, NOTHING, points, setup, panda_model.kinematics(np.zeros(7)), robot, 0.0)
@@ -161,7 +162,7 @@ def test_of_any_points_the_nearest_of_each_link_are_kept(panda_model, seed, coun
         ((points[:, None] - a) * (b - a)).sum(2) / np.maximum(((b - a) ** 2).sum(1), 1e-12), 0.0, 1.0
     )  # fmt: skip
     gap = np.linalg.norm(points[:, None] - a - along[..., None] * (b - a), axis=2) - panda_model.capsules.radius
-    free = gap.min(axis=1, initial=np.inf) > PARAMS.outside_margin_m + 2 * sigma
+    free = gap.min(axis=1, initial=np.inf) > POINTS.margin_m + 2 * sigma
     lower = all_of_them.body_distance - 2 * sigma
     for link in moving_links(panda_model):
         mine = free & (all_of_them.link == link)
@@ -201,9 +202,9 @@ def test_a_point_lasts_for_the_persistence_and_until_the_source_tells_otherwise(
 def test_what_the_arm_comes_to_is_not_forgotten_for_being_taken_for_the_arm(panda_model):
     side = TCP + np.array([0.0, 0.2, 0.06])
     for hidden, kept in ((3.0, True), (0.0, False)):
-        watcher = Watcher(panda_model, replace(PARAMS, outside_hidden_s=hidden))
+        watcher = Watcher(panda_model, replace(PARAMS, outside=OutsidePoints(hidden_s=hidden)))
         (gap,) = watcher.see(1.0, points_at(1.0, side)).body_distance
-        assert gap > PARAMS.outside_margin_m
+        assert gap > POINTS.margin_m
         # the arm turns about its base until the point is within the margin, where the source tells nothing of it
         turned = watcher.q.copy()
         turned[0] += (gap - 0.03) / np.linalg.norm(side[:2])
@@ -211,7 +212,7 @@ def test_what_the_arm_comes_to_is_not_forgotten_for_being_taken_for_the_arm(pand
         seen = [watcher.see(now, points_at(now, side)) for now in np.arange(1.03, 3.9, 0.03)]
         assert [len(near.unit) == 1 for near in seen[6:]] == [kept] * len(seen[6:])
         if kept:
-            assert 0.0 < seen[-1].body_distance[0] < PARAMS.outside_margin_m
+            assert 0.0 < seen[-1].body_distance[0] < POINTS.margin_m
         last = [watcher.see(now, points_at(now)) for now in np.arange(3.9, 4.5, 0.03)]
         assert len(last[-1].unit) == 0, "not for ever"
 
@@ -227,7 +228,7 @@ def test_a_point_in_the_air_that_is_gone_is_not_kept_for_the_arm_once_it_leaves(
 
 @pytest.mark.parametrize("speed", [-0.3, 0.0, 0.5])
 def test_the_own_speed_of_what_is_seen_is_known(panda_model, speed):
-    watcher = Watcher(panda_model, replace(PARAMS, closing_speed=True))
+    watcher = Watcher(panda_model, replace(PARAMS, closing=ClosingSpeed()))
     for k in range(15):
         now = 1.0 + k / 30
         near = watcher.see(now, points_at(now, BESIDE - [0.0, speed * k / 30, 0.0]))
@@ -251,15 +252,15 @@ def test_time_that_goes_backwards_forgets_what_was_seen(watcher):
 
 def test_a_source_that_falls_silent_slows_the_arm_and_stops_it(watcher):
     watcher.see(1.0, points_at(1.0))
-    assert outside_silence(watcher.state, "", 1.2, PARAMS) == (1.0, "")
-    factor, lost = outside_silence(watcher.state, "", 1.3, PARAMS)
+    assert outside_silence(watcher.state, "", 1.2, POINTS) == (1.0, "")
+    factor, lost = outside_silence(watcher.state, "", 1.3, POINTS)
     assert (factor, lost) == (pytest.approx(0.5), "")
-    assert outside_silence(watcher.state, "", 1.41, PARAMS) == (0.0, "has been silent for 0.41 s")
-    assert outside_silence(watcher.state, "gives nonsense", 1.0, PARAMS) == (0.0, "gives nonsense")
-    assert outside_silence(watcher.state, "gives nonsense", 1.0, PerceptionParams()) == (1.0, "")
-    assert outside_silence(None, "", 1.0, PARAMS) == (1.0, "")
+    assert outside_silence(watcher.state, "", 1.41, POINTS) == (0.0, "has been silent for 0.41 s")
+    assert outside_silence(watcher.state, "gives nonsense", 1.0, POINTS) == (0.0, "gives nonsense")
+    assert outside_silence(watcher.state, "gives nonsense", 1.0, None) == (1.0, "")
+    assert outside_silence(None, "", 1.0, POINTS) == (1.0, "")
 
 
 def test_a_source_that_was_never_heard_is_silent(watcher):
     watcher.see(1.0, points_at(-np.inf))
-    assert outside_silence(watcher.state, "", 1.0, PARAMS) == (0.0, "has not been heard yet")
+    assert outside_silence(watcher.state, "", 1.0, POINTS) == (0.0, "has not been heard yet")

@@ -94,13 +94,6 @@ def test_a_target_too_near_to_measure_stays_at_40_mm(watcher):
     np.testing.assert_allclose(found.point, _left_of_hand(0.04), atol=1e-4)
 
 
-def test_perception_can_be_switched_off(panda_model, paper_skin):
-    watcher = _Watcher(panda_model, paper_skin, params=PerceptionParams(enabled=False))
-    before = watcher.state
-    assert len(watcher.see(1.0, hand_left=0.3).unit) == 0
-    assert watcher.state is before
-
-
 def test_a_bare_arm_sees_nothing(panda_model):
     assert len(_Watcher(panda_model, Skin([], panda_model)).see(1.0).unit) == 0
 
@@ -162,7 +155,7 @@ def test_the_forearm_is_no_obstacle_but_what_is_before_it_is(watcher, distance, 
 def test_unfiltered_the_floor_is_an_obstacle(looking_down, panda_model):
     distance = 0.48688 - 0.03 + 0.2
     assert len(looking_down.see(1.0, down=distance).unit) == 0
-    seeing_all = _Watcher(panda_model, looking_down.skin, params=replace(PARAMS, filter_views=False))
+    seeing_all = _Watcher(panda_model, looking_down.skin, params=replace(PARAMS, self_margin_m=None))
     (height,) = seeing_all.see(1.0, down=distance).point[:, 2]
     assert height == pytest.approx(-0.2, abs=1e-4)
 
@@ -338,10 +331,7 @@ def test_the_arm_stands_exactly_when_a_unit_is_named(panda_model, paper_skin, ag
     assert left == 1.0 or max(ages) > 0.0999 or min(ages) < 0.0
 
 
-def test_without_proximity_no_unit_is_missed(panda_model, watcher):
-    watcher.params = PerceptionParams(enabled=False)
-    watcher.take(watcher.readings(0.0), 10.0)
-    assert _silent(watcher, 10.0) == (1.0, "")
+def test_without_units_none_is_missed(panda_model):
     bare = _Watcher(panda_model, Skin([], panda_model))
     bare.take(RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64)), 10.0)
     assert _silent(bare, 10.0) == (1.0, "")

@@ -43,15 +43,18 @@ def test_the_spread_grows_with_the_distance_and_both_uncertainties():
     assert spread(2.0, 0.0, 0.0, 4.0) == 0.0
 
 
-@pytest.mark.parametrize("filter_views", [True, False])
+@pytest.mark.parametrize("filtered", [True, False])
 @given(distances=st.lists(st.floats(0.04, 1.0), min_size=7, max_size=7))
-def test_what_is_seen_counts_as_nearer_by_its_spread(panda_model, paper_skin, filter_views, distances):
-    skin, params = unsure(paper_skin, panda_model, 0.01, 0.05), replace(PARAMS, filter_views=filter_views)
+def test_what_is_seen_counts_as_nearer_by_its_spread(panda_model, paper_skin, filtered, distances):
+    skin, params = (
+        unsure(paper_skin, panda_model, 0.01, 0.05),
+        PARAMS if filtered else replace(PARAMS, self_margin_m=None),
+    )
     near, _ = seen(panda_model, skin, distances, params)
     exact, _ = seen(panda_model, paper_skin, distances, params)
     both = np.isin(exact.obstacles.unit, near.obstacles.unit)
     assert set(near.obstacles.unit) <= set(exact.obstacles.unit)
-    assert filter_views or both.all()
+    assert filtered or both.all()
     u = 2.0 * np.hypot(0.01, 0.05 * np.array(distances)[near.obstacles.unit])
     for name in ("point", "body_point", "direction", "link"):
         np.testing.assert_array_equal(getattr(near.obstacles, name), getattr(exact.obstacles, name)[both])
@@ -77,7 +80,7 @@ def test_no_bit_changes_where_nothing_is_uncertain(panda_model, paper_skin, dist
 
 
 def test_a_distance_from_the_body_may_be_negative_that_from_the_hand_may_not(panda_model, paper_skin):
-    found, _ = seen(panda_model, unsure(paper_skin, panda_model, 0.5), 0.1, replace(PARAMS, filter_views=False))
+    found, _ = seen(panda_model, unsure(paper_skin, panda_model, 0.5), 0.1, replace(PARAMS, self_margin_m=None))
     assert (found.obstacles.body_distance < 0).all()
     np.testing.assert_array_equal(found.obstacles.ee_distance, 0.0)
     assert found.nearest == 0.0
@@ -86,10 +89,10 @@ def test_a_distance_from_the_body_may_be_negative_that_from_the_hand_may_not(pan
 
 def test_a_kept_point_is_as_uncertain_as_it_is_now_far_from_its_unit(panda_model, paper_skin):
     skin = unsure(paper_skin, panda_model, orientation=0.1)
-    first, state = seen(panda_model, skin, 0.3, replace(PARAMS, filter_views=False))
-    _, exact = seen(panda_model, paper_skin, 0.3, replace(PARAMS, filter_views=False))
+    first, state = seen(panda_model, skin, 0.3, replace(PARAMS, self_margin_m=None))
+    _, exact = seen(panda_model, paper_skin, 0.3, replace(PARAMS, self_margin_m=None))
     q = READY + 0.3 * np.eye(7)[0]
-    late = {"params": replace(PARAMS, filter_views=False), "q": q, "now": 1.03}
+    late = {"params": replace(PARAMS, self_margin_m=None), "q": q, "now": 1.03}
     kept, _ = seen(panda_model, skin, 0.3, state=state, **late)
     plain, _ = seen(panda_model, paper_skin, 0.3, state=exact, **late)
     kin = panda_model.kinematics(q)

@@ -3,8 +3,8 @@ of itself."""
 
 import numpy as np
 
-from pretouch.params import PerceptionParams
 from pretouch.perception.scene_filter import Fixtures
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import MAX_DISTANCE, MIN_DISTANCE, cone_rays
@@ -44,8 +44,9 @@ def tells(distance: float, status: int) -> bool:
 class Eyes:
     """What is remembered of each unit's readings."""
 
-    def __init__(self, model: RobotModel, skin: Skin, fixtures: Fixtures, params: PerceptionParams) -> None:
-        self.model, self.skin, self.fixtures, self.params = model, skin, fixtures, params
+    def __init__(self, model: RobotModel, skin: Skin, fixtures: Fixtures, profile: Profile) -> None:
+        self.model, self.skin, self.fixtures = model, skin, fixtures
+        self.looks, self.params = profile.perception is not None, profile.sight
         self.forget()
 
     def forget(self) -> None:
@@ -59,7 +60,7 @@ class Eyes:
 
     def look(self, posture: Posture, ee: np.ndarray, readings: RangeReadings, now: float) -> Obstacles:
         """Take in what is new; return the points known now, with the closest points of the body."""
-        if not self.params.enabled:
+        if not self.looks:
             return obstacles_of([])
         found = []
         for k in range(len(self.skin)):
@@ -78,7 +79,8 @@ class Eyes:
             self.heard[k] = stamp
         d = shown(distance, status)
         late = now - stamp > self.params.persistence_s
-        margin = self.params.self_margin_m + min(self._spread(k, d), self.params.self_margin_m)
+        margin = self.params.self_margin_m or 0.0
+        margin += min(self._spread(k, d), margin)
         if not np.isnan(d) and not late and d < self._predicted(k, T, posture) - margin:
             self.point[k], self.seen[k] = (T @ [0.0, 0.0, d, 1.0])[:3], stamp  # eq. 1
 
@@ -89,7 +91,7 @@ class Eyes:
 
     def _predicted(self, k: int, T: np.ndarray, posture: Posture) -> float:
         """Distance at which unit k would see another link or a fixture, over the rays of its cone."""
-        if not self.params.filter_views:
+        if self.params.self_margin_m is None:
             return np.inf
         p, rays = T[:3, 3], RAYS @ T[:3, :3].T
         nearest = np.inf
@@ -115,7 +117,7 @@ class Eyes:
 
     def silence(self, now: float, status: np.ndarray) -> tuple[float, str]:
         """Factor on the speed for the unit that has been silent longest, and the names of those silent too long."""
-        if not self.params.enabled or not self.heard:
+        if not self.looks or not self.heard:
             return 1.0, ""
         ages = [now - heard for heard in self.heard]
         from_, to = self.params.slow_after_s, self.params.silent_after_s

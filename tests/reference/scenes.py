@@ -226,7 +226,7 @@ SCENES = (
     Scene("free-32", FREE, 32, near=(0.03, 0.3), cycles=50, circle=True, meets=("many",)),
     Scene("raw", RAW, near=(0.1, 0.8), pushes=PUSHES, noise=2.0, meets=YIELDS),
     Scene("still-force", QUICK, noise=0.0, pushes={(40, 50): (0.0, 15.0, 3.0)}),
-    Scene("unfiltered", changed(perception={"filter_views": False}), 32, near=(0.02, 0.6), cycles=60, fixtures=table,
+    Scene("unfiltered", changed(perception={"self_margin_m": None}), 32, near=(0.02, 0.6), cycles=60, fixtures=table,
           meets=("violated", "penetration")),
     Scene("dropout", SHORT, silent={(40, 62): (0,), (70, 145): (2, 3)}, cycles=160, near=(0.1, 0.6),
           pushes={(95, 99): (60.0, 0.0, 0.0)}, meets=(*YIELDS, "from hand_front, hand_back:")),
@@ -272,7 +272,7 @@ def looking_inwards(model: RobotModel) -> tuple[Scene, Skin]:
     def seen(distance: float) -> Callable[[Inputs], Inputs]:
         return lambda i: replace(i, readings=RangeReadings(np.array([i.stamp]), np.array([distance]), np.zeros(1, int)))
 
-    profile = changed(QUICK, perception={"filter_views": False})
+    profile = changed(QUICK, perception={"self_margin_m": None})
     change = {0: seen(height - 0.01), 1: seen(height), 2: seen(height), 3: seen(height + 0.01), 4: seen(height)}
     scene = Scene("inwards", profile, 1, error=0.0, cycles=5, change=change, meets=("penetration", "hold"))
     return scene, Skin([SensorUnit("inwards", model.links[body.link[c]], T)], model)
@@ -284,5 +284,5 @@ def singular(seed: int) -> Scene:
     first, fourth, sixth, last = rng.uniform((-2.5, -2.5, 0.5, -2.5), (2.5, -0.5, 3.0, 2.5))
     posture = (first, 0.0, rng.choice([-1, 1]) * np.pi / 2, fourth, 0.0, sixth, last)
     push = {(2, 9): tuple(20.0 * rng.normal(size=3))}
-    profile = replace(changed(GENTLE, perception={"enabled": False}), approach=None)
+    profile = replace(GENTLE, perception=None, approach=None)
     return Scene(f"singular-{seed}", profile, posture=posture, error=0.0, pushes=push, cycles=6, seed=seed)

@@ -63,7 +63,7 @@ def test_the_cone_of_a_unit_that_senses_reaches_as_far(scene: Scene, nodes: Fake
 def test_a_unit_silent_for_longer_than_the_profile_allows_is_red_and_its_cone_too(
     scene: Scene, nodes: FakeScene, world: World, some_step: ControlStep
 ) -> None:
-    limit = world.profile.perception.silent_after_s
+    limit = world.profile.sight.silent_after_s
     age = np.array([0.0, limit + 0.01, limit - 0.01, 0.0, 0.0, 0.0, 0.0])
     scene.draw(frame(replace(some_step, range_distance=np.full(7, 0.5)), age=age), 0.0)
     red = palette.as_vertex(palette.UNIT_SILENT)

@@ -267,6 +267,6 @@ def test_of_a_dropped_unit_a_frame_knows_since_when(live, paper_skin):
     assert np.all(session.frame.age < 0.1)
     session.set_faults(frozenset({paper_skin.ids[2]}))
     session.advance(0.5)
-    late = session.frame.late(session.world.profile.perception.silent_after_s)
+    late = session.frame.late(session.world.profile.sight.silent_after_s)
     assert np.flatnonzero(late).tolist() == [2]
     assert session.frame.age[2] == pytest.approx(0.5, abs=0.1)

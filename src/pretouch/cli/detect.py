@@ -102,7 +102,7 @@ def _unheard(skin: Skin | None, imported: ImportedData) -> list[str]:
 
 def _said(imported: ImportedData, columns: list[Column], skin: Skin | None) -> list[str]:
     said = [sentence for p, d, _ in columns for sentence in findings(imported, d, p)]
-    if skin is None and any(p.perception.enabled and thresholds_of(p.detect).f_d_n for p, _, _ in columns):
+    if skin is None and any(p.perception is not None and thresholds_of(p.detect).f_d_n for p, _, _ in columns):
         said.append("Without ranges (--skin) no obstacle is known, so eq. 11 lowers no threshold.")
     return said
 

@@ -56,8 +56,10 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         mass, clamp = self._moved(state, doing, body, inputs), state.clamp
         q, dt = inputs.robot.q_commanded, body.period
         # a clamp that is found stands: the arm opens out of it, and no other is looked for
-        if doing == "react" and self.clamp is not None and not clamp.torque:
-            clamp = self._pinched(clamped(clamp, mass.torque, mass.velocity, q, dt, self.clamp), body, inputs)
+        if doing == "react" and not clamp.torque:
+            if self.clamp is not None:
+                clamp = clamped(clamp, mass.torque, mass.velocity, q, dt, self.clamp)
+            clamp = self._pinched(clamp, body, inputs)
         elif doing == "task" and self.pinch is not None:
             clamp = gone(clamp, q, dt)
         # what the tank holds beyond its start is the least energy that the contact has given

@@ -20,7 +20,8 @@ _LEAST_KG = -0.3
 """A load that seems to be less than nothing by more than this is a force from below [kg]: what is wrong with the links'
 masses may look like so much."""
 _FAR_M = 0.15
-"""How far its centre may be from the end-effector's axis [m]."""
+"""How far the centre of a load may be from the end-effector's origin along each horizontal base axis [m]: the prior's
+deviation for the largest load. What is refused is a sum of both beyond twice of it, so along one axis alone 0.3 m."""
 _OFFSETS = 3.0
 """Deviations of a joint's offset before anything is learnt that its whole offset may be, for a step to be learnt."""
 _UNKNOWN_NM = 0.3
@@ -153,7 +154,7 @@ def is_load(
     misfit = fit_load(residual, unit, J, S, samples, change)
     # the change has either sign, as a load can be put down; what hangs there then cannot weigh less than nothing
     fit_load(residual + learnt, unit, J, S, samples, whole)
-    # moments of a centre that is too far off; a load below 0.1 kg may have those of 0.1 kg
+    # the centre is too far off: |x| + |y| > 0.3 m; a load below 0.1 kg may have the moments of 0.1 kg
     if abs(change[1]) + abs(change[2]) > 2.0 * _FAR_M * max(abs(change[0]), 0.1):
         return False
     few = misfit < n + _DEVIATIONS * np.sqrt(2.0 * n)

@@ -35,7 +35,7 @@ class _OnBody(Restriction):
     """An `ApproachRestriction` that works."""
 
     def __init__(self, params: RestrictionParams) -> None:
-        self._weight = 0.0 if params.rows == "hard" else params.slack_weight
+        self._weight = 0.0 if params.rows == "hard" else params.slack_weight  # 0 marks hard rows, see `Restricted`
         self._numbers = flattened(approach_params(params), self._weight)
 
     def step(
@@ -43,6 +43,7 @@ class _OnBody(Restriction):
         request: MotionRequest,
     ) -> tuple[CompiledRows, Any]:  # fmt: skip
         count = len(obstacles.unit)
+        # a row for each obstacle at most: which of them are within d_notice is found out while the rows are written
         room = np.empty((count, len(robot.q))), np.empty(count), np.empty(count, WHOLE)
         return CompiledRows(_motion, room, self._weight, self._numbers), state
 
@@ -51,6 +52,7 @@ class _OnBody(Restriction):
 def _motion(step: Step, rows: Rows, fixed: Fixed, params: ApproachParams, weight: float) -> Ended:
     """Write the rows of eqs. 5-7 and the answer within them."""
     found = rows_into(step.kin, fixed.arm.moved_by, step.near, params, rows)
+    # eqs. 5-7 bound no joint speed; an empty array says so, for None would be another type to compile for
     none = np.empty(0)
     allowed = Allowed(rows.G[:found], rows.h[:found], rows.which[:found], weight, none, none, False)
     return motion_within(step, allowed, fixed)

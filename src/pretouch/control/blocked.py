@@ -27,9 +27,12 @@ def time_blocked(
         period: control period [s].
     """
     wanted2 = (asked * asked).sum()
+    # share of the velocity asked for that is left along it; an arm asked to stand, below 1 mm/s, is not blocked
     progress = (asked * moving).sum() / wanted2 if wanted2 > 1e-6 else 1.0
     if progress < _BLOCKED:
         for r in range(len(limit)):
+            # the hand's points are taken to move as its origin: what its turning adds is left out
             if hand[r] and (asked * direction[r]).sum() - limit[r] > 0.0:
                 return before + period
+    # slow without such a row, by the joint box or at a singularity: the time waits, for nothing near blocks the path
     return before if progress < _FREE else 0.0

@@ -17,7 +17,7 @@ from pretouch.control.touch_speed import TouchLimits, mass_along, touch_speed
 from pretouch.groups import Chain, ObstacleArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
 
-_TANGENTS = 4
+_TANGENTS = 4  # two directions across the normal, both ways along each
 MOST_ROWS = 2 + 2 * _TANGENTS
 """Of a unit: of what it sees and one that fades, and those across the normal of each."""
 
@@ -47,12 +47,14 @@ def slots_init(units: int) -> Slots:
 
 def widened(slots: Slots, units: int) -> Slots:
     """Return a copy of the slots with room for at least so many units, those there were first."""
+    # always a copy: the rows are written in place, and the state of the step before has to stay as it was
     link, limit, across, normal, point = slots
     half = len(link) // 2
     if half >= units:
         return Slots(link.copy(), limit.copy(), across.copy(), normal.copy(), point.copy())
     wide = slots_init(units)
     for wider, known in zip(wide, slots, strict=True):
+        # the fading rows begin at the middle, which moves when points of an outside source join the units
         wider[:half], wider[units : units + half] = known[:half], known[half:]
     return wide
 
@@ -96,7 +98,8 @@ def braking_cap(distance: float, touch: float, deceleration: float, latency: flo
     """
     left, lag = distance - margin, deceleration * latency
     if left <= touch * latency:
-        return touch
+        return touch  # max(0, ...) is 0 here; both branches meet at v_c
+    # the positive root of v^2 + 2 a tau v = v_c^2 + 2 a (d - m)
     return np.sqrt(lag * lag + touch * touch + 2.0 * deceleration * left) - lag
 
 
@@ -123,25 +126,31 @@ def braking_rows(
     for m in range(len(obstacles.unit)):
         k = obstacles.unit[m]
         if not distance[m] < s.notice_m:
-            continue
+            continue  # not counted as seen: a row that its unit has fades below
         seen[k] = True
         _take_slot(slots, k, half, obstacles.link[m])
         for i in range(3):
             slots.normal[k, i], slots.point[k, i] = obstacles.direction[m, i], obstacles.body_point[m, i]
         row = rows.G[found]
         approach = _row(slots.link[k], slots.point[k], obstacles.direction[m], chain, row)
+        # the row is n^T J, so the effective mass along the normal comes of it too
         touch = touch_speed(mass_along(mass.factor, row), touching) if mass.counts else touching.speed_max_m_s
+        # an object that goes away allows no more; an infinite deadband leaves its speed out
         own = max(0.0, obstacles.closing_speed[m] - s.deadband_m_s)
         cap = braking_cap(distance[m], touch, s.deceleration_m_s2, s.latency_s, s.margin_m)
         target = max(cap - own, -s.retreat_m_s)
+        # the same curve at the rate of tightening: the arm can still come down to it at that rate
         last = braking_cap(distance[m], touch, s.tighten_m_s2, s.latency_s, s.margin_m) - own
-        # beyond the speed from which tightening at its rate would still do, smoothness comes second
+        # Faster than that, smoothness comes second: the limit falls at once. With 0.0 it falls as far as a stop, while
+        # a retreat (target < 0) is still approached at the rate of tightening.
         slots.limit[k] = min(_eased(target, slots.limit[k], approach, s), max(target, last, 0.0))
         rows.h[found], rows.which[found] = slots.limit[k], m
         across = np.inf
         if distance[m] < s.across_m:
+            # v_t: linear from the slowest at the surface to the task's speed at across_m
             share = max(0.0, distance[m]) / s.across_m
             across = s.across_slowest_m_s + share * max(0.0, s.fastest_m_s - s.across_slowest_m_s)
+        # it falls at once here; how hard that may slow the arm is bounded where the row is written
         slots.across[k] = min(across, slots.across[k] + s.loosen_m_s2 * s.period_s)
         found += 1
     with_fading = _fading_rows(slots, seen, chain, s, rows, found)
@@ -154,6 +163,7 @@ def _take_slot(slots: Slots, k: int, half: int, link: int) -> None:
     if slots.link[k] == link:
         return
     last = half + k
+    # an object between two links may be nearer to each in turn: exchanged, both rows keep how tight they are
     if slots.link[last] == link:
         slots.link[k], slots.link[last] = slots.link[last], slots.link[k]
         slots.limit[k], slots.limit[last] = slots.limit[last], slots.limit[k]
@@ -163,6 +173,7 @@ def _take_slot(slots: Slots, k: int, half: int, link: int) -> None:
             slots.point[k, i], slots.point[last, i] = slots.point[last, i], slots.point[k, i]
         return
     _leave(slots, k, last)
+    # infinite, so that `_eased` begins at the speed the arm has
     slots.link[k], slots.limit[k], slots.across[k] = link, np.inf, np.inf
 
 
@@ -188,13 +199,17 @@ def _fading_rows(
         last = half + k
         if slots.link[last] < 0:
             continue
+        # Nothing is known of the object any more: point and normal stay in the base frame while the link moves on under
+        # them, which from stop to free takes less than a second at the default rates.
         slots.limit[last] += s.loosen_m_s2 * s.period_s
         slots.across[last] += s.loosen_m_s2 * s.period_s
+        # what the curve allows at d_notice, but for latency, margin and touch speed, or the task's speed if more
         free = max(s.fastest_m_s, np.sqrt(2.0 * s.deceleration_m_s2 * s.notice_m))
         if slots.limit[last] >= free and slots.across[last] >= s.fastest_m_s:
             slots.link[last] = -1
             continue
         approach = _row(slots.link[last], slots.point[last], slots.normal[last], chain, rows.G[found])
+        # where the link has sped up along the old normal, this slows it no harder than a row tightens
         rows.h[found] = max(slots.limit[last], approach - s.tighten_m_s2 * s.period_s)
         found += 1
     return found
@@ -209,6 +224,7 @@ def _rows_across(slots: Slots, chain: Chain, s: BrakingLimits, rows: Rows, found
             continue
         normal = slots.normal[k]
         tangents_of(normal, tangents)
+        # four half-planes for a disc: diagonally across, the square they leave allows sqrt(2) of the cap
         for t in range(_TANGENTS):
             sign = 1.0 if t % 2 == 0 else -1.0
             for i in range(3):
@@ -240,12 +256,13 @@ def tangents_of(normal: FloatArray, tangents: FloatArray) -> None:
 def _eased(target: float, last: float, approach: float, s: BrakingLimits) -> float:
     """Limit between what is wanted, how far it may loosen from the last, and how hard it may slow the arm."""
     eased = min(target, last + s.loosen_m_s2 * s.period_s)
-    return max(eased, approach - s.tighten_m_s2 * s.period_s)
+    return max(eased, approach - s.tighten_m_s2 * s.period_s)  # comes last: it outweighs the target
 
 
 @compiled
 def _row(link: int, point: FloatArray, along: FloatArray, chain: Chain, row: FloatArray) -> float:
     """Write the row along^T J (n,) of a point (3,) of a link, and return the speed along it [m/s]."""
+    # a hinge moves the point with a x (p - p_j): each entry of the row is the part of that along the direction
     anchor, axis, moved_by, qd, speed = chain.anchor, chain.axis, chain.moved_by, chain.qd, 0.0
     for j in range(len(anchor)):
         row[j] = 0.0

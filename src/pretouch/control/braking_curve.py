@@ -48,7 +48,7 @@ class BrakingCurve(BrakingParams, Restriction, name="braking"):
         return _OnBody(self, body).step(state, body, kin, robot, obstacles, request)
 
 
-_NO_MASS = np.zeros((0, 0))
+_NO_MASS = np.zeros((0, 0))  # stands for none: compiled code wants an array, whatever counts
 
 
 class _OnBody(Restriction):
@@ -57,9 +57,11 @@ class _OnBody(Restriction):
     def __init__(self, params: BrakingParams, body: MotionBody) -> None:
         p, across, mass = params, params.tangential, params.effective_mass
         self._weight = p.slack_weight
+        # M is of the links alone; an impact has to stop the rotors too: I_r of docs/explanation/anticipation.md
         self._rotors = None if mass is None else mass.rotor_inertia_kg_m2 * np.eye(body.model.n)
         self._limits = BrakingLimits(
             p.d_notice_m, p.deceleration_m_s2, p.latency_s, p.margin_m, p.retreat_max_m_s,
+            # what is switched off never binds: no speed is above this deadband, no distance below -inf
             np.inf if p.closing_deadband_m_s is None else p.closing_deadband_m_s,
             -np.inf if across is None else across.distance_m, 0.0 if across is None else across.speed_m_s,
             body.task.speed_m_s, p.tighten_m_s2, p.loosen_m_s2, body.limits.period,
@@ -73,6 +75,7 @@ class _OnBody(Restriction):
         slots = widened(state, request.units)
         count, most = len(obstacles.unit), MOST_ROWS * (len(slots.link) // 2)
         room = np.empty((most, len(robot.q))), np.empty(most), np.empty(count, WHOLE)
+        # the mass matrix is a call of MuJoCo: not without anything near
         counts, mass = False, _NO_MASS
         if self._rotors is not None and count > 0:
             counts, mass = True, body.model.mass_matrix(robot.q) + self._rotors
@@ -112,7 +115,9 @@ def _motion(
     obstacles = ObstacleArrays(
         seen.unit, near.link, near.body_point, near.direction, near.body_distance, seen.closing_speed
     )
+    # posture as measured, speeds as commanded: a row tightens from what the arm was sent last
     chain = Chain(kin.anchor, kin.axis, fixed.arm.moved_by, step.robot.qd_commanded)
+    # a mass matrix that cannot be factored leaves the largest touch speed
     factored = Mass(mass_counts and factor(mass, L), L)
     count, found = braking_rows(slots, obstacles, chain, factored, p.touching, p.limits, rows)
     none = np.empty(0)

@@ -82,7 +82,10 @@ def viable_speed(distance: FloatArray, acceleration: FloatArray, period: float) 
 @compiled
 def _before_limit(distance: float, acceleration: float, period: float) -> float:
     d, a = max(distance, 0.0), acceleration
+    # The most steps n whose braking distance a dt^2 n (n + 1) / 2 fits into d. Where it fits exactly, n and n - 1 give
+    # the same speed: a floor that rounding puts one off costs nothing.
     steps = np.floor((np.sqrt(1.0 + 8.0 * d / (a * period**2)) - 1.0) / 2.0)
+    # d = (n + 1) v dt - a dt^2 n (n + 1) / 2, solved for v
     return (d / period + a * period * steps * (steps + 1.0) / 2.0) / (steps + 1.0)
 
 
@@ -102,13 +105,14 @@ def viable_speed_in_envelope(distance: float, offset: float, slope: float, accel
     """
     unit = acceleration * period
     b, o = slope / (2.0 * acceleration), offset / unit
-    x = max(distance - offset**2 / slope, 0.0) / (unit * period)
+    x = max(distance - offset**2 / slope, 0.0) / (unit * period)  # past its zero the joint has to stand
     speed = _before_period(0.0, x, o, b)
     if b > 1.0:
         h = (2.0 * (o + b) - 1.0) / (2.0 * (b - 1.0))
         square = ((o + b) ** 2 + 2.0 * b * x) / b - (b - 1.0) * h**2
         if square > h**2:
             k = np.floor(np.sqrt(square) - h)
+            # F falls to its minimum and rises after it, but periods are whole: one of the two beside it is the least
             speed = min(_before_period(k, x, o, b), _before_period(k + 1.0, x, o, b))
     return speed * unit
 
@@ -117,6 +121,7 @@ def viable_speed_in_envelope(distance: float, offset: float, slope: float, accel
 def _before_period(k: float, x: float, o: float, b: float) -> float:
     """F(k) of `viable_speed_in_envelope`; a command that full braking has brought to rest by then keeps any limit."""
     p, z = o + b * (k + 1.0), max(b * (2.0 * x - k * (k + 1.0)), 0.0)
+    # u = sqrt(p^2 + z) - p, the positive root of u^2 + 2 p u = z, written without the difference of near numbers
     return k + z / (p + np.sqrt(p**2 + z)) if z > 0.0 else k
 
 
@@ -159,6 +164,7 @@ def box_and_brake(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[Flo
         reach = table[3, i] * table[4, i]
         down, up = _viable(q[i], table, i)
         slowest, fastest = qd[i] - reach, qd[i] + reach
+        # acceleration last, so that it wins: an arm past what is viable brakes at its limit, and lower <= upper always
         lower[i] = np.minimum(np.maximum(down, slowest), fastest)
         upper[i] = np.minimum(np.maximum(up, slowest), fastest)
     return lower, upper, _brake(qd, lower, upper, table)
@@ -171,7 +177,7 @@ def _viable(q: float, table: FloatArray, i: int) -> tuple[float, float]:
     up = np.minimum(speed, _before_limit(table[1, i] - q, a, period))
     down = np.minimum(speed, _before_limit(q - table[0, i], a, period))
     offset, slope = table[5, i], table[6, i]
-    if slope > 0.0:
+    if slope > 0.0:  # 0 stands for no envelope
         up = np.minimum(up, viable_speed_in_envelope(table[7, i] - q, offset, slope, a, period))
         down = np.minimum(down, viable_speed_in_envelope(q - table[8, i], offset, slope, a, period))
     return -down, up
@@ -179,9 +185,10 @@ def _viable(q: float, table: FloatArray, i: int) -> tuple[float, float]:
 
 @compiled
 def _brake(qd: FloatArray, lower: FloatArray, upper: FloatArray, table: FloatArray) -> FloatArray:
-    needed = 0.0
+    needed = 0.0  # periods of full braking until the joint that takes longest is at rest
     for i in range(len(qd)):
         needed = np.maximum(needed, abs(qd[i]) / (table[3, i] * table[4, i]))
+    # a period takes the share 1 / needed off each speed; in the last, where needed <= 1, the arm stops
     factor = max(0.0, 1.0 - 1.0 / needed) if needed > 0.0 else 1.0
     command = np.empty(len(qd))
     for i in range(len(qd)):

@@ -70,10 +70,15 @@ def joint_motion(
         rows, speeds = _given(allowed, n), allowed.speeds
         velocity = velocity if allowed.velocity is None else velocity + allowed.velocity
     G, h, which = rows.room
+    # compiled code writes to it, and a step leaves the state it was given as it is
     null_velocity = state.null_velocity.copy() if setup.moves_away else state.null_velocity
+    # Hard rows have no price: the first answer is that without them, and final where it keeps them. Where it does not,
+    # another solver takes over, which needs H and f.
     hard = rows.weight == 0.0
     cost, qd, velocities = np.empty((n + 1, n)) if hard else _NO_COST, np.empty(n), np.empty((2, 3))
     slack, multipliers = np.empty(len(h)), np.empty(n + len(h))
+    # Field by field in the order of `Step`, `Rows` and `Fixed`, 1 us faster than by groups. No type checker finds two
+    # fields of one type that have changed places.
     seen, found, ending, violated, blocked = rows.motion.flat(
         robot.q, robot.qd, robot.q_commanded, robot.qd_commanded,
         o.link, o.body_point, o.direction, o.body_distance,
@@ -86,6 +91,7 @@ def joint_motion(
     if violated and hard and not request.hold:
         qp = _with_hard_rows(setup, robot, ApproachRows(G[:found], h[:found], soft=False), speeds, cost)
         J = setup.body.model.ee_jacobian(kin)[:3]
+        # a step reports the rows of obstacles; those that a restriction adds behind them belong to none
         of_obstacles = QpSolution(qp.qd, qp.slack[:seen], qp.multipliers[: n + seen], qp.outcome, qp.status)
         return Motion(of_obstacles, which, limit, J @ robot.qd, J @ qp.qd), after
     qp = QpSolution(qd, slack[:seen], multipliers[: n + seen], *_how_it_ended(request.hold, ending, violated))
@@ -106,6 +112,7 @@ def _with_hard_rows(
     cost: FloatArray,
 ) -> QpSolution:  # fmt: skip
     """Answer of `joint_motion` where a hard row is in the way, which takes another solver."""
+    # the box of `motion_entry._box` once more: rare enough not to be handed out by each step
     lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, setup.numbers.limits)
     if speeds is not None:
         slowest, fastest = speeds
@@ -130,7 +137,7 @@ class _Unrestricted(Restriction):
 
     def __init__(self, n: int) -> None:
         nothing = np.zeros((0, n)), np.zeros(0), np.zeros(0, WHOLE)
-        self._all = CompiledRows(given_motion, nothing, 1.0, (1.0, *_ANY, False))
+        self._all = CompiledRows(given_motion, nothing, 1.0, (1.0, *_ANY, False))  # any weight but 0, which is hard
 
     def step(
         self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,

@@ -137,19 +137,23 @@ def motion_within(step: Step, allowed: Allowed, fixed: Fixed) -> Ended:
     arm, p, near = fixed.arm, fixed.numbers, step.near
     n, seen, found = len(robot.q), len(allowed.which), len(allowed.h)
     G, h, which, slack, qd = allowed.G, allowed.h, allowed.which, answer.slack[:found], answer.qd
+    # of the rows only the first, those of obstacles, are n^T J of something to move away from
     if p.away.distance_m > 0.0:
         memory.null_velocity[:] = away(memory.null_velocity, G[:seen], which, near, arm.moved_by, p.away)
     J = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J)
+    # the box starts from commanded positions and speeds, where it is exact; Jacobian and cost from measured ones
     lower, upper, stop = _box(robot, allowed, p)
     ending = SOLVED
     if not asked.hold:
+        # H and f are kept for the solver of hard rows alone
         cost = answer.cost if len(answer.cost) > 0 else np.empty((n + 1, n))
         H, f = cost[:n], cost[n]
         _pose(J, robot.q, asked, kin.rotation[arm.ee], memory.null_velocity, p, cost)
         minimum = Minimum(qd, slack, answer.multipliers[: n + found])
         ending = minimise(Problem(H, f, lower, upper, G, h, allowed.weight), p.budget, minimum)
     if asked.hold or ending != SOLVED:
+        # no answer is sent but one that is a minimum; by how much braking violates the rows is reported all the same
         qd[:], answer.multipliers[:] = stop, 0.0
         excesses(G, h, qd, slack)
     by_product = allowed.by_product or p.projected or p.away.distance_m > 0.0
@@ -160,6 +164,7 @@ def motion_within(step: Step, allowed: Allowed, fixed: Fixed) -> Ended:
     if p.blocked_s > 0.0 and asked.tracks and not asked.hold:
         hand, towards = np.empty(seen, np.bool_), np.empty((seen, 3))
         for k in range(seen):
+            # a link that all joints move is the hand
             hand[k] = arm.moved_by[near.link[which[k]]].all()
             towards[k] = near.direction[which[k]]
         moving = answer.velocities[1]
@@ -188,10 +193,13 @@ def _pose(
     n = len(q)
     H, f = cost[:n], cost[n]
     if len(asked.joints) > 0:
+        # 1/2 |qd_asked - qd|^2, a reaction in joint space: H = I is regular in any posture and needs no damping
         H[:], f[:] = np.eye(n), -asked.joints
         return
     m = 6 if p.holds_orientation else 3
+    # 3 rows for the velocity alone: the rotation stays in the null space, and may drift
     x_d = twist(asked.velocity, rotation, asked.rotation_goal, p.orientation_gain_1_s)
+    # eq. 2 as the paper has it needs no projector
     if p.projected or p.away.distance_m > 0.0:
         H[:], f[:] = cost_with_null_space(J[:m], x_d[:m], q, p.q_mid, p.cost, p.projected, null_velocity)
     else:

@@ -21,6 +21,7 @@ def projector(J: FloatArray) -> FloatArray:
     """
     m, n = J.shape
     A, X = np.empty((m, m)), J.copy()
+    # Cholesky factor A of J J^T + c I, without that matrix
     for i in range(m):
         for j in range(i + 1):
             total = _DAMPING if i == j else 0.0
@@ -58,12 +59,15 @@ def cost_with_null_space(
     H, f, z = np.empty((n, n)), np.empty(n), null_velocity.copy()
     for i in range(n):
         middle = mid_joint_velocity(q[i], q_mid[i], p.mid_joint_time_s)
+        # a term of its own has the weight k in all directions; within z it is seen through N only
         f[i] = 0.0 if projected else -k * middle
         z[i] += middle if projected else 0.0
     for i in range(n):
         for m in range(len(x_d)):
             f[i] -= J[m, i] * x_d[m]
         for j in range(n):
+            # |N v|^2 = v^T N v, for N is a projector (but for its damping). It keeps the directions that J loses, so H
+            # is positive definite without mu too.
             f[i] -= k * N[i, j] * z[j]
             H[i, j] = k * N[i, j]
             if i == j:
@@ -102,15 +106,17 @@ def away(
     for r in range(len(which)):
         m = which[r]
         if distance[m] >= within or moved_by[link[m]].all():
-            continue
+            continue  # far, or of the hand, whose place is the task's
         size2 = 0.0
         for j in range(n):
             size2 += G[r, j] * G[r, j]
         wanted = limits.speed_m_s * (1.0 - max(0.0, distance[m]) / within) ** 2
+        # -g v / |g|^2 is the shortest z with g z = -v; the sum over several rows meets none of them exactly
         # a point that hardly moves asks for no more than one 0.1 m off an axis
         for j in range(n):
             z[j] -= G[r, j] * wanted / max(size2, 0.01)
     _shorten(z, limits.joint_rad_s)
+    # An obstacle that appears, or goes, changes z by a step: the arm follows at a bounded rate.
     step = z - last
     _shorten(step, limits.change_rad_s)
     return last + step

@@ -118,6 +118,7 @@ class WayPoints:
         return np.array(self._corners[: len(self._corners) - self.closed])
 
     def _locate(self, phase: float) -> tuple[int, float]:
+        # at the end of an open path no segment begins: the last one holds it
         s = phase % self.length if self.closed else min(max(phase, 0.0), self.length)
         i = min(bisect_right(self._starts, s), len(self._directions)) - 1
         return i, s - self._starts[i]
@@ -190,12 +191,13 @@ def follow(path: Path, state: PathState, position: FloatArray, params: TaskParam
     tx, ty, tz = np.asarray(path.tangent(state.phase), dtype=np.float64).tolist()
     (px, py, pz), (x, y, z) = point.tolist(), position.tolist()
     ex, ey, ez = px - x, py - y, pz - z
+    # feedforward along the path, feedback towards it
     forward = state.speed * max(0.0, 1.0 - math.hypot(ex, ey, ez) / params.off_path_m)
     gain = params.position_gain_1_s
     vx, vy, vz = forward * tx + gain * ex, forward * ty + gain * ey, forward * tz + gain * ez
     speed = math.hypot(vx, vy, vz)
     if speed > state.speed:
-        limit = state.speed / speed
+        limit = state.speed / speed  # as a whole: the direction stays
         vx, vy, vz = limit * vx, limit * vy, limit * vz
     return Following(point, (tx, ty, tz), (vx, vy, vz), forward)
 
@@ -215,6 +217,7 @@ def advance(path: Path, state: PathState, way: Following, velocity: FloatArray, 
     """
     (tx, ty, tz), (ax, ay, az), (vx, vy, vz) = way.tangent, way.velocity, velocity.tolist()
     missing = (ax - vx) * tx + (ay - vy) * ty + (az - vz) * tz
+    # `way.velocity` is that before eqs. 3-4: missing is what they, the rows and the joint box took from it
     phase = state.phase + max(0.0, way.forward - max(0.0, missing)) * params.control_period_s
     if not path.closed:
         phase = min(phase, path.length)

@@ -74,11 +74,12 @@ def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
     for i in range(n):
         # the middle of the box is the last command, as a rule, and the next one near it
         x[i] = 0.5 * (lower[i] + upper[i])
-    which = possible_rows(G, h, lower, upper)
+    which = possible_rows(G, h, lower, upper)  # slack and multipliers of all others are 0
     at_bound, piece = np.zeros(n, np.int64), _Piece(H.copy(), f.copy(), np.zeros(len(h), np.bool_))
     _take_violated(problem, which, x, piece)
     y, left = x.copy(), budget
     while True:
+        # y is the least of the piece that x is on; if another piece rules at y, the cost may rise again before y
         status, left = _box_minimum(piece.hessian, piece.linear, lower, upper, y, at_bound, left)
         if status != SOLVED:
             return status
@@ -93,7 +94,7 @@ def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
         for i in range(n):
             x[i] = y[i]
             if at_bound[i] != 0 and lower[i] < x[i] < upper[i]:
-                at_bound[i] = 0
+                at_bound[i] = 0  # drawn back from a bound that y had reached
         _take_violated(problem, which, x, piece)
     sound = True
     for i in range(n):
@@ -109,10 +110,10 @@ def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatA
     """Indices of the rows G x <= h that some x of the box violates; all others can be left out of any problem in it."""
     which, found = np.empty(len(h), np.int64), 0
     for k in range(len(h)):
-        most = 0.0
+        most = 0.0  # the largest G_k x of the box, which is at one of its corners
         for i in range(len(lower)):
             most += max(G[k, i] * lower[i], G[k, i] * upper[i])
-        if not most <= h[k]:
+        if not most <= h[k]:  # NaN counts as possible
             which[found] = k
             found += 1
     return which[:found]
@@ -121,7 +122,8 @@ def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatA
 @inlined
 def _finite(problem: Problem) -> bool:
     H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
-    # a number that is not finite spoils any sum of products with zero
+    # A number that is not finite spoils any sum of products with zero. This comes first: what is NaN would compare as a
+    # row that holds.
     spoilt = 0.0
     for i in range(len(f)):
         spoilt += 0.0 * f[i] + 0.0 * lower[i] + 0.0 * upper[i]
@@ -171,7 +173,7 @@ def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Pie
             for i in range(n):
                 linear[i] -= weight * h[k] * G[k, i]
                 for j in range(i + 1):
-                    hessian[i, j] += weight * G[k, i] * G[k, j]
+                    hessian[i, j] += weight * G[k, i] * G[k, j]  # w/2 (G_k x - h_k)^2, its lower triangle
     for i in range(n):
         for j in range(i):
             hessian[j, i] = hessian[i, j]
@@ -211,7 +213,7 @@ def _shorten(problem: Problem, which: IntArray, x: FloatArray, y: FloatArray) ->
             rate[m] += G[k, i] * d[i]
     slope, _ = _slope(start, bend, excess, rate, weight, 1.0)
     if slope <= 0:
-        return
+        return  # the cost still falls at y
     low, high, t = 0.0, 1.0, 0.5
     for _ in range(60):
         slope, rise = _slope(start, bend, excess, rate, weight, t)
@@ -268,7 +270,7 @@ def _box_minimum(
                 count += 1
         if not _newton_step(H, gradient, free[:count], L, step):
             return NOT_CONVEX, left
-        # as far as the box allows
+        # as far as the box allows, up to the first joint that meets its bound
         t, block, length = 1.0, -1, 0.0
         for i in free[:count]:
             length = max(length, abs(step[i]))
@@ -306,7 +308,7 @@ def _newton_step(H: FloatArray, gradient: FloatArray, free: IntArray, L: FloatAr
             for c in range(b):
                 total -= L[a, c] * L[b, c]
             if a == b:
-                if not total > 0:
+                if not total > 0:  # or NaN
                     return False
                 L[a, a] = np.sqrt(total)
             else:
@@ -331,9 +333,10 @@ def _certify(problem: Problem, piece: _Piece, at_bound: IntArray, answer: Minimu
     n = len(x)
     excesses(problem.G, problem.h, x, slack)
     for k in range(len(problem.h)):
-        multipliers[n + k] = problem.weight * slack[k]
+        multipliers[n + k] = problem.weight * slack[k]  # derivative of w/2 s^2
     for i in range(n):
         pull = linear[i]
         for j in range(n):
             pull += hessian[i, j] * x[j]
+        # H x + f + G^T (w s) + multiplier = 0 at the minimum; rounding may turn a sign, which the max takes off
         multipliers[i] = at_bound[i] * max(0.0, -at_bound[i] * pull)

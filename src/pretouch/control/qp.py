@@ -26,7 +26,7 @@ ENDING = {
     NOT_CONVEX: "the Hessian is not convex",
     BUDGET: "the iteration limit was reached",
 }
-_OPTIMAL, _INFEASIBLE, _CYCLED = 1, -1, -2
+_OPTIMAL, _INFEASIBLE, _CYCLED = 1, -1, -2  # exit flags of DAQP
 _EXIT = {
     _INFEASIBLE: "the approach rows cannot be met within the acceleration limits",
     _CYCLED: "the solver cycled",
@@ -78,6 +78,7 @@ def manipulability(jacobian: FloatArray) -> float:
             for j in range(n):
                 along += rows[k, j] * rows[i, j]
             for j in range(n):
+                # a row of no height depends on those before it, and the volume is 0 already
                 rows[k, j] -= along * rows[i, j] / height if height > 0 else 0.0
     return volume
 
@@ -124,6 +125,7 @@ def cost_into(
     J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, p: CostParams, H: FloatArray, f: FloatArray
 ) -> None:
     """Write H (n, n) and f (n,) of `task_cost`."""
+    # J^T J has no more rank than the task has rows, and mu is 0 away from singularities: it is k that makes H regular
     mu, k = damping(manipulability(J), p.damping_max, p.manipulability_threshold), p.mid_joint_gain
     for i in range(len(q)):
         f[i] = -k * mid_joint_velocity(q[i], q_mid[i], p.mid_joint_time_s)
@@ -131,6 +133,7 @@ def cost_into(
             f[i] -= J[m, i] * x_d[m]
         for j in range(i + 1):
             H[i, j] = mu + k if i == j else 0.0
+            # with the orientation held, 1 rad/s of error weighs as much as 1 m/s
             for m in range(len(x_d)):
                 H[i, j] += J[m, i] * J[m, j]
             H[j, i] = H[i, j]
@@ -162,6 +165,8 @@ def solve(
     x, slack, multipliers = answer = _room(len(lower), len(rows.h))
     # hard rows have no price: what is best without them is best with them if it keeps them
     weight = slack_weight if rows.soft else 0.0
+    # Before DAQP in any case: that one takes NaN in the cost for a success and drops a row of NaN in silence
+    # (tests/control/test_qp_traps.py).
     ending = _minimise(Problem(cost.H, cost.f, lower, upper, rows.G, rows.h, weight), budget, answer)
     if ending != SOLVED:
         return _braking(stop, rows, QpOutcome.FAILED, ENDING[ending])
@@ -187,7 +192,8 @@ def _solve_hard(
 ) -> QpSolution:
     """Minimise the cost, all of it finite, where hard rows are in the way."""
     which = possible_rows(rows.G, rows.h, lower, upper)
-    # the least bound DAQP takes for none
+    # The first n bounds are those of x itself. -1e30 is the least bound that DAQP takes for none; a sense of 0 is a
+    # hard inequality. With its own tolerance, 1e-6, a row that is violated by as much would count as met.
     lowest = np.full(len(which), -1e30)
     x, _, flag, info = daqp.solve(
         cost.H, cost.f, rows.G[which], np.concatenate((upper, rows.h[which])), np.concatenate((lower, lowest)),
@@ -210,6 +216,7 @@ def _contradict(lower: FloatArray, upper: FloatArray, rows: ApproachRows, budget
     """Whether no joint velocities in the box meet all rows: those that violate them least still do."""
     n = len(lower)
     answer = _room(n, len(rows.h))
+    # only violations cost; the small Hessian is there to make the problem strictly convex
     least = _minimise(Problem(1e-6 * np.eye(n), np.zeros(n), lower, upper, rows.G, rows.h, 1e3), budget, answer)
     return least == SOLVED and bool(answer.slack.max() > 1e-6)
 

@@ -18,6 +18,7 @@ def speed_scale(distance: float, d_max: float) -> float:
 
     `distance` [m] is from the end-effector origin to the nearest obstacle, infinite if there is none.
     """
+    # whichever way the arm moves: eq. 3 slows a retreat as well (docs/explanation/paper.md, slow-down while retreating)
     return min(1.0, distance / d_max)
 
 
@@ -37,4 +38,5 @@ def reduce_speed(state: ReductionState, fresh: float, l_max: int) -> tuple[float
     faded = faded_scale(state.scale, state.cycles + 1, l_max)
     if fresh <= faded:
         return fresh, ReductionState(fresh, 0)
+    # the factor at the loss stays, and the cycles count on: eq. 4 is linear in them and ends at 1 after l_max
     return faded, ReductionState(state.scale, state.cycles + 1)

@@ -33,7 +33,7 @@ def _sigmoid(v_max: float, exponent: Number) -> Number:
 @compiled
 def velocity_a(d: Number, v_max: float, beta: float, d_crit: float) -> Number:
     """V_a = V_max / (1 + exp(beta (2 d / d_crit - 1))) [m/s], eq. 5 of the paper. `d` [m] is from the surface."""
-    return _sigmoid(v_max, beta * (2.0 * d / d_crit - 1.0))
+    return _sigmoid(v_max, beta * (2.0 * d / d_crit - 1.0))  # beta < 0: from about 0 at the surface to V_max at d_crit
 
 
 @compiled
@@ -81,9 +81,11 @@ def _limits(d: FloatArray, p: ApproachParams) -> FloatArray:
 @compiled
 def _limit(d: float, p: ApproachParams) -> float:
     if not d < p.d_notice_m:
-        return np.inf
+        return np.inf  # dropped, not eased: just below, V_b allows V_max
     if d < p.d_repulse_m:
+        # never positive: the point has to retreat, at V_max in penetration; with floor it may come on all the same
         return max(velocity_a(d, p.v_max_m_s, p.beta, p.d_crit_m) - p.v_max_m_s, p.least_m_s)
+    # both cases meet near 0 only if d_repulse is d_crit, as in Table I; otherwise the limit jumps between them
     return max(velocity_b(d, p.v_max_m_s, p.beta, p.d_crit_m, p.d_notice_m), p.least_m_s)
 
 
@@ -136,6 +138,7 @@ def rows_into(kin: Kinematics, moved_by: BoolArray, near: NearArrays, p: Approac
             G[found, j] = 0.0
             if moved_by[link[k], j]:
                 x, y, z = point[k, 0] - anchor[j, 0], point[k, 1] - anchor[j, 1], point[k, 2] - anchor[j, 2]
+                # d . (a x (p - p_j)), column j of d^T J_c: all joints are hinges
                 G[found, j] = (
                     dx * (axis[j, 1] * z - axis[j, 2] * y)
                     + dy * (axis[j, 2] * x - axis[j, 0] * z)

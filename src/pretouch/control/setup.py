@@ -29,11 +29,12 @@ class MotionSetup:
 def motion_setup(body: MotionBody, null_space: NullSpaceMotion | None, budget: int) -> MotionSetup:
     """Return what `joint_motion` is made with; `budget` counts the factorisations after which it gives up."""
     model, t, p, moves_away = body.model, body.task, null_space or NullSpaceMotion(), null_space is not None
-    within = p.distance_m if moves_away else -math.inf
+    within = p.distance_m if moves_away else -math.inf  # nothing is nearer than that, so nothing moves away
     numbers = MotionNumbers(
         cost_params(t), t.orientation_gain_1_s, t.orientation == "hold", budget, body.limits.table, model.q_mid,
         t.mid_joint_projected, NullSpaceLimits(within, p.speed_m_s, p.joint_rad_s, p.rate_rad_s2 * t.control_period_s),
         0.0 if t.blocked_after_s is None else body.limits.period,
     )  # fmt: skip
+    # what remembers nothing hands its state on, and makes no new one in each step
     remembers = moves_away or t.blocked_after_s is not None
     return MotionSetup(body, numbers, moves_away, remembers, flattened(Fixed(model.arm, numbers)))

@@ -41,7 +41,8 @@ def twist(velocity: FloatArray, rotation: FloatArray, goal: FloatArray, gain: fl
 def rotation_error(rotation: FloatArray, goal: FloatArray) -> FloatArray:
     """Rotation from one orientation to the other (3,): the unit axis times the sine of the angle, base frame."""
     error = np.zeros(3)
-    # half the sum of the products of each axis of the one with its like of the other
+    # Half the sum of the cross products of each axis of the one with its like of the other. The sine falls again beyond
+    # a right angle and is 0 for a half turn: good for holding an orientation, not for turning to a far one.
     for i in range(3):
         x, y, z = rotation[0, i], rotation[1, i], rotation[2, i]
         error[0] += 0.5 * (y * goal[2, i] - z * goal[1, i])

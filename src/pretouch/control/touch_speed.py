@@ -37,6 +37,7 @@ def touch_speed(mass: float, limits: TouchLimits) -> float:
     The spring model of ISO/TS 15066, annex A, for orientation. `mass` m_R [kg] is that of the arm along the normal,
     infinite where it cannot move.
     """
+    # all of 1/2 mu v^2 goes into the spring, F^2 / (2 k); an infinite mass leaves mu = m_H
     inverse = 1.0 / limits.mass_kg + 1.0 / mass
     return min(limits.speed_max_m_s, limits.force_n * np.sqrt(inverse / limits.stiffness_n_m))
 
@@ -47,5 +48,5 @@ def mass_along(L: FloatArray, row: FloatArray) -> float:
 
     Khatib (1995): the inertial properties perceived at a point, along a direction.
     """
-    inverse = forward(L, row, np.empty(len(row)))
+    inverse = forward(L, row, np.empty(len(row)))  # g M^-1 g^T = |L^-1 g|^2
     return 1.0 / inverse if inverse > 0 else np.inf

@@ -13,6 +13,8 @@ from pretouch.params.localisation import LocalisationParams as LocalisationParam
 from pretouch.params.near import RestrictionParams as RestrictionParams
 from pretouch.params.near import RowKind as RowKind
 from pretouch.params.near import SpeedReduction as SpeedReduction
+from pretouch.params.perception import ClosingSpeed as ClosingSpeed
+from pretouch.params.perception import OutsidePoints as OutsidePoints
 from pretouch.params.perception import PerceptionParams as PerceptionParams
 from pretouch.params.reaction import AdmittanceParams as AdmittanceParams
 from pretouch.params.reaction import ClampParams as ClampParams

@@ -104,7 +104,7 @@ class BrakingParams(Checked):
     """Whether the touch speed follows from the arm's mass; none: it is `touch_speed_max_m_s`."""
     closing_deadband_m_s: NonNegative | None = None
     """Closing speed of the object itself that is not counted [m/s]; more is taken off what an approach may be, which
-    needs `perception.closing_speed`. 0.05 is what range noise of 20 mm leaves in the estimate for a thing at rest.
+    needs `perception.closing`. 0.05 is what range noise of 20 mm leaves in the estimate for a thing at rest.
     None: the object's own speed does not count."""
     tangential: Tangential | None = None
     """Whether a point near an object is slowed across the normal too."""

@@ -2,23 +2,54 @@
 
 from dataclasses import dataclass
 
-from pretouch.checks import Checked, Count, NonNegative, Positive
+from pretouch.checks import Checked, NonNegative, Positive, PositiveCount
 from pretouch.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class ClosingSpeed(Checked):
+    """Estimate of the speed with which an object itself comes nearer."""
+
+    memory_s: Positive = 0.09
+    """Time in which the weight of a reading falls by 1/e [s]: ours. A change of speed is followed to half in 0.14 s and
+    to nine tenths in 0.34 s; a range noise of 20 mm at 50 Hz leaves 0.05 m/s."""
+
+
+@dataclass(frozen=True)
+class OutsidePoints(Checked):
+    """Obstacle points of outside sources, such as cameras."""
+
+    per_link: PositiveCount = 2
+    """Points that are kept for each link that moves, in different directions from it."""
+    margin_m: NonNegative = 0.05
+    """A point is taken as the arm or a fixture up to this from its surface, and its uncertainty [m]: 20 mm by which
+    links may differ from their capsules, 15 mm that posture and latency leave, 15 mm of edges: ours."""
+    persistence_s: Positive = 0.15
+    """How long a point is kept after the measurement that showed it [s]: 60 ms of latency and two lost frames of a
+    camera at 30 Hz."""
+    hidden_s: NonNegative = 3.0
+    """How long a point is kept where the arm has come so near to it that it would be taken for the arm [s]: what a
+    source shows there says nothing. At 0.03 m/s, about a touch speed, it is the way through that margin. 0: as any
+    other point."""
+    slow_after_s: Positive = 0.2
+    """Age of a source's newest measurement at which the arm begins to slow [s]: `persistence_s`, and another frame."""
+    silent_after_s: Positive = 0.4
+    """Age of a source's newest measurement at which the arm holds [s]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_order(self)
 
 
 @dataclass(frozen=True)
 class PerceptionParams(Checked):
     """From readings to obstacle points (eq. 1)."""
 
-    enabled: bool = True
-    """Whether proximity is used at all; `blind` switches it off."""
-    filter_views: bool = True
-    """Whether readings that show the arm itself or a fixture are left out; off, they count as obstacles."""
     persistence_s: Positive = 0.06
     """How long a sensed point is kept after the measurement that showed it [s]: two missed readings at 50 Hz."""
-    self_margin_m: NonNegative = 0.06
-    """A reading is taken as the arm or a fixture from this much before its predicted return [m]: twice the
-    VL53L1X ranging error of 25 mm, and 10 mm of pose error."""
+    self_margin_m: NonNegative | None = 0.06
+    """A reading is taken as the arm or a fixture, and left out, from this much before its predicted return [m]: twice
+    the VL53L1X ranging error of 25 mm, and 10 mm of pose error. None: all readings count as obstacles."""
     spread_sigmas: NonNegative = 2.0
     """Standard deviations of a unit's place by which what it shows counts as nearer, and as the arm or a fixture
     earlier [1]: ours, about 95 % along one direction. It has no effect where the skin says no uncertainty."""
@@ -35,39 +66,19 @@ class PerceptionParams(Checked):
     keep_while_silent: bool = False
     """Whether the point that a unit showed last is kept until it tells something else, or counts as silent: silence
     is never free space. Off, it goes after `persistence_s`."""
-    closing_speed: bool = False
+    closing: ClosingSpeed | None = None
     """Whether the objects' own closing speeds are estimated, `Obstacles.closing_speed`."""
-    closing_memory_s: Positive = 0.09
-    """Time in which the weight of a reading in that estimate falls by 1/e [s]: ours. A change of speed is followed
-    to half in 0.14 s and to nine tenths in 0.34 s; a range noise of 20 mm at 50 Hz leaves 0.05 m/s."""
-    outside_points: Count = 0
-    """Points of outside sources, such as cameras, that are kept for each link that moves, in different directions from
-    it; 0: none are taken."""
-    outside_margin_m: NonNegative = 0.05
-    """A point of an outside source is taken as the arm or a fixture up to this from its surface, and its uncertainty
-    [m]: 20 mm by which links may differ from their capsules, 15 mm that posture and latency leave, 15 mm of edges:
-    ours."""
-    outside_persistence_s: Positive = 0.15
-    """How long such a point is kept after the measurement that showed it [s]: 60 ms of latency and two lost frames of a
-    camera at 30 Hz."""
-    outside_hidden_s: NonNegative = 3.0
-    """How long such a point is kept where the arm has come so near to it that it would be taken for the arm [s]: what a
-    source shows there says nothing. At 0.03 m/s, about a touch speed, it is the way through that margin. 0: as any
-    other point."""
-    outside_slow_after_s: Positive = 0.2
-    """Age of an outside source's newest measurement at which the arm begins to slow [s]: as that, and another frame."""
-    outside_silent_after_s: Positive = 0.4
-    """Age of an outside source's newest measurement at which the arm holds [s]."""
+    outside: OutsidePoints | None = None
+    """Points of outside sources, such as cameras; none: they are not looked at."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.slow_after_s >= self.silent_after_s:
-            raise ParameterError(
-                f"PerceptionParams.slow_after_s is {self.slow_after_s}: it must be less than silent_after_s,"
-                f" {self.silent_after_s}."
-            )
-        if self.outside_slow_after_s >= self.outside_silent_after_s:
-            raise ParameterError(
-                f"PerceptionParams.outside_slow_after_s is {self.outside_slow_after_s}: it must be less than"
-                f" outside_silent_after_s, {self.outside_silent_after_s}."
-            )
+        _check_order(self)
+
+
+def _check_order(params: PerceptionParams | OutsidePoints) -> None:
+    if params.slow_after_s >= params.silent_after_s:
+        raise ParameterError(
+            f"{type(params).__name__}.slow_after_s is {params.slow_after_s}: it must be less than silent_after_s,"
+            f" {params.silent_after_s}."
+        )

@@ -85,15 +85,19 @@ class Placed(NamedTuple):
 
 
 class PointNumbers(NamedTuple):
-    """What is taken of `PerceptionParams`."""
+    """What is taken of `OutsidePoints` and of the rest of `PerceptionParams`."""
 
-    outside_persistence_s: float
-    outside_hidden_s: float
-    outside_margin_m: float
+    persistence_s: float
+    hidden_s: float
+    margin_m: float
+    per_link: int
     spread_sigmas: float
-    outside_points: int
-    closing_speed: bool
-    closing_memory_s: float
+    estimates: bool
+    """Whether closing speeds are estimated."""
+    memory_s: float
+    """Memory of these estimates."""
+    silence_s: float
+    """How long points of silent sources are kept, 0 for no longer than others."""
 
 
 class _Candidates(NamedTuple):
@@ -118,7 +122,7 @@ class _Candidates(NamedTuple):
 @entry
 def take_points(
     old: KeptPoints, new: ByName[PointSet], now: float, place: IntArray, there: Placed, chain: Chain, posed: float,
-    p: ByName[PointNumbers],
+    p: PointNumbers,
 ) -> None:  # fmt: skip
     """Choose the points of each link's places, and change those that are kept.
 
@@ -147,15 +151,15 @@ def take_points(
         if chosen[k] >= 0:
             m = chosen[k]
             points[k], stamps[k], taken[k] = found.point[m], found.stamp[m], found.known[m] == _OBSTACLE
-    if p.closing_speed:
-        follow_points(old.motion, old.point, old.times[SEEN], points, stamps, taken, p.closing_memory_s)
+    if p.estimates:
+        follow_points(old.motion, old.point, old.times[SEEN], points, stamps, taken, p.memory_s)
     for k in range(len(chosen)):
         old.times[HEARD, k] = new.heard
         if chosen[k] >= 0:
             old.point[k], old.sigma[k], old.times[USED, k] = points[k], found.sigma[chosen[k]], stamps[k]
             # a hidden point was not seen again: the arm is in front of it, so it is taken to be there still
             old.times[SEEN, k] = stamps[k] if taken[k] else new.heard
-            if p.closing_speed and not taken[k]:
+            if p.estimates and not taken[k]:
                 old.motion[0, k], old.motion[1, k] = points[k], 0.0
 
 
@@ -164,16 +168,16 @@ def _candidates(
     old: KeptPoints, new: PointSet, now: float, place: IntArray, there: Placed, ends: FloatArray, p: PointNumbers
 ) -> _Candidates:
     """The kept points that the arm hides and the new ones that are young enough, each with its nearest link."""
-    persistence, sigmas = p.outside_persistence_s, p.spread_sigmas
+    persistence, sigmas = p.persistence_s, p.spread_sigmas
     room, count = len(new.stamp) + len(old.point), 0
     near, spread, when = np.empty((room, 3)), np.empty(room), np.empty(room)
     known = np.full(room, _UNKNOWN)
     for k in range(len(old.point)):
         u = sigmas * old.sigma[k]
-        if now - old.times[USED, k] <= p.outside_hidden_s and now - old.times[SEEN, k] <= persistence:
+        if now - old.times[USED, k] <= p.hidden_s and now - old.times[SEEN, k] <= persistence:
             # within what the filter takes for the arm, no source can show the point; inside the arm it cannot be
             gap_of_arm = _gap(old.point, k, ends, there.arm_radius)
-            if -u <= gap_of_arm <= p.outside_margin_m + u:
+            if -u <= gap_of_arm <= p.margin_m + u:
                 near[count], spread[count], when[count] = old.point[k], old.sigma[k], old.times[USED, k]
                 known[count] = _HIDDEN
                 count += 1
@@ -188,7 +192,7 @@ def _candidates(
     closest(there.body, near, ClosestArrays(body_point, link, direction, gap))
     for m in range(count):
         gap[m] -= sigmas * spread[m]
-        link[m] = p.outside_points * place[link[m]]
+        link[m] = p.per_link * place[link[m]]
     return _Candidates(near, spread, when, known, link, direction, gap)
 
 
@@ -202,7 +206,7 @@ def _elect(
     A candidate is compared with arm and fixtures only once it would win: a cloud has hundreds that never do.
     `ends` are those of the arm at `placed_for`, and change with the stamp of the candidate.
     """
-    for rank in range(p.outside_points):
+    for rank in range(p.per_link):
         for m in range(len(found.point)):
             first = found.first[m]
             best = chosen[first + rank]
@@ -214,7 +218,7 @@ def _elect(
                 if not abs(found.stamp[m] - placed_for) < _ONE_INSTANT:
                     placed_for = found.stamp[m]
                     move_ends(there.arm_ends, there.arm_link, chain, posed - placed_for, ends)
-                within = p.outside_margin_m + p.spread_sigmas * found.sigma[m]
+                within = p.margin_m + p.spread_sigmas * found.sigma[m]
                 found.known[m] = _OBSTACLE
                 if (
                     _on_capsules(found.point, m, ends, there.arm_radius, within)

@@ -1,6 +1,6 @@
 """Points of outside sources, such as cameras: which of them are obstacles, and how long they last.
 
-Of any number of points at most `outside_points` are kept for each link that moves: the one that is nearest to it by
+Of any number of points at most `per_link` are kept for each link that moves: the one that is nearest to it by
 what is certain of their distance, then the nearest one in another direction, and so on. Each has a place of its own,
 so a place goes on showing the same side of the same link, as a unit of the skin does. What is on the arm or a fixture
 is left out, the arm being where it was when the points were measured.
@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, entry
+from pretouch.compiled import entry
 from pretouch.groups import CapsuleArrays, Chain
-from pretouch.params import PerceptionParams
-from pretouch.perception.chosen_points import KeptPoints, Placed, take_points
+from pretouch.params import OutsidePoints
+from pretouch.perception.chosen_points import KeptPoints, Placed, PointNumbers, take_points
 from pretouch.perception.closest import ClosestArrays, closest, distances
 from pretouch.perception.closing import closing_speeds
 from pretouch.perception.obstacles import HEARD, SEEN, TrackState, track_init
@@ -67,23 +67,22 @@ def see_outside(
         robot: the state that `kin` is of.
         now: instant of this step [s].
     """
-    params, model = setup.params, setup.model
-    if not params.enabled or params.outside_points == 0 or (state is None and points is None):
+    numbers, model = setup.outside, setup.model
+    if numbers is None or (state is None and points is None):
         return seen, state
     if state is None or anew:
-        state = outside_init(model, params.outside_points)
+        state = outside_init(model, numbers.per_link)
     ends = placed_ends(model.body.link, model.body.a, model.body.b, kin.position, kin.rotation)
     body = CapsuleArrays(model.body.link, ends[0], ends[1], model.body.radius)
     # a source gives the same set until it has a newer one: each is taken in once
     if points is not None and state.heard < points.heard <= now:
-        state = _taken(state, points, body, setup, kin, robot, now)
+        state = _taken(state, points, numbers, body, setup, kin, robot, now)
     before = state.tracks
     # of the tracks `_shown` changes the directions alone
     count, direction = len(state.sigma), before.direction.copy()
     indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
-    silence = params.outside_silent_after_s if params.keep_while_silent else 0.0
     found, nearest = _shown(
-        _Places(before.point, direction, before.times, before.motion, state.sigma), now, silence, params, body,
+        _Places(before.point, direction, before.times, before.motion, state.sigma), now, numbers, body,
         kin.position[model.ee], len(setup.skin), _Room(indices, vectors, scalars),
     )  # fmt: skip
     after = OutsideState(TrackState(before.point, direction, before.times, before.motion), state.sigma, state.heard)
@@ -102,45 +101,47 @@ def see_outside(
     return Perception(both, seen.distance, min(seen.nearest, nearest), seen.longest_silence), after
 
 
-def outside_silence(state: OutsideState | None, unfit: str, now: float, params: PerceptionParams) -> tuple[float, str]:
+def outside_silence(
+    state: OutsideState | None, unfit: str, now: float, params: OutsidePoints | None
+) -> tuple[float, str]:
     """Factor in [0, 1] on the speed for outside sources that fall silent, and what is wrong with them.
 
-    As with units, silence is no free space: from `outside_slow_after_s` on the arm slows, at `outside_silent_after_s`
-    it stands, and at once where `unfit` says what cannot be used of the points given.
+    As with units, silence is no free space: from `slow_after_s` on the arm slows, at `silent_after_s` it stands, and at
+    once where `unfit` says what cannot be used of the points given.
     """
-    if not params.enabled or params.outside_points == 0:
+    if params is None:
         return 1.0, ""
     if unfit:
         return 0.0, unfit
     # where no source was ever heard of, none is missed
     silence = -math.inf if state is None else now - state.heard
-    if silence <= params.outside_slow_after_s:
+    if silence <= params.slow_after_s:
         return 1.0, ""
-    longest = params.outside_silent_after_s
-    factor = max(0.0, (longest - silence) / (longest - params.outside_slow_after_s))
+    longest = params.silent_after_s
+    factor = max(0.0, (longest - silence) / (longest - params.slow_after_s))
     if silence < longest:
         return factor, ""
     return 0.0, "has not been heard yet" if math.isinf(silence) else f"has been silent for {silence:.2f} s"
 
 
 def _taken(
-    state: OutsideState, points: SeenPoints, body: CapsuleArrays, setup: PerceptionSetup, kin: Kinematics,
-    robot: RobotState, now: float,
+    state: OutsideState, points: SeenPoints, numbers: PointNumbers, body: CapsuleArrays, setup: PerceptionSetup,
+    kin: Kinematics, robot: RobotState, now: float,
 ) -> OutsideState:  # fmt: skip
     """Return the state with a newer set of points taken in; `body` is the arm's, placed."""
-    model, params, old = setup.model, setup.params, state.tracks
+    model, old = setup.model, state.tracks
     arm, others = model.capsules, setup.fixtures.capsules
-    motion = old.motion.copy() if params.closing_speed else old.motion
+    motion = old.motion.copy() if numbers.estimates else old.motion
     tracks, sigma = TrackState(old.point.copy(), old.direction, old.times.copy(), motion), state.sigma.copy()
     place = np.full(len(model.links), -1, dtype=np.int64)
-    place[moving_links(model)] = np.arange(len(sigma) // params.outside_points)
+    place[moving_links(model)] = np.arange(len(sigma) // numbers.per_link)
     # the whole arm explains points, the base too, while only links that move have places for them
     arm_ends = placed_ends(arm.link, arm.a, arm.b, kin.position, kin.rotation)
     other_ends = placed_ends(others.link, others.a, others.b, kin.position, kin.rotation)
     take_points(
         KeptPoints(tracks.point, tracks.times, motion, sigma), points, now, place,
         Placed(body, arm.link, arm_ends, arm.radius, other_ends, others.radius, setup.fixtures.planes),
-        Chain(kin.anchor, kin.axis, model.moved_by, robot.qd), robot.stamp, params,
+        Chain(kin.anchor, kin.axis, model.moved_by, robot.qd), robot.stamp, numbers,
     )  # fmt: skip
     return OutsideState(tracks, sigma, points.heard)
 
@@ -160,14 +161,6 @@ class _Places(NamedTuple):
     """(P,) standard deviation of each point [m]."""
 
 
-class _Numbers(NamedTuple):
-    """What is taken of `PerceptionParams`."""
-
-    outside_persistence_s: float
-    spread_sigmas: float
-    closing_speed: bool
-
-
 class _Room(NamedTuple):
     """Room for P obstacles, as that of `perceive`."""
 
@@ -178,27 +171,23 @@ class _Room(NamedTuple):
 
 @entry
 def _shown(
-    places: _Places, now: float, silence: float, params: ByName[_Numbers], body: CapsuleArrays, ee: FloatArray,
-    units: int, room: _Room,
+    places: _Places, now: float, p: PointNumbers, body: CapsuleArrays, ee: FloatArray, units: int, room: _Room
 ) -> tuple[int, float]:  # fmt: skip
     """Write the obstacles of the places whose points last, as `perceive` does of units.
 
-    `silence` [s] is how long a place that is not heard is kept. Returns how many obstacles there are, and the distance
-    of the nearest from the end-effector's origin [m].
+    Returns how many obstacles there are, and the distance of the nearest from the end-effector's origin [m].
     """
     point, last_direction, times, motion, sigma = places
-    persistence, sigmas, indices, vectors, scalars = (
-        params.outside_persistence_s, params.spread_sigmas, room.indices, room.vectors, room.scalars,
-    )  # fmt: skip
+    indices, vectors, scalars = room.indices, room.vectors, room.scalars
     place, link, near, body_point, direction = indices[0], indices[1], vectors[0], vectors[1], vectors[2]
     ee_distance, body_distance = scalars[0], scalars[1]
     found = 0
-    for p in range(len(sigma)):
+    for k in range(len(sigma)):
         # nothing was heard since the point was seen, and silence is no free space
-        unanswered = times[HEARD, p] <= times[SEEN, p]
-        if now - times[SEEN, p] <= (max(persistence, silence) if unanswered else persistence):
-            place[found] = p
-            near[found], direction[found] = point[p], last_direction[p]
+        unanswered = times[HEARD, k] <= times[SEEN, k]
+        if now - times[SEEN, k] <= (max(p.persistence_s, p.silence_s) if unanswered else p.persistence_s):
+            place[found] = k
+            near[found], direction[found] = point[k], last_direction[k]
             if np.isnan(direction[found, 0]):
                 # any unit vector will do: it stays only for a point on a capsule's axis, see `closest`
                 direction[found, 0], direction[found, 1], direction[found, 2] = 0.0, 0.0, 1.0
@@ -206,16 +195,16 @@ def _shown(
     near, direction = near[:found], direction[:found]
     closest(body, near, ClosestArrays(body_point, link, direction, body_distance))
     distances(near, ee, ee_distance)
-    if params.closing_speed:
+    if p.estimates:
         # by place: afterwards `place` becomes the index behind those of the skin's units
         closing_speeds(motion, place[:found], direction, scalars[2])
     nearest = np.inf
     for m in range(found):
-        p = place[m]
-        last_direction[p] = direction[m]
+        k = place[m]
+        last_direction[k] = direction[m]
         # eqs. 5-7 know penetration; eq. 3 makes a speed factor of the other distance, so that one ends at 0
-        body_distance[m] -= sigmas * sigma[p]
-        ee_distance[m] = max(0.0, ee_distance[m] - sigmas * sigma[p])
+        body_distance[m] -= p.spread_sigmas * sigma[k]
+        ee_distance[m] = max(0.0, ee_distance[m] - p.spread_sigmas * sigma[k])
         nearest = min(nearest, ee_distance[m])
-        place[m] = p + units
+        place[m] = k + units
     return found, nearest

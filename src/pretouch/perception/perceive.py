@@ -1,5 +1,6 @@
 """Perception in one call: readings in, obstacles with their closest body points out."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from pretouch.compiled import entry, flattened, inlined
 from pretouch.groups import CapsuleArrays, Chain, Sensors, SkinArrays
 from pretouch.params import PerceptionParams
+from pretouch.perception.chosen_points import PointNumbers
 from pretouch.perception.closest import ClosestArrays, closest, distances, no_obstacles
 from pretouch.perception.closing import LastSeen, closing_speeds, follow_points, reckon
 from pretouch.perception.obstacles import (
@@ -96,6 +98,8 @@ class PerceptionSetup:
     params: PerceptionParams
     fields: tuple[Any, ...]
     """Of scene, skin and numbers, for compiled code."""
+    outside: PointNumbers | None
+    """What is taken of the parameters for points of outside sources; None where they are not looked at."""
 
 
 def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: PerceptionParams) -> PerceptionSetup:
@@ -105,11 +109,23 @@ def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: 
         model.capsules.arrays, model.body.arrays, fixtures.capsules.arrays, fixtures.planes, RAYS, model.moved_by,
         model.ee,
     )  # fmt: skip
+    estimates, memory = p.closing is not None, math.inf if p.closing is None else p.closing.memory_s
     numbers = SightNumbers(
-        p.persistence_s, p.self_margin_m, p.filter_views, p.closing_speed, p.closing_memory_s, p.reckon_below_minimum,
-        p.silent_after_s if p.keep_while_silent else 0.0, 0.0 if skin.exact else p.spread_sigmas,
+        p.persistence_s, p.self_margin_m or 0.0, p.self_margin_m is not None, estimates, memory,
+        p.reckon_below_minimum, p.silent_after_s if p.keep_while_silent else 0.0,
+        0.0 if skin.exact else p.spread_sigmas,
     )  # fmt: skip
-    return PerceptionSetup(model, skin, fixtures, params, flattened(scene, skin.arrays, numbers))
+    o = p.outside
+    points = None if o is None else PointNumbers(
+        o.persistence_s, o.hidden_s, o.margin_m, o.per_link, p.spread_sigmas, estimates, memory,
+        o.silent_after_s if p.keep_while_silent else 0.0,
+    )  # fmt: skip
+    return PerceptionSetup(model, skin, fixtures, params, flattened(scene, skin.arrays, numbers), points)
+
+
+def nothing_seen(readings: RangeReadings) -> Perception:
+    """Return what is seen without a unit, or where nobody looks."""
+    return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0)
 
 
 def perceive(
@@ -125,10 +141,10 @@ def perceive(
     arm and fixtures are expected earlier by it.
     """
     params, count = setup.params, len(setup.skin)
-    if not params.enabled or count == 0:
-        return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0), state
+    if count == 0:
+        return nothing_seen(readings), state
     # a step is pure: what compiled code writes to is copied first
-    motion = state.motion.copy() if params.closing_speed else state.motion
+    motion = state.motion if params.closing is None else state.motion.copy()
     tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy(), motion)
     moving = robot if params.place_at_stamp else None
     distance = np.empty(count)

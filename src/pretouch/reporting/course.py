@@ -70,7 +70,7 @@ class Course(RunRecord):
     @property
     def proximity_used(self) -> bool:
         """Whether any of the profiles looks at what the units say."""
-        return any(run.profile.perception.enabled for run in self.runs)
+        return any(run.profile.perception is not None for run in self.runs)
 
     @property
     def by_thresholds(self) -> bool:

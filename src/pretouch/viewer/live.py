@@ -71,7 +71,7 @@ class LivePage:
         running, recording = self.controls.running, self._simulation.recording
         before = self._simulation.time
         steps = self._pass_time()
-        late = self._simulation.frame.late(self._simulation.world.profile.perception.slow_after_s)
+        late = self._simulation.frame.late(self._simulation.world.profile.sight.slow_after_s)
         for step in steps:
             self._history.add(step, late=late)
             self._scene.trail.add(step)

@@ -152,7 +152,7 @@ class ReplayPage:
         stride = max(1, (index + 1 - start) // _MOST) if follows else _STRIDE
         for i in range(index, start - 1, -stride)[::-1]:
             kept = recorded[i]
-            step, slow = kept.step, self._world(kept.run).profile.perception.slow_after_s
+            step, slow = kept.step, self._world(kept.run).profile.sight.slow_after_s
             self.history.add(step, self._other(step.stamp), frame_of(kept).late(slow))
             self._scene.trail.add(step)
         self._drawn = index

@@ -145,8 +145,8 @@ class Scene:
         self._arm.paint(
             in_levels(expectation(step.obstacles, len(world.skin), thresholds_of(world.profile.detect))), now
         )
-        perception = world.profile.perception
-        self.units.draw(step, kin, frame.late(perception.silent_after_s), perception.enabled)
+        late = frame.late(world.profile.sight.silent_after_s)
+        self.units.draw(step, kin, late, world.profile.perception is not None)
         self.trail.draw(now)
         self._draw_pairs(step)
         self._draw_forces(frame, kin)

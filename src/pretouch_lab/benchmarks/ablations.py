@@ -7,11 +7,11 @@ WITHOUT = "without "
 """Begins the names of these baselines."""
 
 OFF = {
-    "perception.closing_speed": "no",
+    "perception.closing": "none",
     "perception.reckon_below_minimum": "no",
     "perception.place_at_stamp": "no",
     "perception.keep_while_silent": "no",
-    "perception.outside_points": "0",
+    "perception.outside": "none",
     "task.mid_joint_projected": "no",
     "slow": "on",
     "approach": "none",

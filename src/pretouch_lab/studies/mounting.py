@@ -58,7 +58,7 @@ def cells(grid: Grid) -> list[Cell]:
             (AVOIDING, AVOIDED, static.SIDES),
         )
         for name, mode in grid.controllers(default)
-        if profile(name).perception.enabled
+        if profile(name).perception is not None
         for error, trajectory, side in product(errors, static.TRAJECTORIES, of)
     ]
     return list({cell.name: cell for cell in wanted}.values())
@@ -116,11 +116,11 @@ def missed(record: Record, setup: Setup) -> float | None:
     touch = record.first_contact()
     steps = [s for s in record.steps if touch is None or s.stamp < touch]
     room, model, skin = fixtures(setup.scene), setup.model, setup.skin
-    shown, left_out = 0, 0
+    shown, left_out, margin = 0, 0, setup.profile.sight.self_margin_m or 0.0
     for step in steps:
         kin = model.kinematics(step.q)
         expected = expected_range(kin, *sensor_poses(skin, kin), skin.link, model.capsules, room)
-        board = np.flatnonzero(step.range_distance < expected - setup.profile.perception.self_margin_m)
+        board = np.flatnonzero(step.range_distance < expected - margin)
         shown += len(board)
         left_out += len(np.setdiff1d(board, step.obstacles.unit))
     return rounded(left_out / shown, 5) if shown else None

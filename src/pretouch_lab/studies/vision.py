@@ -73,7 +73,7 @@ def cells(grid: Grid) -> list[Cell]:
     return [
         Cell(NAME, name, {"scene": scene, "sensing": sensing, "view": view, "restrictions": mode})
         for (name, mode), scene, sensing in product(modes.controllers(DEFAULT_RESTRICTIONS), SCENES, SENSING)
-        if profile(name).perception.enabled and (sensing == "skin" or profile(name).perception.outside_points > 0)
+        if (profile(name).perception if sensing == "skin" else profile(name).sight.outside)
         for view in ((NO_VIEW,) if sensing == "skin" else VIEWS)
     ]
 

@@ -36,7 +36,7 @@ def cells(grid: Grid) -> list[Cell]:
     return [
         Cell(NAME, name, {"trajectory": trajectory, "side": side, "readings": way, "restrictions": mode})
         for name, mode in grid.controllers(static.DEFAULT_RESTRICTIONS)
-        if profile(name).perception.enabled
+        if profile(name).perception is not None
         for trajectory, side, way in product(static.TRAJECTORIES, static.SIDES, WAYS)
     ]
 

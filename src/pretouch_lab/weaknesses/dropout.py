@@ -62,7 +62,7 @@ _PERIOD_S = MODES["short"].period_s
 def cells(grid: Grid) -> list[Cell]:
     """A cell for each number of readings and each persistence, of each profile that senses."""
     controllers = [
-        (name, mode) for name, mode in grid.controllers(DEFAULT_RESTRICTIONS) if profile(name).perception.enabled
+        (name, mode) for name, mode in grid.controllers(DEFAULT_RESTRICTIONS) if profile(name).perception is not None
     ]
     return [
         Cell(NAME, name + change, {"readings": float(count), "restrictions": mode})
@@ -244,7 +244,7 @@ def summarise(rows: list[Row]) -> Row:
 
 def _kept_s(name: str) -> float:
     """How long a profile keeps a point [s]."""
-    return profile(name).perception.persistence_s
+    return profile(name).sight.persistence_s
 
 
 def _base(name: str) -> str:

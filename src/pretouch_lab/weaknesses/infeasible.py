@@ -31,7 +31,7 @@ _NEAR_M = 0.1
 
 def cells(grid: Grid) -> list[Cell]:
     """A cell for each number of points and each profile with proximity."""
-    sensing = [name for name in grid.profiles if profile(name).perception.enabled]
+    sensing = [name for name in grid.profiles if profile(name).perception is not None]
     return [Cell(NAME, name, {"points": float(count)}) for count in _COUNTS for name in sensing]
 
 

@@ -49,7 +49,7 @@ WATCHED_S = 3.0
 def cells(grid: Grid) -> list[Cell]:
     """A cell for each length of the push and each decay of a reaction that decays, of each profile that senses."""
     controllers = [
-        (name, mode) for name, mode in grid.controllers(DEFAULT_RESTRICTIONS) if profile(name).perception.enabled
+        (name, mode) for name, mode in grid.controllers(DEFAULT_RESTRICTIONS) if profile(name).perception is not None
     ]
     return [
         Cell(NAME, name + change, {"held_s": held, "restrictions": mode})

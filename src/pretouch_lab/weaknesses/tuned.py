@@ -65,7 +65,7 @@ def cells(grid: Grid) -> list[Cell]:
     tunings: list[tuple[str, str]] = []
     for name in grid.profiles:
         found = profile(name)
-        if not found.perception.enabled:
+        if found.perception is None:
             continue
         if NAMES_MODE.search(name):
             tunings.append((name, restriction_mode(found)))

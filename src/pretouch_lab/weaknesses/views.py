@@ -8,6 +8,7 @@ from textwrap import fill
 import numpy as np
 
 from pretouch.control.path import Circle, Path, WayPoints
+from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
 from pretouch.profiles import Profile, profile
@@ -26,7 +27,7 @@ NAME = "views"
 SCENES = ("circle", "line", "low", "down")
 """Circle and line with the arm on its pedestal, the line close above a table, and this with a unit that looks down."""
 
-_UNFILTERED = ":perception.filter_views=no"
+_UNFILTERED = ":perception.self_margin_m=none"
 _DURATION_S = 40.0
 _HEIGHT_M = {"line": 0.5, "low": 0.1, "down": 0.1}
 """Height of the line in the base frame, where the table's surface is at 0 [m]."""
@@ -40,7 +41,7 @@ _BEFORE_HAND_M = 0.1334
 def cells(grid: Grid) -> list[Cell]:
     """A cell for each scene and controller; each controller that senses also without the filter."""
     seeing = {name: profile(name).perception for name in grid.profiles}
-    filtered = [name for name, params in seeing.items() if params.enabled and params.filter_views]
+    filtered = [name for name, params in seeing.items() if params is not None and params.self_margin_m is not None]
     both = Grid((*grid.profiles, *(name + _UNFILTERED for name in filtered)), grid.restrictions)
     return [
         Cell(NAME, name, {"scene": where, "restrictions": mode})
@@ -110,7 +111,7 @@ def seen(record: Record, context: Context, room: Fixtures, params: Profile) -> R
     slows the arm: there the filter would leave out an obstacle that matters. An obstacle is what the controller took
     for one.
     """
-    margin = params.perception.self_margin_m
+    margin = next(m for m in (params.sight.self_margin_m, PerceptionParams().self_margin_m) if m is not None)
     shown = np.array([s.range_distance for s in record.steps])
     arm, either = (_expected(record, context, known) - margin for known in (no_fixtures(), room))
     targets = np.isfinite(shown)
@@ -170,7 +171,7 @@ def summarise(rows: list[Row]) -> Row:
 
 def tables(part: Row) -> list[TextTable]:
     """Show what the units see and what it costs, then which unit and which axis it concerns."""
-    cells = [cell for cell in part["cells"] if profile(cell["profile"]).perception.enabled]
+    cells = [cell for cell in part["cells"] if profile(cell["profile"]).perception is not None]
     many = len({cell["restrictions"] for cell in cells}) > 1
     return [_shares(cells, many), _sides(cells, many)]
 

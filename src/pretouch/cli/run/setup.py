@@ -90,10 +90,10 @@ def run_setup(command: "Run") -> RunSetup:
     if command.robot.robot == "franka":
         model = RobotModel(planned(model.description, LimiterParams()))
     if units.no_skin:
-        if profile.perception.enabled:
+        if profile.perception is not None:
             raise ParameterError(
                 f"The profile {profile.name} needs sensor units, but there are none: choose --profile blind or"
-                " pretouch:perception.enabled=no, or leave out --no-skin."
+                " pretouch:perception=none, or leave out --no-skin."
             )
         skin = Skin((), model)
     else:

@@ -36,7 +36,7 @@ class StepMessages:
         self._m = messages
         # memory of its own: this thread is not the controller's
         self._model = RobotModel(controller.model.description)
-        self._skin, self._perception = controller.skin, controller.profile.perception
+        self._skin, self._sight = controller.skin, controller.profile.sight
         self.base = base_frame or controller.model.links[0]
         self._links = (self.base, *controller.model.links[1:])
 
@@ -98,7 +98,7 @@ class StepMessages:
     def _unit_statuses(self, readings: RangeReadings, step: ControlStep) -> list[Any]:
         if not len(readings.stamp) == len(readings.status) == len(self._skin):
             return []
-        slow, silent = self._perception.slow_after_s, self._perception.silent_after_s
+        slow, silent = self._sight.slow_after_s, self._sight.silent_after_s
         made = []
         for name, stamp, code in zip(self._skin.ids, readings.stamp.tolist(), readings.status.tolist(), strict=True):
             age = step.stamp - stamp

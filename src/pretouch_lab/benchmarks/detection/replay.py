@@ -62,7 +62,7 @@ def replay(
 ) -> Replayed:  # fmt: skip
     """Give a detector each step of a stream, from its beginning, and what units said of a touch."""
     params = baseline.profile
-    sees = params.perception.enabled
+    sees = params.perception is not None
     detector, steps = DetectorAlone(params, model, skin), len(stream.count)
     alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
     force, touched = np.full((steps, 3), np.nan), [NOT_TOUCHED] * steps

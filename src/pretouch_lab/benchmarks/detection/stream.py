@@ -14,7 +14,7 @@ from pretouch.profiles import profile
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState
 
-PROFILE = "paper:detect.f_base_n=1000:reduction.enabled=no:restriction.mode=off:perception.closing_speed=yes"
+PROFILE = "paper:detect.f_base_n=1000:slow=none:approach=none:perception.closing=on"
 """Of the arms that are recorded: proximity is sensed, but no force is a contact and nothing near changes the motion.
 Closing speeds are there for the detectors that use them; nothing else that is sensed depends on them."""
 
@@ -67,7 +67,7 @@ class StreamRecorder:
     def __init__(self, plant: Plant, look: Callable[[Cycle], None] = lambda cycle: None) -> None:
         """Take the plant, and what else is to be called with each cycle."""
         self._plant, self._look = plant, look
-        self._patience = profile(PROFILE).perception.slow_after_s
+        self._patience = profile(PROFILE).sight.slow_after_s
         self._robot: list[RobotState] = []
         self._obstacles: list[Obstacles] = []
         self._reacting: list[bool] = []

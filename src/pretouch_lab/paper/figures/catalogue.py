@@ -32,7 +32,7 @@ def _beside(name: str) -> list[Cell]:
 
 
 def _against_blind(name: str) -> list[Cell]:
-    if not profile(name).perception.enabled:
+    if profile(name).perception is None:
         raise ExperimentError(f"The figure force-difference cannot show {name}, which has no proximity: name another.")
     return static.cells(Grid(("blind", name)))
 

@@ -55,7 +55,7 @@ _POSTURES = 40
 
 def cells(grid: Grid) -> list[Cell]:
     """A cell for each skin, with the arm on the circle and almost standing, for each profile that senses."""
-    sensing = [name for name in grid.profiles if profile(name).perception.enabled]
+    sensing = [name for name in grid.profiles if profile(name).perception is not None]
     return [Cell(NAME, name, {"arm": arm, "skin": skin}) for name, arm, skin in product(sensing, ARMS, SKINS)]
 
 
