@@ -102,7 +102,7 @@ class Step:
         self.problem, self.model = problem, RobotModel(panda())
         count = problem.points.shape[1]
         if count == 0:
-            self._equip(paper_skin(self.model), np.full(7, np.nan), "slack")
+            self._equip(paper_skin(self.model), np.full(7, np.nan), "approach.rows=slack")
             return
         drawn = 3 * count + 30
         units, distance = _units(self.model, drawn), np.random.default_rng(1).uniform(0.15, 0.5, drawn)
