@@ -184,7 +184,7 @@ class TouchSensors:
             self._sent.send(arrival, (unit, time, bool(self._on[i]), told))
 
 
-class FeelingSkin:
+class SimulatedTouchSkin:
     """The port `TouchSkin` of a simulated arm: range finders, or any other skin, and touch sensors beside them."""
 
     def __init__(self, ranges: SkinPort, sensors: TouchSensors) -> None:

@@ -48,7 +48,7 @@ def band(course: Windowed, f_base: float, f_obs: float = 0.0) -> FloatArray:
 
 
 Detector = Callable[[Windowed, float, float], BoolArray]
-"""Says of each of S samples whether a contact is felt, given F_b and F_obs [N]."""
+"""Says of each of S samples whether a contact is detected, given F_b and F_obs [N]."""
 
 
 def filtered(course: Windowed, f_base: float, f_obs: float = 0.0) -> BoolArray:
@@ -77,10 +77,10 @@ def fixed(course: Windowed, threshold: float, _f_obs: float = 0.0) -> BoolArray:
     return np.any(np.abs(course.force) > threshold, axis=1)
 
 
-def onsets(felt: BoolArray, rest: int) -> list[int]:
-    """Samples at which a contact is felt anew: while one is answered, for `rest` samples, none is looked for."""
+def onsets(detected: BoolArray, rest: int) -> list[int]:
+    """Samples at which a contact is detected anew: while one is answered, for `rest` samples, none is looked for."""
     found: list[int] = []
-    for i in np.flatnonzero(felt).tolist():
+    for i in np.flatnonzero(detected).tolist():
         if not found or i >= found[-1] + rest:
             found.append(i)
     return found
