@@ -1,4 +1,4 @@
-"""What a page shows in space: the room, the arm, what it senses, does and feels, and a person's hand."""
+"""What a page shows in space: the room, the arm, what it senses, does and detects, and a person's hand."""
 
 import math
 from collections.abc import Callable

@@ -81,7 +81,7 @@ class LiveSimulation:
 
     @property
     def stiffness(self) -> float:
-        """Of the person's hand and the object [N/m], as it is felt now."""
+        """Of the person's hand and the object [N/m], as it is now."""
         return self._room.stiffness
 
     @property
