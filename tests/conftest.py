@@ -1,6 +1,7 @@
 """What all tests share: the arm, its skin, and how properties are searched."""
 
 import gc
+import signal
 from collections import Counter
 from pathlib import Path
 
@@ -24,6 +25,11 @@ def panda_model() -> RobotModel:
 @pytest.fixture(scope="session")
 def paper_skin(panda_model: RobotModel) -> skin.Skin:
     return skin.paper_skin(panda_model)
+
+
+def pytest_configure() -> None:
+    """Heed Ctrl-C, here and in what is started: a background job of a shell inherits that it is ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_finish() -> None:

@@ -35,7 +35,9 @@ def recorded(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> list[Co
     return steps
 
 
-@pytest.mark.parametrize("name", ["paper", "blind", "paper:restriction.mode=hard", "paper:threshold.compare=raw"])
+@pytest.mark.parametrize(
+    "name", ["paper", "blind", "paper:restriction.mode=hard", "paper:threshold.compare=raw", "pretouch"]
+)
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
 def test_a_warm_up_sees_every_mode(
     panda_model: RobotModel,
@@ -49,6 +51,7 @@ def test_a_warm_up_sees_every_mode(
     steps = recorded(controller, monkeypatch)
     realtime.warm_up(controller, robot)
     assert {step.mode for step in steps} == set(Mode)
+    assert any(len(step.touched.link) for step in steps) == (name == "pretouch"), "where it is touched"
     if name == "paper":
         seen = {(step.mode, len(step.restricted) > 0) for step in steps}
         assert seen >= {(Mode.TRACK, True), (Mode.TRACK, False), (Mode.REACT, True), (Mode.REACT, False)}

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, fields
+from functools import cache
 from numbers import Integral, Real
 from types import UnionType
 from typing import Annotated, Literal, Union, get_args, get_origin, get_type_hints
@@ -45,9 +46,15 @@ class Checked:
     """Base of parameter sets: checks every field when it is made."""
 
     def __post_init__(self) -> None:
-        hints = get_type_hints(type(self), include_extras=True)
-        for item in fields(self):  # type: ignore[arg-type]
-            _check_field(type(self).__name__, item.name, hints[item.name], getattr(self, item.name))
+        for name, hint in _hints(type(self)):  # type: ignore[arg-type]
+            _check_field(type(self).__name__, name, hint, getattr(self, name))
+
+
+@cache
+def _hints(kind: type) -> tuple[tuple[str, object], ...]:
+    """Name and type of each field of a parameter set, resolved once."""
+    hints = get_type_hints(kind, include_extras=True)
+    return tuple((item.name, hints[item.name]) for item in fields(kind))
 
 
 def _check_field(owner: str, name: str, hint: object, value: object) -> None:

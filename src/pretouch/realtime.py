@@ -31,6 +31,8 @@ _PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
 """Of Linux' `prctl`."""
 
 _WARM_UP_STEPS = 3
+_PUSH_NM = 50.0
+"""External torque of each joint in a contact that is made up [Nm]."""
 """Steps of each kind: what one sees for the first time the next one remembers."""
 _NEWS_S = 0.5
 """Longest time the first state is waited for [s]: then the controller says how old the newest is."""
@@ -211,7 +213,7 @@ def warm_up(controller: Controller, robot: RobotState, points: bool = False) -> 
             rehearsal.step(None, quiet)
         for wrench in (robot.wrench, None, quiet, push):
             for _ in range(_WARM_UP_STEPS):
-                rehearsal.step(seen, wrench)
+                rehearsal.step(seen, wrench, _PUSH_NM if wrench is push else 0.0)
         # a loss that latches, and the way out of it
         rehearsal.step(seen, quiet, q=lost)
         rehearsal.step(seen, quiet, resume=True)
@@ -225,14 +227,20 @@ class _Rehearsal:
         self._state = controller.init(robot)
 
     def step(
-        self, seen: RangeStatus | None, wrench: FloatArray | None, q: FloatArray | None = None, resume: bool = False
-    ) -> None:
-        """Turn the controller once. All units say `seen`, at distances up to 1 m; without it they say nothing."""
+        self, seen: RangeStatus | None, wrench: FloatArray | None, torque: float = 0.0, q: FloatArray | None = None,
+        resume: bool = False,
+    ) -> None:  # fmt: skip
+        """Turn the controller once. All units say `seen`, at distances up to 1 m; without it they say nothing.
+
+        `torque` of each joint is added to what the arm reports [Nm]: a detector may go by torques alone.
+        """
         self._now += self._controller.limits.period
         units = len(self._controller.skin)
         stamp = np.full(units, -np.inf if seen is None else self._now)
         status = np.full(units, int(RangeStatus.NONE if seen is None else seen))
         robot = replace(self._robot, stamp=self._now, wrench=wrench, q=self._robot.q if q is None else q)
+        if torque and robot.tau_ext is not None:
+            robot = replace(robot, tau_ext=robot.tau_ext + torque)
         readings = RangeReadings(stamp, np.linspace(0.0, 1.0, units), status)
         # of each unit one sample, so that nothing of what they are used for is compiled in the loop
         imu = ImuReadings(np.arange(units), np.full(units, self._now - self._controller.limits.period),

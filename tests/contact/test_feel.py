@@ -1,5 +1,7 @@
 """Detection by each method through its one entry: what is felt, what is learnt and when, and which way the force is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -19,6 +21,7 @@ MODEL = RobotModel(panda())
 Q = MODEL.description.q_ready
 KIN = MODEL.kinematics(Q)
 PRETOUCH = profile("pretouch:threshold.window_samples=10")
+UNPLACED = replace(PRETOUCH, detect=replace(PRETOUCH.detect, localise=None))
 STILL = np.zeros(7)
 
 
@@ -103,7 +106,8 @@ def weights_after(state, samples: int, p=PRETOUCH, near=NOTHING, reacting=False,
 @given(st.floats(-0.05, 0.29))
 def test_nothing_is_learnt_near_an_object(distance):
     before = SETTLED.state.test.model
-    after = weights_after(SETTLED, 45, near=object_at(distance, np.array([0.0, 0.0, 1.0])))
+    # where a contact would be decides nothing of what is learnt, and is most of the time a step takes
+    after = weights_after(SETTLED, 45, UNPLACED, near=object_at(distance, np.array([0.0, 0.0, 1.0])))
     assert_array_equal(after, before.weights)
 
 

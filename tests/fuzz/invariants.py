@@ -29,7 +29,10 @@ def arrays_of(value: object) -> list[tuple[str, np.ndarray]]:
     found: list[tuple[str, np.ndarray]] = []
     for part in _names(type(value)):
         inner = getattr(value, part)
-        found += [(part, inner)] if isinstance(inner, np.ndarray) else arrays_of(inner)
+        if isinstance(inner, np.ndarray):
+            found.append((part, inner))
+        elif _names(type(inner)):
+            found += arrays_of(inner)
     return found
 
 
@@ -98,7 +101,7 @@ def check_speed_scale(step: ControlStep, p: Profile) -> None:
 
 def end_of_braking(speed: np.ndarray, reach: np.ndarray, period: float) -> np.ndarray:
     """How far joints still travel [rad] that move at `speed` [rad/s] and lose `reach` [rad/s] each period from now."""
-    speed = np.clip(speed, 0.0, 1e6)  # far beyond any limit, and its square is finite
+    speed = np.minimum(np.maximum(speed, 0.0), 1e6)  # far beyond any limit, and its square is finite
     steps = np.floor(speed / reach)
     return np.asarray(period * (steps * speed - reach * steps * (steps + 1) / 2))
 
@@ -111,28 +114,38 @@ def check_command(step: ControlStep, e: Expected, p: Profile, model: RobotModel)
     rounding = 1e-9 + 1e-15 * np.abs(e.qd)
     assert (np.abs(c - e.qd) <= reach + rounding).all(), ("acceleration", np.abs(c - e.qd) / reach)
     q = e.q + c * dt
-    for sign, room in ((1.0, model.q_max - margin - q), (-1.0, q - model.q_min - margin)):
-        braking = sign * c <= sign * e.qd - reach + rounding
-        still = sign * c <= 1e-12
-        assert (braking | (sign * c <= arm.qd_max + 1e-9)).all(), "velocity"
-        assert (braking | still | (end_of_braking(sign * c, reach, dt) <= room + 1e-9)).all(), "position"
-        if arm.envelope is not None:
-            below = below_envelope(sign * c, sign * q, sign, reach, dt, arm.envelope.moved_in(margin))
-            assert (braking | still | below).all(), "envelope"
+    speed, place = np.stack((c, -c)), np.stack((q, -q))  # towards the upper and the lower side
+    braking = speed <= np.stack((e.qd, -e.qd)) - reach + rounding
+    assert (braking | (speed <= arm.qd_max + 1e-9)).all(), "velocity"
+    done = braking | (speed <= 1e-12)
+    if done.all():
+        return
+    room = np.stack((model.q_max, -model.q_min)) - margin - place
+    assert (done | (end_of_braking(speed, reach, dt) <= room + 1e-9)).all(), "position"
+    envelope = envelope_within(model, margin)
+    if envelope is not None:
+        assert (done | below_envelope(speed, place, reach, dt, envelope)).all(), "envelope"
+
+
+@cache
+def envelope_within(model: RobotModel, margin: float) -> SpeedEnvelope | None:
+    """Return an arm's envelope moved inwards by a margin [rad], made once for each."""
+    envelope = model.description.envelope
+    return None if envelope is None else envelope.moved_in(margin)
 
 
 def below_envelope(
-    speed: np.ndarray, q: np.ndarray, sign: float, reach: np.ndarray, period: float, envelope: SpeedEnvelope
+    speed: np.ndarray, q: np.ndarray, reach: np.ndarray, period: float, envelope: SpeedEnvelope
 ) -> np.ndarray:
-    """Whether joints that are at q (n,) with `speed`, and brake from now on, stay below the envelope on that side.
+    """Whether joints that are at q with `speed`, and brake from now on, stay below the envelope.
 
-    Speeds and positions are counted towards that side, at the end of each period.
+    Speeds and positions (2, n) are counted towards the upper and the lower side, at the end of each period.
     """
-    speed = np.clip(speed, 0.0, 10.0)
-    k = np.arange(1 + int((speed / reach).max()))[:, None]
+    speed = np.minimum(np.maximum(speed, 0.0), 10.0)
+    k = np.arange(1 + int((speed / reach).max()))[:, None, None]
     speeds = np.maximum(speed - k * reach, 0.0)
     places = q - speed * period + np.cumsum(speeds, axis=0) * period
-    end = envelope.q_upper if sign > 0 else -envelope.q_lower
+    end = np.stack((envelope.q_upper, -envelope.q_lower))
     most = np.sqrt(np.maximum(envelope.slope * (end - places), 0.0)) - envelope.offset
     return np.asarray((speeds <= np.maximum(most, 0.0) + 1e-7).all(axis=0))
 

@@ -62,6 +62,12 @@ class Course:
         robot = self.robot()
         self.state = self.controller.init(robot)
         self.oracle = Oracle(world.profile, world.skin.ids, robot, world.model.description.qd_max)
+        p = world.profile
+        self.setting = (
+            "step", f"arm {world.model.description.name}", f"restriction {restriction_mode(p)}",
+            f"detection {p.detect.name}", f"reaction {p.react.name}", f"period {p.task.control_period_s}",
+            f"units {len(world.skin)}",
+        )  # fmt: skip
 
     def robot(self) -> RobotState:
         """Return what the arm's interface reports: the truth, but for the measured joint positions."""
@@ -122,7 +128,7 @@ class Course:
         assert self.world.lying or step.qp.outcome is not QpOutcome.FAILED, step.qp.status
         if e.believed:
             assert np.array_equal(step.q, inputs.robot.q)
-            assert np.allclose(step.q_commanded, e.q, rtol=1e-12, atol=1e-12)
+            assert (np.abs(step.q_commanded - e.q) <= 1e-12 + 1e-12 * np.abs(e.q)).all()
         return invariants.check_mode(step, e, self.oracle, inputs.resume, self.state.mode.latched)
 
     def _replay(self, before: ControllerState, inputs: Inputs, step: ControlStep) -> None:
@@ -136,13 +142,9 @@ class Course:
         assert invariants.same(step, kept), "a published step changed"
 
     def _count(self, step: ControlStep, cause: str) -> None:
-        p = self.world.profile
         tight = len(step.restricted) and step.qp.slack.max() > 1e-6
         self.machine.reached.update([
-            "step", f"arm {self.world.model.description.name}",
-            f"mode {step.mode.name}", f"outcome {step.qp.outcome.name}", f"cause {cause}",
-            f"restriction {restriction_mode(p)}", f"detection {p.detect.name}", f"reaction {p.react.name}",
-            f"period {p.task.control_period_s}", f"units {len(self.world.skin)}",
+            *self.setting, f"mode {step.mode.name}", f"outcome {step.qp.outcome.name}", f"cause {cause}",
             f"sight {self.weather.sight}", f"force {self.weather.feel}", f"slack {bool(tight)}",
             f"slowed {step.speed_scale < 1}", f"on the axis {bool((step.obstacles.body_distance < -0.04).any())}",
         ])  # fmt: skip

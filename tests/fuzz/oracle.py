@@ -106,7 +106,7 @@ class Oracle:
             overrun=not fault and now - last > p.failure.overrun_s,
             no_force=not fault and now - self.force_stamp > p.failure.force_timeout_s,
             silent=[name for name, a in zip(self.ids, age, strict=False) if a >= stop],
-            scale=float(np.clip((stop - age.max(initial=0.0)) / (stop - slow), 0.0, 1.0)),
+            scale=min(max(float(stop - age.max(initial=0.0)) / (stop - slow), 0.0), 1.0),
         )  # fmt: skip
 
     def _believe(self, robot: RobotState, last: float, now: float) -> None:
@@ -122,10 +122,13 @@ class Oracle:
 
     def _fault(self, inputs: Inputs) -> str:
         r = inputs.robot
-        numbers = np.concatenate([[inputs.stamp, r.stamp], r.q, r.qd, r.q_commanded, r.qd_commanded])
-        if not np.isfinite(numbers).all() or np.abs(numbers[2:]).max() >= LARGEST:
+        numbers = np.concatenate((r.q, r.qd, r.q_commanded, r.qd_commanded))
+        if not (np.abs(numbers) < LARGEST).all():  # what is no number is not below
             return "unusable"
-        if max(abs(inputs.stamp), abs(r.stamp)) >= LATEST or (np.abs(r.qd_commanded) >= 2 * self.qd_max).any():
+        if (
+            not (abs(inputs.stamp) < LATEST and abs(r.stamp) < LATEST)
+            or (np.abs(r.qd_commanded) >= 2 * self.qd_max).any()
+        ):
             return "unusable"
         if inputs.stamp < self.stamp:
             return "backwards"

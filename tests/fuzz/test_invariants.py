@@ -76,16 +76,20 @@ def test_a_speed_beyond_an_envelope_is_noticed():
     arm = fr3()
     reach, e = arm.qdd_max * 0.01, arm.envelope
     # 0.3 rad before the end of the upper side and of the lower one
-    for sign, end in ((1.0, e.q_upper), (-1.0, -e.q_lower)):
-        most = np.sqrt(e.slope * 0.3) - e.offset
-        there = invariants.below_envelope(0.5 * most, end - 0.3, sign, reach, 0.01, e)
-        assert there.all()
-        assert not invariants.below_envelope(most + 1e-3, end - 0.3, sign, reach, 0.01, e).any()
+    place = np.stack((e.q_upper, -e.q_lower)) - 0.3
+    most = np.sqrt(e.slope * 0.3) - e.offset
+    assert invariants.below_envelope(np.stack((0.5 * most, 0.5 * most)), place, reach, 0.01, e).all()
+    for side in range(2):
+        speed = np.zeros((2, 7))
+        speed[side] = most + 1e-3
+        below = invariants.below_envelope(speed, place, reach, 0.01, e)
+        assert not below[side].any()
+        assert below[1 - side].all()
     # where braking is weaker than the envelope is steep, what is below it now may not stay there
     steep = e.slope / 2 > arm.qdd_max
     assert steep.any()
-    speed = np.sqrt(e.slope * 0.3) - e.offset - 1e-3
-    assert not invariants.below_envelope(speed, e.q_upper - 0.3, 1.0, reach, 0.01, e)[steep].any()
+    speed = np.stack((most - 1e-3, np.zeros(7)))
+    assert not invariants.below_envelope(speed, place, reach, 0.01, e)[0, steep].any()
 
 
 def test_a_slack_that_is_not_true_is_noticed(course: Course):

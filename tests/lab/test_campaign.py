@@ -287,8 +287,6 @@ def started(out):
         stderr=subprocess.PIPE,
         text=True,
         process_group=0,
-        # a background job of a shell inherits that Ctrl-C is ignored
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     with process:
         try:

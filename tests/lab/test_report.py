@@ -99,10 +99,11 @@ def test_what_is_no_recording_is_named(tmp_path, content):
         read_trace(path)
 
 
-def test_a_recorded_trial_has_the_course_of_the_trial_itself(context, tmp_path):
+def test_a_recorded_trial_is_as_without_and_has_the_course_of_the_trial_itself(context, tmp_path):
     where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
     cell, place = Cell(static.NAME, "paper", where), tmp_path / "x.mcap"
-    _, record = static.trial(cell, 101, replace(context, recording=place))
+    row, record = static.trial(cell, 101, replace(context, recording=place))
+    assert static.trial(cell, 101, context)[0] == row
     trace, again = trace_of(record), read_trace(place)
     assert again[1] == context.skin.ids
     for name in columns_of(record.steps):
@@ -114,13 +115,6 @@ def test_a_recorded_trial_has_the_course_of_the_trial_itself(context, tmp_path):
         (t.time, t.link, t.velocity.tolist()) for t in record.touches
     ]
     np.testing.assert_array_equal(kept.hand_position, record.hand_position)
-
-
-def test_to_record_a_trial_changes_nothing_of_it(context, tmp_path):
-    where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
-    cell = Cell(static.NAME, "paper", where)
-    row, _ = static.trial(cell, 101, context)
-    assert static.trial(cell, 101, replace(context, recording=tmp_path / "x.mcap"))[0] == row
 
 
 def test_a_trace_has_the_mean_true_force_of_each_step(context):

@@ -34,10 +34,17 @@ def controller(panda_model, paper_skin):
     return controller_of(panda_model, paper_skin)
 
 
+@pytest.fixture(scope="module")
+def place(controller, tmp_path_factory):
+    """A recorded run, which nobody writes to."""
+    place = tmp_path_factory.mktemp("run") / "a.mcap"
+    recorded_run(place, controller, 400)
+    return place
+
+
 @pytest.fixture
-def made(controller, tmp_path):
-    recorded_run(tmp_path / "a.mcap", controller, 400)
-    return open_recording(tmp_path / "a.mcap")
+def made(place):
+    return open_recording(place)
 
 
 def test_a_run_is_recomputed_bit_for_bit(made):

@@ -1,7 +1,6 @@
 """Points spread evenly, the same each time."""
 
 import numpy as np
-from scipy.stats.qmc import Halton
 
 from pretouch.types import FloatArray
 
@@ -11,6 +10,8 @@ def spread(count: int, dimensions: int, skip: int = 20) -> FloatArray:
 
     The shift differs between dimensions: the sequence's columns of large primes begin alike.
     """
+    from scipy.stats.qmc import Halton  # takes a third of a second, and all that imports this module may never need it
+
     sequence = Halton(dimensions, scramble=False).fast_forward(1 + skip)
     return (sequence.random(count) + 0.618034 * np.arange(dimensions)) % 1.0
 

@@ -11,7 +11,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from pretouch.errors import ExperimentError, PretouchError
 from pretouch.types import FloatArray
@@ -83,7 +82,9 @@ def _point(wanted: list[Dimension], row: FloatArray, sweep: Sweep) -> Point:
 
 
 def _hypercube(columns: int, samples: int) -> FloatArray:
-    return np.asarray(qmc.LatinHypercube(columns, rng=np.random.default_rng(_DRAWN_WITH)).random(samples))
+    from scipy.stats.qmc import LatinHypercube
+
+    return np.asarray(LatinHypercube(columns, rng=np.random.default_rng(_DRAWN_WITH)).random(samples))
 
 
 def problem(wanted: list[Dimension]) -> dict[str, Any]:

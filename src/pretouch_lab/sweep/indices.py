@@ -1,7 +1,6 @@
 """How much each parameter matters: Sobol indices, rank correlations, or the course over a grid, with 95 % intervals."""
 
 import numpy as np
-from scipy.stats import norm, rankdata
 
 from pretouch.types import FloatArray
 from pretouch_lab.rows import Row, rounded
@@ -38,6 +37,7 @@ def sobol_indices(sweep: Sweep, values: FloatArray, ranked: bool = False) -> Row
     `ranked` the indices are those of the values' ranks.
     """
     from SALib.analyze import sobol
+    from scipy.stats import rankdata
 
     wanted = columns(sweep)
     blocks = values.reshape(-1, len(wanted) + 2)
@@ -63,6 +63,8 @@ def sobol_indices(sweep: Sweep, values: FloatArray, ranked: bool = False) -> Row
 
 def _correlations(run: Run, values: FloatArray) -> Row:
     """Spearman's rank correlation of each column with the values; of a choice, of its number in the list."""
+    from scipy.stats import norm, rankdata
+
     known = np.isfinite(values)
     about: Row = {"points": int(known.sum()), "of": len(values), **_spread(values[known])}
     if known.sum() < 4 or np.ptp(values[known]) == 0.0:

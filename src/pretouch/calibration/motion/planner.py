@@ -11,7 +11,6 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
-from scipy.stats import qmc
 
 from pretouch.calibration.motion.information import Observability
 from pretouch.calibration.motion.limits import MotionLimits
@@ -76,7 +75,9 @@ class _Planner:
 
     def _sequence(self) -> FloatArray:
         """Points (D, 5 n) of the unit cube: for each candidate a posture, and what its swing is like."""
-        sobol = qmc.Sobol(5 * self._model.n, scramble=False)
+        from scipy.stats.qmc import Sobol  # takes a third of a second, and a plan may never be asked for
+
+        sobol = Sobol(5 * self._model.n, scramble=False)
         sobol.fast_forward(1 + _DRAWN * self._params.variant)
         return sobol.random(_DRAWN)
 
