@@ -251,7 +251,7 @@ class Touched:
     """Where the arm is touched: C contacts, the surest first; none where no contact is detected. Base frame."""
 
     link: IntArray
-    """(C,) index of the link that carries each place; links that the same joints move are told apart by place only."""
+    """(C,) index of the link that carries each place; links that the same joints move differ in place only."""
     point: FloatArray
     """(C, 3) on the surface of the body [m]."""
     force: FloatArray

@@ -40,7 +40,7 @@ class LocalisationParams(Checked):
     """Least standard deviation of a place they give [m]: that of neighbouring places of the surface."""
     two_odds: Fraction = 0.5
     """Prior odds of two contacts at once against one, which says what either mistake costs as well: with 0.05, 49 % of
-    development pairs were told apart and 1 % of long single contacts taken for two, with 0.5 57 % and 4 %."""
+    development pairs were recognised and 1 % of long single contacts taken for two, with 0.5 57 % and 4 %."""
     memory_s: NonNegative = 0.15
     """Time over which what the windows of earlier steps said of each place is averaged [s]: an arm that moves shows
     one contact from several postures."""

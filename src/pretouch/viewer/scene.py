@@ -93,7 +93,7 @@ class Scene:
         return hand, target
 
     def on_hand(self, act: Callable[[FloatArray], None]) -> None:
-        """Have a function told where the hand is dragged to (3,) [m], from the page's own thread."""
+        """Have a function called with where the hand is dragged to (3,) [m], from the page's own thread."""
         if self._target is None:
             return
 

@@ -99,6 +99,6 @@ def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[f
 
 
 def dispersion_of(counts: list[int]) -> float:
-    """Variance of counts by their mean, 1 for Poisson counts and taken as 1 where it is less or cannot be told."""
+    """Variance of counts by their mean, 1 for Poisson counts and taken as 1 where it is less or unknown."""
     mean = float(np.mean(counts)) if counts else 0.0
     return max(1.0, float(np.var(counts, ddof=1)) / mean) if len(counts) > 1 and mean > 0 else 1.0
