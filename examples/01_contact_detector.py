@@ -3,7 +3,7 @@
     python examples/01_contact_detector.py
 
 It takes a force per sample and, if you know of objects near, where they are. Near an object a light touch counts: the
-push here is not felt with nothing near, and is felt from a hand on that side.
+push here is not detected with nothing near, and is detected from a hand on that side.
 """
 
 import numpy as np

@@ -85,7 +85,7 @@ STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motio
 class Controller:
     """The line from readings to joint velocities for one arm, skin, surrounding, path and profile.
 
-    `mark` is told the name of each of `STAGES` as it ends, so that a caller with a clock can see where the time goes.
+    `mark` gets the name of each of `STAGES` as it ends, so that a caller with a clock can see where the time goes.
     """
 
     def __init__(
@@ -143,9 +143,9 @@ class Controller:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.window.samples == theirs.window.samples and type(mine.detect) is type(theirs.detect)
         same_points = _points_per_link(mine) == _points_per_link(theirs)
-        way = state.path
+        path = state.path
         if self.path is not before.path:
-            way = paths.joined(self.path, self.model.kinematics(robot.q).position[self.model.ee])
+            path = paths.joined(self.path, self.model.kinematics(robot.q).position[self.model.ee])
         return replace(
             state,
             window=state.window if same_window else window_init(mine.window.samples),
@@ -153,7 +153,7 @@ class Controller:
             if same_window
             else self._detector.init(self.body),
             reaction=mine.react.adopted(state.reaction, self.body, theirs.react, robot.q_commanded),
-            path=way,
+            path=path,
             approach=state.approach if mine.approach == theirs.approach else self._approach_init(),
             motion=state.motion if mine.null_space == theirs.null_space else MotionState(np.zeros(self.model.n)),
             outside=state.outside if same_points else None,
@@ -175,45 +175,46 @@ class Controller:
         mark("kinematics")
         near = self._perceived(state, given, kin)
         mark("perception")
-        felt, window, detector = self._detected(state, inputs, given, near, kin)
+        detection, window, detector = self._detected(state, inputs, given, near, kin)
         mark("contact")
 
         # what to do
         noticed = ReactionInputs(
-            state.mode, kin, robot, felt, near.seen.obstacles, bool(near.silent or near.lost), state.command,
+            state.mode, kin, robot, detection, near.seen.obstacles, bool(near.silent or near.lost), state.command,
             state.path.phase, inputs.resume,
         )  # fmt: skip
         answers, react = p.react.sense(state.reaction, self.body, noticed)
         blocked = state.motion.blocked
-        events = given.events | answers | events_of(given.unfit, near.silent, near.lost, felt, window.count, blocked, p)
+        noted = events_of(given.unfit, near.silent, near.lost, detection, window.count, blocked, p)
+        events = given.events | answers | noted
         mode = next_mode(state.mode, events, inputs.resume)
-        contact = felt.contact if mode.mode is Mode.REACT is not state.mode.mode else None
+        contact = detection.contact if mode.mode is Mode.REACT is not state.mode.mode else None
         mark("mode")
 
         # along the path as fast as eqs. 3-4 leave it, or as the reaction says
         slowed = 1.0 if p.slow is None else speed_scale(near.seen.nearest, p.slow.d_max_m)
         scale, reduction = reduce_speed(state.reduction, min(near.scale, slowed), p.task.restore_cycles)
-        way = paths.follow(self.path, state.path, kin.position[model.ee], p.task)
+        following = paths.follow(self.path, state.path, kin.position[model.ee], p.task)
         answer, react = p.react.move(react, self.body, noticed, mode)
-        desired = way.scaled(scale) if answer is None else answer.velocity
+        desired = following.scaled(scale) if answer is None else answer.velocity
         mark("path")
         motion, mode, approach, moving = self._moved(state, noticed, near, mode, desired, answer)
         mark("motion")
 
         step = ControlStep(
             stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
-            ee_position=kin.position[model.ee], ee_velocity=motion.ee_velocity, path_position=way.point,
+            ee_position=kin.position[model.ee], ee_velocity=motion.ee_velocity, path_position=following.point,
             path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
             speed_scale=scale, range_distance=near.seen.distance, obstacles=near.seen.obstacles,
             force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
-            filtered_force=window.newest, thresholds=felt.thresholds, armed=felt.armed, contact=contact,
+            filtered_force=window.newest, thresholds=detection.thresholds, armed=detection.armed, contact=contact,
             reaction_velocity=desired if mode.mode is Mode.REACT else _STILL, restricted=motion.restricted,
             approach_limit=motion.approach_limit, qp=motion.qp, command=motion.qp.qd,
-            residual=felt.residual, evidence=felt.evidence, touched=felt.touched,
+            residual=detection.residual, evidence=detection.evidence, touched=detection.touched,
         )  # fmt: skip
         after = ControllerState(
             watch=given.watch, tracks=near.tracks, window=window, detector=detector, reduction=reduction,
-            reaction=react, path=paths.advance(self.path, state.path, way, motion.ee_velocity_commanded, p.task)
+            reaction=react, path=paths.advance(self.path, state.path, following, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK else paths.pause(state.path),
             approach=approach, motion=moving, mode=mode, command=motion.qp.qd.copy(),
             rotation_goal=state.rotation_goal, outside=near.outside,
@@ -242,9 +243,9 @@ class Controller:
         seen, tracks = perceive(known, sight, kin, given.readings, now, robot)
         seen, outside = see_outside(state.outside, anew, seen, given.points, sight, kin, robot, now)
         heard, silent = silent_units(self.skin, tracks, given.readings.status, seen.longest_silence, now, sight.params)
-        told, lost = outside_silence(outside, given.lost, now, sight.params.outside)
+        outside_scale, lost = outside_silence(outside, given.lost, now, sight.params.outside)
         watched = self._units > 0 and heard >= 1.0 and not silent
-        return _Near(seen, tracks, outside, min(heard, told), watched, silent, lost)
+        return _Near(seen, tracks, outside, min(heard, outside_scale), watched, silent, lost)
 
     def _detected(
         self, state: ControllerState, inputs: Inputs, given: "_Given", near: "_Near", kin: Kinematics
@@ -258,8 +259,8 @@ class Controller:
             given.watch.stamp, kin, robot, window, before.full, near.seen.obstacles, reacting, near.watched,
             given.touches, imu,
         )  # fmt: skip
-        felt, detector = self._detector.step(state.detector, self.body, sample)
-        return felt, before if reacting and p.freeze_while_reacting else window, detector
+        detection, detector = self._detector.step(state.detector, self.body, sample)
+        return detection, before if reacting and p.freeze_while_reacting else window, detector
 
     def _moved(
         self, state: ControllerState, noticed: ReactionInputs, near: "_Near", mode: ModeState, desired: FloatArray,

@@ -8,9 +8,9 @@ from pretouch.profiles import Profile
 
 
 def events_of(
-    unfit: str, silent: str, lost: str, felt: Detection, samples: int, blocked: float, p: Profile
+    unfit: str, silent: str, lost: str, detection: Detection, samples: int, blocked: float, p: Profile
 ) -> dict[Event, str]:
-    """Name what was seen, heard and felt in one step, beside what the reaction says.
+    """Name what was seen, received and detected in one step, beside what the reaction says.
 
     `blocked` is for how long the path has been so [s].
     """
@@ -21,9 +21,9 @@ def events_of(
         events[Event.SKIN_SILENT] = silent
     if lost:
         events[Event.POINTS_LOST] = lost
-    if not felt.armed and p.detect.by_torques and bool(np.isnan(felt.residual).any()):
+    if not detection.armed and p.detect.by_torques and bool(np.isnan(detection.residual).any()):
         events.setdefault(Event.NO_FORCE, f"up to {p.failure.force_timeout_s:g} s")
-    elif not felt.armed:
+    elif not detection.armed:
         events[Event.WINDOW_FILLING] = f"{samples} of {p.window.samples} samples"
     if p.task.blocked_after_s is not None and blocked >= p.task.blocked_after_s:
         events[Event.PATH_BLOCKED] = f"{blocked:.1f} s"

@@ -1,4 +1,4 @@
-"""Which inputs to believe: faults in what comes from outside, told apart before anything is computed from it."""
+"""Which inputs to believe: faults of the inputs, distinguished before anything is computed from them."""
 
 from dataclasses import replace
 

@@ -61,9 +61,9 @@ class Profile(Checked):
     null_space: NullSpaceMotion | None = None
     """Whether links before the hand move away from what is near in the null space of the task."""
     window: WindowParams = field(default_factory=WindowParams)
-    """The window of the external force: contacts are told once it is full (eq. 8)."""
+    """The window of the external force: contacts are detected once it is full (eq. 8)."""
     detect: Detector = field(default_factory=MovingThresholds)
-    """How a contact is told from free motion (eqs. 9-11)."""
+    """How a contact is distinguished from free motion (eqs. 9-11)."""
     react: Reaction = field(default_factory=DecayingVelocity)
     """How the arm answers a contact (eq. 12)."""
     failure: FailureParams = field(default_factory=FailureParams)

@@ -248,10 +248,10 @@ class Contact:
 
 @value
 class Touched:
-    """Where the arm is touched: C contacts, the surest first; none where nothing is felt. Base frame."""
+    """Where the arm is touched: C contacts, the surest first; none where no contact is detected. Base frame."""
 
     link: IntArray
-    """(C,) index of the link that carries each place; links that the same joints move are told apart by place only."""
+    """(C,) index of the link that carries each place; links that the same joints move differ in place only."""
     point: FloatArray
     """(C, 3) on the surface of the body [m]."""
     force: FloatArray
@@ -263,7 +263,7 @@ class Touched:
 
 
 NOT_TOUCHED = Touched(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-"""Nothing is felt. One of these for all steps: its arrays are not written to either."""
+"""No contact is detected. One of these for all steps: its arrays are not written to either."""
 
 
 class QpOutcome(Enum):
@@ -346,4 +346,4 @@ class ControlStep:
     evidence: float
     """How far the detector is on the way to a contact: one from 1 on, while armed."""
     touched: Touched = field(default_factory=lambda: NOT_TOUCHED)
-    """Where the arm is touched; empty where nothing is felt or the profile does not localise."""
+    """Where the arm is touched; empty where no contact is detected or the profile does not localise."""

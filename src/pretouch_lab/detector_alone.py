@@ -21,7 +21,7 @@ class DetectorAlone:
         self, kin: Kinematics, robot: RobotState, near: Obstacles, reacting: bool = False, watched: bool = True,
         touches: TouchReadings | None = None, imu: ImuReadings | None = None,
     ) -> Detection:  # fmt: skip
-        """Take in a step: posture, robot state, what is near, whether it reacts and is watched, and what units felt."""
+        """Take in a step: posture, robot state, obstacles, whether it reacts and is watched, touch and IMU readings."""
         before, force = self.window, None if robot.wrench is None else robot.wrench[:3]
         window = add_force(before, force, self._params)
         sample = Sample(robot.stamp, kin, robot, window, before.full, near, reacting, watched, touches, imu)

@@ -26,7 +26,7 @@ from pretouch.signals import kept_from_children, leave_to_parent, noted
 Row = dict[str, Any]
 """What one task found, as its JSON file holds it."""
 Progress = Callable[[float], None]
-"""Is told the cost of each task that was done."""
+"""Called with the cost of each task that was done."""
 Job = TypeVar("Job")
 
 TRIES = 3
@@ -41,7 +41,7 @@ class Task:
     work: Callable[[Path], None]
     """Makes the file; runs in another process, so a function of a module or a `partial` of one."""
     cost: float
-    """Processor time it takes, about [s], or what else the remaining time is told by."""
+    """Processor time it takes, about [s], or what else the remaining time is estimated from."""
     turn: int = 0
     """Tasks of a lower turn come first; among those of the same, the longest."""
     about: Row = field(default_factory=dict)

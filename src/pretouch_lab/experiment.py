@@ -48,7 +48,7 @@ class Experiment:
     trial: Callable[[Cell, int, Context], tuple[Row, Record | None]]
     """Runs the trial of a cell with a seed; returns its row, and its course if a figure may want it."""
     cost: Callable[[Cell], float]
-    """About how long a trial of a cell takes, in seconds of simulated time: remaining times are told by it."""
+    """About how long a trial of a cell takes, in seconds of simulated time: remaining times are estimated from it."""
     summarise: Callable[[list[Row]], Row]
     """Makes a summary of all rows of the experiment, whatever is missing."""
     tables: Callable[[Row], list[TextTable]]

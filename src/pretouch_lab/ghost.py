@@ -1,4 +1,4 @@
-"""Drives the ghost of a scene: a ball that is seen, and that nothing feels."""
+"""Drives the ghost of a scene: a ball that is seen, and that touches nothing."""
 
 from collections.abc import Callable
 

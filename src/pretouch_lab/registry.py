@@ -51,7 +51,7 @@ GROUPS = {
     "Its weaknesses": WEAKNESSES,
     "Readings over the wire": HARDWARE,
     "Where units sit": MOUNTING,
-    "Caught between two things": REACTION,
+    "Clamped between two objects": REACTION,
     "Touch sensors of units": TOUCH,
     "Impacts by the units' accelerometers": IMPACTS,
     "A camera beside the skin": VISION,

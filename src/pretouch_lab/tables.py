@@ -22,7 +22,7 @@ _MEANT = {
     "slowing-only": "slowing-only: eqs. 3-4 without F_obs.",
     "thresholds-only": "thresholds-only: F_obs without eqs. 3-4.",
     "paper-0.5m": "paper-0.5m: objects count within the 0.5 m of the paper's text instead of Table I's 0.8 m.",
-    "pretouch": "pretouch: slower where it has to be to brake in time, and contacts felt by the joint torques.",
+    "pretouch": "pretouch: slower where it has to be to brake in time, and contacts detected by the joint torques.",
 }
 _SHOWN_STIFFNESS = 25_000.0
 _UNSAID = ("off", "braking")
@@ -73,18 +73,18 @@ def _places(part: Row, stiffness: float, modes: dict[str, str]) -> TextTable:
     where = ("profile\nwhere", lambda cell: f"{cell['profile']}\n{cell['trajectory']} {cell['side']}")
     return _with_ratios(
         f"Static object, {stiffness / 1000:g} N/mm{with_mode}: medians and ratios blind/profile, 10-90 % below",
-        (where, *_FORCES, ("felt", _felt)),
+        (where, *_FORCES, ("detected", _detected)),
         cells,
         part["ratios"],
         "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
         " (eq. 8) and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, of its 20 ms"
-        " mean and of itself. Felt: contacts detected, of all contacts. The paper finds forces about two times smaller"
+        " mean and of itself. Detected: of all contacts. The paper finds forces about two times smaller"
         " with proximity; which force is meant decides the number. False detections:"
         f" {sum(cell['false_detections'] for cell in cells)}.",
     )
 
 
-def _felt(cell: Row) -> str:
+def _detected(cell: Row) -> str:
     return f"{cell['detected_fraction'] * cell['trials']:.0f}/{cell['contact_fraction'] * cell['trials']:.0f}"
 
 
@@ -141,7 +141,7 @@ def dynamic_tables(part: Row) -> list[TextTable]:
     """How the arm answered the pushes."""
     columns = (
         ("profile", lambda cell: controller(cell, part["cells"])),
-        ("felt", share("detected", "pushes", between=" of ")),
+        ("detected", share("detected", "pushes", between=" of ")),
         ("delay\n[ms]", median("delay_s", 0, 1000)),
         ("direction\n[deg]", median("direction_error_deg", 1)),
         ("peak\n[N]", median("peak_estimate_n", 1)),

@@ -28,7 +28,7 @@ from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, described, fixtures
-from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
+from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchSensorParams, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.depth_camera import DepthCamera, DepthCameraParams
 from pretouch_lab.domain_randomisation import Parts, randomised
@@ -194,12 +194,12 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         known = setup.skin if setup.believed is None else setup.believed
         controller = Controller(model, known, fixtures(scene), setup.path, profile)
         clock = PlantClock(plant, profile.task.control_period_s)
-        felt = _feeling(setup, plant, units)
+        sensed = _with_touch(setup, plant, units)
         plant.advance(SETTLE_S)
         with _recording(setup, controller) as recording:
             recorder = _Recorder(plant, hand, recording)
             options = Options(points=camera)
-            run(controller, plant, felt, clock, recorder, lambda step: done(step, plant), options)
+            run(controller, plant, sensed, clock, recorder, lambda step: done(step, plant), options)
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),
@@ -218,8 +218,8 @@ def _mounted(setup: Setup, plant: Plant) -> AbstractContextManager[RangeFinders 
     return WireSkin(plant, setup.skin, setup.ranging, setup.wire, setup.seed)
 
 
-def _feeling(setup: Setup, plant: Plant, units: RangeFinders | WireSkin) -> ports.Skin:
+def _with_touch(setup: Setup, plant: Plant, units: RangeFinders | WireSkin) -> ports.Skin:
     """Return the units with their touch sensors, where the skin has such; over the wire they have them already."""
     if isinstance(units, WireSkin) or not len(setup.skin.touching):
         return units
-    return FeelingSkin(units, TouchSensors(plant, setup.skin, TouchSensorParams(), setup.seed))
+    return SimulatedTouchSkin(units, TouchSensors(plant, setup.skin, TouchSensorParams(), setup.seed))

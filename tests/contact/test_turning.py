@@ -3,7 +3,7 @@
 import numpy as np
 
 from pretouch.contact.sequential import LENGTHS
-from pretouch.contact.turning import learn_turning, turning_doubt, turning_init
+from pretouch.contact.turning import add_reversal_variance, learn_turning, turning_init
 
 M, S = np.diag([2.0, 1.0]), 0.04 * np.eye(2)
 HARD = np.array([0.0, 10.0])
@@ -13,10 +13,10 @@ def turned(times: int, error: float, growth: np.ndarray) -> np.ndarray:
     turning, means = turning_init(2), np.full((len(LENGTHS), 2), error)
     for k in range(times):
         doubt = np.full(2, 1e-3)
-        turning_doubt(M, growth, turning, doubt)
+        add_reversal_variance(M, growth, turning, doubt)
         learn_turning(k, means, S, doubt, 0.01 / 300.0, turning)
     doubt = np.zeros(2)
-    turning_doubt(M, growth, turning, doubt)
+    add_reversal_variance(M, growth, turning, doubt)
     return doubt
 
 
@@ -39,5 +39,5 @@ def test_it_is_gone_soon_after():
     turning[1] = 0.01
     for k in range(100):
         doubt = np.zeros(2)
-        turning_doubt(M, HARD if k == 0 else np.zeros(2), turning, doubt)
+        add_reversal_variance(M, HARD if k == 0 else np.zeros(2), turning, doubt)
     assert doubt[1] < 0.01 * 64.0 * 0.003

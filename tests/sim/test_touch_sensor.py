@@ -12,7 +12,7 @@ from pretouch.sim.hand import Hand, HandGoal
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import HandSpec, SceneSpec
-from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
+from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchSensorParams, TouchSensors
 from pretouch.types import TouchStatus
 
 UNIT = 0
@@ -160,7 +160,7 @@ def test_beside_range_finders_they_are_one_skin(panda_model, paper_skin):
     plant, skin = plant_of(panda_model), skin_of(paper_skin, panda_model)
     sensors = TouchSensors(plant, skin, EXACT, 0)
     ranges = TouchlessSkin()
-    both = FeelingSkin(ranges, sensors)
+    both = SimulatedTouchSkin(ranges, sensors)
     assert both.read() is ranges.readings
     assert both.touch().status[1] == TouchStatus.NONE
 

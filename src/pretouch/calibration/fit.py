@@ -82,14 +82,15 @@ class Estimate:
             x[GRAVITY],
         )  # fmt: skip
 
-    def felt(self, motion: LinkMotion) -> FloatArray:
+    def specific_force(self, motion: LinkMotion) -> FloatArray:
         """Proper acceleration (N, 3) at the IMU, link frame [m/s^2]."""
         return motion.a + motion.lever @ self.p + motion.R_link_base @ self.gravity
 
     def expected(self, motion: LinkMotion) -> FloatArray:
         """What the IMU should measure (N, 6), but for the clock."""
         gyro = (motion.w @ self.R) * (1 + self.angular_velocity_scale) + self.angular_velocity_bias
-        return np.hstack([gyro, (self.felt(motion) @ self.R) * (1 + self.acceleration_scale) + self.acceleration_bias])
+        force = self.specific_force(motion) @ self.R
+        return np.hstack([gyro, force * (1 + self.acceleration_scale) + self.acceleration_bias])
 
     def differences(self, motion: LinkMotion, measured: Measured) -> FloatArray:
         """Model less measurement (N, 6) [rad/s, m/s^2], the clock's error taken off."""
@@ -151,7 +152,7 @@ class Problem:
         motion, N = self.motion, len(self.motion.w)
         e = self.base.moved(x)
         J = np.zeros((N, 6, UNKNOWNS))
-        turned = motion.w @ e.R, e.felt(motion) @ e.R
+        turned = motion.w @ e.R, e.specific_force(motion) @ e.R
         scales = 1 + np.concatenate([e.angular_velocity_scale, e.acceleration_scale])
         for half, v in enumerate(turned):
             J[:, 3 * half : 3 * half + 3, TURN] = skew(v) @ _right_jacobian(x[TURN])
@@ -232,5 +233,5 @@ def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatAr
     prior = J[data:]
     H, count = J.T @ J, len(blocks)
     inverse = np.linalg.inv(H)
-    told = count / max(1, count - UNKNOWNS / 6) * blocks.T @ blocks + prior.T @ prior
-    return inverse @ (told + (UNKNOWNS / count) ** 3 * H) @ inverse
+    information = count / max(1, count - UNKNOWNS / 6) * blocks.T @ blocks + prior.T @ prior
+    return inverse @ (information + (UNKNOWNS / count) ** 3 * H) @ inverse

@@ -16,7 +16,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 _CLOSE = 0.02
-"""Links whose likeness is less than the best by no more are told apart by fits."""
+"""Links whose likeness is less than the best by no more are distinguished by fits."""
 _AMBIGUOUS = 1.5
 """Two fits whose differences, both sensors' multiplied, are within this factor tell no link apart."""
 _STILL = 0.05
@@ -125,11 +125,11 @@ class Identifier:
         if problem is not None:
             return Identified(close[0].body, signal, None, [*findings, problem])
         fits = [(match.body, self._fit(signal, match, given)) for match in close]
-        told = [(body, located) for body, located in fits if located is not None]
-        if not told:
+        fitted = [(body, located) for body, located in fits if located is not None]
+        if not fitted:
             return Identified(close[0].body, signal, None, [_too_little(self.params)])
-        scores = {body: float(located.noise[0] * located.noise[3]) for body, located in told}
-        alike = [(body, located) for body, located in told if scores[body] <= _AMBIGUOUS * min(scores.values())]
+        scores = {body: float(located.noise[0] * located.noise[3]) for body, located in fitted}
+        alike = [(body, located) for body, located in fitted if scores[body] <= _AMBIGUOUS * min(scores.values())]
         body, located = min(alike, key=lambda one: (given not in one[0], scores[one[0]]))
         if len(alike) > 1:
             others = [links for links, _ in alike if links != body]

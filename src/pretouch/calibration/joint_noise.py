@@ -2,8 +2,8 @@
 
 Accelerations of the joints, differentiated from noisy positions, look like motion of their own. They shrink the levers
 that a fit finds, in all directions in which the true motion is weak, and the residuals do not show it. By how much is
-known: with noise n of a joint's acceleration about the axis c through o, a point p feels n c x (p - o), and the model
-says that its derivative by p is n [c]x. Their product is the pull on p.
+known: with noise n of a joint's acceleration about the axis c through o, a point p accelerates by n c x (p - o), and
+the model says that its derivative by p is n [c]x. Their product is the pull on p.
 """
 
 import numpy as np
@@ -52,8 +52,8 @@ class JointNoise:
         for j in np.flatnonzero(self._model.moved_by[located.link]):
             axis = np.einsum("nji,nj->ni", R, self._axis[:, j])
             lever = located.estimate.p - np.einsum("nji,nj->ni", R, self._anchor[:, j] - origin)
-            felt = np.cross(axis, lever)
-            pull += self.acceleration[j] ** 2 * np.cross(felt, axis).mean(axis=0)
+            accelerated = np.cross(axis, lever)
+            pull += self.acceleration[j] ** 2 * np.cross(accelerated, axis).mean(axis=0)
         information = located.used.sum() / located.noise[3] ** 2
         moved = information * located.covariance[:, PLACE]
         C = located.covariance + moved @ (np.outer(pull, pull) + pull @ pull * _ASIDE * np.eye(3)) @ moved.T

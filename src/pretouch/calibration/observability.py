@@ -1,4 +1,4 @@
-"""Which directions of a unit's pose a motion has told, and which not."""
+"""Which directions of a unit's pose a motion has made observable, and which not."""
 
 from dataclasses import dataclass
 

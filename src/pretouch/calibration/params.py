@@ -57,7 +57,7 @@ class CalibrationParams(Checked):
     shortest_s: Positive = 15.0
     """Time of usable data below which nothing is tried [s]: fewer blocks do not tell how sure an answer is."""
     least_swing_rad: Positive = 0.05
-    """A joint that moves by less has not moved: what it parts cannot be told apart [rad]."""
+    """A joint that moves by less has not moved: the links on its two sides cannot be distinguished [rad]."""
     likeness: Fraction = 0.9
     """How much of a gyroscope's and a link's turning must be the same for the unit to sit on that link."""
     slip_m: Positive = 0.004

@@ -1,4 +1,4 @@
-"""Measured signals at common instants: interpolated, low-passed without delay, and told apart from gaps."""
+"""Measured signals at common instants: interpolated, low-passed without delay, and separated from gaps."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline

@@ -38,7 +38,7 @@ def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = Non
     old = {unit.id: unit for unit in keep.units} if keep else {}
     for name, unit in located.items():
         if name in old:
-            located[name] = replace(unit, touch=old[name].touch)  # where a unit is says nothing of what it feels
+            located[name] = replace(unit, touch=old[name].touch)  # where a unit is says nothing of its touch sensor
     names = [*old, *(name for name in found if name not in old)]
     units = {name: located.get(name) or old.get(name) for name in names}
     there = [unit for unit in units.values() if unit is not None]

@@ -96,8 +96,8 @@ def _best_split(rows: _Rows, per_block: int) -> tuple[int, float]:
         return 0, 0.0
     after = np.cumsum(information[::-1], axis=0)[::-1][allowed][:, :, :_POSE]
     pull = np.cumsum(gradient[::-1], axis=0)[::-1][allowed][:, :_POSE] - step @ after
-    told = after[:, :_POSE] - after.swapaxes(1, 2) @ inverse @ after + np.diag(_APART**-2.0)
-    gain = np.einsum("ki,ki->k", pull, np.linalg.solve(told, pull[:, :, None])[:, :, 0])
+    remaining = after[:, :_POSE] - after.swapaxes(1, 2) @ inverse @ after + np.diag(_APART**-2.0)
+    gain = np.einsum("ki,ki->k", pull, np.linalg.solve(remaining, pull[:, :, None])[:, :, 0])
     best = int(np.argmax(gain))
     return int(begins[allowed][best]), float(gain[best])
 
@@ -141,8 +141,8 @@ def _joined(early: _Rows, late: _Rows, first: int) -> tuple[FloatArray, FloatArr
     prior[:unknowns, :unknowns] = early.prior_J
     # the second pose is near the first one
     prior[unknowns:, unknowns:] = np.diag(1 / _APART)
-    told = np.concatenate([early.prior_residuals, np.zeros(_POSE)])
-    return np.vstack([J.reshape(6 * N, -1), prior]), np.concatenate([residuals.reshape(-1), told])
+    prior_residuals = np.concatenate([early.prior_residuals, np.zeros(_POSE)])
+    return np.vstack([J.reshape(6 * N, -1), prior]), np.concatenate([residuals.reshape(-1), prior_residuals])
 
 
 def _compared(

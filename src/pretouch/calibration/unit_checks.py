@@ -33,18 +33,20 @@ _MISTAKEN = (
 def checked_unit(unit: UnitData, params: CalibrationParams) -> tuple[UnitData, list[Finding]]:
     """Return a unit's data at increasing instants, and what is wrong with it; what is refused cannot be used at all."""
     imu = unit.imu
-    stamp, felt, turned = (np.asarray(a, dtype=np.float64) for a in (imu.stamp, imu.acceleration, imu.angular_velocity))
-    if stamp.ndim != 1 or felt.shape != (len(stamp), 3) or turned.shape != (len(stamp), 3):
-        sentence = f"Accelerations {felt.shape} and angular velocities {turned.shape} do not fit {stamp.shape} stamps."
+    measured = (imu.stamp, imu.acceleration, imu.angular_velocity)
+    stamp, acceleration, turned = (np.asarray(a, dtype=np.float64) for a in measured)
+    if stamp.ndim != 1 or acceleration.shape != (len(stamp), 3) or turned.shape != (len(stamp), 3):
+        both = f"Accelerations {acceleration.shape} and angular velocities {turned.shape}"
+        sentence = f"{both} do not fit {stamp.shape} stamps."
         return unit, [Finding("shape", f"{sentence} Give three of each for each stamp.", True)]
     if not len(stamp):
         return unit, [Finding("silent", "It sent no IMU samples: check that it is switched on and has an IMU.", True)]
-    finite = np.asarray(np.isfinite(np.column_stack([stamp, felt, turned])).all(axis=1))
+    finite = np.asarray(np.isfinite(np.column_stack([stamp, acceleration, turned])).all(axis=1))
     findings = [] if finite.all() else [_not_finite(finite, params)]
     later = _later(np.where(finite, stamp, -np.inf))
     findings += _unordered(stamp[finite], later[finite], params)
     keep = finite & later
-    clean = replace(unit, imu=ImuTrace(stamp[keep], felt[keep], turned[keep]))
+    clean = replace(unit, imu=ImuTrace(stamp[keep], acceleration[keep], turned[keep]))
     findings += _sparse(clean.imu.stamp, params)
     if not any(finding.refused for finding in findings):
         findings += [*_losses(clean, params), *_saturation(clean), *(_stuck(clean) or _gravity(clean))]
@@ -172,9 +174,9 @@ def _saturation(unit: UnitData) -> list[Finding]:
 
 def _gravity(unit: UnitData) -> list[Finding]:
     """Find an accelerometer that does not measure gravity, which a calibration motion hardly adds to."""
-    felt = float(np.median(np.linalg.norm(unit.imu.acceleration, axis=1)))
-    if 0.7 < felt / 9.80665 < 1.4:
+    gravity = float(np.median(np.linalg.norm(unit.imu.acceleration, axis=1)))
+    if 0.7 < gravity / 9.80665 < 1.4:
         return []
-    why = next((why for factor, why in _MISTAKEN if abs(factor * felt / 9.80665 - 1) < 0.1), "check scale and axes")
-    sentence = f"Its accelerometer measures {felt:.4g} m/s^2 where gravity is 9.81: {why}."
+    why = next((why for factor, why in _MISTAKEN if abs(factor * gravity / 9.80665 - 1) < 0.1), "check scale and axes")
+    sentence = f"Its accelerometer measures {gravity:.4g} m/s^2 where gravity is 9.81: {why}."
     return [Finding("gravity", sentence, True)]

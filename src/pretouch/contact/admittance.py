@@ -70,7 +70,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     def move(
         self, state: AdmittanceState, body: Body, inputs: ReactionInputs, mode: ModeState
     ) -> tuple[ReactionMotion | None, AdmittanceState]:
-        """Return the joint velocities of the virtual mass, or of the way out of a clamp."""
+        """Return the joint velocities of the virtual mass, or of the opening of a clamp."""
         if new_contact(inputs, mode) is not None:
             state = self._begun(state, body, inputs)
         doing = self._doing(mode, inputs.detection.armed)
@@ -80,13 +80,13 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         opens = doing == "react" and state.clamp.torque > 0 and not state.clamp.open
         if opens:
             p = self._way_out
-            way, clamp = opened(state.clamp, state.mass.torque, inputs.robot.q_commanded, body.period, p)
-            fastest = fastest_point(kin, model.moved_by, model.body.arrays, way)
-            qd = way * min(1.0, p.open_m_s / fastest) if fastest > 0 else way  # never beyond the place in one period
+            back, clamp = opened(state.clamp, state.mass.torque, inputs.robot.q_commanded, body.period, p)
+            fastest = fastest_point(kin, model.moved_by, model.body.arrays, back)
+            qd = back * min(1.0, p.open_m_s / fastest) if fastest > 0 else back  # never beyond the place in one period
             state = replace(state, clamp=clamp, mass=replace(state.mass, velocity=np.zeros(len(qd))))
         if doing == "soft" and not qd.any():
             return None, state
-        # a pushed arm touches nothing that it sees; one that is caught is between two things, and must get out
+        # a pushed arm touches nothing that it sees; one that is caught is between two objects, and must get out
         touch_speed = self._way_out.open_m_s if opens else 0.0
         return ReactionMotion(model.ee_jacobian(kin)[:3] @ qd, qd, touch_speed), state
 
@@ -115,15 +115,15 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         return inputs.unseen or float(inputs.obstacles.body_distance.min(initial=np.inf)) < self.near_m
 
     def _moved(self, state: AdmittanceState, doing: Doing, body: Body, inputs: ReactionInputs) -> VirtualMass:
-        """Let the mass learn in free motion, and yield to what is felt in a reaction or a soft hold."""
+        """Let the mass learn in free motion, and yield to the external torque in a reaction or a soft hold."""
         mass, clamp, detection, dt = state.mass, state.clamp, inputs.detection, body.period
         if doing == "learn" or (doing == "task" and detection.contact is None):
             return learnt(mass, _residual(mass, inputs), dt, self)
         if doing not in ("react", "soft"):
             return mass
-        model, residual, felt = body.model, _residual(mass, inputs), detection.evidence >= 1.0
+        model, residual, contact = body.model, _residual(mass, inputs), detection.evidence >= 1.0
         band = dead_band(model.description.tau_max, self)
-        mass = yielded(mass, (model, inputs.kin), residual, inputs.command, band, dt, self, felt)
+        mass = yielded(mass, (model, inputs.kin), residual, inputs.command, band, dt, self, contact)
         if doing == "soft" and clamp.torque:
             # out of the clamp it may be moved, not back into it
             mass = replace(mass, velocity=np.where(mass.velocity * clamp.course > 0, 0.0, mass.velocity))
@@ -149,7 +149,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         doing = self._doing(inputs.mode, inputs.detection.armed)
         torque = _residual(state.mass, inputs) - state.mass.mean[1]
         band = dead_band(model.description.tau_max, self)
-        # What was felt before the onset: the last sample, or in a soft hold the filtered torque. A stiff hold remembers
+        # The torque before the onset: the last sample, or in a soft hold the filtered torque. A stiff hold remembers
         # none, and the sample stands for itself.
         before = {"soft": state.mass.steady[0], "still": torque}.get(doing, state.mass.torque)
         mass = begun(state.mass, model, kin, torque, before, band, self)
@@ -166,11 +166,11 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         return AdmittanceState(mass, clamp, place)
 
     def _pinched(self, clamp: ClampState, body: Body, inputs: ReactionInputs) -> ClampState:
-        """Look for something caught between two links, or one and a fixture, as long as a contact is felt."""
+        """Look for something caught between two links, or one and a fixture, as long as a contact is detected."""
         p, found, kin = self.pinch, inputs.detection, inputs.kin
-        if p is None or clamp.torque or found.clear is None:
+        if p is None or clamp.torque or found.significant is None:
             return clamp
-        torque, covariance = found.clear
+        torque, covariance = found.significant
         pinch = find_self_clamp(body.model, kin, torque, covariance, clamp.came, p)
         names = body.model.links
         if pinch is not None:
@@ -187,12 +187,12 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         # an arm that holds softly sticks to static friction
         sticks = doing == "soft" and self.static_friction_nm > 0 and not mass.sliding.any()
         events = {} if sticks else contact_event(inputs.detection)
-        # one of these at most, the first that holds; giving up is told beside it
+        # one of these at most, the first that holds; giving up is reported beside it
         if clamp.torque:
             events[Event.CLAMPED if clamp.open else Event.OPENING] = _caught(clamp)
         elif doing == "react" and self._waits(state, near, inputs.detection.lasting):
-            clear = ", once nothing is seen near it" if near and not given_up(place, self.give_up) else ""
-            events[Event.YIELDING] = f"{self.quiet_s:g} s after the last push{clear}"
+            until = ", once nothing is seen near it" if near and not given_up(place, self.give_up) else ""
+            events[Event.YIELDING] = f"{self.quiet_s:g} s after the last push{until}"
         elif doing in ("react", "soft") and self._presses(mass) and mass.quiet >= max(self.quiet_s, self.patience_s):
             torque = np.abs(mass.steady[1])
             events[Event.PRESSED] = f"{self.patience_s:g} s, about {torque.max():.0f} Nm at joint {torque.argmax() + 1}"
@@ -209,16 +209,16 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     def _waits(self, state: AdmittanceState, near: bool, lasting: bool) -> bool:
         """Whether the arm still yields, or waits for more of the push, or for what presses or is near to go.
 
-        For what is near it waits only where it will go on; it waits too while it is being found out if what is felt is
-        a load (`Detection.lasting`).
+        For what is near it waits only where it will go on; it waits too while it is being found out if the residual
+        is a load (`Detection.lasting`).
         """
         quiet = state.mass.quiet
         waits_for = (near and not given_up(state.place, self.give_up)) or self._presses(state.mass)
         return lasting or quiet < self.quiet_s or (waits_for and quiet < self.patience_s)
 
     def _presses(self, mass: VirtualMass) -> bool:
-        """Whether an arm that static friction holds has felt something of late."""
-        return self.static_friction_nm > 0 and mass.unfelt < self.quiet_s
+        """Whether an arm that static friction holds has detected a contact of late."""
+        return self.static_friction_nm > 0 and mass.no_contact < self.quiet_s
 
 
 def _residual(mass: VirtualMass, inputs: ReactionInputs) -> FloatArray:
@@ -231,4 +231,4 @@ def _caught(clamp: ClampState) -> str:
     """Say what the arm is caught between, or how that shows."""
     if clamp.between:
         return f"{clamp.between}, pushed apart with {clamp.force:.0f} N"
-    return f"{clamp.torque:.1f} Nm against the way it yielded"
+    return f"{clamp.torque:.1f} Nm against the direction it yielded in"

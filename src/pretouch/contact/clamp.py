@@ -1,4 +1,4 @@
-"""Caught between two things: what opposes the way the arm yields, or pushes two of its links apart; and the way out.
+"""Caught between two objects: what opposes the yielding, or pushes two links of the arm apart; and how the arm opens.
 
 See docs/explanation/reaction.md.
 """
@@ -12,7 +12,7 @@ from pretouch.types import FloatArray
 from pretouch.values import value
 
 _MARKS = 12
-"""Places kept of the way the arm came."""
+"""Places kept of the path the arm came."""
 _APART_S = 0.05
 """Time between two of them [s]."""
 
@@ -32,7 +32,7 @@ class ClampState:
     turned: float
     """Time since the last of them [s]."""
     trail: FloatArray
-    """(M, n) joint positions commanded on the way, newest first [rad]."""
+    """(M, n) joint positions commanded on the path, newest first [rad]."""
     marked: float
     """Time since the newest was noted [s]."""
     torque: float
@@ -42,7 +42,7 @@ class ClampState:
     open: bool
     """Whether it has."""
     path: FloatArray
-    """(M, n) as `trail`, of the way before the contact [rad]."""
+    """(M, n) as `trail`, of the path before the contact [rad]."""
     came: FloatArray
     """(n,) joint velocities with which the arm came to the contact [rad/s]."""
     between: str
@@ -65,9 +65,9 @@ def clamp_begun(before: ClampState, q: FloatArray, came: FloatArray) -> ClampSta
 
 
 def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
-    """Note the way of an arm that follows its task, at commanded joint positions (n,) [rad].
+    """Note the path of an arm that follows its task, at commanded joint positions (n,) [rad].
 
-    Where it has been moved meanwhile, by a reaction or by hand, the way begins anew.
+    Where it has been moved meanwhile, by a reaction or by hand, the path begins anew.
     """
     # farther from one mark than the task goes until the next: something else has moved the arm
     if np.abs(q - state.path[0]).max() > _MOVED_RAD:
@@ -78,7 +78,7 @@ def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
 
 
 def caught_between(state: ClampState, between: str, force: float, torque: FloatArray) -> ClampState:
-    """Take what is caught between two things, and turns the joints (n,) [Nm], for a clamp: out of it the arm opens."""
+    """Take what is caught between two objects, and turns the joints (n,) [Nm], for a clamp: out of it the arm opens."""
     return replace(
         state, torque=float(np.abs(torque).max()), trail=state.path, between=between, force=force, opposed=0.0
     )  # fmt: skip
@@ -91,7 +91,7 @@ def clamped(
 
     A clamp is a torque against the course the arm follows a push on, for longer than noise makes one, and so soon
     after the push that it may still be there. Later it is a push of its own, to be yielded to; but that too is a clamp
-    when the arm has been sent to and fro. A push from the side, or harder the same way, is none.
+    when the arm has been sent to and fro. A push from the side, or harder in the same direction, is none.
 
     Args:
         state: memory.
@@ -128,10 +128,10 @@ def clamped(
 def opened(
     state: ClampState, torque: FloatArray, q: FloatArray, dt: float, params: ClampParams
 ) -> tuple[FloatArray, ClampState]:
-    """Return the joint velocities (n,) [rad/s] back to the next place of the way the arm came, of any length.
+    """Return the joint velocities (n,) [rad/s] back to the next place of the path the arm came, of any length.
 
-    It ends after its time, at the end of the way, and where something opposes it as a clamp does: the arm is then not
-    pushed into what pushes it. What of the way to something caught between two links has been opened already is left
+    It ends after its time, at the end of the path, and where something opposes it as a clamp does: the arm is then not
+    pushed into what pushes it. What of the path to something caught between two links has been opened already is left
     out.
 
     Args:
@@ -145,22 +145,22 @@ def opened(
     # past the places that are reached, and those that lead back into what is caught
     while len(trail) > 1 and (np.abs(trail[0] - q).max() < _NEAR_RAD or _closes(state, trail[0] - q)):
         trail = trail[1:]
-    way = trail[0] - q
-    way = np.zeros(len(q)) if _closes(state, way) else way
-    length = float(np.sqrt(way @ way))
-    against = length > 0 and float(torque @ way) < -params.torque_nm * length
+    back = trail[0] - q
+    back = np.zeros(len(q)) if _closes(state, back) else back
+    length = float(np.sqrt(back @ back))
+    against = length > 0 and float(torque @ back) < -params.torque_nm * length
     opposed = state.opposed + dt if against else 0.0
-    over = state.opening + dt > params.open_s or opposed >= _OPPOSED_S - 1e-9 or float(np.abs(way).max()) < _NEAR_RAD
+    over = state.opening + dt > params.open_s or opposed >= _OPPOSED_S - 1e-9 or float(np.abs(back).max()) < _NEAR_RAD
     # to the place within one period: the caller slows that down to `open_m_s`
-    return way / dt, ClampState(
+    return back / dt, ClampState(
         state.course, state.pushed, opposed, state.turns, state.turned, trail, state.marked, state.torque,
         state.opening + dt, state.open or over, state.path, state.came, state.between, state.force,
     )  # fmt: skip
 
 
-def _closes(state: ClampState, way: FloatArray) -> bool:
-    """Whether a way (n,) [rad] leads back to something caught between two links."""
-    return state.between != "" and float(way @ state.came) > 0.0
+def _closes(state: ClampState, motion: FloatArray) -> bool:
+    """Whether a motion (n,) [rad] leads back to something caught between two links."""
+    return state.between != "" and float(motion @ state.came) > 0.0
 
 
 _COURSE_RAD_S = 0.05
@@ -170,10 +170,10 @@ _OPPOSED_S = 0.03
 _WINDOW_S = 0.25
 """Time after a push in which what opposes the yielding is a clamp and no push of its own [s]."""
 _TURNS = 2
-"""Reversals of the yielding, less than `_TURN_S` apart, that leave no way out and are a clamp too."""
+"""Reversals of the yielding, less than `_TURN_S` apart, that let the arm get nowhere and are a clamp too."""
 _TURN_S = 2.0
 """See `_TURNS` [s]."""
 _MOVED_RAD = 0.15
-"""More than a joint turns from one place of the way to the next while the arm follows its path [rad]."""
+"""More than a joint turns from one place of the path to the next while the arm follows its path [rad]."""
 _NEAR_RAD = 0.002
-"""Distance at which a place of the way counts as reached [rad]."""
+"""Distance at which a place of the path counts as reached [rad]."""

@@ -1,4 +1,4 @@
-"""Moving with a push: eq. 12, a velocity set at the onset of a contact that decays whatever is felt."""
+"""Moving with a push: eq. 12, a velocity set at the onset of a contact that decays whatever is measured."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -43,7 +43,7 @@ def decayed(state: DecayState, cycles: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class DecayingVelocity(Reaction, name="decay"):
-    """The paper's reaction (eq. 12): the end-effector moves the way it was pushed, for a while."""
+    """The paper's reaction (eq. 12): the end-effector moves in the direction of the push, for a while."""
 
     State = DecayState
 

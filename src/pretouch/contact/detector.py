@@ -76,7 +76,7 @@ class Detection:
     thresholds: Thresholds
     contact: Contact | None
     armed: bool
-    """Whether a contact could be told."""
+    """Whether a contact could be detected."""
     residual: FloatArray
     """(n,) external joint torques less what the detector takes for free motion [Nm]; NaN without torques."""
     evidence: float
@@ -84,16 +84,16 @@ class Detection:
     learning: bool = False
     """Whether the sample is to be learnt as free motion."""
     lasting: bool = False
-    """Whether it is being found out if what is felt is a load or an error of the estimate: the arm waits for that."""
+    """Whether it is being found out if the residual is a load or an error of the estimate: the arm waits for that."""
     touched: Touched = field(default_factory=lambda: NOT_TOUCHED)
-    """Where the arm is touched; empty where nothing is felt or the profile does not localise."""
-    clear: tuple[FloatArray, FloatArray] | None = None
+    """Where the arm is touched; empty where no contact is detected or the profile does not localise."""
+    significant: tuple[FloatArray, FloatArray] | None = None
     """Residual (n,), averaged over the time in which it stands out most [Nm], and the covariance (n, n) that it has in
-    free motion [Nm^2]; None where the detector has none, or nothing is felt."""
+    free motion [Nm^2]; None where the detector has none, or no contact is detected."""
 
 
 class Detector(Part, group="pretouch.detectors"):
-    """Tells a contact from free motion, from the external torques and the force of each step.
+    """Distinguishes a contact from free motion, from the external torques and the force of each step.
 
     A frozen dataclass of its own parameters. `init` and `step` are pure: what is remembered goes in and out as `state`.
     """

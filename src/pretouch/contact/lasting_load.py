@@ -1,8 +1,8 @@
-"""A residual that stays: a load gripped or put down, or a step of an estimate, told from a contact by what it can be.
+"""A residual that stays: a load gripped or put down, or a step of an estimate; how it differs from a contact.
 
 While nothing is near, a torque that goes on being explained by the same weight at the end-effector, or by the same
 small torque on one joint alone, is learnt as free motion, whether the arm stands or yields. A person who is caught is
-neither: near, or not constant, or not straight down, or felt by more than one joint.
+neither: near, or not constant, or not straight down, or measured by more than one joint.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ _OFFSETS = 3.0
 _UNKNOWN_NM = 0.3
 """What the mean of a joint's torque may be off, by friction [Nm]."""
 _UNKNOWN_ALONE_NM = 0.15
-"""The same where a step of one joint is told from a contact, which other joints feel too [Nm]."""
+"""The same where a step of one joint is distinguished from a contact, which other joints measure too [Nm]."""
 _CHANGE_NM = 0.6
 """How much a constant torque may change while the arm creeps, by friction [Nm]."""
 _CHANGE_PART = 0.1
@@ -56,7 +56,7 @@ def still_explains(
 ) -> bool:  # fmt: skip
     """Whether what has lasted (3 + n,), see `find_lasting`, still explains the mean (n,) of so many samples [Nm].
 
-    It does if no joint's torque has changed, and most of what is felt is not felt without it.
+    It does if no joint's torque has changed, and most of the mean is not left without it.
     """
     whole = left = largest = 0.0
     for j in range(len(residual)):

@@ -126,7 +126,7 @@ def update_model(memory: Memory, now: Situation, p: DetectionNumbers, tested: Te
     calm = 0 if suspected or now.reacting or not alone else min(recent.calm + 1, CALM)
     # learnt also where a contact is suspected: an alarm at a reversal would otherwise come at each of them
     if p.widen_at_turns and alone and not now.reacting and whole == len(LENGTHS):
-        learn_turning(recent.at, tested.means, noise, sample.doubt, now.period / p.memory_s, recent.turning)
+        learn_turning(recent.at, tested.means, noise, sample.model_variance, now.period / p.memory_s, recent.turning)
     filled, waiting = 0, 0
     if calm >= CALM:
         add_sample(
@@ -138,8 +138,8 @@ def update_model(memory: Memory, now: Situation, p: DetectionNumbers, tested: Te
         )  # fmt: skip
         filled, waiting = _queue_block(blocks, blocks.filled + 1, learnt, pace)
     # something that lasts is worth finding only if it troubles the arm; calm samples learn it anyway
-    steady, in_doubt = 0, recent.steady > 0 or suspected or now.reacting
-    if now.settle > 0 and alone and whole == len(LENGTHS) and calm < CALM and in_doubt:
+    steady, unclear = 0, recent.steady > 0 or suspected or now.reacting
+    if now.settle > 0 and alone and whole == len(LENGTHS) and calm < CALM and unclear:
         steady = _lasting_samples(recent, now, tested, learnt, p.offset_prior_nm)
     return calm, filled, waiting, steady
 

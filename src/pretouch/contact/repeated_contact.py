@@ -21,7 +21,7 @@ class RepeatedContactState:
     """How many contacts, 0 for no such location."""
     seen: bool
     """Whether a unit has seen something near there."""
-    clear: float
+    nothing_seen: float
     """Time for which none has seen anything [s]."""
     waited: float
     """Time since the arm gave up [s]."""
@@ -79,12 +79,12 @@ def wait_to_retry(state: RepeatedContactState, near: bool, dt: float, params: Gi
     That is when nothing is seen near any more, or, if nothing ever was, after `retry_s`.
     """
     # one sighting is enough: what was once seen there has gone when it is no longer seen
-    p, seen, clear = params, state.seen or near, 0.0 if near else state.clear + dt
+    p, seen, nothing_seen = params, state.seen or near, 0.0 if near else state.nothing_seen + dt
     time = state.waited + dt
-    if clear >= _CLEAR_S if seen else time >= p.retry_s:
+    if nothing_seen >= _CLEAR_S if seen else time >= p.retry_s:
         # one contact less than it takes to give up: the next one ends it again
         return RepeatedContactState(state.phase, state.point, p.contacts - 1, False, 0.0, 0.0, False, 0.0)
-    return RepeatedContactState(state.phase, state.point, state.contacts, seen, clear, time, False, 0.0)
+    return RepeatedContactState(state.phase, state.point, state.contacts, seen, nothing_seen, time, False, 0.0)
 
 
 _LOCATION_M = 0.1

@@ -160,20 +160,20 @@ def _carried(
 
 
 @compiled
-def mean_and_doubt(
-    weights: FloatArray, covariance: FloatArray, x: FloatArray, mean: FloatArray, doubt: FloatArray
+def mean_and_variance(
+    weights: FloatArray, covariance: FloatArray, x: FloatArray, mean: FloatArray, model_variance: FloatArray
 ) -> None:
     """Write the mean (n,) [Nm] of the torques with features x (n, f), and the variance of its error (n,) [Nm^2]."""
     n, f = x.shape
     for j in range(n):
-        mean[j], doubt[j] = 0.0, 0.0
+        mean[j], model_variance[j] = 0.0, 0.0
         for a in range(f):
             if x[j, a] != 0.0:  # it is 0 for the links before the joint
                 mean[j] += weights[j, a] * x[j, a]
                 part = 0.0
                 for b in range(f):
                     part += covariance[j, a, b] * x[j, b]
-                doubt[j] += x[j, a] * part
+                model_variance[j] += x[j, a] * part
 
 
 @compiled
@@ -211,7 +211,7 @@ class CalmSample(NamedTuple):
     """(n,) torques less their mean [Nm]."""
     M: FloatArray
     """(n, n) mass matrix [kg m^2]."""
-    doubt: FloatArray
+    model_variance: FloatArray
     """(n,) variance of the error of the mean [Nm^2]."""
     moving: int
     """1 if the arm moves, or 0."""
@@ -227,14 +227,14 @@ def add_sample(
     A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. The variance of the mean's error is in the
     sample but not in D. `spread` (2, n) is A and D of samples of its kind.
     """
-    torque, x, residual, M, doubt, moving = sample
+    torque, x, residual, M, model_variance, moving = sample
     n, f = x.shape
     S, L, y, z = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n)
     if first:
         block[:] = 0.0
     spread_of_sample(M, spread, floor, S)
     for i in range(n):
-        S[i, i] += doubt[i]
+        S[i, i] += model_variance[i]
     if not factor(S, L):
         return
     trust = (tails + n) / (tails + forward(L, residual, y))  # Student's weight, less than 1 for an outlier
@@ -244,14 +244,14 @@ def add_sample(
         block[i] += torque[i]
         for a in range(f):
             block[n + i * f + a] += x[i, a]
-        A, D, along = spread[0, i], spread[1, i] + floor**2 + doubt[i], 0.0
+        A, D, along = spread[0, i], spread[1, i] + floor**2 + model_variance[i], 0.0
         for j in range(n):
             along += M[j, i] * z[j]
         block[start + i] += trust * (A * along) ** 2 + A - A * A * forward(L, M[i], y)
         unit[i] = 1.0
         jitter = trust * (D * z[i]) ** 2 + D - D * D * forward(L, unit, y)
         unit[i] = 0.0
-        block[start + n + i] += max(jitter - doubt[i] - floor**2, 0.0)
+        block[start + n + i] += max(jitter - model_variance[i] - floor**2, 0.0)
         block[start + 2 * n + i] += S[i, i]
     block[-2] += 1.0
     block[-1] = moving  # a block is of the kind of its last sample

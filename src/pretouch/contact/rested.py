@@ -13,10 +13,10 @@ _DRIFT = 0.25
 
 
 def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> ResidualModel:
-    """Return what is known after a pause [s]: the mean as it was, its doubt larger, and the spread as it was.
+    """Return the model after a pause [s]: the mean as it was, its covariance larger, the noise covariance as it was.
 
-    With `memory_s` as while learning, the doubt of offset and friction goes a part of the way to the prior, and that of
-    the payload all of it, for what the arm holds may be another. The links' masses stay what they are.
+    With `memory_s` as while learning, the covariance of offset and friction goes part of the way to the prior, and that
+    of the payload all of it, for what the arm holds may be another. The links' masses stay what they are.
     """
     n = len(model.weights)
     prior, gone = prior_of(n, p), -math.expm1(-max(pause_s, 0.0) / p.memory_s)

@@ -119,9 +119,9 @@ _THICKNESS_M = 0.06
 """Mean thickness of what may be caught, between finger and forearm [m]: of two gaps that explain the torques as well,
 the narrower one is taken."""
 _ALONG = 0.85
-"""Cosine of the largest angle between the force and the shortest way across the gap: friction."""
+"""Cosine of the largest angle between the force and the shortest line across the gap: friction."""
 _REST = 9.0
-"""Square of the torques that a caught thing may leave unexplained, in deviations of free motion [1]: 94 % of the
+"""Square of the torques that a caught object may leave unexplained, in deviations of free motion [1]: 94 % of the
 chi-square distribution of the four that a force does not explain."""
 _EXPLAINED = 27.0
 """Least square of the torques that it has to explain [1]. Of 297 contacts from outside one met both bounds."""

@@ -5,7 +5,7 @@ touched and the instants at which it may have begun, of which those 1, 2, 4, ...
 its expectation is the sum of the weights, so that it passes A with a probability of at most sum / A a sample (Markov).
 The force of a contact is unknown, and integrated out in closed form with a Gaussian prior whose spread is g times that
 of free motion (Zellner 1986): so wide a prior as that of the forces that can be would cost a contact that only some
-joints feel what the others do not.
+joints measure what the others do not.
 """
 
 import math
@@ -76,15 +76,16 @@ class Hypotheses(NamedTuple):
 
 @compiled
 def judge(
-    means: FloatArray, whole: int, S: FloatArray, doubt: FloatArray, contacts: Hypotheses, gain: float, tails: float
-) -> tuple[float, int, int]:
+    means: FloatArray, whole: int, S: FloatArray, model_variance: FloatArray, contacts: Hypotheses, gain: float,
+    tails: float,
+) -> tuple[float, int, int]:  # fmt: skip
     """Return ln R, and the window and the hypothesis that have the largest part in it.
 
     Args:
         means: (6, n) means of the windows' samples [Nm].
         whole: how many of them there are.
         S: (n, n) spread of a sample [Nm^2].
-        doubt: (n,) variance of the error of their mean [Nm^2]: it does not average out.
+        model_variance: (n,) variance of the error of their mean [Nm^2]: it does not average out.
         contacts: hypotheses.
         gain: g, how much larger a contact's spread is than that of free motion.
         tails: degrees of freedom of the Student distribution.
@@ -100,7 +101,7 @@ def judge(
             for j in range(i + 1):
                 S0[i, j] = S[n - 1 - i, n - 1 - j] / _LENGTHS[k]
             # unlike the noise, not divided by the length of the window
-            S0[i, i] += doubt[n - 1 - i]
+            S0[i, i] += model_variance[n - 1 - i]
         if not factor(S0, L):
             continue
         for i in range(n):

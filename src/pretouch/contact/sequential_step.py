@@ -15,9 +15,9 @@ from pretouch.contact.force_map import force_map_into
 from pretouch.contact.hypotheses import NearPrior, write_hypotheses
 from pretouch.contact.model_update import DetectionNumbers, Memory, Situation, Tested, update_model
 from pretouch.contact.proximity_prior import MOST
-from pretouch.contact.residual_model import CalmSample, features_into, mean_and_doubt, spread_of_sample
+from pretouch.contact.residual_model import CalmSample, features_into, mean_and_variance, spread_of_sample
 from pretouch.contact.sequential import LONGEST, Hypotheses, judge, window_means
-from pretouch.contact.turning import turning_doubt
+from pretouch.contact.turning import add_reversal_variance
 from pretouch.groups import Mechanism, ObstacleArrays
 from pretouch.robot.mass_matrix import mass_matrix_into
 from pretouch.robot.model import Kinematics, jacobian_into
@@ -71,7 +71,7 @@ def detect_contact(
 
     J_ee = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
-    # nothing is learnt while anything that is seen could be what is felt
+    # nothing is learnt while anything that is seen could be what is measured
     alone = now.may_learn and distance.min() >= p.clear_m if len(distance) else now.may_learn
     sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving)
     tested = Tested(sample, means, whole, covariance, J_ee, alone, log_likelihood_ratio >= p.suspect)
@@ -122,13 +122,13 @@ def _free_motion(
         if abs(free.speed[j]) > p.still_rad_s:
             moving = 1
     features_into(kin, mechanism, free.speed, acceleration if p.inertia else np.zeros(n), free.x)
-    mean_and_doubt(learnt.weights, learnt.covariance, free.x, free.mean, free.model_variance)
+    mean_and_variance(learnt.weights, learnt.covariance, free.x, free.mean, free.model_variance)
     mass_matrix_into(kin, mechanism, free.M)
     spread_of_sample(free.M, learnt.spread[moving], p.noise_floor_nm, free.covariance)
     for j in range(n):
         free.model_variance[j] += p.bias_floor_nm**2
     if p.widen_at_turns:
-        turning_doubt(free.M, acceleration, memory.recent.turning, free.model_variance)
+        add_reversal_variance(free.M, acceleration, memory.recent.turning, free.model_variance)
     return moving
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.contact.cues import Cue, Cues, no_cues, together
 from pretouch.contact.detector import Body, Detection, Detector, Readings, Sample, no_torques, strongest
 from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
-from pretouch.contact.localisation.significance import clearest_mean
+from pretouch.contact.localisation.significance import most_significant_mean
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.sequential_detector import Observation, SequentialState, sequential_init, sequential_step
 from pretouch.groups import NOTHING_NEAR
@@ -68,19 +68,19 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         # while a unit is touched free motion is not learnt, whatever the test says
         alone = sample.watched and not len(said.link)
         seen = Observation(sample.kin, sample.robot, sample.obstacles, said)
-        felt, test = sequential_step(state.test, model, seen, sample.reacting, alone, period, self)
-        bands, touched, clear = Thresholds(felt.bands), NOT_TOUCHED, None
-        contact = strongest(felt.force, bands) if felt.detected and sample.armed else None
+        tested, test = sequential_step(state.test, model, seen, sample.reacting, alone, period, self)
+        bands, touched, significant = Thresholds(tested.bands), NOT_TOUCHED, None
+        contact = strongest(tested.force, bands) if tested.detected and sample.armed else None
         if self.localise:
             touched, location = localise(
-                location or localisation_init(), model, seen, felt.windows, felt.log_likelihood_ratio, period,
+                location or localisation_init(), model, seen, tested.windows, tested.log_likelihood_ratio, period,
                 self.localise,
             )  # fmt: skip
-        if felt.log_likelihood_ratio >= 1.0:
-            clear = clearest_mean(felt.windows, period, self.localise or _USUAL)
+        if tested.log_likelihood_ratio >= 1.0:
+            significant = most_significant_mean(tested.windows, period, self.localise or _USUAL)
         made = Detection(
-            bands, contact, sample.armed, felt.residual, felt.log_likelihood_ratio, felt.learning, felt.lasting,
-            touched, clear,
+            bands, contact, sample.armed, tested.residual, tested.log_likelihood_ratio, tested.learning, tested.lasting,
+            touched, significant,
         )  # fmt: skip
         return made, SequentialTestState(test, location if self.localise else None, remembered)
 
@@ -112,20 +112,20 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         # with the delayed velocities at the present ones nothing accelerates
         state, J = replace(fresh, model=replace(fresh.model, speed=qd)), model.ee_jacobian(kin)[:3]
 
-        def is_felt(force: FloatArray) -> bool:
+        def is_detected(force: FloatArray) -> bool:
             robot = RobotState(0.0, q, qd, q, qd, J.T @ force, None)
             seen = Observation(kin, robot, NOTHING_NEAR, said)
-            felt, _ = sequential_step(state, model, seen, False, False, body.period, self)
-            return felt.log_likelihood_ratio >= 1.0
+            tested, _ = sequential_step(state, model, seen, False, False, body.period, self)
+            return tested.log_likelihood_ratio >= 1.0
 
         largest = 0.0
         for axis in np.eye(3):
-            if not is_felt(_LARGEST_N * axis):
+            if not is_detected(_LARGEST_N * axis):
                 return np.inf
             low, high = 0.0, _LARGEST_N
             while high - low > _TO_N:
                 middle = 0.5 * (low + high)
-                low, high = (low, middle) if is_felt(middle * axis) else (middle, high)
+                low, high = (low, middle) if is_detected(middle * axis) else (middle, high)
             largest = max(largest, high)
         return largest
 

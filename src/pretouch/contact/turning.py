@@ -1,9 +1,9 @@
-"""How much worse free motion is known where the arm turns round: doubt that is learnt where it is needed.
+"""How much worse free motion is known where the arm turns round: a variance of the mean, learnt where needed.
 
 What accelerates hard is known only to a part, and what is wrong with it comes too early or too late. That is the same
-for many samples in a row, so that it is doubt of the mean and not spread. Each joint's variance is a factor on how hard
-the arm accelerates, learnt with a prior (as `residual_model`), also where a contact is suspected: an arm that gave an
-alarm because it turned round would do so for ever.
+for many samples in a row, so that it is variance of the mean and not noise. Each joint's variance is a factor on how
+hard the arm accelerates, learnt with a prior (as `residual_model`), also where a contact is suspected: an arm that gave
+an alarm because it turned round would do so for ever.
 """
 
 import numpy as np
@@ -43,8 +43,8 @@ def turning_init(n: int) -> FloatArray:
 
 
 @compiled
-def turning_doubt(M: FloatArray, growth: FloatArray, turning: FloatArray, doubt: FloatArray) -> None:
-    """Take in how joint velocities grow (n,) [rad/s^2], and add to the doubt (n,) [Nm^2] of the mean."""
+def add_reversal_variance(M: FloatArray, growth: FloatArray, turning: FloatArray, model_variance: FloatArray) -> None:
+    """Take in how joint velocities grow (n,) [rad/s^2], and add to the variance (n,) [Nm^2] of the mean."""
     n = len(growth)
     for j in range(n):
         hard = 0.0
@@ -52,25 +52,25 @@ def turning_doubt(M: FloatArray, growth: FloatArray, turning: FloatArray, doubt:
             # the torque on joint j by the acceleration of joint k; of several the squares add up
             hard += (M[j, k] * max(0.0, abs(growth[k]) - _HARD_RAD_S2)) ** 2
         turning[0, j] = max(hard, _KEEP * turning[0, j])
-        doubt[j] += min(turning[1, j] * turning[0, j], _MOST_NM2)
+        model_variance[j] += min(turning[1, j] * turning[0, j], _MOST_NM2)
 
 
 @compiled
 def learn_turning(
-    at: int, means: FloatArray, S: FloatArray, doubt: FloatArray, forget: float, turning: FloatArray
+    at: int, means: FloatArray, S: FloatArray, model_variance: FloatArray, forget: float, turning: FloatArray
 ) -> None:
-    """Learn the factors from what the means (6, n) of the windows have more than spread (n, n) and doubt (n,) explain.
+    """Learn the factors from the excess of the means (6, n) of the windows over noise (n, n) and model variance (n,).
 
     `at` counts the samples: no sample is in two of the means. `forget` is the part by which one sample's time fades.
     """
     if at % _SAMPLES:
         return
-    for j in range(len(doubt)):
+    for j in range(len(model_variance)):
         x, value, variance = turning[0, j], turning[1, j], turning[2, j]
         # fading towards the prior by the time since the last mean
         variance += _SAMPLES * forget * (_PRIOR**2 - variance)
         if x > _LEAST_NM2:
-            expected = S[j, j] / _SAMPLES + doubt[j]
+            expected = S[j, j] / _SAMPLES + model_variance[j]
             square = min(means[_WINDOW, j] ** 2, _OUTLIER * expected)
             # a scalar Kalman step: `expected` has the slope x, and the square of a Gaussian the variance 2 expected^2
             gain = variance * x / (variance * x**2 + 2.0 * expected**2)

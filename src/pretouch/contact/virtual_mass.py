@@ -1,4 +1,4 @@
-"""Yielding to a push as long as it is felt: a virtual mass and damper in joint space that take energy and give none.
+"""Yielding to a push as long as it lasts: a virtual mass and damper in joint space that take energy and give none.
 
 Each joint obeys M dv/dt = d(tau) - D v, integrated implicitly, with tau the external torque less its mean in free
 motion. See docs/explanation/reaction.md for why joint space, and for the bound on the energy (Hannaford and Ryu 2002;
@@ -40,8 +40,8 @@ class VirtualMass:
     """(n,) 1 of a joint that a push has torn loose from static friction, 0 of one that sticks."""
     quiet: float
     """Time since a torque moved a joint or kept it moving [s]."""
-    unfelt: float
-    """Time since the detector felt a contact [s]."""
+    no_contact: float
+    """Time since the detector found a contact [s]."""
     since: float
     """Time since the contact that began a reaction [s], infinite without one."""
 
@@ -88,8 +88,8 @@ def begun(
 ) -> VirtualMass:  # fmt: skip
     """Begin a reaction: at the speed that the torque (n,) [Nm] would keep up, as far as the start energy allows.
 
-    With static friction a joint begins only where what was felt `before` (n,) [Nm] says the same, and at the lesser of
-    both: what only noise or a small bias says moves no joint, and so none towards who pushes.
+    With static friction a joint begins only where the torque measured `before` (n,) [Nm] says the same, and at the
+    lesser of both: what only noise or a small bias says moves no joint, and so none towards who pushes.
     """
     lesser, least = torque, band
     if params.static_friction_nm > 0:
@@ -111,7 +111,7 @@ def yielded(
     state: VirtualMass, arm: tuple[RobotModel, Kinematics], residual: FloatArray, command: FloatArray,
     band: FloatArray, dt: float, params: AdmittanceParams, contact: bool = True,
 ) -> VirtualMass:  # fmt: skip
-    """Move the virtual mass by one period under the torque that is felt.
+    """Move the virtual mass by one period under the external torque.
 
     Args:
         state: memory.
@@ -121,7 +121,7 @@ def yielded(
         band: (n,) dead band [Nm].
         dt: period [s].
         params: parameters.
-        contact: whether the detector feels one.
+        contact: whether the detector finds one.
     """
     p, torque = params, residual - state.mean[1]
     velocity, side, sliding, steady = np.empty_like(band), np.empty_like(band), np.empty_like(band), state.steady.copy()
@@ -134,9 +134,9 @@ def yielded(
         (velocity, side, sliding, steady),
     )  # fmt: skip
     velocity = _no_faster(velocity, *arm, p.speed_max_m_s)
-    quiet, unfelt = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.unfelt + dt
+    quiet, no_contact = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.no_contact + dt
     return VirtualMass(
-        state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, unfelt, state.since + dt
+        state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, no_contact, state.since + dt
     )
 
 
@@ -232,11 +232,11 @@ def _yield(
         acted = (torque[i] - keep * before[i]) / (1.0 - keep)
         # the least energy that it gave, whichever of the two is true and whatever is wrong within the dead band
         power += min(torque[i] * v[i], acted * v[i]) - band[i] * abs(v[i])
-        felt, now = _beyond(torque[i], band[i]), _beyond(acted, band[i])
+        measured, now = _beyond(torque[i], band[i]), _beyond(acted, band[i])
         # the lesser of both, and nothing where they disagree: a force that has ended no longer drives the arm
         drive = 0.0
-        if felt * now > 0.0 and sliding[i] > 0.0:
-            drive = felt if abs(felt) < abs(now) else now
+        if measured * now > 0.0 and sliding[i] > 0.0:
+            drive = measured if abs(measured) < abs(now) else now
         # against the push the joint has yielded to: what a release leaves in the estimate, unless well beyond the band
         if drive * side[i] < 0.0:
             least = _REVERSE_BAND * band[i]

@@ -202,23 +202,23 @@ def follow(path: Path, state: PathState, position: FloatArray, params: TaskParam
     return Following(point, (tx, ty, tz), (vx, vy, vz), forward)
 
 
-def advance(path: Path, state: PathState, way: Following, velocity: FloatArray, params: TaskParams) -> PathState:
+def advance(path: Path, state: PathState, following: Following, velocity: FloatArray, params: TaskParams) -> PathState:
     """Move the phase on by one period of the task's forward speed, less what the arm falls short of it, never back.
 
-    Slowing or blocking the arm so slows the phase. The way back to the path is no way along it, so an arm pushed
+    Slowing or blocking the arm so slows the phase. Motion back to the path is no progress along it, so an arm pushed
     ahead or back meets the path where it left. The speed allowed next grows by the task's acceleration.
 
     Args:
         path: the path.
         state: phase and speed so far.
-        way: how it is followed from there.
+        following: how it is followed from there.
         velocity: (3,) velocity commanded at the end-effector origin [m/s].
         params: speed, gains and period.
     """
-    (tx, ty, tz), (ax, ay, az), (vx, vy, vz) = way.tangent, way.velocity, velocity.tolist()
+    (tx, ty, tz), (ax, ay, az), (vx, vy, vz) = following.tangent, following.velocity, velocity.tolist()
     missing = (ax - vx) * tx + (ay - vy) * ty + (az - vz) * tz
-    # `way.velocity` is that before eqs. 3-4: missing is what they, the rows and the joint box took from it
-    phase = state.phase + max(0.0, way.forward - max(0.0, missing)) * params.control_period_s
+    # `following.velocity` is that before eqs. 3-4: missing is what they, the rows and the joint box took from it
+    phase = state.phase + max(0.0, following.forward - max(0.0, missing)) * params.control_period_s
     if not path.closed:
         phase = min(phase, path.length)
     return PathState(phase, min(params.speed_m_s, state.speed + params.acceleration_m_s2 * params.control_period_s))

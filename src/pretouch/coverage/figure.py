@@ -1,4 +1,4 @@
-"""An arm's surface coloured by how much of what comes at it is seen in time, with its units and their beams."""
+"""An arm's surface coloured by how much of all approaching objects is seen in time, with its units and their beams."""
 
 import numpy as np
 from matplotlib import colormaps

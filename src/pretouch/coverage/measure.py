@@ -24,7 +24,7 @@ class Share:
 
 @dataclass(frozen=True)
 class LinkShare:
-    """What is seen in time of what comes at one link, or at the whole arm."""
+    """What is seen in time of objects that approach one link, or at the whole arm."""
 
     name: str
     area_m2: float

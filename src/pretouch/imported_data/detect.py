@@ -91,20 +91,20 @@ def _force_alone(ticks: IntArray, begin: int, force: FloatArray, profile: Profil
     for time, sample in zip(((ticks - begin) / 1e9).tolist(), force, strict=True):
         force_now = None if np.isnan(sample[0]) else sample
         armed, window = window.full, add_force(window, force_now, p.window)
-        felt = thresholds.judged(window, force_now, armed, _NOWHERE, _NOTHING)
-        events = {Event.WINDOW_FILLING: ""} if not felt.armed else {}
-        if felt.contact is not None:
+        detection = thresholds.judged(window, force_now, armed, _NOWHERE, _NOTHING)
+        events = {Event.WINDOW_FILLING: ""} if not detection.armed else {}
+        if detection.contact is not None:
             events[Event.CONTACT] = ""
         if answer.active(react):
             events[Event.REACTING] = ""
         before, mode = mode, next_mode(mode, events, resume=False)
         reacting = mode.mode is Mode.REACT
         begins = reacting and before.mode is not Mode.REACT
-        contact = felt.contact if begins else None
+        contact = detection.contact if begins else None
         react = answer.begun(contact.force) if contact else react
         react = advanced(react) if reacting else answer.rest()
         compared = window.newest if force_now is not None and thresholds.compare == "filtered" else sample
-        decided.add(time, sample, compared, felt.thresholds, felt.armed, reacting, contact)
+        decided.add(time, sample, compared, detection.thresholds, detection.armed, reacting, contact)
     return decided.decisions()
 
 

@@ -40,20 +40,20 @@ class Summary:
 def summary(decisions: Decisions, profile: Profile) -> Summary:
     """Sum decisions up."""
     d, period = decisions, profile.task.control_period_s
-    told = d.armed & np.isfinite(d.compared).all(axis=1)
-    free = told & ~d.reacting & ~_before(d)
+    judged = d.armed & np.isfinite(d.compared).all(axis=1)
+    free = judged & ~d.reacting & ~_before(d)
     beyond = np.maximum(d.compared - d.upper, d.lower - d.compared).max(axis=1)
     nothing = np.full(3, np.nan)
     some = bool(free.any())
     return Summary(
-        duration=float(told.sum() * period),
+        duration=float(judged.sum() * period),
         free=float(free.sum() * period),
         mean=d.force[free].mean(axis=0) if some else nothing,
         sigma=d.force[free].std(axis=0) if some else nothing,
         sigma_window=np.median(d.sigma[free], axis=0) if some else nothing,
         width=np.median((d.upper - d.lower)[free] / 2, axis=0) if some else nothing,
         f_base_free=thresholds_of(profile.detect).f_base_n + float(beyond[free].max()) if some else np.nan,
-        f_base_all=thresholds_of(profile.detect).f_base_n + float(beyond[told].max()) if told.any() else np.nan,
+        f_base_all=thresholds_of(profile.detect).f_base_n + float(beyond[judged].max()) if judged.any() else np.nan,
     )
 
 

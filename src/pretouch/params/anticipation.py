@@ -47,9 +47,9 @@ class EffectiveMass(Checked):
     """Allowed force in place of the region's [N]; 0: the region's own, with its factor for a short contact."""
     force_fraction: Fraction = 0.25
     """Part of the allowed force that a touch may reach in the spring model: ours. Half is for what the arm pushes on
-    until it has felt the contact, and half of what is left for figures that public copies disagree on."""
+    until it has detected the contact, and half of what is left for figures that public copies disagree on."""
     rotor_inertia_kg_m2: NonNegative = 0.1
-    """Inertia of each drive as felt at its joint, added to the arm's [kg m^2] (model data of this package)."""
+    """Inertia of each drive reflected to its joint, added to the arm's [kg m^2] (model data of this package)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -84,8 +84,8 @@ class BrakingParams(Checked):
     on, Table I's d_crit. From 0.15 to 1 it changes the time to a touch by 0.6 s and its force by nothing
     (docs/explanation/anticipation.md)."""
     latency_s: NonNegative = 0.06
-    """Time from a measurement to a motion tau [s]: a reading's period of 20 ms, its way of about 12 ms, a control
-    period, and the 16 ms of the drives' set-point filter."""
+    """Time from a measurement to a motion tau [s]: a reading's period of 20 ms, a network delay of about 12 ms, a
+    control period, and the 16 ms of the drives' set-point filter."""
     margin_m: NonNegative = 0.01
     """Taken off each body distance [m]: the ranging offset of a unit (at most 10 mm in the simulation; the data sheet
     of the VL53L1X allows 20 to 25 mm of error in all)."""
@@ -104,7 +104,7 @@ class BrakingParams(Checked):
     """Whether the touch speed follows from the arm's mass; none: it is `touch_speed_max_m_s`."""
     closing_deadband_m_s: NonNegative | None = None
     """Closing speed of the object itself that is not counted [m/s]; more is taken off what an approach may be, which
-    needs `perception.closing`. 0.05 is what range noise of 20 mm leaves in the estimate for a thing at rest.
+    needs `perception.closing`. 0.05 is what range noise of 20 mm leaves in the estimate for an object at rest.
     None: the object's own speed does not count."""
     tangential: Tangential | None = None
     """Whether a point near an object is slowed across the normal too."""

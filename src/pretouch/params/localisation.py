@@ -15,8 +15,8 @@ class LocalisationParams(Checked):
     forces spread evenly over a cone of friction 0.5, about that of skin and cloth on smooth plastic (Derler and
     Gerhardt 2012)."""
     force_n: Positive = 40.0
-    """Standard deviation of the force into the surface before anything is felt [N]: a firm push by hand; harder ones
-    are believed all the same, for the torques then say far more."""
+    """Standard deviation of the force into the surface before anything is measured [N]: a firm push by hand; harder
+    ones are believed all the same, for the torques then say far more."""
     relative: Fraction = 0.06
     """Error of the torques as a part of them [1]: kinematics, friction that turns round under the push, motion within
     the window. With 0.03 two contacts were said of 5, with this of 2 of 60 single ones in development trials."""
@@ -40,7 +40,7 @@ class LocalisationParams(Checked):
     """Least standard deviation of a place they give [m]: that of neighbouring places of the surface."""
     two_odds: Fraction = 0.5
     """Prior odds of two contacts at once against one, which says what either mistake costs as well: with 0.05, 49 % of
-    development pairs were told and 1 % of long single contacts taken for two, with 0.5 57 % and 4 %."""
+    development pairs were recognised and 1 % of long single contacts taken for two, with 0.5 57 % and 4 %."""
     memory_s: NonNegative = 0.15
     """Time over which what the windows of earlier steps said of each place is averaged [s]: an arm that moves shows
     one contact from several postures."""

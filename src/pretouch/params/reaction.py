@@ -7,13 +7,13 @@ from pretouch.checks import Checked, NonNegative, Positive, PositiveCount
 
 @dataclass(frozen=True)
 class ClampParams(Checked):
-    """Being caught between two things while the arm yields, and the way out."""
+    """Being caught between two objects while the arm yields, and how the arm opens."""
 
     torque_nm: Positive = 4.0
-    """Torque against the way the arm yields from which it is caught between two things [Nm]: four times the noise of a
-    Panda's estimate, about 8 N on the hand."""
+    """Torque against the direction of yielding from which the arm is caught between two objects [Nm]: four times the
+    noise of a Panda's estimate, about 8 N on the hand."""
     open_m_s: Positive = 0.1
-    """Speed of the fastest point of the body while the arm opens along the way it came [m/s]."""
+    """Speed of the fastest point of the body while the arm opens along the path it came [m/s]."""
     open_s: Positive = 0.5
     """Longest that it opens [s]."""
 
@@ -34,7 +34,7 @@ class PinchParams(Checked):
 
 @dataclass(frozen=True)
 class GiveUpParams(Checked):
-    """Giving up where the arm meets the same thing again and again."""
+    """Giving up where the arm meets the same object again and again."""
 
     contacts: PositiveCount = 3
     """Contacts at one place of the path after which it gives up."""
@@ -48,7 +48,7 @@ class GiveUpParams(Checked):
 
 @dataclass(frozen=True)
 class AdmittanceParams(Checked):
-    """A virtual mass and damper in each joint that an external torque moves as long as it is felt."""
+    """A virtual mass and damper in each joint that an external torque moves as long as it lasts."""
 
     speed_max_m_s: Positive = 0.3
     """Bound on the speed of every point of the body's axes [m/s] (authors' code family, there of the hand)."""
@@ -78,7 +78,7 @@ class AdmittanceParams(Checked):
     soft_hold: bool = False
     """Whether an arm that holds yields to a push where the cause of the HOLD allows it (`modes.TABLE`)."""
     clamp: ClampParams | None = None
-    """What tells that the arm is caught between two things while it yields; None where it does not look for that."""
+    """What tells that the arm is caught between two objects while it yields; None where it does not look for that."""
     pinch: PinchParams | None = None
     """What tells something caught between links, or a link and a fixture, from a push; None where all is a push."""
     give_up: GiveUpParams | None = None

@@ -89,8 +89,8 @@ def reckon(
                 ahead += rotation[k, i, 2] * (last[k, i] - position[k, i])
                 if not np.isnan(motion[1, k, i]):
                     nearing -= rotation[k, i, 2] * motion[1, k, i]
-            # Slower may be the estimate's error for a thing at rest, 2.5 % of which err by more (anticipation.md). That
-            # the arm itself comes nearer is in the sensor's pose already.
+            # Slower may be the estimate's error for an object at rest, 2.5 % of which err by more (anticipation.md).
+            # That the arm itself comes nearer is in the sensor's pose already.
             if nearing > _ON_ITS_OWN:
                 ahead -= dt * nearing
         # the reading holds all the same: between the sensor and `least`

@@ -38,7 +38,7 @@ class TrackState:
 
     @property
     def heard(self) -> FloatArray:
-        """Stamp of the newest reading that told anything (K,) [s]."""
+        """Stamp of the newest reading that reported anything (K,) [s]."""
         return self.times[HEARD]
 
 

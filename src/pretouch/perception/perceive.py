@@ -46,7 +46,7 @@ class Perception:
     nearest: float
     """Distance of the nearest obstacle from the end-effector origin [m], infinite if there is none."""
     longest_silence: float
-    """Time since the unit that has been silent for longest told anything [s]."""
+    """Time since the unit that has been silent for longest reported anything [s]."""
 
 
 class Scene(NamedTuple):
@@ -220,7 +220,7 @@ def _perceive(
     """Change the tracks, write obstacles.
 
     Returns how many there are, the distance of the nearest from the end-effector, and when the unit that is silent for
-    longest last told anything.
+    longest last reported anything.
     """
     now, times, distance = instant.now, tracks.times, room.distance
     measured(readings.distance, readings.status, distance)

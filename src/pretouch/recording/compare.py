@@ -107,7 +107,7 @@ def compare(recorded: "Recorded", profile: Profile, progress: Callable[[int], No
     """Let another profile decide on the inputs of a recording, cycle by cycle; its commands go nowhere.
 
     It begins with the force window of the recording's first snapshot, if it has one of the same length. A profile for
-    another rate is brought to that of the run. `progress` is told how many cycles are done. Raises RecordingError if
+    another rate is brought to that of the run. `progress` gets how many cycles are done. Raises RecordingError if
     none has usable inputs.
     """
     names = dict.fromkeys(run.profile.name for run in recorded.runs)

@@ -33,7 +33,7 @@ class Further(Protocol):
         ...
 
     def change(self, controller: Controller) -> None:
-        """Be told of another controller."""
+        """Go on with another controller."""
         ...
 
 

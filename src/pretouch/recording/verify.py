@@ -154,7 +154,7 @@ def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: No
 
     With the versions and on the kind of machine that made it, bit for bit, and the state is carried from snapshot to
     snapshot, where it is compared too. Otherwise within `difference.TOLERANCE`, beginning anew at each snapshot, and
-    without the sentences. `progress` is told how many steps are done.
+    without the sentences. `progress` gets how many steps are done.
     """
     count = _Count()
     exact = [run.versions == versions() for run in recorded.runs]

@@ -1,4 +1,4 @@
-"""What was felt, held against what truly touched."""
+"""Detected contacts, held against what truly touched."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -74,7 +74,7 @@ class Course(RunRecord):
 
     @property
     def by_thresholds(self) -> bool:
-        """Whether any of the profiles feels contacts by the paper's thresholds."""
+        """Whether any of the profiles detects contacts by the paper's thresholds."""
         return any(isinstance(run.profile.detect, MovingThresholds) for run in self.runs)
 
     def of_runs(self, value: Callable[["Run"], float]) -> FloatArray:

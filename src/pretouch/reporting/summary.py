@@ -58,7 +58,7 @@ def _nearest(m: Measures) -> str:
         return "Proximity was not used."
     if d is None:
         return "Nothing was sensed near the arm."
-    return f"The nearest thing sensed was {d.distance:.3f} m from the body ({d.name}, at {d.time:.1f} s)."
+    return f"The nearest obstacle sensed was {d.distance:.3f} m from the body ({d.name}, at {d.time:.1f} s)."
 
 
 def _modes(m: Measures) -> str:

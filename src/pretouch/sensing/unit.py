@@ -27,10 +27,10 @@ LARGEST_ORIENTATION_SIGMA = np.pi / 2
 
 
 LARGEST_PATCH = 0.2
-"""Largest radius of the patch a unit feels a touch in [m]: a larger one says nothing of where."""
+"""Largest radius of the patch a unit measures a touch in [m]: a larger one says nothing of where."""
 
 LARGEST_FORCE = 100.0
-"""Largest force [N] a touch sensor may need to feel anything: beyond it a person is hurt before."""
+"""Largest force [N] a touch sensor may need to report a touch: beyond it a person is hurt before."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class TouchPatch:
     """The touch sensor of a unit: a round patch about the unit, on its link's surface.
 
     The values are those of a unit whose case, 40 mm wide, rests on a force-sensing resistor of Interlink's 400 series
-    (data sheet: it feels from 0.1 N on; a case held by foam so that it does not press by itself takes more).
+    (data sheet: it measures from 0.1 N on; a case held by foam so that it does not press by itself takes more).
     """
 
     radius: float = 0.02

@@ -113,11 +113,11 @@ def run(options: SimulateOptions, done: Callable[[], bool], say: Callable[[str],
         if options.hand:
             Hand(arm.plant, VisitingHand(model.ee))
         # it draws the same numbers as the units that send: what is sent is what the arm's own controller has
-        felt = RangeFinders(arm.plant, options.skin, RangeFinderParams(), options.seed)
+        finders = RangeFinders(arm.plant, options.skin, RangeFinderParams(), options.seed)
         controller = Controller(model, options.skin, fixtures(scene), options.path, profile)
         arm.begin()
         printer, end = _StatusPrinter(arm.fleet, arm.clock, say), options.duration_s or np.inf
-        turn_on(controller, arm, felt, arm, printer, lambda _: done() or arm.clock.now >= end)
+        turn_on(controller, arm, finders, arm, printer, lambda _: done() or arm.clock.now >= end)
 
 
 def run_motion(

@@ -35,7 +35,7 @@ class WireSkin:
     ) -> None:  # fmt: skip
         """Mount the units on an arm and switch them on; measurements are those of `RangeFinders` with this seed.
 
-        Units that have one by the skin file feel touches, as `TouchSensors` do: of contacts, and of forces `laid` on
+        Units that have one by the skin file measure touches, as `TouchSensors` do: of contacts, and of forces `laid` on
         the arm.
         """
         self._plant = plant

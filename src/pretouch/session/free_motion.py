@@ -28,7 +28,7 @@ class ModelFile:
     """Where free motion is kept."""
 
     robot: str
-    """What the robot is known by: kind, address, and what it is told to carry."""
+    """What the robot is known by: kind, address, and the payload set in it."""
     path: Path
     given: bool
     """Whether a person named the file: what cannot be used is then an error, and another robot's is taken."""

@@ -72,5 +72,5 @@ class ProgressReporter:
             return
         self._line_due = step.stamp + _LINE_S
         near = step.obstacles.body_distance
-        told = f", nearest {near.min():.2f} m" if len(near) else ""
-        self._tell(f"{step.mode.value.upper():5} {np.linalg.norm(step.ee_velocity):.2f} m/s{told}")
+        nearest = f", nearest {near.min():.2f} m" if len(near) else ""
+        self._tell(f"{step.mode.value.upper():5} {np.linalg.norm(step.ee_velocity):.2f} m/s{nearest}")

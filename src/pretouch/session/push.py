@@ -2,7 +2,7 @@
 
 Some stacks report the force on the robot, others the force by it, and the difference does not show until the arm moves
 towards whoever pushes it. So it is shown before: pushes along the three axes of the base tell the sign, and that the
-force is given in the base frame. Two would not do: a force by the arm in a frame half a turn about z away is felt as
+force is given in the base frame. Two would not do: a force by the arm in a frame half a turn about z away reads as
 asked along x and y, and up is down.
 """
 

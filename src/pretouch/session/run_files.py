@@ -57,7 +57,7 @@ def open_run_files(
         robot: what the arm is called.
         place: recording to write, if any.
         folder: for the last seconds before each HOLD that latches.
-        tell: is told at once, without waiting, that the recording fails.
+        tell: is called at once, without waiting, when the recording fails.
         learnt: what keeps free motion, if anything does.
         further: what else is given each cycle, if anything.
     """

@@ -37,7 +37,7 @@ class Session:
     skin: Skin
     """The units as the loop reads them."""
     units: Units | None
-    """What hears them, where their health can be told."""
+    """What hears them, where their health is known."""
     controller: Controller
     floor: float
     """Height of what is below the arm, base frame [m]."""

@@ -38,7 +38,7 @@ class SimulatedSessionArm:
         self._started, self._failure = threading.Event(), ""
         self._push, self._push_span = np.zeros(3), (np.inf, np.inf)
         plant = self._arm.plant
-        self._felt = plant.mj_data.xfrc_applied[options.model.ee, :3]
+        self._applied = plant.mj_data.xfrc_applied[options.model.ee, :3]
         plant.before_each_step(self._apply)
         self._thread = threading.Thread(target=self._live, daemon=True)
 
@@ -94,7 +94,7 @@ class SimulatedSessionArm:
 
     def _apply(self, now: float) -> None:
         begin, end = self._push_span
-        self._felt[:] = self._push if begin <= now < end else 0.0
+        self._applied[:] = self._push if begin <= now < end else 0.0
 
     def _live(self) -> None:
         arm = self._arm

@@ -45,8 +45,8 @@ class Standstill:
     @property
     def noise(self) -> FloatArray:
         """Standard deviation of each force component (3,) [N]."""
-        felt = self.wrench[np.isfinite(self.wrench).all(axis=1), :3]
-        return np.array(felt.std(axis=0)) if len(felt) else np.full(3, np.nan)
+        force = self.wrench[np.isfinite(self.wrench).all(axis=1), :3]
+        return np.array(force.std(axis=0)) if len(force) else np.full(3, np.nan)
 
     @property
     def missing_share(self) -> float:
@@ -59,9 +59,9 @@ class Standstill:
 
         A span with fewer than half as many states as is usual is left out: its mean is that of the noise.
         """
-        felt = np.isfinite(self.wrench).all(axis=1)
-        away = self.wrench[felt, :3] - self.rest_wrench[:3]
-        span = np.floor((self.stamp[felt] - self.stamp[0]) / MEAN_S)
+        known = np.isfinite(self.wrench).all(axis=1)
+        away = self.wrench[known, :3] - self.rest_wrench[:3]
+        span = np.floor((self.stamp[known] - self.stamp[0]) / MEAN_S)
         spans, counts = np.unique(span, return_counts=True)
         enough = spans[counts >= _ENOUGH * np.median(counts)] if len(spans) else spans
         means = [away[span == one].mean(axis=0) for one in enough]

@@ -102,8 +102,8 @@ class UnitCheck:
 
     def _traffic(self) -> Sequence[UnitTraffic]:
         """Return what was counted, older than the samples by up to 0.6 s but for the newest arrivals."""
-        told = zip(self._units.traffic().units, self._arrivals, strict=True)
-        return [replace(unit, last_arrival=max(arrival, unit.last_arrival)) for unit, arrival in told]
+        traffic = zip(self._units.traffic().units, self._arrivals, strict=True)
+        return [replace(unit, last_arrival=max(arrival, unit.last_arrival)) for unit, arrival in traffic]
 
 
 def _missing(names: Sequence[str], address: tuple[str, int]) -> str:

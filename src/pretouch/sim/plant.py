@@ -209,9 +209,9 @@ class Plant:
             mujoco.mj_step(model, data)
             # the state after the step goes with the torques that led to it
             q, qd = self._q.copy(), self._qd + velocity_noise[i]
-            told = sensing(tau, lost, torque_noise[i], q, self._qdd, *self._sensing)
+            measured = sensing(tau, lost, torque_noise[i], q, self._qdd, *self._sensing)
             mass, self._bias = self.model.mass_matrix_and_bias(q, qd, np.empty(n))
-            self._observer = observe(self._observer, mass, self._bias, qd, told, p.observer_gain_1_s, dt)
+            self._observer = observe(self._observer, mass, self._bias, qd, measured, p.observer_gain_1_s, dt)
             self.time += dt
             self._q_meas, self._qd_meas = q, qd
             if p.state_delay_s:

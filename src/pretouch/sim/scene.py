@@ -88,7 +88,7 @@ class ArmError:
     payload: float
     """Unknown mass at the TCP [kg]."""
     armature: float
-    """Rotor inertia as felt at the joint [kg m^2]."""
+    """Rotor inertia reflected to the joint [kg m^2]."""
 
 
 def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:

@@ -22,7 +22,7 @@ class TouchSensorParams(Checked):
     period_s: Positive = 0.02
     """Time between readings [s]: a unit sends 50 times a second."""
     shortest_s: Positive = 0.01
-    """Least time from one reading to the next: a touch that begins or ends is told as soon as it has passed [s]."""
+    """Least time from one reading to the next: a touch that begins or ends is reported as soon as it has passed [s]."""
     period_jitter: Fraction = 0.02
     """Standard deviation of the period as a fraction of it: as of the range finders."""
     rise_s: Positive = 0.005
@@ -79,10 +79,10 @@ def no_forces(_time: float) -> list[PointForce]:
 
 
 class TouchSensors:
-    """The touch sensors of a skin's units, which feel contacts of the simulated arm and forces laid on it.
+    """The touch sensors of a skin's units, which measure contacts of the simulated arm and forces laid on it.
 
-    A force is felt by a unit that sits on its link if it acts within the patch: no farther from the unit's axis than
-    its radius, and on the unit's side of the link. What is felt is the part of it that presses on the unit.
+    A unit that sits on a force's link measures it if it acts within the patch: no farther from the unit's axis than its
+    radius, and on the unit's side of the link. What is measured is the part of it that presses on the unit.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class TouchSensors:
         """Mount the sensors on a simulated arm; the seed decides their errors, phases, noise, losses, false touches.
 
         Args:
-            plant: the arm; forces of its contacts are felt.
+            plant: the arm; forces of its contacts are measured.
             skin: the units; those with a `touch` have a sensor.
             params: how they err.
             seed: of what chance decides.
@@ -166,25 +166,25 @@ class TouchSensors:
             self._false_until[i] = time + p.false_s * rng.standard_exponential()
             self._false_n[i] = patch.force_min + p.false_n * rng.standard_exponential()
             self._next_false[i] = self._draw_next(self._false_until[i : i + 1])[0]
-        felt = float(self._passed[i])
-        falling, self._before[i] = felt < self._before[i], felt
-        felt *= self._gain[i] * (1.0 + (p.hysteresis if falling else 0.0))
-        felt += (p.noise_floor_n + p.noise * felt) * rng.standard_normal()
+        force = float(self._passed[i])
+        falling, self._before[i] = force < self._before[i], force
+        force *= self._gain[i] * (1.0 + (p.hysteresis if falling else 0.0))
+        force += (p.noise_floor_n + p.noise * force) * rng.standard_normal()
         if time < self._false_until[i] or unit in self.stuck:
-            felt = max(felt, float(self._false_n[i]), 2.0 * patch.force_min)
-        felt = round(min(max(felt, 0.0), p.most_n) / p.step_n) * p.step_n
-        self._on[i] = felt >= patch.force_min * (p.release if self._on[i] else 1.0)
+            force = max(force, float(self._false_n[i]), 2.0 * patch.force_min)
+        force = round(min(max(force, 0.0), p.most_n) / p.step_n) * p.step_n
+        self._on[i] = force >= patch.force_min * (p.release if self._on[i] else 1.0)
         arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout
         if unit in self.silenced:
             return
-        told = felt if patch.measures_force else np.nan
+        reported = force if patch.measures_force else np.nan
         if self._send:
-            self._send(TouchSample(unit, time, bool(self._on[i]), told))
+            self._send(TouchSample(unit, time, bool(self._on[i]), reported))
         elif not lost:
-            self._sent.send(arrival, (unit, time, bool(self._on[i]), told))
+            self._sent.send(arrival, (unit, time, bool(self._on[i]), reported))
 
 
-class FeelingSkin:
+class SimulatedTouchSkin:
     """The port `TouchSkin` of a simulated arm: range finders, or any other skin, and touch sensors beside them."""
 
     def __init__(self, ranges: SkinPort, sensors: TouchSensors) -> None:

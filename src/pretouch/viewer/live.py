@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 class LivePage:
     """A page over a simulation, turned by `turn`; people's commands wait in a queue until then.
 
-    `say` is told what whoever serves the page should know too.
+    `say` gets what whoever serves the page should know too.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class LivePage:
 
     @property
     def notice(self) -> str:
-        """What people are told, or ''."""
+        """The notice shown to people, or ''."""
         return self._status.notice
 
     def ask(self, action: Action, kind: str = "", settle: float = 0.0, quiet: bool = False) -> None:

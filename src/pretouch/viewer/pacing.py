@@ -11,7 +11,7 @@ PATIENCE_S = 2.0
 
 
 class Pace:
-    """Rates of the last second, of ticks told by `tick`."""
+    """Rates of the last second, of calls of `tick`."""
 
     def __init__(self) -> None:
         self._ticks: deque[tuple[float, float, float]] = deque()

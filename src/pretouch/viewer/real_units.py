@@ -74,13 +74,13 @@ class RealUnits:
 
     def touch(self) -> TouchReadings | None:
         """Return the newest touch reading of each unit, stamped as ranges are; None while none is known."""
-        told = touch_of(self.source)
-        if told is None:
+        touch = touch_of(self.source)
+        if touch is None:
             return None
-        fresh = told.stamp > self._touch_seen
-        self._touch_seen[fresh] = told.stamp[fresh]
-        self._touch_stamp[fresh] = np.maximum(self._touch_stamp[fresh], told.stamp[fresh] + self._ahead())
-        return replace(told, stamp=self._touch_stamp.copy())
+        fresh = touch.stamp > self._touch_seen
+        self._touch_seen[fresh] = touch.stamp[fresh]
+        self._touch_stamp[fresh] = np.maximum(self._touch_stamp[fresh], touch.stamp[fresh] + self._ahead())
+        return replace(touch, stamp=self._touch_stamp.copy())
 
     def take_imu(self) -> list[ImuBatch]:
         """Return what the units' IMUs measured since the last call, stamped in the simulation's time.

@@ -19,7 +19,7 @@ from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
-from pretouch.sim.touch_sensor import FeelingSkin, TouchSensorParams, TouchSensors
+from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchSensorParams, TouchSensors
 from pretouch.types import FloatArray
 from pretouch.viewer.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
 from pretouch.viewer.real_units import RealUnits
@@ -108,8 +108,8 @@ class Room:
         self._simulated = None if real else RangeFinders(self.plant, skin, settings.ranging, settings.seed)
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
         if self._simulated and len(skin.touching):
-            felt = TouchSensors(self.plant, skin, TouchSensorParams(), settings.seed)
-            self.units = FeelingSkin(self._simulated, felt)
+            touch = TouchSensors(self.plant, skin, TouchSensorParams(), settings.seed)
+            self.units = SimulatedTouchSkin(self._simulated, touch)
         self.hand = Hand(self.plant, self.mouse, PersonArm(speed_max=HAND_SPEED_M_S))
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._wanted = settings.stiffness

@@ -1,4 +1,4 @@
-"""What a page shows in space: the room, the arm, what it senses, does and feels, and a person's hand."""
+"""What a page shows in space: the room, the arm, what it senses, does and detects, and a person's hand."""
 
 import math
 from collections.abc import Callable
@@ -93,7 +93,7 @@ class Scene:
         return hand, target
 
     def on_hand(self, act: Callable[[FloatArray], None]) -> None:
-        """Have a function told where the hand is dragged to (3,) [m], from the page's own thread."""
+        """Have a function called with where the hand is dragged to (3,) [m], from the page's own thread."""
         if self._target is None:
             return
 

@@ -56,7 +56,7 @@ class LiveSimulation:
         self.recording: Recording | None = None
         """The recording under way."""
         self.notice = ""
-        """The last thing a person should be told, as a sentence; whoever shows it may empty it."""
+        """The last notice for a person, as a sentence; whoever shows it may empty it."""
         self._begin(settings or LiveSettings())
 
     def _begin(self, settings: LiveSettings) -> None:
@@ -81,7 +81,7 @@ class LiveSimulation:
 
     @property
     def stiffness(self) -> float:
-        """Of the person's hand and the object [N/m], as it is felt now."""
+        """Of the person's hand and the object [N/m], as it is now."""
         return self._room.stiffness
 
     @property

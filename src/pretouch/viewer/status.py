@@ -23,14 +23,14 @@ _STICKY = (
 
 
 class Status:
-    """Mode and reason, then time and rates, then what a person should be told."""
+    """Mode and reason, then time and rates, then the notice for a person."""
 
     def __init__(self, gui: "GuiApi") -> None:
         self._html = gui.add_html("")
         self._sent = float("-inf")
         self._shown: tuple[object, ...] = ()
         self.notice = ""
-        """What a person should be told, until something else is to be said."""
+        """The notice for a person, until another replaces it."""
 
     def draw(self, step: ControlStep, rates: str, warning: str, now: float) -> None:
         """Show a step, at a time [s]; not more often than five times a second unless there is something new to say."""

@@ -1,8 +1,8 @@
 """Impacts, by the units' accelerometers: what they measure less what the commanded motion explains.
 
 Each sample is put into a bin of 10 ms by its own stamp: units send at different times, a datagram at a time, and only
-what they felt at the same time can be compared. `impact_pattern` says of a bin which link's contact explains it. From
-that follow gains on the links of the sequential test, for a short while; where nothing jolts they are 1.
+what they measured at the same time can be compared. `impact_pattern` says of a bin which link's contact explains it.
+From that follow gains on the links of the sequential test, for a short while; where nothing jolts they are 1.
 """
 
 import math
@@ -47,7 +47,7 @@ class ImpactState:
 
     number: int
     """Number of the newest bin; bin b lasts from b `BIN_S` on."""
-    felt: FloatArray
+    measured: FloatArray
     """(B, K, 3) sums of the accelerations in each bin, bin b in place b mod B [m/s^2]."""
     heard: IntArray
     """(B, K) how many there are."""
@@ -55,7 +55,7 @@ class ImpactState:
     """(B, K, 3) sums of those that the motion explains."""
     moved: FloatArray
     """(B, K) sums of their size, gravity left out."""
-    told: IntArray
+    steps: IntArray
     """(B,) how many steps they are of."""
     mean: FloatArray
     """(K, 3) mean innovation of each unit [m/s^2]."""
@@ -77,8 +77,8 @@ def impact_init(model: RobotModel, units: int) -> ImpactState:
     """Return the state of so many units before their first sample."""
     grid = (BINS, units)
     return ImpactState(
-        number=-1, felt=np.zeros((*grid, 3)), heard=np.zeros(grid, np.int64), expected=np.zeros((*grid, 3)),
-        moved=np.zeros(grid), told=np.zeros(BINS, np.int64), mean=np.zeros((units, 3)), spread=np.zeros((units, 3)),
+        number=-1, measured=np.zeros((*grid, 3)), heard=np.zeros(grid, np.int64), expected=np.zeros((*grid, 3)),
+        moved=np.zeros(grid), steps=np.zeros(BINS, np.int64), mean=np.zeros((units, 3)), spread=np.zeros((units, 3)),
         usual=np.zeros(units), seen=np.zeros(units, np.int64), speed=np.zeros(model.n), behind=np.zeros(model.n),
         excess=np.zeros(len(model.links)),
     )  # fmt: skip
@@ -134,18 +134,19 @@ def listen(state: ImpactState, body: Body, sample: Sample, p: AccelerometerParam
     if not 0 <= gap < BINS:  # the first step, or time has jumped: no bin is whole
         fresh = impact_init(model, len(skin))
         s = ImpactState(
-            number, fresh.felt, fresh.heard, fresh.expected, fresh.moved, fresh.told, s.mean, s.spread, s.usual,
+            number, fresh.measured, fresh.heard, fresh.expected, fresh.moved, fresh.steps, s.mean, s.spread, s.usual,
             s.seen, robot.qd_commanded, fresh.behind, fresh.excess,
         )  # fmt: skip
         gap = 0
-    felt, heard, expected, moved, told = s.felt.copy(), s.heard.copy(), s.expected.copy(), s.moved.copy(), s.told.copy()
+    measured, heard, expected = s.measured.copy(), s.heard.copy(), s.expected.copy()
+    moved, steps = s.moved.copy(), s.steps.copy()
     mean, spread, usual, seen = s.mean.copy(), s.spread.copy(), s.usual.copy(), s.seen.copy()
     speed, behind, excess = s.speed.copy(), s.behind.copy(), s.excess * math.exp(-period / p.memory_s)
     likelihood = np.zeros((BINS, len(model.parts)))
     judged = _listen(
         sample.kin, model.mechanism, skin.arrays, robot.qd_commanded, imu,
         (
-            number, gap, (felt, heard, expected, moved, told), (mean, spread, usual, seen), speed, behind
+            number, gap, (measured, heard, expected, moved, steps), (mean, spread, usual, seen), speed, behind
         ),
         _Params(period, p.follow_1_s, p.motion_doubt, p.rotor_kg_m2, p.contact_gain, p.tails),
         likelihood,
@@ -153,7 +154,7 @@ def listen(state: ImpactState, body: Body, sample: Sample, p: AccelerometerParam
     if judged:
         _raise(excess, likelihood, model.parts, p)
     after = ImpactState(
-        number, felt, heard, expected, moved, told, mean, spread, usual, seen, speed, behind, excess
+        number, measured, heard, expected, moved, steps, mean, spread, usual, seen, speed, behind, excess
     )  # fmt: skip
     return replace(no_cues(len(model.links)), gain=1.0 + excess), after
 
@@ -174,11 +175,11 @@ def _raise(excess: FloatArray, likelihood: FloatArray, parts: IntArray, p: Accel
 class _Bins(NamedTuple):
     """Sums of samples, as of `ImpactState`: B bins of K units, or one of them."""
 
-    felt: FloatArray
+    measured: FloatArray
     heard: IntArray
     expected: FloatArray
     moved: FloatArray
-    told: IntArray
+    steps: IntArray
 
 
 class _Usual(NamedTuple):
@@ -232,28 +233,28 @@ def _listen(
     Returns how many there are. Writes what is remembered.
     """
     number, bins, usual = memory.number, memory.bins, memory.usual
-    felt, heard, expected, moved, told = bins
+    measured, heard, expected, moved, steps = bins
     unit, stamp, acceleration = imu
     for b in range(number - memory.gap + 1, number + 1):
         k = b % BINS
-        _learn(felt[k], heard[k], expected[k], told[k], usual)
-        felt[k], heard[k], expected[k], moved[k], told[k] = 0.0, 0, 0.0, 0.0, 0
+        _learn(measured[k], heard[k], expected[k], steps[k], usual)
+        measured[k], heard[k], expected[k], moved[k], steps[k] = 0.0, 0, 0.0, 0.0, 0
     growth = _followed(qd_commanded, memory.speed, memory.behind, p.follow, p.period)
     newest = number % BINS
     _expect(kin, mechanism.arm.moved_by, skin, memory.speed, growth, expected[newest], moved[newest])
-    told[newest] += 1
+    steps[newest] += 1
     fresh = np.zeros(BINS, np.bool_)
     for i in range(len(unit)):
         b = int(np.floor(stamp[i] / BIN_S))
         if number - BINS < b <= number:
             k = b % BINS
-            felt[k, unit[i]] += acceleration[i]
+            measured[k, unit[i]] += acceleration[i]
             heard[k, unit[i]] += 1
             fresh[k] = True
     judged = 0
     A = np.empty((0, 0, 3, 3))
     for k in range(BINS):
-        if fresh[k] and told[k]:
+        if fresh[k] and steps[k]:
             if not judged:
                 A = responses(kin, mechanism, p.rotor, skin)
             judged += 1
@@ -302,7 +303,8 @@ def _expect(
 @compiled
 def _innovation(bins: _Bins, k: int, known_of: _Usual, motion_doubt: float) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Innovations (K, 3) of bin k with their variances (K, 3), and which units' are known (K,)."""
-    felt, heard, expected, moved, told = bins.felt[k], bins.heard[k], bins.expected[k], bins.moved[k], bins.told[k]
+    measured, heard, expected = bins.measured[k], bins.heard[k], bins.expected[k]
+    moved, steps = bins.moved[k], bins.steps[k]
     mean, spread, usual, seen = known_of
     z, variance, known = np.zeros(mean.shape), np.ones(mean.shape), np.zeros(len(mean), np.bool_)
     for u in range(len(mean)):
@@ -310,16 +312,16 @@ def _innovation(bins: _Bins, k: int, known_of: _Usual, motion_doubt: float) -> t
             known[u] = True
             fewer = max(1.0, usual[u] / heard[u])
             for i in range(3):
-                z[u, i] = felt[u, i] / heard[u] - expected[u, i] / told - mean[u, i]
-                variance[u, i] = fewer * spread[u, i] + (motion_doubt * moved[u] / told) ** 2
+                z[u, i] = measured[u, i] / heard[u] - expected[u, i] / steps - mean[u, i]
+                variance[u, i] = fewer * spread[u, i] + (motion_doubt * moved[u] / steps) ** 2
     return z, variance, known
 
 
 @compiled
-def _learn(felt: FloatArray, heard: IntArray, expected: FloatArray, told: int, known_of: _Usual) -> None:
+def _learn(measured: FloatArray, heard: IntArray, expected: FloatArray, steps: int, known_of: _Usual) -> None:
     """Learn mean and spread (K, 3) of the units from a bin that gets no more samples; outliers count for less."""
     mean, spread, usual, seen = known_of
-    if not told:
+    if not steps:
         return
     for u in range(len(mean)):
         if not heard[u]:
@@ -328,7 +330,7 @@ def _learn(felt: FloatArray, heard: IntArray, expected: FloatArray, told: int, k
         slow, slower = max(first, BIN_S / _MEAN_S), max(first, BIN_S / _SPREAD_S)
         usual[u] += slower * (heard[u] - usual[u])
         for i in range(3):
-            z = felt[u, i] / heard[u] - expected[u, i] / told - mean[u, i]
+            z = measured[u, i] / heard[u] - expected[u, i] / steps - mean[u, i]
             if seen[u] == 0:
                 mean[u, i] = z
                 continue

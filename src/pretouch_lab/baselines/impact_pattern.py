@@ -1,4 +1,4 @@
-"""Which link's contact explains what accelerometers all over an arm felt at once.
+"""Which link's contact explains what accelerometers all over an arm measured at once.
 
 A force f on link l accelerates the joints by M^-1 J_l^T f, and the unit u by A_ul f, A_ul = R_u^T J_u M^-1 J_l^T. The
 likelihood ratio of the pattern z of all units is that of the sequential test: the force is integrated out with a prior
@@ -18,7 +18,7 @@ from pretouch.types import BoolArray, FloatArray
 _LARGEST = 100.0
 """Logarithm of a likelihood ratio from which on it is all the same."""
 _SINGULAR = 1e-6
-"""Part of its trace by which a force's information is made regular: one that no unit feels has none."""
+"""Part of its trace by which a force's information is made regular: one that no unit measures has none."""
 
 
 @compiled
@@ -33,7 +33,7 @@ def responses(kin: Kinematics, mechanism: Mechanism, rotor: float, skin: SkinArr
     n, units = len(anchor), len(link)
     M, L, J = np.empty((n, n)), np.zeros((n, n)), np.empty((6, n))
     y, X = np.empty(n), np.empty((n, 3))
-    A, felt = np.zeros((len(parts), units, 3, 3)), np.empty((units, 3, n))
+    A, Jacobian = np.zeros((len(parts), units, 3, 3)), np.empty((units, 3, n))
     mass_matrix_into(kin, mechanism, M)
     for j in range(n):
         M[j, j] += rotor
@@ -43,7 +43,7 @@ def responses(kin: Kinematics, mechanism: Mechanism, rotor: float, skin: SkinArr
         R = rotation[link[u]] @ np.ascontiguousarray(T_link_sensor[u, :3, :3])
         place = position[link[u]] + rotation[link[u]] @ np.ascontiguousarray(T_link_sensor[u, :3, 3])
         jacobian_into(anchor, axis, moved_by[link[u]], place, J)
-        felt[u] = R.T @ np.ascontiguousarray(J[:3])
+        Jacobian[u] = R.T @ np.ascontiguousarray(J[:3])
     for h in range(len(parts)):
         touched = parts[h]
         jacobian_into(anchor, axis, moved_by[touched], position[touched] + rotation[touched] @ middle[h], J)
@@ -51,7 +51,7 @@ def responses(kin: Kinematics, mechanism: Mechanism, rotor: float, skin: SkinArr
             forward(L, J[a], y)
             backward(L, y, X[:, a])
         for u in range(units):
-            A[h, u] = felt[u] @ X
+            A[h, u] = Jacobian[u] @ X
     return A
 
 

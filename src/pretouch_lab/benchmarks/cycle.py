@@ -25,7 +25,7 @@ from pretouch_lab.rows import Row
 _SETTLE = 500
 """Cycles after the force window is full in which the arm gets up to speed."""
 _STAGED = 2000
-"""Most cycles in which the stages are told apart."""
+"""Most cycles in which the stages are shown separately."""
 _SHORTER = 5000
 """Most cycles in which every reading is new."""
 _MOST_CYCLES = 10_000_000

@@ -21,7 +21,7 @@ def front_table(detection: Row, avoidance: Row) -> TextTable:
         return "-" if row is None else short(row["false_alarms_per_hour"])
 
     def delay(seen: bool) -> Callable[[str], str]:
-        return lambda name: _felt(find(detection["rows"], _SHOWN[name], "contacts: goal", seen))
+        return lambda name: _delay(find(detection["rows"], _SHOWN[name], "contacts: goal", seen))
 
     def of(family: str, key: str) -> Callable[[str], str]:
         return lambda name: _value(cells[family, name], key, 1)
@@ -31,7 +31,7 @@ def front_table(detection: Row, avoidance: Row) -> TextTable:
         ("false alarms\n[1/h]", free),
         ("delay, seen\n[ms]", delay(True)),
         ("delay, unseen\n[ms]", delay(False)),
-        ("peak felt\n[N]", of("static", "peak_estimate_n")),
+        ("peak, estimated\n[N]", of("static", "peak_estimate_n")),
         ("true 20 ms\n[N]", of("static", "true_peak_20ms_n")),
         ("until touch\n[s]", of("static", "first_contact_s")),
         ("turn beside\na person [s]", of("person", "cycle_time_s")),
@@ -47,7 +47,7 @@ def front_table(detection: Row, avoidance: Row) -> TextTable:
     )
 
 
-def _felt(row: Row | None) -> str:
+def _delay(row: Row | None) -> str:
     if row is None or not row["contacts"]:
         return "-"
     delay = "none" if row["median_delay_s"] is None else f"{1000 * row['median_delay_s']:.0f}"

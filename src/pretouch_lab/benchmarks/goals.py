@@ -95,10 +95,10 @@ def _contacts(rows: list[Row], seen: bool) -> list[Goal]:
     if row is None or not row["contacts"]:
         return [Goal(text, "-", "-", None) for text in texts]
     missed, of = row["missed"], row["contacts"]
-    none_felt = row["median_delay_s"] is None
-    low, high = (0.0, 0.0) if none_felt else row["median_bounds_s"]
+    none_detected = row["median_delay_s"] is None
+    low, high = (0.0, 0.0) if none_detected else row["median_bounds_s"]
     return [
-        Goal(texts[0], "none felt", "-", False) if none_felt else Goal(
+        Goal(texts[0], "none detected", "-", False) if none_detected else Goal(
             texts[0], f"{1000 * row['median_delay_s']:.0f} ms (95 % below {1000 * row['p95_delay_s']:.0f} ms)",
             f"{1000 * low:.0f} to {1000 * high:.0f} ms", row["median_delay_s"] <= limit,
         ),
@@ -107,15 +107,15 @@ def _contacts(rows: list[Row], seen: bool) -> list[Goal]:
 
 
 def _towards(streams: list[Row], played: list[Row]) -> Goal:
-    felt = [row for seen in (True, False) if (row := find(streams, BASE, "contacts: all", seen))]
-    against, of = sum(row["towards"] for row in felt), sum(row["contacts"] - row["missed"] for row in felt)
+    both = [row for seen in (True, False) if (row := find(streams, BASE, "contacts: all", seen))]
+    against, of = sum(row["towards"] for row in both), sum(row["contacts"] - row["missed"] for row in both)
     own = [row for row in played if row["contender"] == BASE]
     moved, reactions = sum(row["towards_person"] for row in own), sum(row["reactions"] for row in own)
     if not of + reactions:
         return Goal("never a reaction towards the person", "-", "-", None)
     return Goal(
         "never a reaction towards the person",
-        f"{against} of {of} contacts felt, {moved} of {reactions} reactions in the closed loop",
+        f"{against} of {of} contacts detected, {moved} of {reactions} reactions in the closed loop",
         f"at most {100 * share_below(against + moved, of + reactions):.1f} %", against + moved == 0,
     )  # fmt: skip
 

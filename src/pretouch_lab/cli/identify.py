@@ -18,7 +18,7 @@ class Identify:
     """Estimate an arm's offsets, friction, ripple, masses and noise from free motion, for the simulation to be like it.
 
     Nothing may touch the arm; two minutes along smooth paths that turn all joints, below 0.5 m/s, are good. What cannot
-    be told from the recording keeps its usual value, and the file says so.
+    be identified from the recording keeps its usual value, and the file says so.
     """
 
     file: tyro.conf.Positional[str]
@@ -110,7 +110,7 @@ def _show(found: "Identified", model: "RobotModel", said: str) -> None:
             markup=False,
         )
     else:
-        console.print("Without velocities neither their noise nor the observer's gain is told.", markup=False)
+        console.print("Without velocities neither their noise nor the observer's gain is identified.", markup=False)
     console.print(
         "In brackets: the recording hardly tells it, and it stays near what is usual. Errors are standard errors. Of"
         " the friction only what the robot does not compensate shows. In simulation offsets, ripple and"

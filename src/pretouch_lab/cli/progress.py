@@ -11,7 +11,7 @@ if TYPE_CHECKING:  # the help is to need none of the heavy packages
     from pretouch_lab.engine import Progress, Task
 
 Advance = Callable[[float, str], None]
-"""Is told the cost of what was done, and what the bar is to be called from then on."""
+"""Called with the cost of what was done, and what the bar is to be named from then on."""
 
 
 @contextmanager

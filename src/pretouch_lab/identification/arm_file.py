@@ -11,7 +11,7 @@ from pretouch_lab.identification.identify import Identified
 
 
 def arm_toml(found: Identified, model: RobotModel, source: str) -> str:
-    """Return the file's text; what could not be told keeps its usual value, and a comment says so."""
+    """Return the file's text; what could not be identified keeps its usual value, and a comment says so."""
     n, fitted, noise = model.n, found.fit, found.noise
     own, errors = fitted.of_joints(fitted.numbers), fitted.of_joints(fitted.errors)
     known = found.known()

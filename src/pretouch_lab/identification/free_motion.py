@@ -54,8 +54,8 @@ def read_free_motion(
         if not kept:
             raise RecordingError(f"{place} holds no state of the robot: give another recording.")
         states = ([r.stamp for r in kept], [r.q for r in kept], [r.qd for r in kept], [r.tau_ext for r in kept])
-        told = ArmSamples(*(np.array(column) for column in states))
-        samples = told.at(np.append(True, np.diff(told.stamp) > 0.0))  # a state that was told twice counts once
+        received = ArmSamples(*(np.array(column) for column in states))
+        samples = received.at(np.append(True, np.diff(received.stamp) > 0.0))  # a repeated state counts once
         said = f"{place}: states of {arm.description.name} as the controller had them"
     if samples.q.shape[1] == arm.n:  # `identify` says it otherwise
         check_reach(place, samples.q, arm)

@@ -23,7 +23,7 @@ _SURE_RAD_S, _SURE_RAD_S2 = 0.002, 0.8
 """Noise of speeds [rad/s] and accelerations [rad/s^2] that is strived for: a quarter of the noise of velocities that an
 arm measures, and a fifth of what is quick."""
 _QUICK_RAD_S2 = 4.0
-"""Where a joint's speed changes faster than this [rad/s^2], as at a corner of a path, its speed is not told well."""
+"""Where a joint's speed changes faster than this [rad/s^2], as at a corner of a path, its speed is not known well."""
 _ROUNDED_RAD_S = 0.005
 """A fit of half the width may tell a speed that differs by this [rad/s]: half of the noise of measured velocities."""
 _SIGMAS = 6.0

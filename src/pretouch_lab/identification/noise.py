@@ -16,7 +16,7 @@ LAGS = 20
 _FITTED = 10
 _LEAST_BLOCKS = 8
 _LEAST_VELOCITY_RAD_S = 1e-5
-"""Least noise of measured velocities that is told [rad/s]."""
+"""Least noise of measured velocities that is reported [rad/s]."""
 
 
 @value

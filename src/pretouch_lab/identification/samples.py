@@ -10,11 +10,11 @@ from pretouch.types import FloatArray
 from pretouch.values import value
 
 LEAST_S = 20.0
-"""Shortest free motion that is used [s]: the noise takes as long to be told from friction."""
+"""Shortest free motion that is used [s]: the noise takes as long to be separated from friction."""
 LEAST_MOVED_RAD = 0.1
 """A recording is of an arm that moves if a joint turns by this [rad]."""
 _GAP_PERIODS, _BRIDGED_S = 3.5, 0.1
-"""Samples further apart than both [s] have a gap between them; over less the motion is told by those around."""
+"""Samples further apart than both [s] have a gap between them; less is interpolated."""
 _HIGHEST_HZ = 250.0
 """Rate above which samples are left out [Hz]: the observer's low-pass leaves nothing up there to learn from."""
 _LOWEST_HZ = 40.0

@@ -1,4 +1,4 @@
-"""Stamps that are off, as those of a busy receiver, told by the joints together.
+"""Stamps that are off, as those of a busy receiver, recovered from the joints together.
 
 An error of a stamp moves all joints of a sample along their speeds, as no noise of encoders does. So where the
 positions are too noisy for a narrow fit, stamps are moved to where the joints say that they were. Errors that last
@@ -100,7 +100,7 @@ def _paced(stamps: list[FloatArray], velocities: list[FloatArray], motions: list
         pace.append(sums[:, 0] / square)
         spread.append(noise * gains[:, 0] ** 2 / square)
     each, own = np.concatenate(pace), np.concatenate(spread)
-    usual = float(np.median(each))  # velocities that are all told too large are no matter of time
+    usual = float(np.median(each))  # velocities that are all reported too large are no matter of time
     moving = (np.concatenate(speeds) ** 2).sum(axis=1) > _MOVING_RAD_S**2
     variance = float(np.median((each - usual)[moving] ** 2 - _MEDIAN_SQUARE * own[moving])) / _MEDIAN_SQUARE
     if variance <= 0.0:

@@ -68,11 +68,11 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
 
 
 def _at_detection(reactions: list[ControlStep], spans: list[tuple[float, float]]) -> dict[str, float | None]:
-    """Medians over the pushes that were felt: delay [s], and norms of the filtered and the raw estimate [N]."""
-    felt = [(s, next((a for a, b in spans if a <= s.stamp <= b + _NOTICE_S), None)) for s in reactions]
+    """Medians over the pushes that were detected: delay [s], and norms of the filtered and the raw estimate [N]."""
+    reached = [(s, next((a for a, b in spans if a <= s.stamp <= b + _NOTICE_S), None)) for s in reactions]
     rows = [
         (s.stamp - touch, float(np.linalg.norm(s.filtered_force)), float(np.linalg.norm(s.force)))
-        for s, touch in felt
+        for s, touch in reached
         if touch is not None
     ]
     names = ("detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n")

@@ -1,4 +1,4 @@
-"""Whether cues of units tell better where a contact is: what two ways of feeling the same contacts said of places."""
+"""Whether cues of units tell better where a contact is: what two ways of detecting the same contacts say of places."""
 
 from collections.abc import Callable
 
@@ -7,15 +7,15 @@ import numpy as np
 from pretouch_lab.rows import Row, rounded
 
 SIDES = ("without", "with")
-"""The two ways in which each contact is felt."""
+"""The two ways in which each contact is detected."""
 LEAST_N, LEAST_S = 15.0, 0.1
 """What a firm contact has at least: force [N] and duration [s]."""
-FIRM, FELT = f"{LEAST_N:g} N, {1000 * LEAST_S:g} ms and more", "all felt"
+FIRM, DETECTED = f"{LEAST_N:g} N, {1000 * LEAST_S:g} ms and more", "all detected"
 """Sets of contacts that are counted."""
 NOTE = (
-    "Each pair without, then with. Judged 100 ms after the force began to rise, or at its end if earlier. Felt: a"
-    " place was said then. Right body: of all n; link 7, flange and hand are one. Median, 90 %: error of the place, of"
-    " those felt both ways (both)."
+    "Each pair without, then with. Judged 100 ms after the force began to rise, or at its end if earlier. Detected:"
+    " a place was said then. Right body: of all n; link 7, flange and hand are one. Median, 90 %: error of the place,"
+    " of those detected both ways (both)."
 )
 
 
@@ -28,15 +28,15 @@ def chosen(contacts: list[Row], name: str) -> list[Row]:
     """Return those of a set, by its name; each contact has what was said of it each way as `where`."""
     if name == FIRM:
         return [contact for contact in contacts if firm(contact)]
-    return [contact for contact in contacts if any(contact["where"][side]["felt"] for side in SIDES)]
+    return [contact for contact in contacts if any(contact["where"][side]["detected"] for side in SIDES)]
 
 
 def compared(said: list[Row]) -> Row:
-    """Count what was said of contacts each way; errors of those that were felt both ways, to compare the same ones."""
-    both = [one for one in said if all(one[side]["felt"] for side in SIDES)]
+    """Count what was said of contacts each way; errors of those detected both ways, to compare the same ones."""
+    both = [one for one in said if all(one[side]["detected"] for side in SIDES)]
     return {"contacts": len(said), "both": len(both)} | {
         side: {
-            **{name: sum(one[side][name] for one in said) for name in ("felt", "right", "two")},
+            **{name: sum(one[side][name] for one in said) for name in ("detected", "right", "two")},
             **{f"p{part}_m": _at([one[side]["error_m"] for one in both], part) for part in (50, 90)},
         }
         for side in SIDES
@@ -60,7 +60,7 @@ def _errors(name: str) -> Callable[[Row], str]:
 
 COLUMNS = (
     ("n", lambda found: str(found["contacts"])),
-    ("felt", _pair("felt")),
+    ("detected", _pair("detected")),
     ("right\nbody", _pair("right")),
     ("said\ntwo", _pair("two")),
     ("both", lambda found: str(found["both"])),

@@ -94,7 +94,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         "refused": refused,
         "drawn": refused + len(believed),
     }
-    row["felt"] = row["detection_delay_s"] is not None
+    row["detected"] = row["detection_delay_s"] is not None
     return row, record
 
 

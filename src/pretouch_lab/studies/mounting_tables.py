@@ -16,7 +16,7 @@ _MEASURES = (
     *_COMPARED, *(f"{name}_ratio" for name in _COMPARED), "detection_delay_s", "missed_fraction", "least_gap_m",
     "obstacle_fraction", "speed_scale",
 )  # fmt: skip
-_TOTALS = ("felt", "false_detections", "held", "refused", "drawn")
+_TOTALS = ("detected", "false_detections", "held", "refused", "drawn")
 _ERROR = ("position_mm", "orientation_deg", "told")
 _KEYS = ("trajectory", "side", "profile", "restrictions", *_ERROR)
 
@@ -74,7 +74,7 @@ def _names(many: bool) -> tuple[Column, ...]:
     def misplaced(cell: Row) -> str:
         return error(cell) + (f"\n{cell['profile']}\n{cell['restrictions']}" if many else "")
 
-    return ("error", misplaced), ("told", lambda cell: "yes" if cell["told"] == "told" else "")
+    return ("error", misplaced), ("declared", lambda cell: "yes" if cell["told"] == "told" else "")
 
 
 def _forces(cells: list[Row], many: bool) -> TextTable:
@@ -87,7 +87,7 @@ def _forces(cells: list[Row], many: bool) -> TextTable:
         ),
         ("most\n[N]", plain("largest_true_20ms_n", ".0f")),
         ("missed\n[%]", _missed),
-        ("felt", lambda cell: f"{cell['felt']}/{cell['contact_fraction'] * cell['trials']:.0f}"),
+        ("detected", lambda cell: f"{cell['detected']}/{cell['contact_fraction'] * cell['trials']:.0f}"),
         ("false", plain("false_detections")),
     )
     return tabulated(
@@ -95,10 +95,10 @@ def _forces(cells: list[Row], many: bool) -> TextTable:
         columns,
         cells,
         "Each unit sits this far from where the controller believes it to be, in a direction of its own, or is turned"
-        " by this angle about an axis of its own; told: the skin file says so as standard deviations. Columns as in the"
-        " static tables; below, the median of the ratios trial by trial with their 10-90 %. Most: largest of the true"
-        " 20 ms peaks. Missed: of the readings that show the board, those that the controller took for the arm or the"
-        " room. Felt: contacts detected, of all contacts. False: detections before the contact.",
+        " by this angle about an axis of its own; declared: the skin file says so as standard deviations. Columns as"
+        " in the static tables; below, the median of the ratios trial by trial with their 10-90 %. Most: largest of the"
+        " true 20 ms peaks. Missed: of the readings that show the board, those that the controller took for the arm or"
+        " the room. Detected: of all contacts. False: detections before the contact.",
     )
 
 

@@ -96,9 +96,9 @@ class _Limb:
             for i in range(data.ncon):
                 contact = data.contact[i]
                 if limb in (contact.geom1, contact.geom2):
-                    thing = contact.geom1 if contact.geom2 == limb else contact.geom2
+                    other = contact.geom1 if contact.geom2 == limb else contact.geom2
                     mujoco.mj_contactForce(mj, data, i, wrench)
-                    sides[int(mj.geom_bodyid[thing]) == other_side] += float(wrench[0])
+                    sides[int(mj.geom_bodyid[other]) == other_side] += float(wrench[0])
             self.force.append(min(sides))
 
         plant.before_each_step(measure)
@@ -172,7 +172,7 @@ def tables(part: Row) -> list[TextTable]:
         ("latched", plain("latched")),
     )
     table = tabulated(
-        "A limb between two things: medians",
+        "A limb between two objects: medians",
         columns,
         part["cells"],
         f"A limb 9 to 11 cm thick between upper arm and forearm, or on the floor under the hand, for {_END_S:g} s of"

@@ -1,4 +1,4 @@
-"""What touch sensors of units add to the detection of contacts: the same recorded arms, felt with them and without."""
+"""What touch sensors of units add to the detection of contacts: the same recorded arms with them and without."""
 
 from itertools import product
 
@@ -12,7 +12,7 @@ from pretouch_lab.studies.tactile_tables import summarise, tables
 def cells(_grid: Grid) -> list[Cell]:
     """Contacts on patches and beside them, by a hand that units see or do not; and free motion with false touches.
 
-    The profile is the experiment's own, for what is compared are its two ways to feel the same arm.
+    The profile is the experiment's own, for what is compared are its two ways to detect contacts of the same arm.
     """
     wanted = [(place, sight) for place, sight in product((ON_PATCH, BESIDE, INNER), ("seen", "unseen"))]
     return [Cell(NAME, PROFILE, {"place": place, "hand": sight}) for place, sight in (*wanted, (NOWHERE, "none"))]

@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.paper.claims.detectors import rate_bounds
 from pretouch_lab.rows import Row, grouped, rounded
-from pretouch_lab.studies.located import COLUMNS, FELT, FIRM, NOTE, SIDES, chosen, compared
+from pretouch_lab.studies.located import COLUMNS, DETECTED, FIRM, NOTE, SIDES, chosen, compared
 from pretouch_lab.studies.tactile_kinds import INNER
 from pretouch_lab.tables import plain
 
@@ -33,13 +33,13 @@ def summarise(rows: list[Row]) -> Row:
 
 
 def _where(contacts: list[Row]) -> list[Row]:
-    """Places said of firm contacts and of all that were felt, by place and sight; of the inner links each alone too."""
+    """Places said of firm contacts and of all detected ones, by place and sight; of the inner links each alone too."""
     every = [{**contact, "link": "all"} for contact in contacts]
     inner = [contact for contact in contacts if contact["place"] == INNER]
     return [
         where | {"of": name} | compared([contact["where"] for contact in own])
         for where, group in grouped(every + inner, ("place", "hand", "link"))
-        for name in (FIRM, FELT)
+        for name in (FIRM, DETECTED)
         if (own := chosen(group, name))
     ]
 
@@ -49,8 +49,8 @@ def _cell(group: list[Row]) -> Row:
     both = [c for c in group if c["without"] is not None and c["with"] is not None]
     found: dict[str, Any] = {
         "contacts": len(group),
-        "felt": sum(c["felt_s"] is not None for c in group),
-        "felt_ms": _median([c["felt_s"] for c in group if c["felt_s"] is not None]),
+        "heard": sum(c["heard_s"] is not None for c in group),
+        "heard_ms": _median([c["heard_s"] for c in group if c["heard_s"] is not None]),
         "both": len(both),
     }
     for name in SIDES:
@@ -72,16 +72,17 @@ def tables(part: Row) -> list[TextTable]:
             ("hand", plain("hand")),
             ("force\n[N]", lambda cell: cell["force_n"] if cell["force_n"] == "all" else f"{cell['force_n']:g}"),
             ("contacts", plain("contacts")),
-            ("felt", plain("felt")),
-            ("felt in\n[ms]", _ms("felt_ms")),
+            ("heard", plain("heard")),
+            ("heard in\n[ms]", _ms("heard_ms")),
             *((f"missed\n{name}", plain(f"missed_{name}")) for name in SIDES),
             *((f"delay [ms]\n{name}", _ms(f"delay_{name}_ms")) for name in SIDES),
         )
         note = (
             "Contacts of 0.06 and 0.2 s on an arm on the circle at 0.3 m/s that does not react; profile pretouch"
-            " without and with use_touch on the same recorded arms. Felt: contacts that a unit's touch sensor told, and"
-            " how long after the force passed 1 N that was heard (median). Delays: medians over the contacts that both"
-            f" found. {part['busy']} contacts that began while an earlier alarm was still answered are left out."
+            " without and with use_touch on the same recorded arms. Heard: contacts that a unit's touch sensor"
+            " reported, and how long after the force passed 1 N that was (median). Delays: medians over the contacts"
+            f" that both found. {part['busy']} contacts that began while an earlier alarm was still answered are left"
+            " out."
         )
         made.append(tabulated("Contacts with touch sensors and without", columns, part["cells"], note, names=3))
     if part["where"]:

@@ -1,4 +1,4 @@
-"""One trial of `tactile`: an arm is recorded while it is touched, and felt with its touch sensors and without."""
+"""One trial of `tactile`: an arm is recorded while touched; contacts are detected with touch sensors and without."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -53,13 +53,13 @@ _TRIES = 400
 _LATE_S = 0.4
 
 
-def feeling(skin: Skin) -> Skin:
+def with_touch_sensors(skin: Skin) -> Skin:
     """Return a skin whose units have touch sensors: its own, or the usual one at each unit where none has one."""
     return skin if len(skin.touching) else Skin([replace(unit, touch=TouchPatch()) for unit in skin.units], model())
 
 
 def inner_skin(skin: Skin) -> Skin:
-    """Return a skin with more units, all of which feel touch: those of the skin of 32 on links 2 to 4, and one on 1."""
+    """Return a skin with more units, all with touch sensors: those of the skin of 32 on links 2 to 4, and one on 1."""
     links = [f"{model().description.name}_{name}" for name in INNER_LINKS]
     more = [unit for unit in sensing_of("nominal", 0).skin.units if unit.link in links]
     units = [*skin.units, *more, _within_reach(links[0])]
@@ -137,7 +137,7 @@ class Course:
 
 
 def recorded(skin: Skin, place: str, seen: bool, seed: int, free_s: float = FREE_S) -> Course:
-    """Let an arm run that goes on whatever it feels, and record it."""
+    """Let an arm run that goes on whatever touches it, and record it."""
     sensing = sensing_of("seven", seed, skin)
     touches = plan(skin, place, seed, sensing.hand_radius)
     end = touches[-1].end + _LATE_S if touches else WARM_UP_S + free_s
@@ -158,7 +158,7 @@ def recorded(skin: Skin, place: str, seen: bool, seed: int, free_s: float = FREE
 def played(cell: Cell, seed: int, context: Context, free_s: float = FREE_S) -> tuple[Row, None]:
     """Run one trial; return its row of results."""
     place = str(cell.where["place"])
-    skin = inner_skin(context.skin) if place == INNER else feeling(context.skin)
+    skin = inner_skin(context.skin) if place == INNER else with_touch_sensors(context.skin)
     course = recorded(skin, place, cell.where["hand"] == "seen", seed, free_s)
     made = {
         name: replay(course.stream, Baseline(name, text, "scale"), model(), course.touch.__getitem__, skin)
@@ -182,7 +182,7 @@ def played(cell: Cell, seed: int, context: Context, free_s: float = FREE_S) -> t
             "link": model().links[touch.link],
             "force_n": touch.force_n,
             "duration_s": touch.duration_s,
-            "felt_s": _felt(course, touch),
+            "heard_s": _heard(course, touch),
             **{name: None if found[k] is None else rounded(found[k] or 0.0, 4) for name, found in delays.items()},
             "where": {
                 name: said_of(touch, found.stamp, found.touched, course.stream.robot["q"])
@@ -204,7 +204,7 @@ def _false_touches(course: Course, counted: BoolArray) -> int:
     return int(begun[counted].sum())
 
 
-def _felt(course: Course, touch: Touching) -> float | None:
+def _heard(course: Course, touch: Touching) -> float | None:
     """Time from a contact's onset until a unit's touch was heard of [s], None if none was."""
     stamp, onset = course.stream.stamp, touch.onset(1.0)
     during = (stamp > onset) & (stamp <= touch.end + 0.1)

@@ -30,8 +30,8 @@ DEFAULT_RESTRICTIONS = "slack"
 SCENES = ("room", "board", "hand")
 SENSING = ("skin", "camera", "both")
 VIEWS = {"front": (1.6, 0.0, 1.0), "behind": (0.5, 1.6, 0.5)}
-"""Where the camera is [m]: in front of the arm, above what comes near; or on the other side of the arm than the board
-and the person's hand, so that the arm hides them."""
+"""Where the camera is [m]: in front of the arm, above the obstacle's path; or on the other side of the arm than the
+board and the person's hand, so that the arm hides them."""
 NO_VIEW = "none"
 _OWN_PROFILE = "pretouch"
 """Run beside those asked for: a profile that takes outside points."""
@@ -178,12 +178,12 @@ def tables(part: Row) -> list[TextTable]:
             "Seven units, a depth camera, or both: medians",
             columns,
             part["cells"],
-            "Front: the camera looks at what comes near. Behind: the arm is between. First: true distance of the object"
-            f" from the arm when it is first seen. Seen: share of the time with the object within {_NEAR_M:g} m in"
-            f" which a sensed point shows it. Unseen: time within {_CLOSE_M:g} m in which none does. Before: from first"
-            " seen to the first touch. Speed, peak: of that touch, and the largest true force, 20 ms mean. Way: along"
-            f" the path in {_DURATION_S:g} s. False: share of the steps with a point within {_FALSE_M:g} m of the arm"
-            " where nothing is. Held: trials with a HOLD after the start.",
+            "Front: the camera looks at approaching obstacles. Behind: the arm is between. First: true distance of the"
+            f" object from the arm when it is first seen. Seen: share of the time with the object within {_NEAR_M:g} m"
+            f" in which a sensed point shows it. Unseen: time within {_CLOSE_M:g} m in which none does. Before: from"
+            " first seen to the first touch. Speed, peak: of that touch, and the largest true force, 20 ms mean. Way:"
+            f" along the path in {_DURATION_S:g} s. False: share of the steps with a point within {_FALSE_M:g} m of the"
+            " arm where nothing is. Held: trials with a HOLD after the start.",
             names=4,
         )
     ]

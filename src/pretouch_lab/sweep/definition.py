@@ -186,10 +186,10 @@ def _from(entry: Any, number: int, path: Path, seeds: SeedRange) -> Sweep:
         for name, value in given.items() if isinstance(given, dict) else ():
             if not isinstance(value, str):
                 raise ExperimentError(f'The {where} has {key} {name} = {value!r}: give text, "5:15" or "yes".')
-    told: dict[str, Any] = {"experiment": "", "vary": {}}
-    told |= {key: tuple(given) if isinstance(given, list) else given for key, given in entry.items() if given != ""}
+    settings: dict[str, Any] = {"experiment": "", "vary": {}}
+    settings |= {key: tuple(given) if isinstance(given, list) else given for key, given in entry.items() if given != ""}
     try:
-        return sweep_of(Asked(**told), seeds)
+        return sweep_of(Asked(**settings), seeds)
     except PretouchError as error:
         raise ExperimentError(f"{error} (in {where})") from error
 
@@ -198,7 +198,7 @@ _TOLD: dict[str, tuple[type, str]] = {
     "samples": (int, "a whole number"), "arms": (int, "a whole number"), "vary": (dict, "a table"),
     "fix": (dict, "a table"), "metrics": (list, "a list of names"), "ranks": (list, "a list of names"),
 }  # fmt: skip
-"""What a key is told by, where it is not text."""
+"""What a key is parsed as, where it is not text."""
 
 
 def sensitivity(seeds: SeedRange) -> list[Sweep]:

@@ -16,7 +16,7 @@ from pretouch_lab.rows import Row
 from pretouch_lab.sweep.setting import Setting
 
 Numbers = dict[str, float | None]
-"""What is measured, by its name; None where there is nothing to measure, as the delay of what was not felt."""
+"""What is measured, by its name; None where there is nothing to measure, as the delay of what was not detected."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ CLOSED_LOOP = (
         {
             **_PEAKS, "delay_s": "time from the touch to the reaction [s]",
             "impact_speed_m_s": "speed of the touch [m/s]", "contact": "whether it touched the board",
-            "missed": "whether a touch was not felt", **_FALSE,
+            "missed": "whether a touch was not detected", **_FALSE,
         },
         _static, _static_cost,
     ),
@@ -151,8 +151,8 @@ CLOSED_LOOP = (
     ),
     Measure(
         "dynamic", "a person pushes the arm now and then (paper IV-C)", "paper", DynamicScene(),
-        {**_PEAKS, "delay_s": "median time from a push to the reaction [s]", "missed": "part of the pushes not felt",
-         **_FALSE},
+        {**_PEAKS, "delay_s": "median time from a push to the reaction [s]",
+         "missed": "part of the pushes not detected", **_FALSE},
         _dynamic, lambda _: 2.5,
     ),
 )  # fmt: skip

@@ -66,7 +66,7 @@ class Run:
 
 
 def opened(sweep: Sweep, out: Path) -> Run:
-    """Take a sweep up in a folder, with what was played before; a damaged file is told and its cell played again."""
+    """Take a sweep up in a folder, with what was played; a damaged file is reported and its cell played again."""
     SWEEP.need("A sweep")
     chosen = points(sweep)
     run = Run(sweep, out / sweep.name, chosen, [cell_of(sweep, point) for point in chosen])

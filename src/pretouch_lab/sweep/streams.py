@@ -82,13 +82,13 @@ def _contact_stream(setting: Setting) -> Stream:
 
 
 def _contacts(setting: Setting, stream: Stream) -> Numbers:
-    """Delay of what was felt, and how much was not; what fell into the answer to an earlier alarm is neither."""
+    """Delay of what was detected, and how much was missed; what fell into the answer to an earlier alarm is neither."""
     made = replay(stream, _detector(setting), model())
     found = [delay for delay, _ in matched(touches_of(stream), made.stamp, made.onsets()) if delay != BUSY]
-    felt = [delay for delay in found if delay is not None]
+    delays = [delay for delay in found if delay is not None]
     return {
-        "delay_s": float(np.median(felt)) if felt else None,
-        "missed": 1.0 - len(felt) / len(found) if found else None,
+        "delay_s": float(np.median(delays)) if delays else None,
+        "missed": 1.0 - len(delays) / len(found) if found else None,
     }
 
 
@@ -118,7 +118,7 @@ ON_STREAMS = (
     ),
     Measure(
         "contacts", "an arm that is touched on all links and does not react", "paper", ContactScene(),
-        {"delay_s": "median time from a contact to its alarm [s]", "missed": "part of the contacts not felt"},
+        {"delay_s": "median time from a contact to its alarm [s]", "missed": "part of the contacts not detected"},
         _contacts, lambda s: _REPLAY_S * _contacts_s(s), _DETECTION,
         _contact_stream, lambda s: (0.05 + 0.0006 * _units(s)) * _contacts_s(s),
     ),

@@ -83,7 +83,7 @@ def jobs_of(sweep: Sweep, wanted: list[Cell]) -> list[Job]:
 
 
 def work(text: str) -> str:
-    """Play the cells of a job; what fails is told with its reason, and stops no other."""
+    """Play the cells of a job; what fails is reported with its reason, and stops no other."""
     job = json.loads(text)
     here = code(job["experiment"])
     if job["code"] != here:

@@ -103,9 +103,9 @@ class Loss:
         return [int(np.maximum(np.round(gap / _PERIOD_S) - 1, 0).sum()) for gap in gaps]
 
 
-def facing(plant: Plant, skin: Skin, thing: str) -> list[int]:
-    """Units in whose cone a thing of the scene is the first that some ray meets."""
-    wanted, rays = plant.mj_model.geom(thing).id, cone_rays(2)
+def facing(plant: Plant, skin: Skin, name: str) -> list[int]:
+    """Units in whose cone a geom of the scene is the first that some ray meets."""
+    wanted, rays = plant.mj_model.geom(name).id, cone_rays(2)
     position, rotation = sensor_poses(skin, plant.model.kinematics(plant.mj_data.qpos[: plant.model.n]))
     geom, distance = np.zeros(len(rays), np.int32), np.zeros(len(rays))
     found = []

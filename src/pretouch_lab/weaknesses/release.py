@@ -90,7 +90,7 @@ def _over(person: Pusher, now: float) -> bool:
 
 
 def stuck(step: ControlStep) -> bool:
-    """Whether the arm stands where it has no force estimate: it waits there to be guided, and feels no push."""
+    """Whether the arm stands where it has no force estimate: it waits there to be guided, and detects no push."""
     return step.mode is Mode.HOLD and not np.isfinite(step.force).all()
 
 
@@ -122,7 +122,7 @@ def _judge(record: Record, force_n: float, touch: float, release: float, end: fl
         "estimated_fraction": rounded(
             float(np.mean([np.isfinite(s.force).all() for s in steps if s.stamp <= release]))
         ),
-        "felt": any(speed > 0 and stamp <= release + _NOTICE_S for stamp, speed in reactions),
+        "detected": any(speed > 0 and stamp <= release + _NOTICE_S for stamp, speed in reactions),
         "reactions": len(reactions),
         "against_while_held": sum(t <= release for t in against),
         "against_after_release": sum(t > release for t in against),
@@ -161,7 +161,7 @@ def _pooled(pushed: list[Row]) -> Row:
     ]
     return {
         "pushes": len(done),
-        "felt": sum(push["felt"] for push in done),
+        "detected": sum(push["detected"] for push in done),
         "against_while_held": sum(push["against_while_held"] > 0 for push in done),
         "against_after_release": sum(push["against_after_release"] > 0 for push in done),
         **{name: spread([push[name] for push in done if push[name] is not None]) for name in measures},
@@ -187,7 +187,7 @@ def tables(part: Row) -> list[TextTable]:
         ("held\n[s]", plain("held_s", "g")),
         ("profile", lambda cell: _base(cell["profile"]) + (f"\n{cell['restrictions']}" if several else "")),
         ("decay\n[s]", lambda cell: f"{_decay_s(cell['profile']):g}"),
-        ("felt", share("felt", "pushes")),
+        ("detected", share("detected", "pushes")),
         ("out", plain("out")),
         ("reac-\ntions", median("reactions", 0)),
         ("against\nwhile", plain("against_while_held")),

@@ -214,10 +214,10 @@ def _shares(cells: list[Row], many: bool) -> TextTable:
         " pedestal; else: neither, what the filter leaves; obst.: those the controller took for obstacles, held over"
         " missed readings. Cut is the filter's price: of all views, with a target or not, those in which what is"
         " predicted, less the margin, is nearer than d_max of eq. 3; an object behind it that should slow the arm could"
-        " not be told from the arm or the room. It is counted whether the filter is on or not. Way: travelled in 40 s,"
-        " of the way of blind. Speed: median and least factor of eqs. 3 and 4. False: contacts detected. Low: the arm"
-        " stands on a table and moves 0.1 m above it; down: so too, with one more unit that looks down out of the"
-        " robot's hand.",
+        " not be distinguished from the arm or the room. It is counted whether the filter is on or not. Way: travelled"
+        " in 40 s, of the way of blind. Speed: median and least factor of eqs. 3 and 4. False: contacts detected. Low:"
+        " the arm stands on a table and moves 0.1 m above it; down: so too, with one more unit that looks down out of"
+        " the robot's hand.",
     )
 
 

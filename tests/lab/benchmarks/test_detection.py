@@ -308,7 +308,7 @@ def test_a_run_leaves_rows_for_every_baseline_and_goes_on_after_a_kill(tmp_path,
     contact = rows.contacts[0]["contacts"][0]
     assert contact["delay_s"] < 0.2
     assert contact["towards"] is False
-    assert contact["feelable"]
+    assert contact["detectable"]
     found = bench.found()
     results = json.loads(json.dumps(found.json, allow_nan=False))
     keys = {"contender", "scenario", "seen", "false_alarms_per_hour", "median_delay_s", "p95_delay_s", "missed",

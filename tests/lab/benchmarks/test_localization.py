@@ -89,7 +89,7 @@ def test_a_contact_is_judged_by_its_body_and_its_place():
     assert row["taken_for_end"] == "hand"
     assert row["error_end_m"] == 0.0
     missed = _one(touch, said_of(NOT_TOUCHED, NOT_TOUCHED))
-    assert (missed["felt"], missed["right"], missed["error_m"]) == (False, False, None)
+    assert (missed["detected"], missed["right"], missed["error_m"]) == (False, False, None)
 
 
 def test_two_contacts_are_matched_with_the_nearer_ones():
@@ -130,7 +130,7 @@ def test_rows_say_what_was_found():
     rows = rows_by_body([one, two])
     assert [row["link"] for row in rows] == ["hand", TWO]
     first = rows[0]
-    assert (first["skin"], first["contacts"], first["felt"], first["right_link"]) == ("none", 2, 1, 0.5)
+    assert (first["skin"], first["contacts"], first["detected"], first["right_link"]) == ("none", 2, 1, 0.5)
     assert first["median_error_m"] == pytest.approx(0.0173, abs=1e-4)
     assert first["rate_hz"] == 500.0
     assert rows[1]["recognised"] == 0.0

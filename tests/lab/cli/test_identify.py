@@ -47,7 +47,7 @@ def test_without_velocities_no_torque_noise_is_told(table, tmp_path, capsys):
     place, numbers = tmp_path / "still.csv", tmp_path / "numbers.json"
     place.write_text("\n".join(",".join(line[:8] + line[15:]) for line in lines) + "\n")
     assert cli.main(["identify", str(place), "--json", str(numbers)]) == 0
-    assert "Without velocities neither their noise nor the observer's gain is told" in capsys.readouterr().out
+    assert "Without velocities neither their noise nor the observer's gain is identified" in capsys.readouterr().out
     told = {row["name"]: row["told"] for row in json.loads(numbers.read_text())["of_joints"]}
     assert not any(told["torque noise [Nm]"])
     assert all(told["offset [Nm]"])

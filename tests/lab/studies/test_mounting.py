@@ -171,7 +171,7 @@ def test_units_in_their_place_miss_nothing(exact):
     row, record = exact
     assert row["missed_fraction"] < 0.01
     assert row["contact"]
-    assert row["felt"]
+    assert row["detected"]
     assert row["touch_s"] == record.first_contact()
     assert -0.01 < row["least_gap_m"] < 0.002
 
@@ -210,7 +210,7 @@ def row(position: float, force: float, side: str = "+y", seed: int = 0, told: st
     empty = side == ROOM
     return {
         "experiment": NAME, **cell(side, position, told=told).where, "profile": "paper", "seed": seed,
-        "contact": not empty, "felt": not empty, "impact_speed_m_s": None if empty else 0.1,
+        "contact": not empty, "detected": not empty, "impact_speed_m_s": None if empty else 0.1,
         **dict.fromkeys(mounting_forces(), None if empty else force), "touch_s": None if empty else 6.0,
         "detection_delay_s": None if empty else 0.05, "missed_fraction": None if empty else 0.1,
         "least_gap_m": None if empty else 0.0, "obstacle_fraction": 0.2 if empty else None,
@@ -244,7 +244,7 @@ def test_trials_are_compared_with_their_twin_without_error():
 
 
 def test_trials_with_restrictions_have_a_table_of_their_own():
-    rows = [row(0.0, 10.0, restrictions="hard", contact=False, felt=False), row(0.0, 10.0)]
+    rows = [row(0.0, 10.0, restrictions="hard", contact=False, detected=False), row(0.0, 10.0)]
     titles = [table.title for table in tables(summarise(rows))]
     assert [("restrictions" in title) for title in titles] == [False, True]
     assert summarise([]) == {"cells": []}

@@ -14,7 +14,7 @@ from pretouch_lab.trial import Record
 from pretouch_lab.weaknesses import release
 
 PUSH = {
-    "push_n", "watched", "touching_fraction", "estimated_fraction", "felt", "reactions", "against_while_held",
+    "push_n", "watched", "touching_fraction", "estimated_fraction", "detected", "reactions", "against_while_held",
     "against_after_release", "mean_peak_n", "speed_towards_m_s", "reaction_speed_towards_m_s",
 }  # fmt: skip
 Y = np.array([0.0, 1.0, 0.0])
@@ -59,7 +59,7 @@ def test_a_release_answered_towards_the_person_is_told_from_the_answer_to_the_pu
         "watched": True,
         "touching_fraction": pytest.approx(0.5, abs=2e-3),
         "estimated_fraction": pytest.approx(2 / 3, abs=1e-3),
-        "felt": True,
+        "detected": True,
         "reactions": 2,
         "against_while_held": 0,
         "against_after_release": 1,
@@ -72,18 +72,18 @@ def test_a_release_answered_towards_the_person_is_told_from_the_answer_to_the_pu
 def test_a_reaction_against_the_push_while_it_is_held_is_no_answer_to_it():
     steps = [step(1.0, 0.0), step(1.2, -0.02, mean=-5.0, reaction=-0.3, begins=True), step(2.1, -0.02)]
     (push,) = release.judged(record(steps), PERSON)
-    assert push["felt"] is False
+    assert push["detected"] is False
     assert push["watched"] is False  # the trial is over before the 3 s are
     assert (push["against_while_held"], push["against_after_release"]) == (1, 0)
     assert push["mean_peak_n"] == 5.0
     assert push["reaction_speed_towards_m_s"] == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize(("later", "felt"), [(0.3, True), (-0.3, False), (0.0, False)])
-def test_a_reaction_from_standstill_is_judged_by_its_first_motion(later, felt):
+@pytest.mark.parametrize(("later", "detected"), [(0.3, True), (-0.3, False), (0.0, False)])
+def test_a_reaction_from_standstill_is_judged_by_its_first_motion(later, detected):
     steps = [step(1.0, 0.0), step(1.1, 0.0, begins=True), step(1.2, 0.0, reaction=later), step(5.1, 0.0)]
     (push,) = release.judged(record(steps), PERSON)
-    assert (push["felt"], push["reactions"], push["against_while_held"]) == (felt, 1, int(later < 0))
+    assert (push["detected"], push["reactions"], push["against_while_held"]) == (detected, 1, int(later < 0))
 
 
 def test_a_push_that_never_touched_is_left_out_and_the_next_touch_ends_the_watch():
@@ -91,7 +91,7 @@ def test_a_push_that_never_touched_is_left_out_and_the_next_touch_ends_the_watch
     person = SimpleNamespace(pushes=pushes, contacts=[(1.0, 2.0), None, (2.15, 2.25)])
     first, second = release.judged(record(STEPS), person)
     assert first["reactions"] == 1
-    assert (second["reactions"], second["felt"]) == (2, False)
+    assert (second["reactions"], second["detected"]) == (2, False)
     assert release.judged(record(STEPS), SimpleNamespace(pushes=pushes, contacts=[None])) == []
     assert release.judged(record(STEPS), SimpleNamespace(pushes=pushes, contacts=[])) == []
 
@@ -163,7 +163,7 @@ def test_no_command_exceeds_a_limit(trials, panda_model):
 
 def push_row(**changes):
     return {
-        "push_n": 20.0, "watched": True, "touching_fraction": 1.0, "estimated_fraction": 1.0, "felt": True,
+        "push_n": 20.0, "watched": True, "touching_fraction": 1.0, "estimated_fraction": 1.0, "detected": True,
         "reactions": 2, "against_while_held": 0, "against_after_release": 0, "mean_peak_n": 10.0,
         "speed_towards_m_s": 0.1, "reaction_speed_towards_m_s": None,
     } | changes  # fmt: skip
@@ -186,10 +186,10 @@ def test_pushes_of_all_trials_are_pooled_and_echoes_counted_once_a_push():
     echo = push_row(against_after_release=2, reaction_speed_towards_m_s=0.2, mean_peak_n=20.0, reactions=3)
     slipped = push_row(touching_fraction=0.5, against_after_release=1)
     cut_short = push_row(watched=False, against_after_release=1)
-    trials = [row([push_row(), echo, slipped]), row([push_row(felt=False), cut_short]), row([], held=4.0)]
+    trials = [row([push_row(), echo, slipped]), row([push_row(detected=False), cut_short]), row([], held=4.0)]
     summary = release.summarise(trials)
     first, second = summary["cells"]
-    assert (first["trials"], first["pushes"], first["felt"], first["against_after_release"]) == (2, 3, 2, 1)
+    assert (first["trials"], first["pushes"], first["detected"], first["against_after_release"]) == (2, 3, 2, 1)
     assert (first["out"], first["stuck"]) == (3, 0)
     assert first["mean_peak_n"]["median"] == 10.0
     assert first["reaction_speed_towards_m_s"] == {"median": 0.2, "p10": 0.2, "p90": 0.2, "n": 1}

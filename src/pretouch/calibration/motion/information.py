@@ -58,11 +58,11 @@ class Observability:
     def _of_motion(self, which: int, motion: LinkMotion) -> FloatArray:
         """Information (23, 23) about a unit on one link whose axes are the link's."""
         up = self._params.gravity * motion.R_link_base[:, :, 2]
-        felt = motion.a + motion.lever @ self._place[int(self.links[which])] + up
-        N, eye = len(felt), np.eye(3)
+        specific_force = motion.a + motion.lever @ self._place[int(self.links[which])] + up
+        N, eye = len(specific_force), np.eye(3)
         J = np.zeros((N, 6, fit.UNKNOWNS))
         for rows, v, bias, scale in ((slice(0, 3), motion.w, fit.GYRO_BIAS, fit.GYRO_SCALE),
-                                     (slice(3, 6), felt, fit.ACC_BIAS, fit.ACC_SCALE)):  # fmt: skip
+                                     (slice(3, 6), specific_force, fit.ACC_BIAS, fit.ACC_SCALE)):  # fmt: skip
             J[:, rows, fit.TURN], J[:, rows, bias], J[:, rows, scale] = skew(v), eye, v[:, :, None] * eye
             if N > 1:
                 J[:, rows, fit.CLOCK] = np.gradient(v, 1 / self._params.rate_hz, axis=0)

@@ -2,7 +2,7 @@
 
 The arm goes from posture to posture and stands in each for a while: the directions of gravity tell orientations, and
 biases from scales. In some of them it then swings: angular velocities tell orientations again, and what the
-accelerometers feel of the turning tells positions. Postures and swings are added one by one, each time the one with
+accelerometers measure of the turning tells positions. Postures and swings are added one by one, each time the one with
 which the worst known link, in its worst direction, is known best. Nothing is drawn by chance: candidates are the points
 of a Sobol sequence.
 """
@@ -132,30 +132,30 @@ class _Planner:
                 f"The arm can swing in only {len(usable)} of {len(swings)} postures, but {wanted} are needed: start"
                 " with more space around it, or set a smaller clearance_m or margin_rad."
             )
-        told = np.array([
+        contributions = np.array([
             self._knowledge.of_plan(Plan(np.array([0.0, _EXPECTED_S]), postures[[i, i]], (swing,)))
             for i, swing in enumerate(swings) if swing is not None
         ])  # fmt: skip
-        picked, information = self._greedy(told, self._knowledge.prior, wanted)
+        picked, information = self._greedy(contributions, self._knowledge.prior, wanted)
         return [usable[i] for i in picked], information
 
     def _choose_standing(self, postures: FloatArray, chosen: list[int], information: FloatArray) -> list[int]:
         """Return the candidates to stand in, beside those to swing about."""
-        told = self._knowledge.of_standing(postures, self._params.dwell_s)
-        information = information + told[chosen].sum(axis=0)
+        contributions = self._knowledge.of_standing(postures, self._params.dwell_s)
+        information = information + contributions[chosen].sum(axis=0)
         others = [i for i in range(len(postures)) if i not in chosen]
-        picked, _ = self._greedy(told[others], information, self._params.poses - len(chosen))
+        picked, _ = self._greedy(contributions[others], information, self._params.poses - len(chosen))
         return [others[i] for i in picked]
 
-    def _greedy(self, told: FloatArray, information: FloatArray, count: int) -> tuple[list[int], FloatArray]:
+    def _greedy(self, contributions: FloatArray, information: FloatArray, count: int) -> tuple[list[int], FloatArray]:
         """Pick `count` of the candidates (S, L', 23, 23), one by one, by what is known with each."""
         picked: list[int] = []
         for _ in range(count):
-            sigmas = np.stack(self._knowledge.sigmas(information + told), axis=-1) / _GOAL
+            sigmas = np.stack(self._knowledge.sigmas(information + contributions), axis=-1) / _GOAL
             score = sigmas.max(axis=(1, 2)) + sigmas.mean(axis=(1, 2))
             score[picked] = np.inf
             picked.append(int(np.argmin(score)))
-            information = information + told[picked[-1]]
+            information = information + contributions[picked[-1]]
         return picked, information
 
     def _assembled(self, route: Route, postures: FloatArray, patterns: dict[int, int]) -> Plan:

@@ -17,7 +17,7 @@ def independent_part(period: float, p: LocalisationParams) -> float:
     return min(1.0, period / p.independent_s)
 
 
-def clearest_mean(
+def most_significant_mean(
     windows: ResidualWindows, period: float, p: LocalisationParams
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return the mean (n,) that stands out most [Nm], and its covariance (n, n) in free motion [Nm^2].

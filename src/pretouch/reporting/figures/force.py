@@ -53,8 +53,8 @@ def _along(axes: Axes, course: Course, k: int, shown: slice, known: slice) -> No
     draw(axes, time, course.upper[shown, k], color=INK, lw=1.0, label=bounds(course))
     draw(axes, time, course.lower[shown, k], color=INK, lw=1.0)
     first, past, _ = shown.indices(len(course))
-    felt = [i for i, contact, _ in course.contacts if contact.axes[k] or not course.by_thresholds]
-    at = np.array([i for i in felt if first <= i < past], dtype=np.int64)
+    detected = [i for i, contact, _ in course.contacts if contact.axes[k] or not course.by_thresholds]
+    at = np.array([i for i in detected if first <= i < past], dtype=np.int64)
     found = course.filtered_force if course.by_thresholds else course.force
     axes.plot(course.time[at], found[at, k], "v", color=RED, mec="white", mew=0.6, ms=7, label="detected")
     axes.set_ylabel(f"force along {AXES[k]} [N]")

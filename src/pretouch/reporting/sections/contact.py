@@ -18,20 +18,20 @@ _FORCE = {
     False: "Force: at the end-effector, as the joint torques beyond those of free motion tell it; the contact may be"
     " elsewhere. Axes: where that passes the band of one sample, or is nearest to it",
 }
-"""What a contact's force is, by whether the paper's thresholds feel it."""
+"""What a contact's force is, by whether the paper's thresholds detect it."""
 
 
 def contact_section(m: Measures) -> Html:
-    """What was felt, and where it is known what truly touched and what was missed."""
-    parts: list[Html] = [_felt(m)]
+    """Detected contacts and, where it is known, what truly touched and what was missed."""
+    parts: list[Html] = [_detected(m)]
     if not m.truth_known:
-        parts.append(note("True touches are not known: delays, missed touches and false detections cannot be told."))
+        parts.append(note("True touches are not known: delays, missed touches and false detections cannot be counted."))
     else:
         parts += [_touched(m), _false(m)]
     return joined(parts)
 
 
-def _felt(m: Measures) -> Html:
+def _detected(m: Measures) -> Html:
     if not m.detections:
         return element("p", "No contact was detected.")
     head = [

@@ -156,7 +156,7 @@ class ServedArm:
 
 
 class JointTorques:
-    """What the motors gave and the joints felt in the last physics step, without the errors of the torque sensors."""
+    """Torques of motors and joints in the last physics step, without the errors of the torque sensors."""
 
     def __init__(self, plant: Plant) -> None:
         """Watch an arm."""

@@ -1,4 +1,4 @@
-"""The obstacle of a scenario: how it moves, and how far from it things truly are."""
+"""The obstacle of a scenario: how it moves, and how far from it the bodies truly are."""
 
 from dataclasses import dataclass
 from typing import Protocol

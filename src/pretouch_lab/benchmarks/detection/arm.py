@@ -1,4 +1,4 @@
-"""An arm that goes on whatever it feels, in a room with one ghost, and the stream of what it said."""
+"""An arm that goes on whatever touches it, in a room with one ghost, and the stream of what it said."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

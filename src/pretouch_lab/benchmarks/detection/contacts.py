@@ -182,7 +182,7 @@ class Toucher:
         wrench[3:] = np.cross(at - data.xipos[touch.link], force)
 
     def forces(self, time: float) -> list[PointForce]:
-        """Return the force that acts at a time, for sensors that feel forces without a contact of the simulation."""
+        """Return the force that acts at a time, for sensors of forces without a contact of the simulation."""
         touch = self._current(time)
         if touch is None or touch.size_n(time) <= 0.0:
             return []

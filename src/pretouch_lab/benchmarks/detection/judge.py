@@ -119,7 +119,7 @@ def about(touch: Touching, stream: Stream, noise: FloatArray) -> dict[str, Any]:
         "force_n": touch.force_n,
         "duration_s": touch.duration_s,
         "seen": bool(away <= judged["seen_m"]),
-        "feelable": bool(np.any(torque > judged["feelable_sigmas"] * noise)),
+        "detectable": bool(np.any(torque > judged["feelable_sigmas"] * noise)),
     }
 
 

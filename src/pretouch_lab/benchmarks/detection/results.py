@@ -82,7 +82,7 @@ def wanted(_cell: Row, contact: Row) -> bool:
     """Whether a contact is one of those the goals of delay are set for."""
     goal = scenario("contacts")["goal"]
     strong = contact["force_n"] >= goal["force_n"] and contact["duration_s"] >= goal["duration_s"]
-    return bool(strong and contact["feelable"] and contact["link"] in goal["links"])
+    return bool(strong and contact["detectable"] and contact["link"] in goal["links"])
 
 
 def contact_scenarios(rows: Rows) -> dict[str, Callable[[Row, Row], bool]]:
@@ -174,11 +174,11 @@ def board_rows(rows: Rows, baselines: Iterable[Baseline]) -> list[Row]:
         own = [row for row in rows.boards if row["contender"] == baseline.name]
         for name, group in _boards(own).items():
             touched = [row for row in group if row["contact"]]
-            felt = [row["detection_delay_s"] for row in touched]
+            times = [row["detection_delay_s"] for row in touched]
             values: Row = {key: _median(touched, key) for key in ("peak_estimate_n", "true_peak_20ms_n", "clamping_n")}
             falsely = sum(row["false_detections"] for row in group)
             where = {"contender": baseline.name, "scenario": name, "false_alarms": falsely}
-            found.append({**EMPTY, **where, **delays(felt), **values})
+            found.append({**EMPTY, **where, **delays(times), **values})
     return found
 
 

@@ -122,15 +122,15 @@ def place_said(touch: Touching, found: Touched, q: FloatArray, when: str = "") -
     `when` ends the names of its values.
     """
     rigid, kin = model().rigid, model().kinematics(q)
-    felt = len(found.link) > 0
-    off = float(np.linalg.norm(found.point[0] - place_of(touch, kin))) if felt else None
+    detected = len(found.link) > 0
+    off = float(np.linalg.norm(found.point[0] - place_of(touch, kin))) if detected else None
     return {
-        f"felt{when}": felt,
-        f"right{when}": felt and bool(rigid[found.link[0]] == rigid[touch.link]),
+        f"detected{when}": detected,
+        f"right{when}": detected and bool(rigid[found.link[0]] == rigid[touch.link]),
         f"error{when}_m": None if off is None else rounded(off, 5),
-        f"taken_for{when}": name_of(int(found.link[0])) if felt else None,
+        f"taken_for{when}": name_of(int(found.link[0])) if detected else None,
         f"two{when}": len(found.link) == 2,
-        f"sigma{when}_m": rounded(float(found.sigma[0]), 5) if felt else None,
+        f"sigma{when}_m": rounded(float(found.sigma[0]), 5) if detected else None,
     }
 
 
@@ -158,12 +158,12 @@ def _two(a: Touching, b: Touching, said: Said) -> Row:
     found, kin = said.touched[i], model().kinematics(said.q[i])
     row: Row = {"links": [name_of(a.link), name_of(b.link)], "forces_n": [a.force_n, b.force_n]}
     if len(found.link) != 2:
-        return row | {"felt": len(found.link) > 0, "two": False, "right": False, "errors_m": None}
+        return row | {"detected": len(found.link) > 0, "two": False, "right": False, "errors_m": None}
     true = np.array([place_of(a, kin), place_of(b, kin)])
     away = np.linalg.norm(true[:, None] - found.point[None], axis=2)
     matched = away.diagonal() if away.trace() <= away[0, 1] + away[1, 0] else away[:, ::-1].diagonal()
     links: IntArray = np.array([a.link, b.link])
     return row | {
-        "felt": True, "two": True, "right": sorted(rigid[found.link]) == sorted(rigid[links]),
+        "detected": True, "two": True, "right": sorted(rigid[found.link]) == sorted(rigid[links]),
         "errors_m": [rounded(float(value), 5) for value in matched],
     }  # fmt: skip

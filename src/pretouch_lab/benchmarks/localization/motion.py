@@ -1,4 +1,4 @@
-"""An arm that wanders between random postures, whatever it feels: localisation has to work in any of them."""
+"""An arm that wanders between random postures, whatever touches it: localisation has to work in any of them."""
 
 from dataclasses import dataclass, replace
 from typing import Any

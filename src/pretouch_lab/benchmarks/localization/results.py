@@ -35,16 +35,16 @@ def _order(link: str) -> tuple[bool, str]:
 def _of_body(skin: str, link: str, found: list[Row], rate: float) -> Row:
     row: Row = {"skin": skin, "link": link, "contacts": len(found)}
     for when in ("", "_end"):
-        felt = [one for one in found if one[f"felt{when}"]]
+        detected = [one for one in found if one[f"detected{when}"]]
         row |= {
-            f"felt{when}": len(felt),
+            f"detected{when}": len(detected),
             f"right_link{when}": rounded(sum(one[f"right{when}"] for one in found) / len(found), 4),
-            f"median_error{when}_m": _at([one[f"error{when}_m"] for one in felt], 50),
-            f"p90_error{when}_m": _at([one[f"error{when}_m"] for one in felt], 90),
+            f"median_error{when}_m": _at([one[f"error{when}_m"] for one in detected], 50),
+            f"p90_error{when}_m": _at([one[f"error{when}_m"] for one in detected], 90),
             f"said_two{when}": sum(one[f"two{when}"] for one in found),
-            f"median_sigma{when}_m": _at([one[f"sigma{when}_m"] for one in felt], 50),
+            f"median_sigma{when}_m": _at([one[f"sigma{when}_m"] for one in detected], 50),
         }
-    taken = [one["taken_for"] for one in found if one["felt"] and not one["right"]]
+    taken = [one["taken_for"] for one in found if one["detected"] and not one["right"]]
     row["taken_for"] = {name: taken.count(name) for name in sorted(set(taken), key=_order)}
     return row | {"median_limit_m": _at([one["limit_m"] for one in found], 50), "rate_hz": rate}
 
@@ -52,7 +52,7 @@ def _of_body(skin: str, link: str, found: list[Row], rate: float) -> Row:
 def _of_pairs(skin: str, found: list[Row], rate: float) -> Row:
     errors = [value for one in found if one["errors_m"] for value in one["errors_m"]]
     return {
-        "skin": skin, "link": TWO, "contacts": len(found), "felt": sum(one["felt"] for one in found),
+        "skin": skin, "link": TWO, "contacts": len(found), "detected": sum(one["detected"] for one in found),
         "recognised": rounded(sum(one["two"] for one in found) / len(found), 4),
         "right_link": rounded(sum(one["right"] for one in found) / len(found), 4),
         "median_error_m": _at(errors, 50), "p90_error_m": _at(errors, 90), "rate_hz": rate,
@@ -75,9 +75,10 @@ def tables_of(results: Row) -> list[TextTable]:
             _SINGLES,
             singles,
             f"Judged {1000 * judged['after_s']:.0f} ms after the force began to rise, or at its end if that is earlier,"
-            " and once more at its end. Error: from the true place, both on the body in that posture, of what was felt,"
-            " whichever body it was taken for; what was not felt is not right. hand: link 7, flange and hand, which the"
-            " same joints move. Limit: what the torques alone could tell at best, the bound of Cramer and Rao, median."
+            " and once more at its end. Error: from the true place, both on the body in that posture, of what was"
+            " detected, whichever body it was taken for; what was not detected is not right. hand: link 7, flange and"
+            " hand, which the same joints move. Limit: what the torques alone could tell at best, the bound of Cramer"
+            " and Rao, median."
             f" An inference takes so long that 99 of 100 would keep up with: {rates}.",
         )
     ]
@@ -106,7 +107,7 @@ _SINGLES = (
     ("skin", plain("skin")),
     ("body", plain("link")),
     ("contacts", plain("contacts")),
-    ("felt", plain("felt")),
+    ("detected", plain("detected")),
     ("right\nbody", _percent("right_link")),
     ("taken for", _taken_for),
     ("median\n[cm]", _cm("median_error_m")),
@@ -120,7 +121,7 @@ _SINGLES = (
 _PAIRS = (
     ("skin", plain("skin")),
     ("pairs", plain("contacts")),
-    ("felt", plain("felt")),
+    ("detected", plain("detected")),
     ("taken\nfor two", _percent("recognised")),
     ("both bodies\nright", _percent("right_link")),
     ("median\n[cm]", _cm("median_error_m")),

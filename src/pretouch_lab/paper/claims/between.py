@@ -98,7 +98,7 @@ def results(record: Record, touched: tuple[float, float] | None) -> Row:
         "both_lowered": bool(lowered),
         "both_lowered_s": rounded(period * len(lowered)),
         "both_lowered_at_touch": lowered_on_both_sides(before[-1]) if touched and before else None,
-        "felt": answer is not None,
+        "detected": answer is not None,
         "detection_delay_s": None if answer is None else rounded(answer.stamp - touch, 4),
         "filtered_at_detection_n": None if answer is None else rounded(float(answer.filtered_force[_Y])),
         "raw_at_detection_n": None if answer is None else rounded(float(answer.force[_Y])),
@@ -132,7 +132,7 @@ def lowered_on_both_sides(step: ControlStep) -> bool:
 
 
 def summarise(rows: list[Row]) -> Row:
-    """Cells: how far the band along y was narrowed before the push, and whether the push was felt."""
+    """Cells: how far the band along y was narrowed before the push, and whether the push was detected."""
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row["profile"], row["restrictions"]), []).append(row)
@@ -145,7 +145,7 @@ def _cell(profile: str, restrictions: str, group: list[Row]) -> Row:
         "restrictions": restrictions,
         "trials": len(group),
         "contacts": sum(row["contact"] for row in group),
-        "felt": sum(row["felt"] for row in group),
+        "detected": sum(row["detected"] for row in group),
         "both_lowered": sum(row["both_lowered"] for row in group),
         "both_lowered_at_touch": sum(bool(row["both_lowered_at_touch"]) for row in group),
         "false_detections": sum(row["false_detections"] for row in group),
@@ -156,13 +156,13 @@ def _cell(profile: str, restrictions: str, group: list[Row]) -> Row:
 
 
 def tables(part: Row) -> list[TextTable]:
-    """How far the band was narrowed from both sides, and what was felt of the push."""
+    """How far the band was narrowed from both sides, and which pushes were detected."""
     columns = (
         ("profile", lambda cell: controller(cell, part["cells"])),
         *((f"T_{name[0]}\n{name.split('_')[1]}", median(f"{name}_y", 1)) for name in _WIDTHS),
         ("both\never", share("both_lowered")),
         ("both at\ntouch", share("both_lowered_at_touch", "contacts")),
-        ("felt", share("felt", "contacts")),
+        ("detected", share("detected", "contacts")),
         ("delay\n[ms]", median("detection_delay_s", 0, 1000)),
         ("filtered\n[N]", median("filtered_at_detection_n", 1)),
         ("false", plain("false_detections")),
@@ -174,7 +174,7 @@ def tables(part: Row) -> list[TextTable]:
         "T_u: upper threshold above the window's mean along y; T_l: lower threshold below it. Free: median while"
         " nothing sensed lowers that bound, in trials where it ever is free. Least: before the push. Both: trials in"
         " which objects narrowed the band from above and below at once, ever before the push and when it touched."
-        " Felt: of the pushes that touched. Filtered (eq. 8): along y, at detection.",
+        " Detected: of the pushes that touched. Filtered (eq. 8): along y, at detection.",
     )
     return [table]
 

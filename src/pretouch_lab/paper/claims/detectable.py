@@ -1,4 +1,4 @@
-"""The smallest push, step and ramp that is felt: near and far from an object, at rest and moving.
+"""The smallest push, step and ramp that is detected: near and far from an object, at rest and moving.
 
 Known forces act on an arm that does not answer them; detectors are held against the recorded estimate afterwards.
 """
@@ -34,10 +34,10 @@ RATES_N_S = (5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0)
 SIZES: dict[Shape, tuple[float, ...]] = {"push": FORCES_N, "step": FORCES_N, "ramp": RATES_N_S}
 
 DIRECTIONS = ("axis", "diagonal")
-FELT_FRACTION = 0.9
-"""Fraction of events from which on a size counts as felt."""
+DETECTED_FRACTION = 0.9
+"""Fraction of events from which on a size counts as detected."""
 _LATE_S = 0.1
-"""A push or step may be felt until this long after its end: the estimate lags [s]."""
+"""A push or step may be detected until this long after its end: the estimate lags [s]."""
 _READY_S = 1.5
 """From then on the arm moves as it will, its window full [s]."""
 _GAP_S = (1.4, 1.9)
@@ -138,9 +138,9 @@ def answers(course: Windowed, times: FloatArray, events: tuple[Event, ...]) -> l
     """
     found = []
     for judge, direction in product(JUDGES, DIRECTIONS):
-        felt = judge.detector(course, judge.f_base_n, judge.f_obs_n)
+        detected = judge.detector(course, judge.f_base_n, judge.f_obs_n)
         chosen = [event for event in events if _direction(event) == direction]
-        replies = [(event, answered(felt, times, event)) for event in chosen]
+        replies = [(event, answered(detected, times, event)) for event in chosen]
         at = [(event, time) for event, time in replies if time is not None]
         found.append(
             {
@@ -148,7 +148,7 @@ def answers(course: Windowed, times: FloatArray, events: tuple[Event, ...]) -> l
                 "object": judge.object,
                 "direction": direction,
                 "events": len(chosen),
-                "firing": sum(_firing(felt, times, event) for event in chosen),
+                "firing": sum(_firing(detected, times, event) for event in chosen),
                 "detected": len(at),
                 "delay_s": _median([time - event.start for event, time in at]),
                 "reached_n": _median([event.reached_n(time) for event, time in at]),
@@ -161,16 +161,16 @@ def _direction(event: Event) -> str:
     return "axis" if np.count_nonzero(event.direction) == 1 else "diagonal"
 
 
-def _firing(felt: BoolArray, times: FloatArray, event: Event) -> bool:
+def _firing(detected: BoolArray, times: FloatArray, event: Event) -> bool:
     """Whether the detector fired at the last sample before an event."""
-    return bool(felt[np.searchsorted(times, event.start, side="right") - 1])
+    return bool(detected[np.searchsorted(times, event.start, side="right") - 1])
 
 
-def answered(felt: BoolArray, times: FloatArray, event: Event) -> float | None:
+def answered(detected: BoolArray, times: FloatArray, event: Event) -> float | None:
     """Instant [s] at which a detector first fires (S,) at an event, None if it does not or was firing before."""
     last = event.start + event.rise_s if event.shape == "ramp" else event.end + _LATE_S
-    during = felt & (times > event.start) & (times <= last)
-    return None if _firing(felt, times, event) or not during.any() else float(times[during.argmax()])
+    during = detected & (times > event.start) & (times <= last)
+    return None if _firing(detected, times, event) or not during.any() else float(times[during.argmax()])
 
 
 def _median(values: list[float]) -> float | None:
@@ -178,7 +178,7 @@ def _median(values: list[float]) -> float | None:
 
 
 def summarise(rows: list[Row]) -> Row:
-    """Put together what all seeds found: fractions felt by size, and the smallest size felt from there on."""
+    """Put together what all seeds found: fractions detected by size, and the smallest size detected from there on."""
     names = ("motion", "shape", "detector", "object", "direction")
     found: dict[tuple[str, ...], dict[float, list[Row]]] = {}
     for row in rows:
@@ -188,7 +188,8 @@ def summarise(rows: list[Row]) -> Row:
     cells = []
     for place, by_size in found.items():
         sizes = [_size(size, by_size[size]) for size in sorted(by_size)]
-        cells.append({**dict(zip(names, place, strict=True)), "smallest_felt": smallest_felt(sizes), "sizes": sizes})
+        smallest = smallest_detected(sizes)
+        cells.append({**dict(zip(names, place, strict=True)), "smallest_detected": smallest, "sizes": sizes})
     return {"cells": cells, "trials": len(rows), "held": sum(row["held"] for row in rows)}
 
 
@@ -201,11 +202,11 @@ def _size(size: float, group: list[Row]) -> Row:
     return {"size": size, **counts, "fraction": rounded(counts["detected"] / counts["events"], 4), **measured}
 
 
-def smallest_felt(sizes: list[Row]) -> float | None:
-    """Return the size from which on at least nine of ten events are felt, None if those of the largest are not."""
+def smallest_detected(sizes: list[Row]) -> float | None:
+    """Return the size from which on at least nine of ten events are detected, None if those of the largest are not."""
     smallest = None
     for entry in sorted(sizes, key=lambda entry: -entry["size"]):
-        if entry["detected"] < FELT_FRACTION * entry["events"]:
+        if entry["detected"] < DETECTED_FRACTION * entry["events"]:
             break
         smallest = entry["size"]
     return smallest

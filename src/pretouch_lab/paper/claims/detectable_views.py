@@ -1,4 +1,4 @@
-"""The smallest forces felt as tables, and the fractions felt as a figure."""
+"""The smallest forces detected as tables, and the fractions detected as a figure."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ Key = tuple[Any, ...]
 
 
 def detectable_tables(part: Row) -> list[TextTable]:
-    """Show the smallest pushes and steps felt, and the slowest ramps; of an interrupted run what there is."""
+    """Show the smallest pushes and steps detected, and the slowest ramps; of an interrupted run what there is."""
     cells = {_key(cell): cell for cell in part["cells"]}
     shapes = {cell["shape"] for cell in part["cells"]}
     made = [_forces(cells)] if shapes & {"push", "step"} else []
@@ -47,14 +47,14 @@ def _forces(cells: dict[Key, Row]) -> TextTable:
         ("chance\n[%]", lambda judge: _by_chance(cells, judge)),
     )
     return tabulated(
-        "Smallest push (0.2 s) and step (1 s) felt [N]: along an axis / along a diagonal",
+        "Smallest push (0.2 s) and step (1 s) detected [N]: along an axis / along a diagonal",
         columns,
         _judges(cells),
-        "Of the true force, the size from which on 9 of 10 events are felt, - if those of 30 N are not. Slow is"
+        "Of the true force, the size from which on 9 of 10 events are detected, - if those of 30 N are not. Slow is"
         " 0.06 m/s, moving 0.3 m/s. Near: F_obs is 4 N on both sides, far: 0 N. Filtered (eq. 8), raw, and raw twice"
         " in a row are held against eq. 9 with F_b 10 N; fixed: the estimate itself against that force, no window."
         " Chance: how often a detector fires on the moving arm when nothing pushes it, in the 1.1 s in which it may"
-        " feel a step; what often fires by chance tells nothing.",
+        " detect a step; what often fires by chance tells nothing.",
     )
 
 
@@ -62,7 +62,7 @@ def _smallest(cells: dict[Key, Row], motion: str, shape: str, judge: tuple[str, 
     both = [cells.get((motion, shape, *judge, direction)) for direction in ("axis", "diagonal")]
     if None in both:
         return ""
-    return " / ".join("-" if c["smallest_felt"] is None else f"{c['smallest_felt']:g}" for c in both if c)
+    return " / ".join("-" if c["smallest_detected"] is None else f"{c['smallest_detected']:g}" for c in both if c)
 
 
 def _by_chance(cells: dict[Key, Row], judge: tuple[str, str]) -> str:
@@ -85,14 +85,14 @@ def _ramps(cells: dict[Key, Row]) -> TextTable:
         *(c for m in _MOTIONS for c in ((f"{m}\n[N/s]", smallest(m)), (f"{m}\n[N]", reached(m)))),
     )
     return tabulated(
-        "Slowest ramp felt [N/s]: axis / diagonal; force when it is felt on an axis [N]",
+        "Slowest ramp detected [N/s]: axis / diagonal; force when it is detected on an axis [N]",
         columns,
         _judges(cells),
-        "A ramp rises to 30 N and is let go. Rate: the one from which on 9 of 10 ramps are felt before they are let"
+        "A ramp rises to 30 N and is let go. Rate: the one from which on 9 of 10 ramps are detected before they are let"
         " go, - if those of 60 N/s are not. The mean of the window follows a slow ramp, so to all but the fixed"
-        " thresholds it is never a contact, however large it grows; what fires by chance now and then seems to feel"
+        " thresholds it is never a contact, however large it grows; what fires by chance now and then seems to detect"
         f" the slowest ramps, which take long. Force: true force when a ramp of {_RAMP_N_S:g} N/s along an axis is"
-        " felt: of each trial the median of those that are, and of the trials the median.",
+        " detected: of each trial the median of those that are, and of the trials the median.",
     )
 
 
@@ -113,7 +113,7 @@ _PANELS = (("push", "a push of 0.2 s"), ("step", "a step of 1 s")), (("rest", "a
 
 
 def draw_detectable(sources: Sources) -> list[Picture]:
-    """Draw the fraction felt of pushes and steps along the axes against their size, at rest and moving."""
+    """Draw the fraction detected of pushes and steps along the axes against their size, at rest and moving."""
     from matplotlib.figure import Figure
 
     from pretouch_lab.paper.figures.marks import labels
@@ -133,9 +133,9 @@ def draw_detectable(sources: Sources) -> list[Picture]:
     for axes in panels[-1]:
         axes.set_xlabel("largest true force, along an axis [N]")
     for axes in panels[:, 0]:
-        axes.set_ylabel("fraction felt")
-    figure.suptitle("Pushes and steps felt, with an object near (F_obs 4 N) and far (0 N)")
-    return [Picture("detectable", "Fraction of pushes and steps felt against their size", figure)]
+        axes.set_ylabel("fraction detected")
+    figure.suptitle("Pushes and steps detected, with an object near (F_obs 4 N) and far (0 N)")
+    return [Picture("detectable", "Fraction of pushes and steps detected against their size", figure)]
 
 
 def _curves(axes: "Axes", cells: dict[Key, Row], motion: str, shape: str) -> None:

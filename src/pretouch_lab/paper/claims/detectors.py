@@ -48,7 +48,7 @@ def band(course: Windowed, f_base: float, f_obs: float = 0.0) -> FloatArray:
 
 
 Detector = Callable[[Windowed, float, float], BoolArray]
-"""Says of each of S samples whether a contact is felt, given F_b and F_obs [N]."""
+"""Says of each of S samples whether a contact is detected, given F_b and F_obs [N]."""
 
 
 def filtered(course: Windowed, f_base: float, f_obs: float = 0.0) -> BoolArray:
@@ -77,10 +77,10 @@ def fixed(course: Windowed, threshold: float, _f_obs: float = 0.0) -> BoolArray:
     return np.any(np.abs(course.force) > threshold, axis=1)
 
 
-def onsets(felt: BoolArray, rest: int) -> list[int]:
-    """Samples at which a contact is felt anew: while one is answered, for `rest` samples, none is looked for."""
+def onsets(detected: BoolArray, rest: int) -> list[int]:
+    """Samples at which a contact is detected anew: while one is answered, for `rest` samples, none is looked for."""
     found: list[int] = []
-    for i in np.flatnonzero(felt).tolist():
+    for i in np.flatnonzero(detected).tolist():
         if not found or i >= found[-1] + rest:
             found.append(i)
     return found
@@ -99,6 +99,6 @@ def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[f
 
 
 def dispersion_of(counts: list[int]) -> float:
-    """Variance of counts by their mean, 1 for Poisson counts and taken as 1 where it is less or cannot be told."""
+    """Variance of counts by their mean, 1 for Poisson counts and taken as 1 where it is less or unknown."""
     mean = float(np.mean(counts)) if counts else 0.0
     return max(1.0, float(np.var(counts, ddof=1)) / mean) if len(counts) > 1 and mean > 0 else 1.0

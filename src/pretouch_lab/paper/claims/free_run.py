@@ -102,9 +102,9 @@ def _listed(values: FloatArray) -> list[float]:
     return [rounded(value, 4) for value in values]
 
 
-def tally(detector: str, felt: BoolArray, force_n: float, near: bool) -> Row:
+def tally(detector: str, detected: BoolArray, force_n: float, near: bool) -> Row:
     """Count the false detections of a detector, held with a force [N], with objects near or with nothing near."""
-    return {"detector": detector, "force_n": force_n, "near": near, "count": len(onsets(felt, _ANSWERED))}
+    return {"detector": detector, "force_n": force_n, "near": near, "count": len(onsets(detected, _ANSWERED))}
 
 
 def false_rates(rows: list[Row]) -> list[Row]:

@@ -1,4 +1,4 @@
-"""How many contacts are felt that are none, the noisier the arm's sensors are."""
+"""How many false detections there are, the noisier the arm's sensors are."""
 
 from dataclasses import replace
 

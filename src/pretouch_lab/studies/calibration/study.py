@@ -96,7 +96,7 @@ def study(
         skins: how many; each has one unit on each link from the second on.
         seed: of the first skin, its arm and its sensors; the next skins take the next seeds.
         compared: also with the method and the motion of Watanabe et al.
-        links_known: whether the calibration is told each unit's link, or has to find it. Watanabe et al. are told.
+        links_known: whether the calibration is given each unit's link, or has to find it. Watanabe et al. are given it.
         plan: our motion, if not the one that is planned by default.
         processes: that compute at once; None: one a processor.
         progress: called after each simulation.

@@ -32,7 +32,7 @@ _DRAWN_LOG2, _SEARCHES = 9, 10
 _GRAVITY = 9.80665
 """[m/s^2]."""
 _EDGE_S = 0.2
-"""Left out at either end of an interval in which the arm stands [s]: the low-pass still feels the motion there."""
+"""Left out at either end of an interval in which the arm stands [s]: the low-pass still passes the motion there."""
 
 
 def watanabe(
@@ -80,14 +80,14 @@ def _residuals(arm: ArmMotion, unit: UnitData, standing: list[BoolArray]) -> Cal
     proper = motion.a + _GRAVITY * motion.R_link_base[:, :, 2]
     # while the arm stands, that is against gravity; the paper compares with the mean, the authors' program with this
     f = np.array([proper[which].mean(axis=0) for which in standing if which.any()])
-    felt = np.array([sensed[which].mean(axis=0) for which in standing if which.any()])
-    moving_f, lever, moving_felt = proper[moving], motion.lever[moving], sensed[moving]
+    measured = np.array([sensed[which].mean(axis=0) for which in standing if which.any()])
+    moving_f, lever, moving_measured = proper[moving], motion.lever[moving], sensed[moving]
 
     def residuals(parameters: FloatArray) -> FloatArray:
         T = pose(parameters)
         R, p = T[:3, :3], T[:3, 3]
-        static = (f @ R - felt) / np.sqrt(len(f))
-        dynamic = ((moving_f + lever @ p) @ R - moving_felt) / np.sqrt(max(1, len(moving_f)))
+        static = (f @ R - measured) / np.sqrt(len(f))
+        dynamic = ((moving_f + lever @ p) @ R - moving_measured) / np.sqrt(max(1, len(moving_f)))
         return np.concatenate([static.ravel(), dynamic.ravel()])
 
     return residuals

@@ -1,1 +1,1 @@
-"""Impacts felt by the units' accelerometers: contacts, their judgement, tables."""
+"""Impacts measured by the units' accelerometers: contacts, their judgement, tables."""

@@ -119,7 +119,7 @@ def play_again(course: Course, found: Profile, use_imu: bool) -> Played:
     links, touched = np.full((steps, len(arm.parts)), np.nan), [NOT_TOUCHED] * steps
     for i, (robot, near, reacting, watched) in enumerate(stream.steps()):
         kin, imu = arm.kinematics(robot.q), course.imu[i]
-        if use_imu:  # once more beside the test, to see what it is told
+        if use_imu:  # once more beside the test, to see what it gets
             sample = Sample(robot.stamp, kin, robot, detector.window, True, near, imu=imu)
             cues, jolts = cue.step(jolts, detector.body, sample)
             gain[i] = 1.0 if cues is None else cues.gain
@@ -148,9 +148,9 @@ def link_evidence(known: SequentialState, kin: Kinematics, robot: RobotState, p:
     contacts = Hypotheses(np.empty((parts, 3, n)), np.empty(parts, np.int64), np.empty(n + parts), np.zeros((parts, 3)))
     prior = NearPrior(near.gain, near.distance_m, near.horizon_s)
     write_hypotheses(kin, arm.mechanism, robot.qd, NOTHING_NEAR, np.ones(len(arm.links)), prior, contacts)
-    doubt, found = np.full(n, p.bias_floor_nm**2), np.empty(parts)
+    model_variance, found = np.full(n, p.bias_floor_nm**2), np.empty(parts)
     for h in range(parts):
         one = np.zeros(n + parts)
         one[n + h] = 1.0
-        found[h] = judge(means, whole, S, doubt, contacts._replace(weight=one), p.contact_gain, p.tails)[0]
+        found[h] = judge(means, whole, S, model_variance, contacts._replace(weight=one), p.contact_gain, p.tails)[0]
     return found

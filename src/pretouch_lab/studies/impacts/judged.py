@@ -15,7 +15,7 @@ from pretouch_lab.studies.impacts.contacts import LOOK, WARM_UP_S, Course, Playe
 from pretouch_lab.studies.impacts.kinds import GROUPS, KINDS, LINKS
 
 _LATE_S = 0.3
-"""How long after its end a contact may still be felt [s]."""
+"""How long after its end a contact may still be detected [s]."""
 _ONSET_N = 1.0
 _GAIN = 2.0
 """Gain from which a step counts as one with a cue [1]."""
@@ -45,7 +45,7 @@ def judged(
         made = play_again(touched, found, use)
         onsets = begun(made.alarm)
         for contact, touch in zip(contacts, touches, strict=True):
-            contact[name] = _judged(touch, touched, made, _felt(touch, touched.stream.stamp, onsets))
+            contact[name] = _judged(touch, touched, made, _detected(touch, touched.stream.stamp, onsets))
         free = play_again(alone, found, use)
         row[name] = {
             "alarms": int(counted[begun(free.alarm)].sum()),
@@ -67,13 +67,13 @@ def _about(touch: Touching) -> Row:
     }
 
 
-def _felt(touch: Touching, stamp: FloatArray, onsets: list[int]) -> int | None:
+def _detected(touch: Touching, stamp: FloatArray, onsets: list[int]) -> int | None:
     """Return the step of the first alarm that a contact caused, if there is one."""
     return next((i for i in onsets if touch.onset(_ONSET_N) < stamp[i] <= touch.end + _LATE_S), None)
 
 
 def _judged(touch: Touching, touched: Course, made: Played, step: int | None) -> Row:
-    """Say how late a contact was felt, what the cues were, and on which link it was taken to be."""
+    """Say how late a contact was detected, what the cues were, and on which link it was taken to be."""
     parts, stamp = model().parts, touched.stream.stamp
     true = int(np.flatnonzero(parts == touch.link)[0])
     during = (stamp > touch.onset(_ONSET_N)) & (stamp <= touch.onset(_ONSET_N) + 0.1)

@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.impacts.kinds import GROUPS, KINDS
-from pretouch_lab.studies.located import COLUMNS, FELT, FIRM, NOTE, SIDES, chosen, compared
+from pretouch_lab.studies.located import COLUMNS, DETECTED, FIRM, NOTE, SIDES, chosen, compared
 from pretouch_lab.tables import plain
 
 ALL, LATER = "all", "alarm both ways"
@@ -32,7 +32,7 @@ def summarise(rows: list[Row]) -> Row:
 
 
 def _where(rows: list[Row]) -> list[Row]:
-    """Places said of firm contacts, of all that were felt, and of these a while after the alarm: by way and kind."""
+    """Places said of firm contacts, of all detected ones, and of these a while after the alarm: by way and kind."""
     found = []
     for way, name in dict.fromkeys((row["way"], row["profile"]) for row in rows):
         contacts = [c for row in rows if (row["way"], row["profile"]) == (way, name) for c in row["contacts"]]
@@ -41,7 +41,7 @@ def _where(rows: list[Row]) -> list[Row]:
                 c | {"where": {side: c[side]["where"] for side in SIDES}} for c in contacts if kind in (ALL, c["kind"])
             ]
             later = [{side: c[side].get("where_later") for side in SIDES} for c in own]
-            sets = {which: [c["where"] for c in chosen(own, which)] for which in (FIRM, FELT)}
+            sets = {which: [c["where"] for c in chosen(own, which)] for which in (FIRM, DETECTED)}
             sets[LATER] = [said for said in later if all(said.values())]
             found += [
                 {"way": way, "profile": name, "kind": kind, "of": which} | compared(said)
@@ -70,7 +70,7 @@ def _share(contacts: list[Row], key: str) -> list[int]:
 
 
 def _paired(contacts: list[Row]) -> Row:
-    """Of contacts felt either way: how many were felt earlier and later with IMUs, and the mean of the difference."""
+    """Of contacts detected either way: how many earlier and later with IMUs, and the mean of the difference."""
     both = [(c["with"]["delay_s"], c["without"]["delay_s"]) for c in contacts]
     gained = [a - b for a, b in both if a is not None and b is not None]
     return {
@@ -105,7 +105,7 @@ def tables(part: Row) -> list[TextTable]:
             "Each number without, then with. Way: usual, datagrams every 20 ms and a vibration of 0.3 m/s^2; calm 0.1,"
             " shaken 0.5 m/s^2; at once, datagrams every 2.5 ms. Impact: a hand of 0.6 kg and 75 N/mm at 0.1 to 0.5"
             " m/s. Push: 20 N, risen in 20 to 300 ms. Delay: from the true force passing 1 N. Change: mean of contacts"
-            " felt either way.",
+            " detected either way.",
         ),
         tabulated(
             f"The same by group of links, way {first}",
@@ -119,14 +119,14 @@ def tables(part: Row) -> list[TextTable]:
             own,
             "Cue: contacts with a gain of 2 or more within 100 ms. IMU: the link with the largest gain is the touched"
             " one, of these. Torques: so is that of the sequential test's best force, 30 ms after its alarm, of the"
-            " contacts felt. Both: with the gains of the accelerometers. +-1: or a link next to it.",
+            " contacts detected. Both: with the gains of the accelerometers. +-1: or a link next to it.",
         ),
         tabulated(
             "Where contacts are said to be",
             (("way", plain("way")), kind, ("of", plain("of")), *COLUMNS),
             part["where"],
-            f"{NOTE} An impact ends after 10 ms, and little is felt by then. Alarm both ways: contacts that gave one"
-            " without and with, each judged 30 ms after its own.",
+            f"{NOTE} An impact ends after 10 ms, and little is detected by then. Alarm both ways: contacts that gave"
+            " one without and with, each judged 30 ms after its own.",
             names=3,
         ),
         tabulated(

@@ -35,7 +35,7 @@ def test_objects_on_both_sides_narrow_the_band_from_above_and_below(trials):
 def test_the_push_is_felt_and_goes_away_from_the_hand(trials):
     row, record = trials["paper"]
     assert row["contact"]
-    assert row["felt"]
+    assert row["detected"]
     assert 0 < row["detection_delay_s"] < row["push_s"] + 0.3
     assert 6.0 < row["filtered_at_detection_n"] < row["raw_at_detection_n"]
     hardest = record.true_force[np.linalg.norm(record.true_force, axis=1).argmax()]
@@ -68,7 +68,7 @@ def test_widths_are_those_of_the_steps(trials):
 
 def test_a_push_that_never_touched_has_no_results(trials):
     row = between.results(trials["blind"][1], None)
-    assert row["contact"] is row["felt"] is False
+    assert row["contact"] is row["detected"] is False
     assert row["detection_delay_s"] is row["both_lowered_at_touch"] is None
     assert row["false_detections"] == len(trials["blind"][1].reactions())
 
@@ -86,9 +86,9 @@ def test_body_and_hand_are_on_opposite_sides_and_move_with_the_seed():
 
 def test_summary_and_table_count_what_the_rows_say(trials):
     rows = [json.loads(json.dumps(row, allow_nan=False)) for row, _ in trials.values()]
-    blind, paper = between.summarise([*rows, {**rows[1], "felt": False, "detection_delay_s": None}])["cells"]
+    blind, paper = between.summarise([*rows, {**rows[1], "detected": False, "detection_delay_s": None}])["cells"]
     assert (blind["trials"], paper["trials"]) == (1, 2)
-    assert (paper["felt"], paper["contacts"]) == (1, 2)
+    assert (paper["detected"], paper["contacts"]) == (1, 2)
     assert paper["detection_delay_s"]["n"] == 1
     assert paper["upper_least_n_y"]["median"] == rows[1]["upper_least_n"][1]
     (table,) = between.tables({"cells": [blind, paper]})

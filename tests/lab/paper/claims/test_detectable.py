@@ -192,7 +192,8 @@ def entry(size, detected, events=10):
     [([0, 9, 10], 6.0), ([9, 8, 10], 8.0), ([10, 10, 10], 4.0), ([10, 10, 8], None), ([0, 0, 0], None)],
 )
 def test_a_size_is_felt_if_all_larger_ones_are_too(detected, expected):
-    assert detectable.smallest_felt([entry(s, d) for s, d in zip((4.0, 6.0, 8.0), detected, strict=True)]) == expected
+    sizes = [entry(s, d) for s, d in zip((4.0, 6.0, 8.0), detected, strict=True)]
+    assert detectable.smallest_detected(sizes) == expected
 
 
 @pytest.fixture(scope="module")
@@ -226,7 +227,7 @@ def test_summary_tables_and_figure_of_an_unfinished_run(rows):
     found = {(c["shape"], c["detector"], c["object"], c["direction"]): c for c in summary["cells"]}
     raw = found["push", "raw", "near", "axis"]
     assert [e["size"] for e in raw["sizes"]] == [0.0, 30.0]
-    assert raw["smallest_felt"] == 30.0
+    assert raw["smallest_detected"] == 30.0
     assert raw["sizes"][1]["fraction"] == 1.0
     assert raw["sizes"][1]["delay_s"]["n"] == 1
     forces, ramps = detectable.EXPERIMENT.tables(summary)
