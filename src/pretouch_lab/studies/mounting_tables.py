@@ -74,7 +74,7 @@ def _names(many: bool) -> tuple[Column, ...]:
     def misplaced(cell: Row) -> str:
         return error(cell) + (f"\n{cell['profile']}\n{cell['restrictions']}" if many else "")
 
-    return ("error", misplaced), ("declared", lambda cell: "yes" if cell["told"] == "told" else "")
+    return ("error", misplaced), ("stated", lambda cell: "yes" if cell["told"] == "told" else "")
 
 
 def _forces(cells: list[Row], many: bool) -> TextTable:
@@ -95,7 +95,7 @@ def _forces(cells: list[Row], many: bool) -> TextTable:
         columns,
         cells,
         "Each unit sits this far from where the controller believes it to be, in a direction of its own, or is turned"
-        " by this angle about an axis of its own; declared: the skin file says so as standard deviations. Columns as"
+        " by this angle about an axis of its own; stated: the skin file says so as standard deviations. Columns as"
         " in the static tables; below, the median of the ratios trial by trial with their 10-90 %. Most: largest of the"
         " true 20 ms peaks. Missed: of the readings that show the board, those that the controller took for the arm or"
         " the room. Detected: of all contacts. False: detections before the contact.",

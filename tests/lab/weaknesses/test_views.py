@@ -11,7 +11,7 @@ from pretouch.sim.scene import fixtures
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.weaknesses import views
 
-UNFILTERED = "paper:perception.filter_views=no"
+UNFILTERED = "paper:perception.self_margin_m=none"
 
 
 @pytest.fixture(scope="module")
