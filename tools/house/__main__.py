@@ -37,7 +37,6 @@ class Measure:
 def measures() -> list[Measure]:
     """Measure the house."""
     product, lab = Source(ROOT / "src/pretouch"), Source(ROOT / "src/pretouch_lab")
-    lines, lab_lines = sum(product.files.values()), sum(lab.files.values())
     functions = product.functions + lab.functions
     longest_file = max((product.files | lab.files).items(), key=lambda item: item[1])
     longest, widest = max(functions, key=lambda f: f.lines), max(functions, key=lambda f: f.parameters)
@@ -46,24 +45,19 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product", lines, 49_720, 35_000),
-        Measure("files of the product", len(product.files), 434, 300),
-        Measure("lines of product and lab", lines + lab_lines, 69_330, 50_000),
-        Measure("lines of the largest file", longest_file[1], 354, 350, str(longest_file[0].relative_to(ROOT / "src"))),
+        Measure("lines of the product, comments aside", product.lines, 49_720, 35_000),
+        Measure("files of the product", len(product.files), 420, 300),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 69_330, 50_000),
+        Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
         Measure("lines of functions, 95th percentile", quantiles([f.lines for f in functions], n=20)[-1], 27),
-        Measure("lines of the longest function", longest.lines, 95, 60, longest.place),
-        *(
-            Measure(
-                f"comments in {name} [%]", 100 * Source(ROOT / "src/pretouch" / name).comment_share, 0, 5, least=True
-            )
-            for name in ("control", "contact", "perception")
-        ),
+        Measure("lines of the longest function", longest.lines, 60, 60, longest.place),
+        *(_comments(package) for package in ("control", "contact", "perception")),
         Measure("words of documents by hand", sum(words_by_hand(ROOT).values()), 42_000, 42_000),
         Measure("lines of README", len((ROOT / "README.md").read_text().splitlines()), 150, 150),
-        Measure("parameters of a profile", len(values), 146, 140),
-        Measure("booleans among them", sum(isinstance(value, bool) for value in values), 16, 6),
+        Measure("parameters of a profile", len(values), 125, 140),
+        Measure("booleans among them", sum(isinstance(value, bool) for value in values), 8, 6),
         Measure("import pretouch, processor [s]", _import_s(), 0.05, 0.05),
         Measure("modules in an import cycle", len(cycle), 0, 0, " > ".join(cycle)),
     ]
@@ -71,7 +65,7 @@ def measures() -> list[Measure]:
 
 def _comments(package: str) -> Measure:
     share = Source(ROOT / "src/pretouch" / package).comment_share
-    return Measure(f"comments in {package} [%]", round(100 * share, 1), 0.8, 5, least=True)
+    return Measure(f"comments in {package} [%]", round(100 * share, 1), 5, 5, least=True)
 
 
 def _values(group: object) -> list[object]:
@@ -93,10 +87,10 @@ def _number(value: float | None) -> str:
 def main() -> int:
     """Print the measures; return 1 where one is beyond what is held."""
     found = measures()
-    print(f"{'':36}{'now':>8}{'held':>8}{'aim':>8}")
+    print(f"{'':42}{'now':>8}{'held':>8}{'aim':>8}")
     for measure in found:
         numbers = "".join(f"{_number(number):>8}" for number in (measure.value, measure.held, measure.aim))
-        print(f"{measure.name:36}{numbers}  {'' if measure.kept else 'BEYOND '}{measure.where}".rstrip())
+        print(f"{measure.name:42}{numbers}  {'' if measure.kept else 'BEYOND '}{measure.where}".rstrip())
     beyond = [measure.name for measure in found if not measure.kept]
     if beyond:
         print(f"Beyond what is held: {', '.join(beyond)}. Make it smaller, or say in tools/house why it must grow.")

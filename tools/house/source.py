@@ -39,16 +39,32 @@ class Source:
         """All functions, nested ones too."""
         return [found for path in self.files for found in _functions(path, self.folder)]
 
+    @cached_property
+    def _tokens(self) -> list[list[tokenize.TokenInfo]]:
+        found = []
+        for path in self.files:
+            with tokenize.open(path) as file:
+                found.append(list(tokenize.generate_tokens(file.readline)))
+        return found
+
+    @cached_property
+    def _comments(self) -> list[tokenize.TokenInfo]:
+        tokens = (token for file in self._tokens for token in file)
+        return [token for token in tokens if token.type == tokenize.COMMENT and not _TO_TOOLS.match(token.string)]
+
+    @property
+    def lines(self) -> int:
+        """Lines but those that hold a comment alone: a reason costs nothing."""
+        return sum(self.files.values()) - sum(token.line.lstrip().startswith("#") for token in self._comments)
+
     @property
     def comment_share(self) -> float:
         """Lines that hold a comment, as a share of those that hold code or a docstring."""
-        comments = code = 0
-        for path in self.files:
-            with tokenize.open(path) as file:
-                tokens = list(tokenize.generate_tokens(file.readline))
-            comments += sum(token.type == tokenize.COMMENT and not _TO_TOOLS.match(token.string) for token in tokens)
-            code += len({line for token in tokens if token.type not in _BLANK for line in _lines(token)})
-        return comments / max(code, 1)
+        code = sum(
+            len({line for token in tokens if token.type not in _BLANK for line in _lines(token)})
+            for tokens in self._tokens
+        )
+        return len(self._comments) / max(code, 1)
 
 
 _TO_TOOLS = re.compile(r"#\s*(fmt|noqa|type)\b")

@@ -18,7 +18,6 @@ from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant
-from pretouch.sim.units import SentImus
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, ImuReadings, RobotState, Touched
 from pretouch_lab.baselines.accelerometers import Accelerometers
 from pretouch_lab.benchmarks.detection.arm import (
@@ -35,6 +34,7 @@ from pretouch_lab.benchmarks.detection.contacts import Toucher, Touching, place_
 from pretouch_lab.benchmarks.detection.stream import Stream
 from pretouch_lab.detector_alone import DetectorAlone
 from pretouch_lab.studies.impacts.kinds import HELD_S, IMPACTS_M_S, KINDS, LINKS, PUSH_N, PUSHES_S, pulse
+from pretouch_lab.studies.impacts.units import SentImus
 
 LOOK = 3
 """Steps after an alarm at which the touched link is asked for: by then the units' datagrams have come."""

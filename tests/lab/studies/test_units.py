@@ -8,7 +8,7 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
-from pretouch.sim.units import DATAGRAM_S, UnitsWithImus
+from pretouch_lab.studies.impacts.units import DATAGRAM_S, UnitsWithImus
 
 
 def units(model, skin, imu, **radio):
