@@ -279,6 +279,18 @@ def test_rows_that_were_violated_on_the_way_leave_no_rounding():
     assert not answer.slack.any()
 
 
+@pytest.mark.parametrize("seed", [210, 223, 2534, 2547, 3900, 5214, 8212, 9219, 10970, 13595, 14760, 14930, 17572])
+def test_an_answer_of_zero_on_bounds_and_rows_is_found(seed: int):
+    # as at rest with objects near: what rounding leaves of the gradient shrinks with x, down to the least of numbers
+    rng = np.random.default_rng(seed)
+    count = 4 if seed == 9219 else 2
+    lower, upper = -rng.uniform(0, 0.3, 7) * (rng.random(7) < 0.6), rng.uniform(0.01, 0.3, 7) * (rng.random(7) < 0.7)
+    rows = ApproachRows(rng.uniform(-0.1, 0.5, (count, 7)), np.zeros(count), soft=True)
+    answer = solve(Cost(np.eye(7), np.zeros(7)), lower, upper + 1e-3, rows, 1e6, np.full(7, 1e-4))
+    assert answer.outcome is QpOutcome.SOLVED
+    np.testing.assert_allclose(answer.qd, 0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(300))
 def test_rows_that_meet_in_the_answer_do_not_hold_it_up(seed: int):
     # rows drawn through one point, so that ties abound

@@ -24,6 +24,9 @@ _ROUNDING = 1e-13
 _REST = 1e-11
 """Length of a step from which no other is needed [rad/s]."""
 
+_LEAST = 1e-6
+"""Velocity below which rounding is not taken to shrink further [rad/s]: at an answer of 0 it would vanish."""
+
 
 class Problem(NamedTuple):
     """What is minimised."""
@@ -263,7 +266,7 @@ def _box_minimum(
             gradient[i], terms = f[i], abs(f[i])
             for j in range(n):
                 gradient[i] += H[i, j] * x[j]
-                terms += abs(H[i, j] * x[j])
+                terms += abs(H[i, j]) * max(abs(x[j]), _LEAST)
             size = max(size, terms)
             if at_bound[i] == 0:
                 free[count] = i
