@@ -25,10 +25,6 @@ from pretouch_lab.engine import missing, rows_of, run_tasks
 SMALL = Request(("static",), seeds=1, profiles=("blind",))
 
 
-def open_folder(request, out):
-    request.open(out)
-
-
 def run_campaign(request, out, progress):
     request.open(out)
     run_tasks(request.tasks(out), out, progress)
@@ -80,7 +76,7 @@ def test_tasks_take_all_cells_seed_by_seed():
 def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
     one = replace(SMALL, seeds=1)
     seen = []
-    open_folder(one, tmp_path)
+    one.open(tmp_path)
     tasks = one.tasks(tmp_path)
     assert missing(tasks) == tasks
     run_campaign(one, tmp_path, seen.append)
@@ -104,11 +100,11 @@ def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("change", [{"seeds": 5}, {"stiffness": (2000.0,)}, {"restrictions": ("floor",)}])
 def test_a_folder_of_another_run_is_not_touched(tmp_path, change):
-    open_folder(SMALL, tmp_path)
+    SMALL.open(tmp_path)
     before = (tmp_path / "run.json").read_text()
     (name,) = change
     with pytest.raises(ExperimentError, match=rf"holds a run with {name} = .*: give another --out"):
-        open_folder(replace(SMALL, **change), tmp_path)
+        replace(SMALL, **change).open(tmp_path)
     assert (tmp_path / "run.json").read_text() == before
 
 
@@ -116,45 +112,45 @@ def test_a_changed_skin_file_is_noticed(tmp_path):
     file, out = tmp_path / "skin.toml", tmp_path / "out"
     file.write_bytes(PAPER_SKIN.read_bytes())
     request = replace(SMALL, skin=str(file))
-    open_folder(request, out)
-    open_folder(request, out)
+    request.open(out)
+    request.open(out)
     file.write_bytes(PAPER_SKIN.read_bytes().replace(b"-0.108", b"-0.109"))
     with pytest.raises(ExperimentError, match="but the skin file has changed since: give another --out"):
-        open_folder(request, out)
+        request.open(out)
     file.unlink()
     with pytest.raises(SkinError, match="cannot be read: No such file"):
-        open_folder(request, out)
+        request.open(out)
 
 
 def test_a_changed_built_in_skin_is_noticed(tmp_path, monkeypatch):
-    open_folder(SMALL, tmp_path / "out")
+    SMALL.open(tmp_path / "out")
     (tmp_path / "skin.toml").write_text("")
     monkeypatch.setattr(campaign, "skin_file", lambda arm: tmp_path / "skin.toml")
     with pytest.raises(ExperimentError, match="but the skin file has changed since"):
-        open_folder(SMALL, tmp_path / "out")
+        SMALL.open(tmp_path / "out")
 
 
 def test_changed_parameters_of_a_profile_are_noticed(tmp_path, monkeypatch):
-    open_folder(SMALL, tmp_path)
+    SMALL.open(tmp_path)
     for name in ("paper", "blind"):
         task = replace(PROFILES[name].task, control_period_s=0.5 * PROFILES[name].task.control_period_s)
         monkeypatch.setitem(PROFILES, name, replace(PROFILES[name], task=task))
         if name == "paper":
-            open_folder(SMALL, tmp_path)  # not one that it asks for
+            SMALL.open(tmp_path)  # not one that it asks for
     with pytest.raises(ExperimentError, match="but the parameters of profile blind have changed since"):
-        open_folder(SMALL, tmp_path)
+        SMALL.open(tmp_path)
 
 
 @pytest.mark.parametrize("content", [b"{", b"[]", b"3", b"\xff", b"[" * 100_000, b"9" * 5000])
 def test_a_damaged_folder_is_named(tmp_path, content):
     (tmp_path / "run.json").write_bytes(content)
     with pytest.raises(ExperimentError, match=r"run\.json is damaged"):
-        open_folder(SMALL, tmp_path)
+        SMALL.open(tmp_path)
 
 
 @pytest.mark.parametrize("content", [b"{", b"{}", b"[]", b"\xff", b"[" * 100_000, b"", None])
 def test_a_damaged_trial_is_run_again(tmp_path, monkeypatch, content):
-    open_folder(SMALL, tmp_path)
+    SMALL.open(tmp_path)
     first, *others = SMALL.tasks(tmp_path)
     first.file.parent.mkdir(parents=True)
     for task in others:
@@ -274,7 +270,7 @@ def test_a_file_is_written_whole_or_not_at_all_however_long_its_name(tmp_path):
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ExperimentError, match="cannot be used: Not a directory: give another --out"):
-        open_folder(SMALL, tmp_path / "file" / "below")
+        SMALL.open(tmp_path / "file" / "below")
 
 
 @contextmanager
