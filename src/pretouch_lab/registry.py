@@ -69,6 +69,12 @@ def summarise(trials: list[Row]) -> dict[str, Any]:
     }
 
 
+def conclusions(summary: dict[str, Any]) -> list[str]:
+    """What came out of the experiments that say so."""
+    told = (experiment.conclude(summary[name]) for name, experiment in EXPERIMENTS.items() if name in summary)
+    return [said for said in told if said]
+
+
 def tables(summary: dict[str, Any]) -> list[TextTable]:
     """All tables of such summaries."""
     return [

@@ -36,6 +36,7 @@ def write_report(parts: list[tuple[Request, Path]], summary: dict[str, Any], fol
 
 def _write(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: Path) -> Path:
     contents: list[Html] = []
+    front: list[Html] = []
     sections: list[Html] = []
     words: list[str] = []
     for title, group in GROUPS.items():
@@ -49,11 +50,15 @@ def _write(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: P
             made = experiment.tables(summary[experiment.name])
             words += [markdown(table, 2) for table in made]
             drawn = _pictures(parts, experiment, summary[experiment.name], folder)
+            said = experiment.conclude(summary[experiment.name])
+            if said:
+                front += [element("p", said, "summary"), *drawn[:1]]
+                drawn = drawn[1:]
             parts_of.append(element("div", joined([*map(titled_table, made), *drawn]), anchor=experiment.name))
         sections.append(element("section", joined(parts_of)))
     own = [element("h2", "This implementation"), _picture(_framework(), folder)]
     ran = element("summary", "What was run") + element("p", joined((_about(request) for request, _ in parts), "<br>"))
-    head = [element("h1", _TITLE), element("details", Html(ran)), element("ul", joined(contents))]
+    head = [element("h1", _TITLE), *front, element("ul", joined(contents)), element("details", Html(ran))]
     page = folder / "index.html"
     page.write_text(document(_TITLE, joined([*head, *sections, element("section", joined(own))]), _NOTE), "utf-8")
     (folder / "tables.md").write_text("\n".join(words), encoding="utf-8")

@@ -27,8 +27,10 @@ class Links(HTMLParser):
     def __init__(self):
         super().__init__()
         self.images, self.tables, self.anchors, self.ids = [], 0, [], set()
+        self.order = []
 
     def handle_starttag(self, tag, attrs):
+        self.order += [tag] if tag in ("p", "img", "table") else []
         if tag == "img":
             self.images.append(dict(attrs)["src"])
         self.tables += tag == "table"
@@ -57,9 +59,10 @@ def test_the_page_shows_each_table_and_picture(request_and_folder):
     links = Links()
     links.feed(page.read_text())
     assert links.tables == 2
-    assert links.images == ["static.png", "dynamic.png", "framework.png"]
+    assert links.images == ["static.png", "dynamic-compared.png", "dynamic.png", "framework.png"]
     assert links.anchors == ["static", "dynamic"]
     assert set(links.anchors) <= links.ids
+    assert links.order[:4] == ["p", "img", "p", "img"], "the page begins with what came out"
     for name in links.images:
         with Image.open(out / name) as picture:
             assert picture.width >= 1000

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -12,17 +13,22 @@ from pretouch.atomic_write import write_json
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch_lab.campaign import (
-    Request,
-)
+from pretouch.text_table import TextTable
+from pretouch_lab.campaign import Request
 from pretouch_lab.cli.progress import bar
 from pretouch_lab.engine import missing, rows_of, run_tasks
-from pretouch_lab.registry import summarise, tables
+from pretouch_lab.registry import conclusions, summarise, tables
 from pretouch_lab.report import write_report
+from pretouch_lab.rows import Row
 
 
-def run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) -> None:
-    """Run one or more campaigns; whatever happens, summarise and keep what was finished."""
+def run_all(
+    parts: list[tuple[Request, Path]], folder: Path, json_file: Path, what: Callable[[Row], list[TextTable]] = tables
+) -> None:
+    """Run one or more campaigns; whatever happens, summarise and keep what was finished.
+
+    In the end it says what came out, after the tables that `what` makes of the summary.
+    """
     for _, out in parts:
         _check_apart(json_file, out)
     for request, out in parts:
@@ -46,7 +52,9 @@ def run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) ->
         raise
     summary = _keep(parts, json_file)["summary"]
     console = Console(highlight=False)
-    show(console, tables(summary))
+    show(console, what(summary))
+    for said in conclusions(summary):
+        console.print(f"{said}\n")
     console.print(f"Figures and page: {write_report(parts, summary, folder)}", soft_wrap=True, markup=False)
     console.print(f"Numbers: {json_file}", soft_wrap=True, markup=False)
 

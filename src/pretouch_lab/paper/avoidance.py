@@ -7,12 +7,14 @@ import numpy as np
 from pretouch.control.path import Circle
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
+from pretouch.recording.run_record import RunRecord
 from pretouch.robot.model import RobotModel
 from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.paper.conclusions import avoidance_conclusion
 from pretouch_lab.rows import Row, rounded
 from pretouch_lab.summary import avoidance_summary
 from pretouch_lab.tables import avoidance_tables
@@ -27,6 +29,7 @@ PLACES_M = {"beside": 0.43, "inside": 0.35}
 """Distance of the centre of the person's hand from the plane y = 0 [m]. The side of the robot's hand comes to 0.35 m on
 the free circle: beside is 3 cm clear of it, inside half of the person's hand is in its way."""
 _SPREAD_M = 0.03
+_COMPARED = "Speed of the end-effector and true force on the arm with a hand beside the path and inside it"
 
 
 def cells(grid: Grid) -> list[Cell]:
@@ -86,15 +89,21 @@ def gaps(record: Record, model: RobotModel, radius: float) -> FloatArray:
 
 def _draw(sources: Sources) -> list[Picture]:
     from pretouch_lab.paper.figures.circle import circle_figure
+    from pretouch_lab.paper.figures.compared import compared_figure
 
+    scenes: dict[str, dict[str, RunRecord]] = {}
     for cell in sources.summary["cells"]:
-        if cell["place"] == "beside" and cell["profile"] != "blind":
-            where = {"place": "beside", "restrictions": cell["restrictions"]}
-            trace = sources.trace(Cell(NAME, cell["profile"], where))
-            if trace is not None:
-                figure = circle_figure(trace, profile(cell["profile"]))
-                return [Picture("avoidance", "End-effector path with a hand beside it", figure)]
-    return []
+        trace = sources.trace(Cell(NAME, cell["profile"], {key: cell[key] for key in ("place", "restrictions")}))
+        if trace is not None:
+            scenes.setdefault(f"hand {cell['place']} the path", {}).setdefault(cell["profile"], trace)
+    made = [Picture("avoidance-compared", _COMPARED, compared_figure(scenes))] if scenes else []
+    for name, trace in scenes.get("hand beside the path", {}).items():
+        if name != "blind":
+            text = "End-effector path with a hand beside it"
+            return [*made, Picture("avoidance", text, circle_figure(trace, profile(name)))]
+    return made
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, avoidance_summary, avoidance_tables, _draw)
+EXPERIMENT = Experiment(
+    NAME, cells, trial, lambda _: _DURATION_S, avoidance_summary, avoidance_tables, _draw, avoidance_conclusion
+)

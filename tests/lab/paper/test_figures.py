@@ -23,6 +23,7 @@ from pretouch_lab.paper.figures import framework, marks
 from pretouch_lab.paper.figures.catalogue import CATALOGUE
 from pretouch_lab.paper.figures.circle import circle_figure
 from pretouch_lab.paper.figures.close_up import close_up_figure
+from pretouch_lab.paper.figures.compared import compared_figure
 from pretouch_lab.paper.figures.force_difference import force_difference_figure
 from pretouch_lab.paper.figures.interaction import interaction_figure
 from pretouch_lab.registry import EXPERIMENTS
@@ -61,6 +62,7 @@ def drawn(trace):
         "interaction": interaction_figure(trace, UNITS, PAPER),
         "close-up": close_up_figure(trace, UNITS, PAPER),
         "force-difference": force_difference_figure(pairs, ["paper"]),
+        "compared": compared_figure({"pushed": {"blind": trace, "paper": trace}, "alone": {"blind": trace}}),
     }
 
 
@@ -68,7 +70,7 @@ def line(axes, label):
     return next(found for found in axes.lines if found.get_label() == label)
 
 
-@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
+@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference", "compared"])
 def test_what_must_be_told_apart_differs_without_colour(name):
     for axes in drawn(made_trace())[name].axes:
         looks = [
