@@ -45,6 +45,7 @@ def test_a_hand_dragged_into_the_arm_by_mouse_leads_to_a_reaction_and_back_to_th
         assert np.allclose(target(simulation)[1:], start[1:], atol=1e-6)
         visitor.wait_for("mode", Mode.REACT.name)
         visitor.keep("reacting", tmp_path)
+        visitor.tab("Hand")
         visitor.type("x [m]", 1.2)
         visitor.wait_for("mode", Mode.TRACK.name)
         assert target(simulation)[0] == 1.2
@@ -60,8 +61,8 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
     simulation = LiveSimulation()
     with live(simulation) as served, chromium() as visitor:
         visitor.open(served)
-        visitor.tab("Controller")
         visitor.choose("Profile", "blind")
+        visitor.tab("Controller")
         visitor.wait_until(lambda: simulation.world.profile.name == "blind")
         visitor.wait_until(lambda: visitor.value("Restrictions") == "off")
 
