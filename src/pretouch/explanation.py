@@ -16,6 +16,8 @@ _REST_M_S = 0.015
 """Speed of the end-effector below which it rests [m/s], of a measured velocity with its noise."""
 _REST_RAD_S = 0.01
 """Largest commanded joint velocity of an arm that is held still [rad/s]: 5 mm/s at half a metre."""
+_ANSWER_M_S = 1e-3
+"""Speed of the end-effector from which on a reaction moves the arm [m/s]."""
 _ASKED_M_S = 0.005
 """Speed from which on a motion is asked for [m/s]."""
 
@@ -64,8 +66,13 @@ def resumable(step: ControlStep) -> bool:
 
 
 def still(step: ControlStep) -> bool:
-    """Whether the arm is in contact and does not move: what pushes it is below what moves it."""
+    """Whether the arm is in contact and does not move."""
     return step.mode is Mode.REACT and float(np.abs(step.command).max(initial=0.0)) < _REST_RAD_S
+
+
+def answers(step: ControlStep) -> bool:
+    """Whether the arm moves with a contact."""
+    return not still(step) and float(np.linalg.norm(step.reaction_velocity)) >= _ANSWER_M_S
 
 
 def binding(step: ControlStep) -> BoolArray:

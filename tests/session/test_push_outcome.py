@@ -52,8 +52,9 @@ def test_a_push_that_a_test_of_the_torques_misses_says_the_evidence(step: Contro
     assert said == "The push of 15 N was not detected: the evidence came to 0.62, and 1 would have been a contact."
 
 
-def test_a_push_while_the_window_fills_says_so(step: ControlStep) -> None:
-    assert outcome(step, all={"armed": False}).endswith("contacts yet, for its force window was filling.")
+def test_a_push_of_an_arm_that_holds_says_why_it_holds(step: ControlStep) -> None:
+    said = outcome(step, all={"mode": Mode.HOLD, "reason": "The force window is filling.", "evidence": 0.0})
+    assert said == "The push of 15 N was not detected: the arm held (The force window is filling)."
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pretouch.explanation import still
+from pretouch.explanation import answers
 from pretouch.types import ControlStep, FloatArray, Mode
 
 _GRACE_S = 0.3
@@ -33,8 +33,7 @@ class PushOutcome:
         if self._detected is None and step.contact is not None:
             self._detected = step.stamp - self._begin
         elif self._detected is not None:
-            moves = step.mode is Mode.REACT and bool(np.any(np.abs(step.reaction_velocity) > 1e-3)) and not still(step)
-            self._moved = self._moved or moves
+            self._moved = self._moved or answers(step)
         return self._sentence() if step.stamp >= self._end + _GRACE_S else ""
 
     def _sentence(self) -> str:
@@ -42,15 +41,15 @@ class PushOutcome:
         if self._detected is not None:
             answer = "the arm moved with it" if self._moved else "the arm held still: it was below what moves the arm"
             return f"{push} was detected after {self._detected:.2f} s, and {answer}."
-        return f"{push}{self._before}." if self._before else f"{push} was not detected: {_lack(self._nearest)}."
+        return f"{push}{self._before}." if self._before else f"{push} was not detected: {lacked(self._nearest)}."
 
 
-def _lack(step: ControlStep | None) -> str:
-    """Say what a contact would have taken in the step that was nearest to one."""
+def lacked(step: ControlStep | None) -> str:
+    """Say what a contact would have taken in the step that was nearest to one, as the end of a sentence."""
     if step is None:
         return "no control step ran meanwhile"
-    if not step.armed:
-        return "the controller could not detect contacts yet, for its force window was filling"
+    if step.mode is Mode.HOLD:
+        return f"the arm held ({step.reason.rstrip('.')})"
     limits, force = step.thresholds, step.filtered_force - step.thresholds.mean
     band = np.where(force > 0, limits.upper - limits.mean, limits.mean - limits.lower)
     share = np.abs(force) / band

@@ -78,7 +78,9 @@ class Controls:
         profile = gui.add_dropdown("Profile", tuple(PROFILES))
         self._choice(profile, self._choose_profile, "profile", lambda: self._base)
         self._pause = self._button("Pause", self._toggle_pause, icon="PLAYER_PAUSE", color="gray")
-        self._resume = self._button(_NO_RESUME, simulation.resume, hint="Leave a hold that waits for you.")
+        self._resume = self._button(
+            _NO_RESUME, simulation.resume, hint="Leave a hold that waits for you.", disabled=True
+        )
         self._button("Reset", simulation.reset, color="gray", hint="Restart at time 0 with the current settings.")
         self._record = self._button("Record", partial(toggle_recording, simulation), color="gray")
 
@@ -250,8 +252,8 @@ class Controls:
 
     def offer_resume(self, possible: bool) -> None:
         """Let the button to resume be pressed while a hold waits for it; else it says that none does."""
-        self._resume.disabled = not possible
-        self._resume.label = "Resume" if possible else _NO_RESUME
+        if self._resume.disabled is possible:
+            self._resume.disabled, self._resume.label = not possible, "Resume" if possible else _NO_RESUME
 
     def show_hand(self, target: FloatArray) -> None:
         """Have the sliders show where the hand is to be (3,) [m]."""
