@@ -34,8 +34,8 @@ _WARM_UP_STEPS = 3
 _PUSH_NM = 50.0
 """External torque of each joint in a contact that is made up [Nm]."""
 """Steps of each kind: what one sees for the first time the next one remembers."""
-_NEWS_S = 2.0
-"""Longest time the first state is waited for [s]: then the controller says how old the newest is. The arm stands."""
+_NEWS_S = 0.5
+"""Longest time the first state is waited for [s]: then the controller says how old the newest is."""
 _LOOK_S = 0.001
 """Between two looks at whether a state has come [s]."""
 

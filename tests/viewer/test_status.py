@@ -39,7 +39,7 @@ def test_each_word_comes_with_its_sentence_and_the_mode(status: Status, html: Ht
         status.draw(Mode.REACT, Explanation(doing, f"Why {doing.value}."), "1.0 s", "", float(i))
         assert f">{doing.value.upper()}<" in html.sent[-1]
         assert f"Why {doing.value}." in html.sent[-1]
-        assert "REACT · 1.0 s" in html.sent[-1]
+        assert "<span id='mode'>REACT</span> · 1.0 s" in html.sent[-1]
 
 
 def test_it_is_sent_five_times_a_second_and_at_once_when_there_is_news(status: Status, html: Html) -> None:

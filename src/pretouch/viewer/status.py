@@ -23,7 +23,8 @@ _HEIGHT_PX = 118
 _STYLE = (
     "<style>"
     "div:has(> #status){position:sticky;top:0;z-index:10;background:var(--mantine-color-body,#fff)}"
-    ".mantine-ScrollArea-content div:has(#status){overflow:clip!important}"
+    ".mantine-ScrollArea-content div:has(#status){overflow:clip!important;min-width:0!important}"
+    ".mantine-ScrollArea-content:has(#status){width:100%!important;min-width:0!important}"
     f"@media (max-width:{PHONE_PX}px){{"
     f".mantine-Paper-root:has(#status){{max-height:{_SHEET}%!important}}"
     "div[style*='width: 20em']:has(#status){width:100%!important}"
@@ -59,12 +60,12 @@ class Status:
         if news == self._shown and now - self._sent < PERIOD_S:
             return
         self._sent, self._shown = now, news
-        page = _page(found, f"{mode.name} · {rates}", warning, self.notice)
+        page = _page(mode, found, rates, warning, self.notice)
         if page != self._page:
             self._html.content = self._page = page
 
 
-def _page(found: Explanation, rates: str, warning: str, notice: str) -> str:
+def _page(mode: Mode, found: Explanation, rates: str, warning: str, notice: str) -> str:
     colour = palette.css(_COLOURS[found.doing])
     lines = [
         f"<div style='border-left:6px solid {colour};padding:0 0 2px 10px'>"
@@ -72,7 +73,7 @@ def _page(found: Explanation, rates: str, warning: str, notice: str) -> str:
         f"{found.doing.value.upper()}</div>"
         f"<div id='reason' style='font-size:14px;line-height:1.35'>{escape(found.sentence)}</div></div>",
         f"<div id='rates' style='opacity:.6;margin-top:4px;font-size:11px;font-variant-numeric:tabular-nums'>"
-        f"{escape(rates)}</div>",
+        f"<span id='mode'>{mode.name}</span> · {escape(rates)}</div>",
         _banner("notice", notice, palette.PATH),
         _banner("warning", warning, palette.HOLDING),
     ]
