@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -94,7 +95,7 @@ def test_a_person_types_pushes() -> None:
     arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
     ours, theirs = os.openpty()
     with os.fdopen(theirs) as terminal:
-        typed = TypedPushes(arm.pushes, terminal)
+        typed = TypedPushes(arm, terminal)
         assert typed.possible
         assert not typed.take()
         os.write(ours, b"-y\n0,0,4:0.5\n0,1")
@@ -109,11 +110,27 @@ def test_a_person_types_pushes() -> None:
     os.close(ours)
 
 
+def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(capsys: pytest.CaptureFixture[str]) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.openpty()
+    with os.fdopen(theirs) as terminal:
+        typed = TypedPushes(arm, terminal)
+        os.write(ours, b"0,20,0:0.4\n")
+        for _ in range(650):
+            typed.take()
+            arm.step(None)
+    os.close(ours)
+    (said,) = capsys.readouterr().out.splitlines()
+    found = re.fullmatch(r"The push of 20 N is over. The arm's estimate of it came to ([\d.]+) N; .*", said)
+    assert found is not None
+    assert 15.0 < float(found[1]) < 30.0
+
+
 def test_what_is_typed_and_is_no_push_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
     ours, theirs = os.openpty()
     with os.fdopen(theirs) as terminal:
-        typed = TypedPushes(arm.pushes, terminal)
+        typed = TypedPushes(arm, terminal)
         os.write(ours, b"harder\n")
         typed.take()
         assert "'harder'" in capsys.readouterr().out
@@ -126,7 +143,7 @@ def test_nobody_types_where_there_is_no_terminal(tmp_path: Path) -> None:
     arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
     (tmp_path / "typed").write_text("+y\n")
     with (tmp_path / "typed").open() as file:
-        typed = TypedPushes(arm.pushes, file)
+        typed = TypedPushes(arm, file)
         assert not typed.possible
         typed.take()
     arm.step(None)

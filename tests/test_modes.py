@@ -114,12 +114,12 @@ def test_a_blocked_reaction_goes_on():
 
 def test_an_overrun_says_how_long_it_was():
     state = next_mode(ModeState(Mode.TRACK, ""), {Event.OVERRUN: "0.080 s"}, resume=False)
-    assert "The step before this one was 0.080 s ago: braking" in state.reason
+    assert "The step before this one was 0.080 s ago, for this machine is busy" in state.reason
 
 
 def test_after_a_reaction_the_arm_follows_its_path_again():
     state = next_mode(ModeState(Mode.TRACK, ""), {Event.CONTACT: "12.0 N"}, resume=False)
-    assert (state.mode, state.reason) == (Mode.REACT, "A contact of 12.0 N: moving with it.")
+    assert (state.mode, state.reason) == (Mode.REACT, "A contact of 12.0 N: yielding to what moves the arm.")
     state = next_mode(state, {Event.REACTING: "1.20 s"}, resume=False)
     assert (state.mode, state.reason) == (Mode.REACT, "Moving with a contact: 1.20 s left.")
     assert next_mode(state, {}, resume=False).mode is Mode.TRACK

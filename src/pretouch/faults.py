@@ -94,7 +94,12 @@ def examine(
         faults[Event.UNUSABLE] = f"the step's time stamp is {inputs.stamp}"
     elif abs(now - robot.stamp) > params.state_timeout_s:
         age = now - robot.stamp
-        faults[Event.STATE_STALE] = f"{age:.3f} s old" if age > 0 else f"{-age:.3f} s in the future"
+        faults[Event.STATE_STALE] = (
+            f"{age:.3f} s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow:"
+            " close other programs and check the connection to the arm"
+            if age > 0
+            else f"{-age:.3f} s in the future: let one clock stamp states and steps"
+        )
     sent = (*watch.sent[-int(params.state_timeout_s / period) - 1 :], (watch.stamp, command))
     if now < watch.stamp:
         faults[Event.TIME_BACKWARDS] = f"from {watch.stamp:.3f} s to {now:.3f} s"

@@ -61,7 +61,7 @@ TABLE: tuple[Transition, ...] = (
     ),
     Transition(
         Event.STATE_STALE, _ANY, Mode.HOLD,
-        "The robot's state is {}: check the connection to the arm, then resume.", latches=True,
+        "The robot's state is {}, then resume.", latches=True,
     ),
     Transition(
         Event.SOLVER_FAILED, _ANY, Mode.HOLD,
@@ -76,7 +76,10 @@ TABLE: tuple[Transition, ...] = (
         "Moving with a contact, but the approach limits allow no motion within the acceleration limits: braking.",
     ),
     Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "{}", latches=True),
-    Transition(Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT, "A contact of {}: moving with it."),
+    Transition(
+        Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT,
+        "A contact of {}: yielding to what moves the arm.",
+    ),
     Transition(Event.REACTING, frozenset({Mode.REACT}), Mode.REACT, "Moving with a contact: {} left."),
     Transition(
         Event.CLAMPED, frozenset({Mode.REACT}), Mode.HOLD,
@@ -113,7 +116,8 @@ TABLE: tuple[Transition, ...] = (
     ),
     Transition(
         Event.OVERRUN, _ANY, Mode.HOLD,
-        "The step before this one was {} ago: braking; give the controller a process of its own.",
+        "The step before this one was {} ago, for this machine is busy, perhaps without a real-time kernel: braking,"
+        " then going on. Close other programs, and give the controller a process of its own.",
     ),
     Transition(Event.GIVEN_UP, _ANY, Mode.HOLD, "Given up after {}.", soft=True),
     Transition(
@@ -124,7 +128,8 @@ TABLE: tuple[Transition, ...] = (
     ),
     Transition(
         Event.WINDOW_FILLING, _ANY, Mode.HOLD,
-        "The force window is filling ({}): contacts cannot be distinguished from noise yet.",
+        "The force window is filling ({}): contacts cannot be distinguished from noise yet. The arm moves"
+        " once it is full.",
     ),
     Transition(
         Event.PATH_BLOCKED, frozenset({Mode.TRACK}), Mode.TRACK,

@@ -10,20 +10,30 @@ from pretouch.types import Inputs, Mode, RobotState
 
 UNUSABLE = "The robot's state cannot be used ({}): check the connection to the arm, then resume."
 BACKWARDS = "Time went backwards ({}): let one monotonic clock stamp everything, then resume."
-STALE = "The robot's state is {}: check the connection to the arm, then resume."
+STALE = "The robot's state is {}, then resume."
+OLD = (
+    "{:.3f} s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow: close other"
+    " programs and check the connection to the arm"
+)
+AHEAD = "{:.3f} s in the future: let one clock stamp states and steps"
 BLOCKED = "The approach limits cannot be met within the acceleration limits: braking and trying again."
 BLOCKED_REACT = (
     "Moving with a contact, but the approach limits allow no motion within the acceleration limits: braking."
 )
-CONTACT = "A contact of {}: moving with it."
+CONTACT = "A contact of {}: yielding to what moves the arm."
 REACTING = "Moving with a contact: {} left."
 SILENT = "No usable reading from {}: check the unit's power, radio and sensor; the arm goes on when it is heard again."
 NO_FORCE = (
     "The robot has given no force estimate for {}, as near a singularity, and contacts could not be detected: guide the"
     " arm to another posture."
 )
-OVERRUN = "The step before this one was {} ago: braking; give the controller a process of its own."
-FILLING = "The force window is filling ({}): contacts cannot be distinguished from noise yet."
+OVERRUN = (
+    "The step before this one was {} ago, for this machine is busy, perhaps without a real-time kernel: braking, then"
+    " going on. Close other programs, and give the controller a process of its own."
+)
+FILLING = (
+    "The force window is filling ({}): contacts cannot be distinguished from noise yet. The arm moves once it is full."
+)
 TRACKING = "Following the path."
 
 LARGEST = 1e3
@@ -85,7 +95,7 @@ class Trust:
         else:
             age = inputs.stamp - robot.stamp
             if abs(age) > self.params.state_timeout_s:
-                wrong[STALE] = f"{age:.3f} s old" if age > 0 else f"{-age:.3f} s in the future"
+                wrong[STALE] = OLD.format(age) if age > 0 else AHEAD.format(-age)
         kept = int(self.params.state_timeout_s / period) + 1
         self.sent = [*self.sent[-kept:], (before, command)]
         if self.now < before:

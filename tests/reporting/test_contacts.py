@@ -3,6 +3,8 @@ import pytest
 
 from pretouch.recording.run_record import TrueForces
 from pretouch.reporting.measures import measure
+from pretouch.reporting.sections.contact import contact_section
+from pretouch.reporting.summary import summary
 from pretouch.reporting.touches import touches_of
 from pretouch.types import Mode
 from pretouch_lab.paper import static
@@ -67,6 +69,8 @@ def pushed(panda_model, paper_skin):
         stamp, changes = round(0.01 * i, 2), {}
         if 55 <= i < 155 or i >= 280:
             changes["mode"] = Mode.REACT
+        if 55 <= i < 75:
+            changes |= {"command": np.full(7, 0.1), "reaction_velocity": np.array([0.0, -0.1, 0.0])}
         if i in (55, 280):
             changes["contact"] = made.contact([0.0, -8.0, 6.0], [False, True, False])
             changes["reaction_velocity"] = np.array([0.0, -0.24, 0.18])
@@ -90,6 +94,7 @@ def test_a_detection_tells_force_axes_delay_and_reaction(pushed):
     assert first.delay == pytest.approx(0.05)
     assert first.reaction_speed == pytest.approx(0.3)
     assert first.reaction_s == pytest.approx(1.0)
+    assert first.moved_s == pytest.approx(0.2)
     assert first.touch == 0
 
 
@@ -101,6 +106,12 @@ def test_a_touch_while_yielding_is_not_missed_and_a_later_one_is(pushed):
 def test_a_detection_without_a_touch_is_told(pushed):
     assert [d.time for d in pushed.without_touch] == [2.8]
     assert pushed.detections[1].delay is None
+
+
+def test_a_contact_that_held_the_arm_still_is_told_as_that(pushed):
+    assert pushed.detections[1].moved_s == 0.0
+    assert "2 contacts were detected, 1 of which did not move the arm" in summary(pushed)
+    assert contact_section(pushed).count("<td>held still</td>") == 1
 
 
 def test_the_largest_true_force_counts_felt_or_not(pushed):

@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.loop import Cycle
 from pretouch.session.progress import ProgressReporter, RunSummary
-from pretouch.types import Inputs
+from pretouch.types import Contact, Inputs, Mode
 from tests.following_arm import Arm
 
 
@@ -23,7 +23,7 @@ class Sink:
 def watched(panda_model, paper_skin):
     """An arm under a controller, a watcher of it, what it told, and how to turn both."""
     arm, told, sink = Arm(panda_model, paper_skin), [], Sink()
-    reporter = ProgressReporter(sink, told.append, " Press Enter.", 0.01)
+    reporter = ProgressReporter(sink, told.append, " Press Enter.", arm.controller)
 
     def turn(cycles, **given):
         for _ in range(cycles):
@@ -73,5 +73,33 @@ def test_contacts_are_counted_and_a_line_comes_every_five_seconds(watched):
     assert any(sentence.startswith("REACT") for sentence in told)
     before = len(told)
     turn(900)
-    assert 1 <= sum("m/s" in sentence for sentence in told[before:]) <= 2
+    reaction, *lines = told[before:]
+    assert reaction == "REACT Moving the way it was pushed: 0.99 s left."
+    assert 1 <= len(lines) <= 3
+    assert all(line == "TRACK In its place: nothing near is seen." for line in lines[1:])
     assert any("1 contact." in sentence for sentence in reporter.summary.sentences(0.01))
+
+
+def test_a_force_that_was_nearly_a_contact_is_told_with_what_it_lacked(watched):
+    _, told, _, turn = watched
+    turn(120)
+    before = len(told)
+    turn(150, force=(0.0, 11.0, 0.0))
+    turn(300)
+    (said,) = [line for line in told[before:] if "not taken for a contact" in line]
+    assert said.startswith("TRACK A force was not taken for a contact: the filtered force came to ")
+    assert said.endswith(" N would have been a contact then.")
+
+
+def test_a_contact_that_does_not_move_the_arm_is_counted_as_what_it_is(watched):
+    reporter, _, _, turn = watched
+    turn(120)
+    still = {"mode": Mode.REACT, "command": np.zeros(7), "reaction_velocity": np.zeros(3)}
+    moves = {"mode": Mode.REACT, "command": np.full(7, 0.1), "reaction_velocity": np.full(3, 0.1)}
+    contact = Contact(np.array([0.0, 9.0, 0.0]), np.ones(3, bool))
+    for changes in ({**still, "contact": contact}, still, {}, {**moves, "contact": contact}, moves, {}):
+        turn(1)
+        cycle = reporter._further.cycles[-1]
+        reporter.record(replace(cycle, step=replace(cycle.step, **changes)))
+    assert (reporter.summary.contacts, reporter.summary.unmoved) == (2, 1)
+    assert "2 contacts, 1 of which did not move the arm." in reporter.summary.sentences(0.01)[0]

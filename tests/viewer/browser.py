@@ -98,8 +98,14 @@ class Visitor:
         self.page.locator("text=Software WebGL").locator("xpath=../..").locator("button").first.click()
 
     def text(self, name: str) -> str:
-        """One of mode, reason, rates, warning, notice."""
+        """One of word, reason, mode, rates, warning, notice."""
         return str(self.page.locator(f"#{name}").inner_text())
+
+    def box(self, selector: str) -> dict[str, float]:
+        """Where the first thing of a selector is, and its size [px]."""
+        box = self.page.locator(selector).first.bounding_box()
+        assert box is not None
+        return {key: float(value) for key, value in box.items()}
 
     def top(self, name: str) -> float:
         """Where a line of the status begins, from the top of the window [px]."""

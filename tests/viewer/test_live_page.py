@@ -16,7 +16,7 @@ from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.types import Mode
 from pretouch.viewer.controls import toggle_recording
-from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S, TYPED_S
+from pretouch.viewer.gui import PANEL_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage, serve_live
 from pretouch.viewer.room import Faults, LiveSettings
 from pretouch.viewer.scene import GIZMO_M
@@ -242,7 +242,7 @@ def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Cloc
     clock.page._drag(np.array([1.0, 0.4, 0.3]))
     clock.turn(0.1)
     assert clock.page.notice.startswith("Not done: ")
-    click(clock.page, "Resume")
+    click(clock.page, "Pause")
     clock.turn(0.1)
     assert clock.page.notice == ""
 
@@ -257,12 +257,40 @@ def test_a_recording_in_trouble_is_said_once_on_the_page_and_in_the_terminal(
     assert said[1:] == ["The recording ended early (disk full)."]
 
 
-@pytest.mark.parametrize(("width", "height"), [(1280, 800), (1920, 1080)])
-def test_the_hand_begins_between_the_panels(simulation: LiveSimulation, width: int, height: int) -> None:
-    box = {"x": LEFT_PX, "y": 0, "width": width - LEFT_PX - RIGHT_PX, "height": height}
+@pytest.mark.parametrize(("width", "height"), [(1024, 768), (1440, 900)])
+def test_the_hand_begins_beside_the_panel(simulation: LiveSimulation, width: int, height: int) -> None:
+    box = {"x": 0, "y": 0, "width": width - PANEL_PX, "height": height}
     assert simulation.frame.hand is not None
     np.testing.assert_allclose(simulation.frame.hand, LiveSettings().hand_start, atol=0.01)
     for offset in np.vstack([np.zeros(3), GIZMO_M * np.eye(3)]):
         x, y = seen_at(simulation.frame.hand + offset, box)
-        assert LEFT_PX < x < width - RIGHT_PX
+        assert 0 < x < width - PANEL_PX
         assert 0 < y < height
+
+
+def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock: Clock, simulation: LiveSimulation) -> None:
+    clock.page.ask(lambda: simulation.move_hand(np.array([1.4, 0.0, 1.2])))
+    clock.turn(1.5)  # the force window is full
+    give(clock.page, "Force [N]", 60.0)
+    click(clock.page, "Push the hand")
+    clock.turn(1.6)
+    assert clock.page.notice.startswith("The push of 60 N was detected after 0.")
+    assert clock.page.notice.endswith("and the arm moved with it.")
+    assert simulation.frame.step.mode is Mode.REACT
+    clock.turn(4.0)
+    assert simulation.frame.step.mode is Mode.TRACK
+    give(clock.page, "Force [N]", 5.0)
+    give(clock.page, "Duration [s]", 0.3)
+    click(clock.page, "Push the hand")
+    clock.turn(0.8)
+    assert clock.page.notice.startswith("The push of 5 N was not detected: the filtered force came to ")
+    assert clock.page.notice.endswith(" N would have been a contact then.")
+
+
+def test_resuming_is_offered_only_where_a_hold_waits_for_it(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clock.page._server, "get_clients", lambda: {0: None})
+    clock.turn(0.1)
+    button = handle(clock.page, "Resume: nothing waits for it")
+    assert button.disabled
+    clock.page.controls.offer_resume(True)
+    assert (button.label, button.disabled) == ("Resume", False)

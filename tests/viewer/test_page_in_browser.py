@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tests.viewer.browser import Served, chromium
 
+from pretouch.explanation import explain
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.profiles import profile
@@ -45,6 +46,7 @@ def test_a_hand_dragged_into_the_arm_by_mouse_leads_to_a_reaction_and_back_to_th
         assert np.allclose(target(simulation)[1:], start[1:], atol=1e-6)
         visitor.wait_for("mode", Mode.REACT.name)
         visitor.keep("reacting", tmp_path)
+        visitor.tab("Hand")
         visitor.type("x [m]", 1.2)
         visitor.wait_for("mode", Mode.TRACK.name)
         assert target(simulation)[0] == 1.2
@@ -60,8 +62,8 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
     simulation = LiveSimulation()
     with live(simulation) as served, chromium() as visitor:
         visitor.open(served)
-        visitor.tab("Controller")
         visitor.choose("Profile", "blind")
+        visitor.tab("Controller")
         visitor.wait_until(lambda: simulation.world.profile.name == "blind")
         visitor.wait_until(lambda: visitor.value("Restrictions") == "off")
 
@@ -79,6 +81,39 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
         visitor.keep("dropped", tmp_path)
         visitor.tick("hand_left")
         visitor.wait_for("mode", Mode.TRACK.name)
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (1024, 768), (1440, 900)])
+def test_the_page_shows_word_and_sentence_of_the_step_and_the_panel_covers_no_scene(
+    tmp_path: Path, width: int, height: int
+) -> None:
+    simulation = LiveSimulation(LiveSettings(profile=profile("paper"), hand_start=(0.5, 0.45, 0.25)))
+    with live(simulation) as served, chromium(width, height) as visitor:
+        visitor.open(served)
+        visitor.wait_for("reason", " sees something at ")  # the hand is beside the path
+        visitor.press("Pause")
+        visitor.wait_for("rates", "paused")
+        found = explain(simulation.frame.step, simulation.skin.ids, simulation.model.links)
+        visitor.wait_for("reason", found.sentence)
+        assert visitor.text("word") == found.doing.value.upper()
+        scene, panel = visitor.box("canvas"), visitor.box("#status")
+        assert scene["y"] + scene["height"] <= panel["y"] or scene["x"] + scene["width"] <= panel["x"]
+        assert scene["width"] * scene["height"] > 0.5 * width * height
+        for label in ("Push the hand", "Go on", "Reset", "Record"):
+            button = visitor.page.get_by_role("button", name=label, exact=True).bounding_box()
+            assert button["x"] >= 0
+            assert button["x"] + button["width"] <= width
+            assert button["y"] + button["height"] <= height
+        visitor.keep(f"panel-{width}", tmp_path)
+
+
+def test_a_server_that_has_ended_is_said() -> None:
+    with chromium() as visitor:
+        with live(LiveSimulation()) as served:
+            visitor.open(served)
+            assert not visitor.page.locator("#lost").is_visible()
+        visitor.page.wait_for_selector("#lost", state="visible")
+        assert not visitor.page.locator("#word").is_visible()
 
 
 def test_a_number_typed_key_by_key_is_the_one_that_counts(tmp_path: Path) -> None:

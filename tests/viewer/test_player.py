@@ -52,10 +52,12 @@ def test_steps_on_and_back_are_single(index: int) -> None:
 
 def test_what_happened_is_found_bit_by_bit(some_step: ControlStep) -> None:
     contact = Contact(np.array([12.0, 0.0, 0.0]), np.array([True, False, False]))
+    moves = {"reaction_velocity": np.array([0.1, 0.0, 0.0]), "command": np.full(7, 0.1)}
     steps = [
         replace(some_step, mode=Mode.REACT if 40 <= i < 60 else Mode.TRACK, contact=contact if i == 40 else None)
         for i in range(100)
     ]
+    steps[45] = replace(steps[45], **moves)
     timeline = Timeline(steps.__getitem__, len(steps))
     timeline.search(45)
     assert [h.index for h in timeline.found] == [40]
@@ -69,6 +71,17 @@ def test_what_happened_is_found_bit_by_bit(some_step: ControlStep) -> None:
     assert timeline.after(60) is None
     assert timeline.before(60) is first
     assert timeline.before(40) is None
+
+
+def test_a_contact_that_did_not_move_the_arm_is_told_as_it_ends(some_step: ControlStep) -> None:
+    contact = Contact(np.array([6.0, 0.0, 0.0]), np.array([True, False, False]))
+    held = replace(some_step, mode=Mode.REACT, command=np.zeros(7), reaction_velocity=np.zeros(3))
+    steps = [some_step, replace(held, contact=contact), held, some_step]
+    timeline = Timeline(steps.__getitem__, len(steps))
+    timeline.search(4)
+    assert [h.what for h in timeline.found] == [
+        "Contact of 6.0 N", "REACT to TRACK, after a contact that did not move the arm"
+    ]  # fmt: skip
 
 
 def test_what_is_known_of_a_step_comes_in_its_turn(some_step: ControlStep) -> None:

@@ -47,6 +47,7 @@ def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
     speeds = [np.linalg.norm(some_step.ee_velocity), np.linalg.norm(some_step.desired_velocity)]
     np.testing.assert_array_equal(last[10 + K : 12 + K], speeds)
     assert last[12 + K] == some_step.evidence
+    assert last[13 + K] == min(some_step.obstacles.body_distance, default=9.0)
     assert last[-1] == 5.0
 
 
@@ -65,7 +66,7 @@ def test_a_history_of_little_can_be_drawn(some_step: ControlStep, samples: int) 
     for _ in range(samples):
         history.add(some_step)
     columns = history.columns()
-    assert columns.shape[0] == 1 + K + 12
+    assert columns.shape[0] == 1 + K + 13
     assert columns.shape[1] >= 2
     assert np.all(np.isfinite(columns[0]))
 
@@ -89,12 +90,13 @@ def test_a_unit_whose_reading_is_late_shows_nothing(some_step: ControlStep) -> N
 def test_axes_of_force_are_symmetric_and_grow_with_the_force(some_step: ControlStep) -> None:
     history, gui = History(K), FakeGui()
     plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
+    gui.more.value = True
     limits = replace(some_step.thresholds, parts=np.zeros((6, 3)))
     seen = []
     for i, force in enumerate((3.0, -20.0, 65.0, np.nan)):
         history.add(replace(some_step, stamp=float(i), force=np.array([0.0, force, 0.0]), thresholds=limits))
         plots.draw(float(i))
-        lines = [np.array(plot.data[-2:]) for plot in gui.plots[1:4]]
+        lines = [np.array(plot.data[-2:]) for plot in gui.plots[3:6]]
         seen.append([(frame.min(), frame.max()) for frame in lines])
     at_rest = (-FORCE_N, FORCE_N)
     assert [forces[1] for forces in seen] == [at_rest, (-30.0, 30.0), (-120.0, 120.0), (-120.0, 120.0)]
@@ -112,14 +114,38 @@ def test_no_scale_changes_for_a_page_would_no_longer_follow_the_time(some_step: 
     assert all(len({len(line) for line in plot.data}) == 1 for plot in gui.plots)
 
 
+def test_what_is_folded_is_sent_only_while_it_is_shown(some_step: ControlStep) -> None:
+    history, gui = History(K), FakeGui()
+    plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
+    history.add(some_step)
+    before = [plot.data for plot in gui.plots]
+    plots.draw(0.0)
+    changed = [plot.data is not data for plot, data in zip(gui.plots, before, strict=True)]
+    assert changed == [True, True, True, False, False, False, False]
+    assert [plot.visible for plot in gui.plots[3:]] == [False] * 4
+    gui.more.value = True
+    plots.draw(1.0)
+    assert all(plot.data is not data for plot, data in zip(gui.plots, before, strict=True))
+
+
+def test_a_second_profile_has_its_plots_shown(some_step: ControlStep) -> None:
+    gui = FakeGui()
+    Plots(gui, History(K, 6), ["unit"] * K, "blind")  # type: ignore[arg-type]
+    assert all(plot.visible for plot in gui.plots[3:])
+
+
 class FakeGui:
     """Keeps the plots of a page."""
 
     def __init__(self) -> None:
         self.plots: list[SimpleNamespace] = []
 
-    def add_html(self, content: str) -> None:
-        pass
+    def add_html(self, content: str) -> SimpleNamespace:
+        return SimpleNamespace(visible=True)
+
+    def add_checkbox(self, label: str, value: bool, hint: str) -> SimpleNamespace:
+        self.more = SimpleNamespace(value=value, on_update=lambda act: None)
+        return self.more
 
     def add_uplot(self, data: object, series: object, **given: object) -> SimpleNamespace:
         self.plots.append(SimpleNamespace(data=data, **given))

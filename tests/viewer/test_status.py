@@ -1,10 +1,10 @@
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from pretouch.types import ControlStep, Mode
+from pretouch.explanation import Doing, Explanation
+from pretouch.types import Mode
 from pretouch.viewer import palette
 from pretouch.viewer.status import PERIOD_S, Status, legend
 
@@ -31,39 +31,44 @@ def status(html: Html) -> Status:
     return Status(SimpleNamespace(add_html=lambda content: html))  # type: ignore[arg-type]
 
 
-def test_a_mode_comes_with_its_colour_and_sentence(status: Status, html: Html, some_step: ControlStep) -> None:
-    for mode in Mode:
-        status.draw(replace(some_step, mode=mode, reason=f"Why {mode.value}."), "t = 1 s", "", 0.0)
-        assert f">{mode.name}<" in html.sent[-1]
-        assert f"Why {mode.value}." in html.sent[-1]
-        assert palette.css(palette.MODES[mode]) in html.sent[-1]
+FREE = Explanation(Doing.MOVING, "Following its path.")
 
 
-def test_it_is_sent_five_times_a_second_and_at_once_when_there_is_news(
-    status: Status, html: Html, some_step: ControlStep
-) -> None:
+def test_each_word_comes_with_its_sentence_and_the_mode(status: Status, html: Html) -> None:
+    for i, doing in enumerate(Doing):
+        status.draw(Mode.REACT, Explanation(doing, f"Why {doing.value}."), "1.0 s", "", float(i))
+        assert f">{doing.value.upper()}<" in html.sent[-1]
+        assert f"Why {doing.value}." in html.sent[-1]
+        assert "<span id='mode'>REACT</span> · 1.0 s" in html.sent[-1]
+
+
+def test_it_is_sent_five_times_a_second_and_at_once_when_there_is_news(status: Status, html: Html) -> None:
     for i in range(300):
-        status.draw(some_step, f"t = {i} s", "", i / 30)
+        status.draw(Mode.TRACK, FREE, f"t = {i} s", "", i / 30)
     assert len(html.sent) <= 10 / PERIOD_S + 1
     sent = len(html.sent)
-    status.draw(replace(some_step, mode=Mode.HOLD), "", "", 300 / 30)
+    status.draw(Mode.TRACK, Explanation(Doing.SLOWED, "Slowed to 17 %."), "", "", 300 / 30)
     assert len(html.sent) == sent + 1
 
 
-def test_what_a_person_is_told_and_the_warning_are_both_shown(
-    status: Status, html: Html, some_step: ControlStep
-) -> None:
-    status.draw(some_step, "", "Too slow.", 0.0)
+def test_what_is_the_same_is_not_sent_again(status: Status, html: Html) -> None:
+    for i in range(30):
+        status.draw(Mode.TRACK, FREE, "paused", "", i / 3)
+    assert len(html.sent) == 1
+
+
+def test_what_a_person_is_told_and_the_warning_are_both_shown(status: Status, html: Html) -> None:
+    status.draw(Mode.TRACK, FREE, "", "Too slow.", 0.0)
     assert "id='warning'" in html.sent[-1]
     assert "id='notice'" not in html.sent[-1]
     status.notice = "Not done."
-    status.draw(some_step, "", "Too slow.", 0.0)
+    status.draw(Mode.TRACK, FREE, "", "Too slow.", 0.0)
     assert html.sent[-1].index("Not done.") < html.sent[-1].index("Too slow.")
 
 
-def test_words_are_not_taken_for_markup(status: Status, html: Html, some_step: ControlStep) -> None:
+def test_words_are_not_taken_for_markup(status: Status, html: Html) -> None:
     status.notice = "<b>a & b</b>"
-    status.draw(replace(some_step, reason="<script>"), "<i>", "", 0.0)
+    status.draw(Mode.TRACK, Explanation(Doing.MOVING, "<script>"), "<i>", "", 0.0)
     assert "&lt;b&gt;a &amp; b&lt;/b&gt;" in html.sent[-1]
     assert "<script>" not in html.sent[-1]
     assert "<i>" not in html.sent[-1]

@@ -22,7 +22,7 @@ from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import skin_for
 from pretouch.serving.fci.arm import ArmSetup, ServedArm
 from pretouch.serving.fci.options import ServeOptions, drop_of
-from pretouch.serving.fci.pushes import Pushes, push_of, typed_push
+from pretouch.serving.fci.pushes import TcpPush, push_of, typed_push
 from pretouch.serving.fci.server import FciServer
 from pretouch.serving.fci.units import UnitsSetup
 from pretouch.serving.simulate import VisitingHand
@@ -30,11 +30,14 @@ from pretouch.signals import ended
 from pretouch.sim.hand import HandScript
 from pretouch.sim.paper_scenes import dynamic_pushes, static_path, static_scene
 from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.types import FloatArray
 
 if TYPE_CHECKING:
     from pretouch.cli.commands import ServeFci
 
 _say = partial(print, flush=True)
+_LAG_S = 0.2
+"""How long the arm's estimate of a push that has ended is still looked at [s]."""
 _STIFFEST = 1e6
 """Largest stiffness of the board [N/m]."""
 
@@ -52,7 +55,7 @@ def serve_fci(command: "ServeFci") -> None:
         host, port = server.address
         pace = "lockstep" if c.lockstep else "real time"
         _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}).")
-        typed = TypedPushes(arm.pushes, sys.stdin)
+        typed = TypedPushes(arm, sys.stdin)
         if typed.possible:
             _say("Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force such as 0,15,0 [N].")
         server.serve(lambda: ended() or typed.take())
@@ -61,9 +64,11 @@ def serve_fci(command: "ServeFci") -> None:
 class TypedPushes:
     """Pushes that a person at the terminal types, one a line."""
 
-    def __init__(self, pushes: Pushes, source: TextIO) -> None:
-        """Take where they go, and what is typed at; only a terminal is listened to."""
-        self._pushes, self._text = pushes, b""
+    def __init__(self, arm: ServedArm, source: TextIO) -> None:
+        """Take the arm that is pushed, and what is typed at; only a terminal is listened to."""
+        self._arm, self._text = arm, b""
+        self._push: TcpPush | None = None
+        self._rest, self._largest = np.zeros(3), 0.0
         self._descriptor = source.fileno() if source.isatty() else -1
 
     @property
@@ -72,7 +77,8 @@ class TypedPushes:
         return self._descriptor >= 0
 
     def take(self) -> bool:
-        """Have what was typed come; always False, so that a server goes on."""
+        """Have what was typed come, and say how it was measured; always False, so that a server goes on."""
+        self._follow()
         if not self.possible or not select.select([self._descriptor], [], [], 0)[0]:
             return False
         read = os.read(self._descriptor, 4096)
@@ -81,10 +87,32 @@ class TypedPushes:
         *lines, self._text = (self._text + read).split(b"\n")
         for line in filter(bytes.strip, lines):
             try:
-                self._pushes.add(typed_push(line.decode(errors="replace"), self._pushes.now))
+                self._push = typed_push(line.decode(errors="replace"), self._arm.pushes.now)
+                self._arm.pushes.add(self._push)
+                self._rest, self._largest = self._estimate(), 0.0
             except ParameterError as error:
                 _say(str(error))
         return False
+
+    def _follow(self) -> None:
+        """Note how much of the newest push the arm's own estimate shows, and say it once the push is over."""
+        push = self._push
+        if push is None:
+            return
+        size = float(np.linalg.norm(push.force))
+        along = float((self._estimate() - self._rest) @ np.array(push.force)) / size if size else 0.0
+        self._largest = max(self._largest, along)
+        if self._arm.pushes.now >= push.start + push.duration + _LAG_S:
+            self._push = None
+            _say(
+                f"The push of {size:.0f} N is over. The arm's estimate of it came to {self._largest:.1f} N; the client"
+                " says whether it took that for a contact."
+            )
+
+    def _estimate(self) -> FloatArray:
+        """Force (3,) [N] that the arm reports, 0 where it has no estimate."""
+        wrench = self._arm.report.wrench
+        return np.zeros(3) if wrench is None else wrench[:3]
 
 
 def _setup(c: "ServeFci") -> ArmSetup:

@@ -39,7 +39,9 @@ class Detection:
     reaction_speed: float
     """At its beginning [m/s]."""
     reaction_s: float
-    """How long the arm moved with it [s]."""
+    """How long the reaction lasted [s]."""
+    moved_s: float
+    """How long the arm moved in it [s]; 0 of a contact that held it still, for it was below what moves the arm."""
     touch: int | None
     """Index of the true touch it answers."""
     delay: float | None
@@ -78,6 +80,7 @@ def detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
                 filtered=course.filtered_force[i], raw=course.force[i],
                 peak=_farthest(force), peak_norm=_norm(force), held_norm=_norm(force[late]),
                 reaction_speed=speed, reaction_s=float(lasted[i:end].sum()), touch=touch,
+                moved_s=float(lasted[i:end][course.answering[i:end]].sum()),
                 delay=time - begun if first else None,
             )
         )  # fmt: skip

@@ -40,6 +40,8 @@ class Course(RunRecord):
     """(S,) distance of the nearest sensed point from the end-effector's origin [m]."""
     nearest_point: FloatArray
     """(S, 3) that point [m]."""
+    answering: BoolArray
+    """(S,) whether the arm moves with a contact."""
     restricted: IntArray
     """(S,) how many obstacles restrict the arm."""
     q_margin: FloatArray

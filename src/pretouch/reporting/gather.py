@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pretouch.explanation import answers
 from pretouch.recording.run_record import Columns, TrueForces, columns_of, contacts_of
 from pretouch.reporting.course import NO_READING, OUTCOMES, Course
 from pretouch.robot.model import RobotModel
@@ -81,6 +82,7 @@ def _block(batch: list["Kept"], run: "Run", layout: _Layout) -> Columns:
         **found,
         **spread,
         "run": np.full(len(batch), batch[0].run),
+        "answering": np.array([answers(s) for s in steps]),
         "restricted": np.array([len(s.restricted) for s in steps]),
         "outcome": np.array([OUTCOMES.index(s.qp.outcome) for s in steps]),
         "slack": np.array([np.max(s.qp.slack, initial=0.0) for s in steps]),

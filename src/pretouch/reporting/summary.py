@@ -37,6 +37,8 @@ def _what(m: Measures) -> str:
 def _contacts(m: Measures) -> Text:
     found = len(m.detections)
     said = f"{found or 'No'} contact{'s' if found != 1 else ''} {'were' if found != 1 else 'was'} detected"
+    unmoved = sum(not d.moved_s for d in m.detections)
+    said += f", {unmoved} of which did not move the arm" if unmoved else ""
     if not m.truth_known:
         return f"{said}; what truly touched is not known."
     delays = [d.delay for d in m.detections if d.delay is not None]

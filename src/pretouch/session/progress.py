@@ -6,7 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pretouch.controller import Controller
+from pretouch.explanation import answers, explain, resumable
 from pretouch.loop import Cycle, Recorder
+from pretouch.session.push_outcome import lacked
 from pretouch.types import ControlStep, Mode
 
 _NUMBERS = re.compile(r"\d+(\.\d+)?")
@@ -14,6 +17,8 @@ _LINE_S = 5.0
 """Time between two lines on how it goes [s]."""
 _AGAIN_S = 1.0
 """Least time between two sentences on why the arm holds [s]."""
+_NEAR, _GONE = 0.6, 0.3
+"""Evidence from which on a force comes near a contact, and below which it is over: free motion came to 0.5."""
 _BRIEF_S = 0.05
 """A HOLD shorter than this is not counted at the end [s]."""
 
@@ -24,6 +29,8 @@ class RunSummary:
 
     steps: int = 0
     contacts: int = 0
+    unmoved: int = 0
+    """Contacts that the arm did not move with, for they were below what moves it."""
     holds: dict[str, float] = field(default_factory=dict)
     """Time held [s] by the reason, without its numbers."""
 
@@ -31,7 +38,8 @@ class RunSummary:
         """Return the summary in sentences."""
         found = [
             f"{self.steps} control steps, {self.steps * period:.1f} s; {self.contacts}"
-            f" {'contact' if self.contacts == 1 else 'contacts'}."
+            f" {'contact' if self.contacts == 1 else 'contacts'}"
+            + (f", {self.unmoved} of which did not move the arm." if self.unmoved else ".")
         ]
         lasting = [(seconds, reason) for reason, seconds in self.holds.items() if seconds >= _BRIEF_S]
         found += [f"Held for {seconds:.1f} s: {reason}" for seconds, reason in sorted(lasting, reverse=True)]
@@ -41,11 +49,14 @@ class RunSummary:
 class ProgressReporter:
     """A recorder that reports each change, and passes each cycle on to another recorder."""
 
-    def __init__(self, further: Recorder, tell: Callable[[str], None], latched: str, period: float) -> None:
-        """Take another recorder, what tells a sentence without waiting, and what to do where a HOLD latches."""
-        self._further, self._tell, self._latched, self._period = further, tell, latched, period
+    def __init__(self, further: Recorder, tell: Callable[[str], None], latched: str, of: Controller) -> None:
+        """Take another recorder, what tells a sentence without waiting, what to do where a HOLD latches, and whose."""
+        self._further, self._tell, self._latched, self._period = further, tell, latched, of.limits.period
+        self._names = of.skin.ids, of.model.links
+        self._answered = True
+        self._nearest: ControlStep | None = None
         self._kind: tuple[Mode, str, bool] | None = None
-        self._line_due = self._said = -np.inf
+        self._line_due = self._said = self._near_due = -np.inf
         self._examples: dict[str, str] = {}
         self.summary = RunSummary()
 
@@ -55,22 +66,43 @@ class ProgressReporter:
         step, summary = cycle.step, self.summary
         summary.steps += 1
         summary.contacts += step.contact is not None
+        self._count_answer(step)
+        self._note_near_contact(step)
         stem = _NUMBERS.sub("#", step.reason)
         if step.mode is Mode.HOLD:
             reason = self._examples.setdefault(stem, step.reason)
             summary.holds[reason] = summary.holds.get(reason, 0.0) + self._period
-        kind = (step.mode, stem if step.mode is Mode.HOLD else "", cycle.after.mode.latched)
+        found = explain(step, *self._names)
+        part = {Mode.HOLD: stem, Mode.REACT: found.doing.name, Mode.TRACK: ""}[step.mode]
+        kind = (step.mode, part, resumable(step))
         if kind == self._kind:
-            self._line(step)
+            if step.stamp >= self._line_due:
+                self._say(step, found.sentence)
         elif self._kind is None or kind[0] is not self._kind[0] or step.stamp >= self._said + _AGAIN_S:
             self._kind, self._said = kind, step.stamp
-            self._line_due = step.stamp + _LINE_S
-            self._tell(f"{step.mode.value.upper():5} {step.reason}{self._latched if cycle.after.mode.latched else ''}")
+            self._say(step, found.sentence)
 
-    def _line(self, step: ControlStep) -> None:
-        if step.stamp < self._line_due:
-            return
+    def _count_answer(self, step: ControlStep) -> None:
+        """Count a contact that has ended without a motion of the arm."""
+        if step.contact is not None:
+            self._answered = False
+        self._answered = self._answered or answers(step)
+        if step.mode is not Mode.REACT and not self._answered:
+            self.summary.unmoved, self._answered = self.summary.unmoved + 1, True
+
+    def _note_near_contact(self, step: ControlStep) -> None:
+        """Say of a force that came near a contact and was none what it lacked: somebody may have pushed."""
+        nearest = self._nearest
+        if step.mode is not Mode.TRACK or step.evidence < _GONE:
+            self._nearest = None
+            near = nearest is not None and nearest.evidence >= _NEAR
+            # its end moves the filtered force the other way
+            if near and step.mode is Mode.TRACK and step.stamp >= self._near_due:
+                self._near_due = step.stamp + _LINE_S
+                self._tell(f"{step.mode.value.upper():5} A force was not taken for a contact: {lacked(nearest)}.")
+        elif nearest is None or step.evidence > nearest.evidence:
+            self._nearest = step
+
+    def _say(self, step: ControlStep, sentence: str) -> None:
         self._line_due = step.stamp + _LINE_S
-        near = step.obstacles.body_distance
-        nearest = f", nearest {near.min():.2f} m" if len(near) else ""
-        self._tell(f"{step.mode.value.upper():5} {np.linalg.norm(step.ee_velocity):.2f} m/s{nearest}")
+        self._tell(f"{step.mode.value.upper():5} {sentence}{self._latched if resumable(step) else ''}")

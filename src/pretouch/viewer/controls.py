@@ -11,13 +11,14 @@ import numpy as np
 from pretouch.composition import differences
 from pretouch.errors import RecordingError
 from pretouch.profiles import PROFILES, Profile, restriction_mode, restriction_modes, with_restriction
+from pretouch.serving.fci.pushes import AXES
 from pretouch.types import FloatArray
-from pretouch.viewer import palette
 from pretouch.viewer.action_queue import ActionQueue
 from pretouch.viewer.gui import SETTLE_S, TYPED_S, add_button, add_view_boxes, put, when_changed
 from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs
 from pretouch.viewer.room import ObjectName, PathName
 from pretouch.viewer.simulation import LiveSimulation
+from pretouch.viewer.status import legend
 from pretouch.viewer.unit_panel import UnitPanel
 
 if TYPE_CHECKING:
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 RECORDINGS = Path("runs")
 """Folder in which recordings are kept."""
+PUSH_N, PUSH_S = 20.0, 1.0
+"""Force [N] and duration [s] of a push unless a person chooses others."""
+_NO_RESUME = "Resume: nothing waits for it"
 _CLOCK = 0.1, 1.0
 """Range of the clock's speed, simulated over real time."""
 
@@ -47,7 +51,10 @@ def with_name(profile: Profile, base: str) -> Profile:
 
 
 class Controls:
-    """All controls of a live page, in tabs. Methods without underscore are called by the loop."""
+    """All controls of a live page: few of them shown, the others in folders.
+
+    Methods without underscore are called by the loop.
+    """
 
     def __init__(self, gui: "GuiApi", simulation: LiveSimulation, commands: ActionQueue) -> None:
         self._gui, self._simulation, self._actions = gui, simulation, commands
@@ -60,40 +67,62 @@ class Controls:
         """Told which part of the scene to show or hide."""
         self.unit_panel: UnitPanel | None = None
         """How the units are, if they are real."""
-        tabs = gui.add_tab_group()
-        with tabs.add_tab("Run"):
-            self._run_tab()
-        with tabs.add_tab("Controller"):
-            self._controller_tab()
-        with tabs.add_tab("World"):
-            self._world_tab()
-        with tabs.add_tab("View"):
-            add_view_boxes(gui, commands, lambda name, visible: self.on_view(name, visible))
+        self._first()
         self.refresh()
 
-    # tabs
+    # what is always shown, and what is folded
 
-    def _run_tab(self) -> None:
-        gui, simulation, running = self._gui, self._simulation, self.running
-        self._pause = self._button("Pause", self._toggle_pause, icon="PLAYER_PAUSE")
-        self._button("Single step", self._single_step, color="gray", hint="One control cycle; pauses.")
-        clock = gui.add_slider("Clock speed", *_CLOCK, 0.1, 1.0, hint="Simulated over real time.")
-        self._number(clock, self._set_clock, "clock speed", lambda: running.speed)
-        self._resume = self._button("Resume", simulation.resume, hint="Leave a hold that waits for you.")
-        self._button("Reset", simulation.reset, color="gray", hint="Restart at time 0 with the current settings.")
-        self._record = self._button("Record", partial(toggle_recording, simulation), color=palette.AVOIDING)
-        with gui.add_folder("Hand"):
-            self._hand = [
-                gui.add_slider(f"{axis} [m]", low, high, 0.01, 0.0, hint="Or drag the arrows at the hand.")
-                for axis, low, high in (("x", -1.0, 1.4), ("y", -1.2, 1.2), ("z", -0.15, 1.4))
-            ]
-            for slider in self._hand:
-                when_changed(slider, self._actions, lambda _: self._move_hand(), "hand", quiet=True)
-
-    def _controller_tab(self) -> None:
-        gui, docs = self._gui, field_docs()
+    def _first(self) -> None:
+        gui, simulation = self._gui, self._simulation
+        self._button("Push the hand", self._push, icon="HAND_FINGER", hint="With the force of the folder Push.")
         profile = gui.add_dropdown("Profile", tuple(PROFILES))
         self._choice(profile, self._choose_profile, "profile", lambda: self._base)
+        self._pause = self._button("Pause", self._toggle_pause, icon="PLAYER_PAUSE", color="gray")
+        self._resume = self._button(
+            _NO_RESUME, simulation.resume, hint="Leave a hold that waits for you.", disabled=True
+        )
+        self._button("Reset", simulation.reset, color="gray", hint="Restart at time 0 with the current settings.")
+        self._record = self._button("Record", partial(toggle_recording, simulation), color="gray")
+
+    def fold_rest(self) -> None:
+        """Add all other controls, each group folded."""
+        gui = self._gui
+        folders: tuple[tuple[str, Callable[[], None]], ...] = (
+            ("Push", self._push_folder), ("Hand", self._hand_folder), ("Clock", self._clock_folder),
+            ("Controller", self._controller_folder), ("World", self._world_folder),
+            ("View", self._view_folder),
+        )  # fmt: skip
+        for name, add in folders:
+            with gui.add_folder(name, expand_by_default=False):
+                add()
+        self.refresh()
+
+    def _push_folder(self) -> None:
+        gui = self._gui
+        self._axis = gui.add_dropdown("Direction", tuple(AXES), initial_value="+y", hint="Of the base frame.")
+        self._force = gui.add_slider("Force [N]", 5.0, 60.0, 1.0, PUSH_N)
+        self._lasting = gui.add_slider("Duration [s]", 0.1, 3.0, 0.1, PUSH_S)
+
+    def _hand_folder(self) -> None:
+        self._hand = [
+            self._gui.add_slider(f"{axis} [m]", low, high, 0.01, 0.0, hint="Or drag the hand.")
+            for axis, low, high in (("x", -1.0, 1.4), ("y", -1.2, 1.2), ("z", -0.15, 1.4))
+        ]
+        for slider in self._hand:
+            when_changed(slider, self._actions, lambda _: self._move_hand(), "hand", quiet=True)
+
+    def _clock_folder(self) -> None:
+        running = self.running
+        clock = self._gui.add_slider("Clock speed", *_CLOCK, 0.1, 1.0, hint="Simulated over real time.")
+        self._number(clock, self._set_clock, "clock speed", lambda: running.speed)
+        self._button("Single step", self._single_step, color="gray", hint="One control cycle; pauses.")
+
+    def _view_folder(self) -> None:
+        add_view_boxes(self._gui, self._actions, lambda name, visible: self.on_view(name, visible))
+        self._gui.add_html(legend())
+
+    def _controller_folder(self) -> None:
+        gui, docs = self._gui, field_docs()
         speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=docs["TaskParams", "speed_m_s"])
         self._number(speed, self._choose_speed, "path speed", lambda: self._profile.task.speed_m_s)
         mode = gui.add_dropdown("Restrictions", restriction_modes(), hint=docs["Profile", "approach"])
@@ -105,7 +134,7 @@ class Controls:
                 self._typed(field, partial(self._change_entry, entry), entry.symbol, partial(self._text_of, entry))
             self._button("Reset parameters", self._reset_parameters, hint="Back to those of the profile.")
 
-    def _world_tab(self) -> None:
+    def _world_folder(self) -> None:
         gui, simulation = self._gui, self._simulation
         path = gui.add_dropdown("Path", get_args(PathName))
         self._choice(path, simulation.set_path, "path", lambda: simulation.settings.path)
@@ -191,6 +220,11 @@ class Controls:
     def _reset_parameters(self) -> None:
         self._choose_profile(self._base)
 
+    def _push(self) -> None:
+        """Push the hand as the folder says; the notice tells what became of it."""
+        axis = np.array(AXES[self._axis.value])
+        self._simulation.push(float(self._force.value) * axis, float(self._lasting.value))
+
     def _toggle_pause(self) -> None:
         self.running.paused = not self.running.paused
 
@@ -216,9 +250,10 @@ class Controls:
         self._pause.label = "Go on" if self.running.paused else "Pause"
         self._record.label = "Stop recording" if self._simulation.recording else "Record"
 
-    def offer_resume(self, latched: bool) -> None:
-        """Let the button to resume be pressed while a hold waits for it."""
-        self._resume.disabled = not latched
+    def offer_resume(self, possible: bool) -> None:
+        """Let the button to resume be pressed while a hold waits for it; else it says that none does."""
+        if self._resume.disabled is possible:
+            self._resume.disabled, self._resume.label = not possible, "Resume" if possible else _NO_RESUME
 
     def show_hand(self, target: FloatArray) -> None:
         """Have the sliders show where the hand is to be (3,) [m]."""

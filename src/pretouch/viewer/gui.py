@@ -5,7 +5,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from pretouch.viewer.action_queue import ActionQueue
-from pretouch.viewer.plots import History, Plots
 from pretouch.viewer.scene import PARTS
 
 if TYPE_CHECKING:
@@ -18,25 +17,15 @@ SETTLE_S = 0.8
 """Time without a key from which on a number that is typed counts [s]."""
 TYPED_S = 6.0
 """Time without a key from which on a field shows what holds again: whoever pauses after 0.0 can type on [s]."""
-LEFT_PX, RIGHT_PX = 310, 330
-"""Widths of the panels of plots and of controls [px]."""
+PANEL_PX = 330
+"""Width of the panel [px]."""
 
 
 def style_page(server: "ViserServer") -> None:
     """Give a page its colours, and put its controls to the right."""
     server.gui.configure_theme(brand_color=(49, 104, 196), show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
-    server.gui.main_panel.set_width(RIGHT_PX)
-
-
-def add_plots(server: "ViserServer", history: History, units: tuple[str, ...], other: str = "") -> Plots:
-    """Put plots to the left of a page; `other` names the profile whose thresholds are drawn beside those recorded."""
-    panel = server.gui.add_panel()
-    with panel.add_tab("Last 10 s"):
-        plots = Plots(server.gui, history, units, other)
-    panel.dock_left()
-    panel.set_width(LEFT_PX)
-    return plots
+    server.gui.main_panel.set_width(PANEL_PX)
 
 
 def when_changed(

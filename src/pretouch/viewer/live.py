@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pretouch.errors import PretouchError
+from pretouch.explanation import explain, resumable
 from pretouch.loop import MonotonicClock
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.action_queue import Action, ActionQueue
 from pretouch.viewer.controls import Controls
-from pretouch.viewer.gui import PERIOD_S, add_plots, style_page
+from pretouch.viewer.gui import PERIOD_S, style_page
 from pretouch.viewer.pacing import Pace
-from pretouch.viewer.plots import History
+from pretouch.viewer.plots import History, Plots
 from pretouch.viewer.scene import Scene
 from pretouch.viewer.server import ServeOptions, served, url_of
 from pretouch.viewer.simulation import LiveSimulation
-from pretouch.viewer.status import Status, legend
+from pretouch.viewer.status import Status
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -40,14 +41,14 @@ class LivePage:
         """Whether the receiver of the real units has ended."""
         style_page(server)
         self._status = Status(server.gui)
-        server.gui.add_html(legend())
         self.controls = Controls(server.gui, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
         self._status.notice = self._scene.said
         self.controls.on_view = self._scene.show
         self._scene.on_hand(self._drag)
         self._history = History(len(simulation.skin))
-        self._plots = add_plots(server, self._history, simulation.skin.ids)
+        self._plots = Plots(server.gui, self._history, simulation.skin.ids)
+        self.controls.fold_rest()
 
     @property
     def notice(self) -> str:
@@ -130,8 +131,12 @@ class LivePage:
                 "paused" if self.controls.running.paused
                 else f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
             )  # fmt: skip
-            self._status.draw(frame.step, f"t = {frame.step.stamp:.2f} s · {rates}{recorded}", pace.sentence(), now)
-            self.controls.offer_resume(self._simulation.latched)
+            step, skin, links = frame.step, self._simulation.skin, self._simulation.model.links
+            self._status.draw(
+                step.mode, explain(step, skin.ids, links), f"{step.stamp:.1f} s · {rates}{recorded}",
+                pace.sentence(), now,
+            )  # fmt: skip
+            self.controls.offer_resume(resumable(step))
             if self.controls.unit_panel:
                 self.controls.unit_panel.draw(now)
 

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pretouch.explanation import answers
 from pretouch.types import ControlStep, FloatArray, Mode
+
+_UNMOVED = ", after a contact that did not move the arm"
 
 
 class Player:
@@ -80,6 +83,7 @@ class Timeline:
         self._step, self._count, self._known = step, count, known or {}
         self._looked = 0
         self._mode: Mode | None = None
+        self._answered = True
         self.found: list[TimelineEvent] = []
 
     @property
@@ -99,8 +103,11 @@ class Timeline:
             what = [self._known[i]] if i in self._known else []
             if step.contact is not None:
                 what.insert(0, f"Contact of {np.linalg.norm(step.contact.force):.1f} N")
+                self._answered = False
             elif self._mode is not None and step.mode is not self._mode:
-                what.insert(0, f"{self._mode.name} to {step.mode.name}")
+                held = self._mode is Mode.REACT and not self._answered
+                what.insert(0, f"{self._mode.name} to {step.mode.name}" + (_UNMOVED if held else ""))
+            self._answered = self._answered or answers(step)
             if what:
                 self.found.append(TimelineEvent(i, "; ".join(what)))
             self._mode, self._looked = step.mode, i + 1

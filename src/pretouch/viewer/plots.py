@@ -1,4 +1,4 @@
-"""The last seconds as plots: distances of the units, force with its moving thresholds, evidence, speed."""
+"""The last seconds as plots: how near a contact is, what is nearest, speed; and, asked for, each force and unit."""
 
 import math
 from collections import deque
@@ -27,18 +27,20 @@ _NOTHING_M = 9.0
 FORCE_N = 15.0
 """What the axes of force reach to at least, up and down [N]."""
 _UNSEEN = "transparent"
+_SMALL_PX = 84
+"""Height of the plots that are always shown [px]."""
 SAMPLES = int(SPAN_S / SAMPLE_S)
 
 
 class History:
     """Samples of the last `SPAN_S`: time, distances (K), then force, upper and lower threshold (3 each), two speeds.
 
-    After these the evidence of a contact, and what else is given.
+    After these the evidence of a contact, the distance of what is nearest to the body, and what else is given.
     """
 
     def __init__(self, units: int, more: int = 0, start: float = 0.0) -> None:
         """Take the number of units and of further columns that `add` is given, and the stamp of time 0 [s]."""
-        self._units, self._width, self._start = units, 1 + units + 9 + 2 + 1 + more, start
+        self._units, self._width, self._start = units, 1 + units + 9 + 2 + 2 + more, start
         self._rows: deque[FloatArray] = deque(maxlen=SAMPLES)
         self._open: FloatArray | None = None
 
@@ -58,10 +60,12 @@ class History:
         thresholds, force = step.thresholds, slice(1 + self._units, 4 + self._units)
         reading = step.range_distance if late is None else np.where(late, np.nan, step.range_distance)
         distance = np.nan_to_num(reading, nan=_NOTHING_M)
+        nearest = float(step.obstacles.body_distance.min(initial=_NOTHING_M))
         row = np.concatenate(
             [
                 [time], distance, step.force, thresholds.upper, thresholds.lower,
-                [np.linalg.norm(step.ee_velocity), np.linalg.norm(step.desired_velocity), step.evidence], more,
+                [np.linalg.norm(step.ee_velocity), np.linalg.norm(step.desired_velocity), step.evidence, nearest],
+                more,
             ]
         )  # fmt: skip
         if self._open is None:
@@ -88,44 +92,62 @@ class History:
 
 
 class Plots:
-    """Six plots of a history, one below the other."""
+    """Three plots of a history, one below the other; with a box for those of each axis and unit."""
 
     def __init__(self, gui: "GuiApi", history: History, ids: Sequence[str], other: str = "") -> None:
         """`other` names a second profile, whose thresholds (upper 3, lower 3) are the history's further columns."""
         self._history, self._units, self._other = history, len(ids), bool(other)
         self._sent = -np.inf
-        colours = [palette.css(palette.UNITS[i % len(palette.UNITS)]) for i in range(len(ids))]
-        gui.add_html(_caption("Distance [m]", zip(ids, colours, strict=True)))
-        self._distance = _plot(gui, colours, 112, (0.0, 1.0))
         grey, force, second = (palette.css(c) for c in (palette.FOLLOWING, palette.FORCE, palette.REACTING))
+        blue, green = palette.css(palette.PATH), palette.css(palette.SENSED)
+        gui.add_html(_caption("Touch", [("a contact from 1 on", force)]))
+        self._evidence = _plot(gui, [force, grey], _SMALL_PX, (0.0, 1.5), dashed=1)
+        gui.add_html(_caption("Nearest [m]", [("from the arm to what a unit sees", green)]))
+        self._nearest = _plot(gui, [green], _SMALL_PX, (0.0, 1.0))
+        gui.add_html(_caption("Speed [m/s]", [("of the hand", blue), ("asked for", grey)]))
+        self._speed = _plot(gui, [blue, grey], _SMALL_PX, (0.0, 0.4), dashed=1)
+
+        self._more = gui.add_checkbox("More plots", bool(other), hint="Force of each axis, distance of each unit.")
+        colours = [palette.css(palette.UNITS[i % len(palette.UNITS)]) for i in range(len(ids))]
         marks = [("force", force), ("thresholds or bands", grey)] + ([(f"of {other}", second)] if other else [])
         lines = [force, grey, grey] + ([second] * 2 if other else [])
-        self._force = []
+        self._force, captions = [], []
         for axis in "xyz":
-            gui.add_html(_caption(f"Force {axis} [N]", marks if axis == "x" else ()))
+            captions.append(gui.add_html(_caption(f"Force {axis} [N]", marks if axis == "x" else ())))
             # a page whose scale is changed no longer follows the time: unseen lines hold it open
             self._force.append(_plot(gui, [*lines, _UNSEEN, _UNSEEN], 96, None, dashed=3))
-        blue = palette.css(palette.PATH)
-        gui.add_html(_caption("Evidence", [("a contact from 1 on", force)]))
-        self._evidence = _plot(gui, [force, grey], 70, (0.0, 1.5), dashed=1)
-        gui.add_html(_caption("Speed [m/s]", [("end-effector", blue), ("desired", grey)]))
-        self._speed = _plot(gui, [blue, grey], 84, (0.0, 0.4), dashed=1)
+        captions.append(gui.add_html(_caption("Distance [m]", zip(ids, colours, strict=True))))
+        self._distance = _plot(gui, colours, 112, (0.0, 1.0))
+        self._folded: list[Any] = [*captions, *self._force, self._distance]
+        self._unfold()
+
+        @self._more.on_update
+        async def _(_: Any) -> None:
+            self._unfold()
+
+    def _unfold(self) -> None:
+        """Show the plots of each axis and unit, or hide them."""
+        for handle in self._folded:
+            handle.visible = self._more.value
 
     def draw(self, now: float) -> None:
-        """Send the history, at a time [s]; not more often than eight times a second."""
+        """Send what is shown of the history, at a time [s]; not more often than eight times a second."""
         if now - self._sent < PERIOD_S:
             return
         self._sent = now
         rows, k = self._history.columns(), self._units
         time = rows[0]
+        self._evidence.data = (time, rows[12 + k], np.ones(len(time)))
+        self._nearest.data = (time, rows[13 + k])
+        self._speed.data = (time, *rows[10 + k : 12 + k])
+        if not self._more.value:
+            return
         self._distance.data = (time, *rows[1 : 1 + k])
         for axis, plot in enumerate(self._force):
             at = [1 + k + axis, 4 + k + axis, 7 + k + axis]
-            at += [13 + k + axis, 16 + k + axis] if self._other else []
+            at += [14 + k + axis, 17 + k + axis] if self._other else []
             reach = np.full(len(time), _reach(rows[at]))
             plot.data = (time, *rows[at], -reach, reach)
-        self._evidence.data = (time, rows[12 + k], np.ones(len(time)))
-        self._speed.data = (time, *rows[10 + k : 12 + k])
 
 
 def _plot(

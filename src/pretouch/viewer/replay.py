@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pretouch.explanation import explain
 from pretouch.loop import MonotonicClock
 from pretouch.recording.codec import decode_step
 from pretouch.recording.compare import Comparison, Found
@@ -16,9 +17,9 @@ from pretouch.recording.surroundings import surroundings
 from pretouch.types import FloatArray
 from pretouch.viewer.action_queue import ActionQueue
 from pretouch.viewer.frame import Frame, World
-from pretouch.viewer.gui import PERIOD_S, add_button, add_plots, add_view_boxes, put, style_page, when_changed
+from pretouch.viewer.gui import PERIOD_S, add_button, add_view_boxes, put, style_page, when_changed
 from pretouch.viewer.player import Player, Timeline, TimelineEvent
-from pretouch.viewer.plots import SPAN_S, History
+from pretouch.viewer.plots import SPAN_S, History, Plots
 from pretouch.viewer.scene import Scene
 from pretouch.viewer.server import ServeOptions, served, url_of
 from pretouch.viewer.status import Status, legend
@@ -81,12 +82,16 @@ class ReplayPage:
         style_page(server)
         self._status = Status(server.gui)
         self._status.notice = recorded.said
-        server.gui.add_html(legend() + (comparison_html(comparison, stamps[0]) if comparison else ""))
+        if comparison:
+            server.gui.add_html(comparison_html(comparison, stamps[0]))
         self._controls(server)
         self._scene = Scene(server, world)
         other = comparison.other.name if comparison else ""
         self.history = History(len(world.skin), 6 if other else 0, stamps[0])
-        self._plots = add_plots(server, self.history, world.skin.ids, other)
+        self._plots = Plots(server.gui, self.history, world.skin.ids, other)
+        with server.gui.add_folder("View", expand_by_default=False):
+            add_view_boxes(server.gui, self._actions, self._scene.show)
+            server.gui.add_html(legend())
 
     def _controls(self, server: "ViserServer") -> None:
         gui, player, commands = server.gui, self.player, self._actions
@@ -103,8 +108,6 @@ class ReplayPage:
             add_button(gui, commands, label, act, icon=icon, color="gray")
         speed = gui.add_dropdown("Speed", ("0.1", "0.25", "0.5", "1", "2", "4"), initial_value="1")
         when_changed(speed, commands, lambda chosen: setattr(player, "speed", float(chosen)), "speed")
-        with gui.add_folder("View"):
-            add_view_boxes(gui, commands, lambda name, visible: self._scene.show(name, visible))
 
     def _jump(self, event: TimelineEvent | None) -> None:
         """Pause at an event."""
@@ -176,7 +179,8 @@ class ReplayPage:
             put(self._slider, round(player.time, 2))
         self._play.label = "Pause" if player.playing else "Play"
         rates = f"{player.time:.2f} of {player.duration:.2f} s · stamp {step.stamp:.2f} s · {self.run_name(kept.run)}"
-        self._status.draw(step, rates, "", now)
+        run = self._recorded.runs[kept.run]
+        self._status.draw(step.mode, explain(step, run.skin.ids, run.model.links), rates, "", now)
 
     def run_name(self, run: int) -> str:
         """Name the controller of a run; of several, one may differ from another by nothing but its path."""

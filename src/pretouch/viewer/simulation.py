@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, turn
@@ -17,6 +19,8 @@ from pretouch.recording.truth import truth_of
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
+from pretouch.serving.fci.pushes import Pushes, TcpPush
+from pretouch.session.push_outcome import PushOutcome
 from pretouch.sim.scene import described, fixtures
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.frame import Frame, World
@@ -38,6 +42,8 @@ class LiveSimulation:
     """What stands still; another object after each change of it."""
     frame: Frame
     """The newest instant."""
+    _push: PushOutcome | None
+    """The newest push, until what it led to is known."""
 
     def __init__(
         self, settings: LiveSettings | None = None, model: RobotModel | None = None, skin: Skin | None = None,
@@ -71,6 +77,7 @@ class LiveSimulation:
         self._room, self._state = room, self.controller.init(room.plant.read())
         self._boxes = surroundings({"scene": described(room.scene)}).boxes
         self._resume, self._remainder = False, 0.0
+        self._pushes, self._push = Pushes(room.plant, (), 0.0), None
         self._update_world()
         self.single_step()
 
@@ -83,11 +90,6 @@ class LiveSimulation:
     def stiffness(self) -> float:
         """Of the person's hand and the object [N/m], as it is now."""
         return self._room.stiffness
-
-    @property
-    def latched(self) -> bool:
-        """Whether the arm is in a hold that lasts until a person resumes."""
-        return self._state.mode.latched
 
     # time passes
 
@@ -108,7 +110,10 @@ class LiveSimulation:
         self._state = cycle.after
         hand = room.hand.position
         age = cycle.step.stamp - cycle.inputs.readings.stamp
-        self.frame = Frame(cycle.step, hand, room.mouse.target, room.plant.true_force, room.touched, age)
+        force = room.plant.true_force + self._pushes.force
+        self.frame = Frame(cycle.step, hand, room.mouse.target, force, room.touched, age)
+        if self._push:
+            self.notice = self._push.take(cycle.step) or self.notice
         self._keep(cycle, hand)
         return cycle.step
 
@@ -150,6 +155,12 @@ class LiveSimulation:
         faults = Faults(frozenset(silenced), noise_factor, latency_s)
         self._room.set_faults(faults)
         self.settings = replace(self.settings, faults=faults)
+
+    def push(self, force: FloatArray, duration: float) -> None:
+        """Push the robot's hand with a force (3,) [N], base frame, for a while [s]; the notice tells what it led to."""
+        x, y, z = np.asarray(force, dtype=np.float64).tolist()
+        self._pushes.add(TcpPush(self.time, (x, y, z), duration))
+        self._push = PushOutcome(force, self.time, duration)
 
     def resume(self) -> None:
         """Ask to leave a latched HOLD, once."""
@@ -199,7 +210,8 @@ class LiveSimulation:
             return
         for batch in imu:
             self.recording.imu(self.skin.ids[batch.unit], batch.stamp, batch.acceleration, batch.angular_velocity)
-        self.recording.record(cycle, truth_of(log, touches, hand))
+        forces = [(time, force + self._pushes.at(time)) for time, force in log]
+        self.recording.record(cycle, truth_of(forces, touches, hand))
         if self.recording.trouble:
             self.notice = self.recording.trouble
             self.stop_recording()

@@ -1,59 +1,94 @@
-"""The lines at the top of a page: what the arm does and why, and how well the page keeps up."""
+"""The lines at the top of a page: what the arm does, who limits it and how far, and how well the page keeps up."""
 
 from html import escape
 from typing import TYPE_CHECKING
 
-from pretouch.types import ControlStep, Mode
+from pretouch.explanation import Doing, Explanation
+from pretouch.types import Mode
 from pretouch.viewer import palette
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
 PERIOD_S = 0.2
-"""Time between two updates of a page [s], unless the mode changes."""
+"""Time between two updates of a page [s], unless what the arm does changes."""
+PHONE_PX = 576
+"""Width of a window up to which viser puts all controls into a sheet at the bottom [px]."""
+_SHEET = 44
+"""Share of a phone's height that the sheet takes at most [%]; the scene has the rest, so that none of it is covered."""
 
-_HEIGHT_PX = 222
-"""Height of it all: three lines of reason, two of rates, and three of notice and of warning each."""
+_HEIGHT_PX = 118
+"""Least height of word and sentence: three lines of it, so that what is below does not move under a person's mouse."""
 
-_STICKY = (
-    "<style>div:has(> #status){position:sticky;top:0;z-index:10;background:var(--mantine-color-body,#fff)}"
-    ".mantine-ScrollArea-content div:has(#status){overflow:clip!important}</style>"
+_STYLE = (
+    "<style>"
+    "div:has(> #status){position:sticky;top:0;z-index:10;background:var(--mantine-color-body,#fff)}"
+    ".mantine-ScrollArea-content div:has(#status){overflow:clip!important;min-width:0!important}"
+    ".mantine-ScrollArea-content:has(#status){width:100%!important;min-width:0!important}"
+    "#lost{display:none}:root:has(.mantine-Loader-root) #lost{display:block}"
+    ":root:has(.mantine-Loader-root) #now{display:none}"
+    f"@media (max-width:{PHONE_PX}px){{"
+    f".mantine-Paper-root:has(#status){{max-height:{_SHEET}%!important}}"
+    "div[style*='width: 20em']:has(#status){width:100%!important}"
+    f"div:has(> div > canvas){{height:{100 - _SHEET}dvh!important}}"
+    "#status{min-height:86px!important}#word{font-size:22px!important}}"
+    "</style>"
 )
-"""Keeps the lines above the controls that scroll beneath them."""
+"""Keeps the lines above the controls that scroll beneath them; on a phone, the sheet beneath the scene."""
+
+_LOST = (
+    f"<div id='lost' style='border-left:6px solid {palette.css(palette.AVOIDING)};padding:0 0 2px 10px'>"
+    f"<div style='color:{palette.css(palette.AVOIDING)};font-weight:800;font-size:24px'>CONNECTION LOST</div>"
+    "<div style='font-size:14px;line-height:1.35'>What you see is over: pretouch has ended, or cannot be reached. Start"
+    " it again; the page connects by itself.</div></div>"
+)
+"""Shown in place of the rest while the client waits for a server, which it says by its only loader."""
+
+_COLOURS = {
+    Doing.MOVING: palette.RECOVERING, Doing.SLOWED: palette.FORCE, Doing.AVOIDING: palette.AVOIDING,
+    Doing.RETURNING: palette.RECOVERING, Doing.BLOCKED: palette.AVOIDING, Doing.YIELDING: palette.REACTING,
+    Doing.TOUCHED: palette.REACTING, Doing.CAUGHT: palette.AVOIDING, Doing.WAITING: palette.HOLDING,
+    Doing.STOPPED: palette.AVOIDING,
+}  # fmt: skip
 
 
 class Status:
-    """Mode and reason, then time and rates, then the notice for a person."""
+    """Word and sentence, then mode, time and rates, then the notice for a person."""
 
     def __init__(self, gui: "GuiApi") -> None:
+        gui.add_html(_STYLE)
         self._html = gui.add_html("")
         self._sent = float("-inf")
         self._shown: tuple[object, ...] = ()
+        self._page = ""
         self.notice = ""
         """The notice for a person, until another replaces it."""
 
-    def draw(self, step: ControlStep, rates: str, warning: str, now: float) -> None:
-        """Show a step, at a time [s]; not more often than five times a second unless there is something new to say."""
-        news = (step.mode, warning, self.notice)
+    def draw(self, mode: Mode, found: Explanation, rates: str, warning: str, now: float) -> None:
+        """Show what the arm does, at a time [s]; five times a second at most, unless there is something new to say."""
+        news = (mode, found.doing, warning, self.notice)
         if news == self._shown and now - self._sent < PERIOD_S:
             return
         self._sent, self._shown = now, news
-        self._html.content = _page(step.mode, step.reason, rates, warning, self.notice)
+        page = _page(mode, found, rates, warning, self.notice)
+        if page != self._page:
+            self._html.content = self._page = page
 
 
-def _page(mode: Mode, reason: str, rates: str, warning: str, notice: str) -> str:
-    colour = palette.css(palette.MODES[mode])
+def _page(mode: Mode, found: Explanation, rates: str, warning: str, notice: str) -> str:
+    colour = palette.css(_COLOURS[found.doing])
     lines = [
-        f"<div style='border-left:5px solid {colour};padding:2px 0 2px 10px'>"
-        f"<span id='mode' style='color:{colour};font-weight:700;letter-spacing:.06em'>{mode.name}</span>"
-        f"<div id='reason' style='min-height:2.8em;line-height:1.4'>{escape(reason)}</div></div>",
-        f"<div id='rates' style='opacity:.65;margin-top:6px;font-variant-numeric:tabular-nums'>{escape(rates)}</div>",
+        f"<div style='border-left:6px solid {colour};padding:0 0 2px 10px'>"
+        f"<div id='word' style='color:{colour};font-weight:800;font-size:27px;line-height:1.15'>"
+        f"{found.doing.value.upper()}</div>"
+        f"<div id='reason' style='font-size:14px;line-height:1.35'>{escape(found.sentence)}</div></div>",
+        f"<div id='rates' style='opacity:.6;margin-top:4px;font-size:11px;font-variant-numeric:tabular-nums'>"
+        f"<span id='mode'>{mode.name}</span> · {escape(rates)}</div>",
         _banner("notice", notice, palette.PATH),
         _banner("warning", warning, palette.HOLDING),
     ]
-    # of fixed height, so that the controls below do not move under a person's mouse
-    box = f"box-sizing:border-box;height:{_HEIGHT_PX}px;overflow:auto;padding:6px 12px;font-size:13px"
-    return f"{_STICKY}<div id='status' style='{box}'>{''.join(lines)}</div>"
+    box = f"box-sizing:border-box;min-height:{_HEIGHT_PX}px;padding:6px 12px"
+    return f"<div id='status' style='{box}'>{_LOST}<div id='now'>{''.join(lines)}</div></div>"
 
 
 def _banner(name: str, said: str, tint: palette.Colour) -> str:
@@ -62,7 +97,7 @@ def _banner(name: str, said: str, tint: palette.Colour) -> str:
         return ""
     return (
         f"<div id='{name}' style='margin-top:5px;padding:4px 8px;border-radius:6px;font-size:12px;line-height:1.3;"
-        f"background:{palette.css(tint)}1f;overflow-wrap:anywhere'>{escape(said)}</div>"
+        f"max-height:64px;overflow:auto;background:{palette.css(tint)}1f;overflow-wrap:anywhere'>{escape(said)}</div>"
     )
 
 

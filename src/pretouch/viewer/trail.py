@@ -5,14 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.types import BoolArray, ControlStep, FloatArray, Mode
+from pretouch.explanation import OFF_PATH_M as OFF_PATH_M
+from pretouch.explanation import binding as binding
+from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch.viewer import palette
 
 if TYPE_CHECKING:
     from viser import LineSegmentsHandle, SceneApi
-
-OFF_PATH_M = 0.01
-"""Distance from the path at which the arm is off it [m]; following it takes less."""
 
 SPACING_M = 0.005
 """Length of a segment, about [m]."""
@@ -45,15 +44,6 @@ def activity(step: ControlStep) -> Activity:
     if np.linalg.norm(step.ee_position - step.path_position) < OFF_PATH_M:
         return Activity.FOLLOWING
     return Activity.AVOIDING if binding(step).any() else Activity.RECOVERING
-
-
-def binding(step: ControlStep) -> BoolArray:
-    """Which of the restricted obstacles (K',) keep the arm from what it would do."""
-    count, qp = len(step.restricted), step.qp
-    pushed, violated = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-    if count and len(qp.slack) == count:
-        pushed, violated = qp.multipliers[-count:] > 1e-9, qp.slack > 1e-6
-    return pushed | violated
 
 
 class Trail:

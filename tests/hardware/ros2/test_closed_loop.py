@@ -129,7 +129,7 @@ def test_a_state_that_does_not_come_or_only_comes_again_latches_a_hold(
 
         steps = run.until(done, 3)
     assert steps[-1].mode is Mode.HOLD
-    assert "s old: check the connection to the arm, then resume" in steps[-1].reason
+    assert "check the connection to the arm, then resume" in steps[-1].reason
 
 
 @pytest.mark.slow

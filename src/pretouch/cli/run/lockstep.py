@@ -46,7 +46,7 @@ def run_lockstep(command: "Run", setup: RunSetup) -> int:
         name, ending = f"{command.robot.arm} at {address}, in lockstep", Ending()
         learnt = free_motion(command.robot, controller, name, remembered=False)  # runs alike are to stay alike
         with open_run_files(controller, name, place, folder, say, learnt) as kept:
-            reporter = ProgressReporter(kept.recorder, say, "", controller.limits.period)
+            reporter = ProgressReporter(kept.recorder, say, "", controller)
             try:
                 until, begin = _Until(seconds), learnt.begin if learnt else None
                 run_in_lockstep(client, controller, readings_at, reporter, until, learnt=begin)

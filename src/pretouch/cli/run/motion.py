@@ -58,7 +58,7 @@ def execute(
         further = stack.enter_context(found.output(controller))
         folder = Path(command.holds)
         kept = stack.enter_context(open_run_files(controller, session.arm.name, place, folder, tell, learnt, further))
-        reporter = ProgressReporter(kept.recorder, tell, latched, controller.limits.period)
+        reporter = ProgressReporter(kept.recorder, tell, latched, controller)
         options = Options(enter, learnt.begin if learnt else None, None, command.priority, command.cpu, tell)
         try:
             if _go_to_start(session, way.approach, tell, ending):

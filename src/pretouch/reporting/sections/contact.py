@@ -36,7 +36,7 @@ def _detected(m: Measures) -> Html:
         return element("p", "No contact was detected.")
     head = [
         "no.", "axes", "towards", "time [s]", "force [N]", "direction x y z", "filtered x y z [N]", "raw x y z [N]",
-        "peak x y z [N]", "reaction [m/s]", "lasted [s]",
+        "peak x y z [N]", "reaction [m/s]", "lasted [s]", "moved [s]",
     ]  # fmt: skip
     rows = [_detection(i, d) for i, d in enumerate(m.detections[:_ROWS], 1)]
     if len(m.course.runs) > 1:
@@ -48,7 +48,8 @@ def _detected(m: Measures) -> Html:
         *_left_out(len(m.detections), len(rows)),
         note(
             f"{_FORCE[m.course.by_thresholds]}; on the arm, base frame. Filtered: value of eq. 8."
-            " Raw: the estimate. Peak: on each axis the estimate farthest from zero during the contact."
+            " Raw: the estimate. Peak: on each axis the estimate farthest from zero during the contact. Held still: the"
+            " contact was below what moves the arm."
         ),
     ])  # fmt: skip
 
@@ -58,7 +59,7 @@ def _detection(order: int, d: Detection) -> list[Text]:
         str(order), " ".join(a for a, hit in zip(_AXES, d.axes, strict=True) if hit),
         heading(d.force), number(d.time, 2), number(float(np.linalg.norm(d.force)), 1), vector(_unit(d.force), 2),
         vector(d.filtered, 1), vector(d.raw, 1), vector(d.peak, 1), number(d.reaction_speed, 3),
-        number(d.reaction_s, 2),
+        number(d.reaction_s, 2), number(d.moved_s, 2) if d.moved_s else "held still",
     ]  # fmt: skip
 
 

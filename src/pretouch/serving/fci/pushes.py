@@ -30,10 +30,11 @@ class TcpPush:
     """[s]"""
 
 
-_AXES = {
-    "+x": (_TYPED_N, 0.0, 0.0), "-x": (-_TYPED_N, 0.0, 0.0), "+y": (0.0, _TYPED_N, 0.0),
-    "-y": (0.0, -_TYPED_N, 0.0), "+z": (0.0, 0.0, _TYPED_N), "-z": (0.0, 0.0, -_TYPED_N),
+AXES = {
+    "+x": (1.0, 0.0, 0.0), "-x": (-1.0, 0.0, 0.0), "+y": (0.0, 1.0, 0.0),
+    "-y": (0.0, -1.0, 0.0), "+z": (0.0, 0.0, 1.0), "-z": (0.0, 0.0, -1.0),
 }  # fmt: skip
+"""Directions by their names, base frame."""
 
 
 def push_of(text: str) -> TcpPush:
@@ -56,8 +57,9 @@ def push_of(text: str) -> TcpPush:
 def typed_push(text: str, now: float) -> TcpPush:
     """Read a push that begins now [s] from an axis, as +y or -x, or from FX,FY,FZ or FX,FY,FZ:DURATION [N, s]."""
     plain = text.strip().lower()
-    if plain in _AXES:
-        return TcpPush(now, _AXES[plain], _TYPED_S)
+    if plain in AXES:
+        x, y, z = AXES[plain]
+        return TcpPush(now, (_TYPED_N * x, _TYPED_N * y, _TYPED_N * z), _TYPED_S)
     try:
         return push_of(f"{now}:{plain}")
     except ParameterError:
@@ -85,13 +87,16 @@ class Pushes:
         """Have another one come; those that are over are forgotten."""
         self._pushes = (*(p for p in self._pushes if p.start + p.duration > self.now), push)
 
+    def at(self, time: float) -> FloatArray:
+        """Return the force (3,) [N] at an instant of the plant's clock [s]."""
+        now = time - self._begin
+        return sum((np.array(p.force) for p in self._pushes if p.start <= now < p.start + p.duration), start=_NONE)
+
     def _push(self, time: float) -> None:
         if not self._pushes:
             return
-        now, data, link = time - self._begin, self._plant.mj_data, self._link
-        self.force = sum(
-            (np.array(p.force) for p in self._pushes if p.start <= now < p.start + p.duration), start=_NONE
-        )
+        data, link = self._plant.mj_data, self._link
+        self.force = self.at(time)
         data.xfrc_applied[link, :3] = self.force
         # the simulation applies it at the centre of mass
         data.xfrc_applied[link, 3:] = np.cross(data.xpos[link] - data.xipos[link], self.force)

@@ -1,0 +1,194 @@
+"""What the arm does, who limits it and how far, as one word and one sentence of a control step."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from pretouch.types import BoolArray, ControlStep, Mode
+
+OFF_PATH_M = 0.01
+"""Distance from the path at which the arm is off it [m]; following it takes less."""
+_FULL = 0.95
+"""Share of the speed asked for from which on the arm is not called slowed: what a joint velocity's noise leaves."""
+_REST_M_S = 0.015
+"""Speed of the end-effector below which it rests [m/s], of a measured velocity with its noise."""
+_REST_RAD_S = 0.01
+"""Largest commanded joint velocity of an arm that is held still [rad/s]: 5 mm/s at half a metre."""
+_ANSWER_M_S = 1e-3
+"""Speed of the end-effector from which on a reaction moves the arm [m/s]."""
+_ASKED_M_S = 0.005
+"""Speed from which on a motion is asked for [m/s]."""
+
+
+class Doing(Enum):
+    """What the arm does, in one word for somebody who sees it for the first time."""
+
+    MOVING = "moving"
+    SLOWED = "slowed"
+    AVOIDING = "keeping away"
+    RETURNING = "returning"
+    BLOCKED = "blocked"
+    YIELDING = "yielding"
+    TOUCHED = "touched"
+    CAUGHT = "caught"
+    WAITING = "waiting"
+    STOPPED = "stopped"
+    """It holds until a person resumes."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What the arm does and why."""
+
+    doing: Doing
+    sentence: str
+
+
+def explain(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> Explanation:
+    """Say what the arm does in a step, who limits it, and how far.
+
+    Args:
+        step: of the controller.
+        units: ids of the skin's units, in its order.
+        links: names of the arm's links, in the order of the model.
+    """
+    if step.mode is Mode.HOLD:
+        return Explanation(Doing.STOPPED if resumable(step) else Doing.WAITING, step.reason)
+    names = _Names(units, links)
+    return _in_contact(step, names) if step.mode is Mode.REACT else _on_the_way(step, names)
+
+
+def resumable(step: ControlStep) -> bool:
+    """Whether a person can end the hold of a step: its sentence then says so (`modes.TABLE`)."""
+    return step.mode is Mode.HOLD and "resume" in step.reason
+
+
+def still(step: ControlStep) -> bool:
+    """Whether the arm is in contact and does not move."""
+    return step.mode is Mode.REACT and float(np.abs(step.command).max(initial=0.0)) < _REST_RAD_S
+
+
+def answers(step: ControlStep) -> bool:
+    """Whether the arm moves with a contact."""
+    return not still(step) and float(np.linalg.norm(step.reaction_velocity)) >= _ANSWER_M_S
+
+
+def binding(step: ControlStep) -> BoolArray:
+    """Which of the restricted obstacles (K',) keep the arm from what it would do."""
+    count, qp = len(step.restricted), step.qp
+    pushed, violated = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    if count and len(qp.slack) == count:
+        pushed, violated = qp.multipliers[-count:] > 1e-9, qp.slack > 1e-6
+    return pushed | violated
+
+
+@dataclass(frozen=True)
+class _Names:
+    """Names of units and links."""
+
+    units: Sequence[str]
+    links: Sequence[str]
+
+    def sees(self, step: ControlStep, obstacle: int) -> str:
+        """Say who sees an obstacle, and how far from the arm."""
+        distance = max(0.0, float(step.obstacles.body_distance[obstacle]))
+        return f"{self.who(step, obstacle)} sees something at {distance:.2f} m"
+
+    def who(self, step: ControlStep, obstacle: int) -> str:
+        """Name the unit that sees an obstacle."""
+        unit = int(step.obstacles.unit[obstacle])
+        return self.units[unit] if unit < len(self.units) else "an outside source"
+
+    def link(self, index: int) -> str:
+        return self.links[index]
+
+
+def _on_the_way(step: ControlStep, names: _Names) -> Explanation:
+    """Explain a step in which the arm follows its path."""
+    limiting = step.restricted[binding(step)]
+    off = float(np.linalg.norm(step.ee_position - step.path_position))
+    speed = float(np.linalg.norm(step.ee_velocity))
+    share, near = _share(step), step.obstacles.body_distance
+    slowed = step.speed_scale < _FULL
+    if not (slowed or len(limiting)):
+        if off >= OFF_PATH_M:
+            return Explanation(Doing.RETURNING, f"Returning to its path, {off:.2f} m away.")
+        seen = f"{names.sees(step, int(near.argmin()))}." if len(near) else "nothing near is seen."
+        follows = np.linalg.norm(step.desired_velocity) >= _ASKED_M_S
+        return Explanation(
+            Doing.MOVING, (f"Following its path at {speed:.2f} m/s: " if follows else "In its place: ") + seen
+        )
+    # the row that bites is the cause; without one it is eq. 3, by the distance from the end-effector
+    cause = int(limiting[near[limiting].argmin()]) if len(limiting) else _slowing(step)
+    why = names.sees(step, cause) if cause >= 0 else "what was seen has gone from view, or a unit is late"
+    if len(limiting) and off >= OFF_PATH_M:
+        kept = f"{off:.2f} m from its path: {why}."
+        if speed < _REST_M_S:
+            return Explanation(Doing.BLOCKED, f"At rest {kept} It goes on when the way is clear.")
+        return Explanation(Doing.AVOIDING, f"Kept {kept}")
+    if speed < _REST_M_S and share < 0.1:
+        return Explanation(Doing.BLOCKED, f"At rest: {why}. It goes on when the way is clear.")
+    back = "" if off < OFF_PATH_M else f" on its way back to the path, {off:.2f} m away"
+    if share < _FULL:
+        return Explanation(Doing.SLOWED, f"Slowed to {100 * share:.0f} %{back}: {why}.")
+    return Explanation(Doing.MOVING, f"Following its path, but {_limit(step, names, cause)}.")
+
+
+def _share(step: ControlStep) -> float:
+    """Share of the speed that the path alone would ask for, from 0 to 1: eq. 3, and what the rows leave of it."""
+    asked = float(np.linalg.norm(step.desired_velocity))
+    if asked < _ASKED_M_S or not binding(step).any():
+        return step.speed_scale
+    along = float(step.ee_velocity @ step.desired_velocity) / asked**2
+    return step.speed_scale * min(max(along, 0.0), 1.0)
+
+
+def _slowing(step: ControlStep) -> int:
+    """Index of the obstacle nearest to the end-effector, -1 of none."""
+    return int(step.obstacles.ee_distance.argmin()) if len(step.obstacles.unit) else -1
+
+
+def _limit(step: ControlStep, names: _Names, cause: int) -> str:
+    """Say how fast a link may near what limits it."""
+    limit = float(step.approach_limit[np.flatnonzero(step.restricted == cause)[0]])
+    link = names.link(int(step.obstacles.link[cause]))
+    may = f"may near it at {limit:.2f} m/s at most" if limit >= 0 else "has to back away from it"
+    return f"{names.sees(step, cause)}, and {link} {may}"
+
+
+def _in_contact(step: ControlStep, names: _Names) -> Explanation:
+    """Explain a step in which the arm reacts to a contact."""
+    if step.reason.startswith("Clamped"):
+        return Explanation(Doing.CAUGHT, step.reason)
+    place = f" at {names.link(int(step.touched.link[0]))}" if len(step.touched.link) else ""
+    force = force_of(step)
+    pushed = f"Touched{place}" + (f" with {force:.0f} N" if np.isfinite(force) else "")
+    if step.contact is not None:  # it has not moved with it yet
+        return Explanation(Doing.TOUCHED, f"{pushed}.")
+    cause, _, detail = step.reason.partition(": ")
+    if not (len(step.touched.link) or step.evidence >= 1.0):
+        then = f"{detail[:1].upper()}{detail[1:]}"
+        if cause == "Moving with a contact":  # eq. 12 goes on whatever is measured
+            return Explanation(Doing.YIELDING, f"Moving the way it was pushed: {detail}")
+        rests = still(step)
+        return Explanation(Doing.WAITING if rests else Doing.YIELDING, f"The push has ended. {then}")
+    if not still(step):
+        speed = float(np.linalg.norm(step.ee_velocity))
+        return Explanation(Doing.YIELDING, f"{pushed}: moving with the push at {speed:.2f} m/s.")
+    limiting = step.restricted[binding(step)]
+    if len(limiting) and float(np.linalg.norm(step.reaction_velocity)) >= _ASKED_M_S:
+        return Explanation(Doing.TOUCHED, f"{pushed}: held still, for {names.sees(step, int(limiting[0]))}.")
+    return Explanation(Doing.TOUCHED, f"{pushed}: held still, the push is below what moves the arm.")
+
+
+def force_of(step: ControlStep) -> float:
+    """Size of the force of a contact [N]: at the surest place, of a new contact, or of the estimate; NaN of none."""
+    if len(step.touched.link):
+        force = step.touched.force[0]
+    elif step.contact is not None:
+        force = step.contact.force
+    else:
+        force = step.force - step.thresholds.mean
+    return float(np.linalg.norm(force))

@@ -1,0 +1,203 @@
+"""Sentences of steps made by hand, each with the numbers that it must say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pretouch.explanation import Doing, Explanation, explain, resumable, still
+from pretouch.modes import TABLE
+from pretouch.types import Contact, ControlStep, Mode, Obstacles, QpOutcome, QpSolution, Thresholds, Touched
+
+UNITS, LINKS = ("hand_front", "hand_left"), ("link0", "link5", "hand")
+AHEAD = np.array([0.3, 0.0, 0.0])
+
+
+def seen(*rows: tuple[int, float, float, int]) -> Obstacles:
+    """Obstacles of (unit, distance from the end-effector, from the body [m], link)."""
+    unit, ee, body, link = (np.array(column) for column in zip(*rows, strict=True)) if rows else (np.zeros(0),) * 4
+    zeros = np.zeros((len(rows), 3))
+    return Obstacles(unit.astype(int), zeros, ee, zeros, link.astype(int), zeros, body, np.zeros(len(rows)))
+
+
+def limited(slack: float = 0.0, multiplier: float = 1.0) -> QpSolution:
+    """An answer that one approach row limits."""
+    return QpSolution(np.zeros(7), np.array([slack]), np.r_[np.zeros(7), multiplier], QpOutcome.SOLVED, "solved")
+
+
+@pytest.fixture
+def step() -> ControlStep:
+    """Of an arm that follows its path at 0.3 m/s with nothing near."""
+    still, parts = np.zeros(3), np.zeros((6, 3))
+    parts[0], parts[1], parts[2] = 11.0, -9.0, 1.0
+    free = QpSolution(np.full(7, 0.2), np.zeros(0), np.zeros(7), QpOutcome.SOLVED, "solved")
+    return ControlStep(
+        stamp=4.0, mode=Mode.TRACK, reason="Following the path.", q=np.zeros(7), q_commanded=np.zeros(7),
+        ee_position=np.array([0.5, 0.25, 0.25]), ee_velocity=AHEAD, path_position=np.array([0.5, 0.25, 0.25]),
+        path_phase=1.0, desired_velocity=AHEAD, speed_scale=1.0, range_distance=np.full(2, np.nan), obstacles=seen(),
+        force=still, filtered_force=still, thresholds=Thresholds(parts), armed=True, contact=None,
+        reaction_velocity=still, restricted=np.zeros(0, int), approach_limit=np.zeros(0), qp=free, command=free.qd,
+        residual=np.full(7, np.nan), evidence=0.1,
+    )  # fmt: skip
+
+
+def said(step: ControlStep, **changes: object) -> Explanation:
+    return explain(replace(step, **changes), UNITS, LINKS)  # type: ignore[arg-type]
+
+
+def test_an_arm_that_nothing_limits_follows_its_path(step: ControlStep) -> None:
+    assert said(step) == Explanation(Doing.MOVING, "Following its path at 0.30 m/s: nothing near is seen.")
+    far = said(step, obstacles=seen((0, 0.9, 0.75, 2), (1, 0.6, 0.45, 2)))
+    assert far == Explanation(Doing.MOVING, "Following its path at 0.30 m/s: hand_left sees something at 0.45 m.")
+
+
+def test_an_arm_without_a_way_to_go_is_in_its_place(step: ControlStep) -> None:
+    found = said(step, desired_velocity=np.zeros(3), ee_velocity=np.zeros(3))
+    assert found == Explanation(Doing.MOVING, "In its place: nothing near is seen.")
+
+
+def test_eq_3_is_said_with_its_factor_and_the_unit_nearest_to_the_end_effector(step: ControlStep) -> None:
+    # 0.136 m of 0.8 m are 17 %; what hand_left sees is nearer to the body, but not to the end-effector
+    slowed = {"speed_scale": 0.17, "desired_velocity": 0.17 * AHEAD, "ee_velocity": 0.17 * AHEAD}
+    found = said(step, obstacles=seen((1, 0.5, 0.1, 1), (0, 0.136, 0.18, 2)), **slowed)
+    assert found == Explanation(Doing.SLOWED, "Slowed to 17 %: hand_front sees something at 0.18 m.")
+    gone = said(step, **slowed)
+    assert gone == Explanation(Doing.SLOWED, "Slowed to 17 %: what was seen has gone from view, or a unit is late.")
+
+
+def test_what_an_outside_source_sees_is_of_no_unit(step: ControlStep) -> None:
+    found = said(step, obstacles=seen((2, 0.4, 0.3, 2)), speed_scale=0.5)
+    assert found.sentence == "Slowed to 50 %: an outside source sees something at 0.30 m."
+
+
+def test_a_row_slows_to_the_share_of_the_speed_that_it_leaves(step: ControlStep) -> None:
+    near = {"obstacles": seen((0, 0.4, 0.2, 2), (1, 0.2, 0.12, 2)), "restricted": np.array([0])}
+    found = said(step, **near, approach_limit=np.array([0.05]), qp=limited(), ee_velocity=0.35 * AHEAD)
+    assert found == Explanation(Doing.SLOWED, "Slowed to 35 %: hand_front sees something at 0.20 m.")
+    # eq. 3 and the row together: 0.5 * 0.4
+    both = said(
+        step, **near, approach_limit=np.array([0.05]), qp=limited(), speed_scale=0.5, desired_velocity=0.5 * AHEAD,
+        ee_velocity=0.2 * AHEAD,
+    )  # fmt: skip
+    assert both.sentence == "Slowed to 20 %: hand_front sees something at 0.20 m."
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"), [(0.05, "link5 may near it at 0.05 m/s at most"), (-0.1, "link5 has to back away from it")]
+)
+def test_a_row_that_limits_the_direction_alone_names_unit_and_link(step: ControlStep, limit: float, words: str) -> None:
+    found = said(
+        step, obstacles=seen((1, 0.5, 0.15, 1)), restricted=np.array([0]), approach_limit=np.array([limit]),
+        qp=limited(),
+    )  # fmt: skip
+    assert found == Explanation(
+        Doing.MOVING, f"Following its path, but hand_left sees something at 0.15 m, and {words}."
+    )
+
+
+def test_a_row_that_does_not_bind_limits_nothing(step: ControlStep) -> None:
+    found = said(
+        step, obstacles=seen((1, 0.5, 0.15, 1)), restricted=np.array([0]), approach_limit=np.array([0.4]),
+        qp=limited(multiplier=0.0),
+    )  # fmt: skip
+    assert found.sentence == "Following its path at 0.30 m/s: hand_left sees something at 0.15 m."
+
+
+def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_follows(step: ControlStep) -> None:
+    # the page's old sentence at 0.05 m/s, pushed off the path: "Following the path."
+    off = {"path_position": step.ee_position + np.array([0.0, 0.0, 0.12]), "obstacles": seen((1, 0.2, 0.06, 2))}
+    near = {"restricted": np.array([0]), "approach_limit": np.array([0.02]), "qp": limited(slack=0.01)}
+    found = said(step, **off, **near, desired_velocity=AHEAD / 6, ee_velocity=np.array([0.0, 0.05, 0.0]))
+    assert found == Explanation(Doing.AVOIDING, "Kept 0.12 m from its path: hand_left sees something at 0.06 m.")
+    still = said(step, **off, **near, ee_velocity=np.array([0.0, 0.01, 0.0]))
+    assert still == Explanation(
+        Doing.BLOCKED,
+        "At rest 0.12 m from its path: hand_left sees something at 0.06 m. It goes on when the way is clear.",
+    )
+    assert said(step, path_position=off["path_position"]) == Explanation(
+        Doing.RETURNING, "Returning to its path, 0.12 m away."
+    )
+    slow = said(step, **off, speed_scale=0.4)
+    assert (
+        slow.sentence == "Slowed to 40 % on its way back to the path, 0.12 m away: hand_left sees something at 0.06 m."
+    )
+
+
+def test_an_arm_at_rest_before_something_says_what(step: ControlStep) -> None:
+    found = said(step, obstacles=seen((0, 0.02, -0.01, 2)), speed_scale=0.02, ee_velocity=np.array([0.004, 0.0, 0.0]))
+    assert found == Explanation(
+        Doing.BLOCKED, "At rest: hand_front sees something at 0.00 m. It goes on when the way is clear."
+    )
+
+
+def touched(step: ControlStep, **changes: object) -> Explanation:
+    at = Touched(np.array([1]), np.zeros((1, 3)), np.array([[0.0, 12.0, 5.0]]), np.zeros(1), np.ones(1))
+    return said(
+        step, **{
+            "mode": Mode.REACT, "reason": "Yielding to a contact: the task goes on 1 s after the last push.",
+            "evidence": 1.4, "touched": at, "reaction_velocity": np.array([0.0, 0.1, 0.0]), **changes,
+        }
+    )  # fmt: skip
+
+
+def test_a_contact_that_moves_the_arm_is_said_with_link_force_and_speed(step: ControlStep) -> None:
+    found = touched(step, ee_velocity=np.array([0.0, 0.12, 0.0]))
+    assert found == Explanation(Doing.YIELDING, "Touched at link5 with 13 N: moving with the push at 0.12 m/s.")
+
+
+def test_a_contact_that_does_not_move_the_arm_is_said_as_what_it_is(step: ControlStep) -> None:
+    rest = {"command": np.full(7, 0.001), "reaction_velocity": np.zeros(3)}
+    found = touched(step, **rest)
+    assert found == Explanation(
+        Doing.TOUCHED, "Touched at link5 with 13 N: held still, the push is below what moves the arm."
+    )
+    assert still(replace(step, mode=Mode.REACT, command=rest["command"]))
+    assert not still(replace(step, mode=Mode.TRACK, command=rest["command"]))
+
+
+def test_a_contact_that_would_move_the_arm_into_something_names_the_unit(step: ControlStep) -> None:
+    found = touched(
+        step, command=np.zeros(7), obstacles=seen((0, 0.2, 0.03, 2)), restricted=np.array([0]),
+        approach_limit=np.zeros(1), qp=limited(),
+    )  # fmt: skip
+    assert found.sentence == "Touched at link5 with 13 N: held still, for hand_front sees something at 0.03 m."
+
+
+def test_a_new_contact_is_said_by_its_force_and_one_that_has_ended_with_what_follows(step: ControlStep) -> None:
+    new = touched(step, touched=step.touched, contact=Contact(np.array([0.0, -8.0, 6.0]), np.ones(3, bool)))
+    assert new == Explanation(Doing.TOUCHED, "Touched with 10 N.")
+    over = {"touched": step.touched, "evidence": 0.2}
+    ended = touched(step, **over, command=np.zeros(7))
+    assert ended == Explanation(Doing.WAITING, "The push has ended. The task goes on 1 s after the last push.")
+    eq_12 = touched(step, **over, reason="Moving with a contact: 1.20 s left.")
+    assert eq_12 == Explanation(Doing.YIELDING, "Moving the way it was pushed: 1.20 s left.")
+
+
+def test_a_force_without_a_place_is_the_estimate_less_its_mean_and_nothing_where_there_is_none(
+    step: ControlStep,
+) -> None:
+    found = touched(step, touched=step.touched, force=np.array([1.0, 13.0, 10.0]))  # 1 N of it is the mean
+    assert found.sentence.startswith("Touched with 15 N: ")
+    assert touched(step, touched=step.touched, force=np.full(3, np.nan)).sentence.startswith("Touched: ")
+
+
+def test_a_clamp_is_said_as_such(step: ControlStep) -> None:
+    reason = "Clamped between two objects (5.0 Nm against the direction it yielded in): opening the way it came."
+    assert touched(step, reason=reason) == Explanation(Doing.CAUGHT, reason)
+
+
+def test_a_hold_says_its_cause_and_is_a_stop_where_a_person_has_to_resume(step: ControlStep) -> None:
+    silent = "No usable reading from hand_left: check it; the arm goes on when it is heard again."
+    assert said(step, mode=Mode.HOLD, reason=silent) == Explanation(Doing.WAITING, silent)
+    tries = "Given up after 3 contacts: clear it; the arm tries again when 30 s have passed, or on resume."
+    assert said(step, mode=Mode.HOLD, reason=tries).doing is Doing.STOPPED
+
+
+@pytest.mark.parametrize("row", TABLE, ids=lambda row: row.event.name)
+def test_what_latches_says_that_a_person_has_to_resume_and_nothing_else_promises_it(
+    step: ControlStep, row: object
+) -> None:
+    sentence = row.sentence  # type: ignore[attr-defined]
+    if sentence != "{}":  # a hold that lasts says what it said
+        held = replace(step, mode=row.target, reason=sentence)  # type: ignore[attr-defined]
+        assert resumable(held) == row.latches  # type: ignore[attr-defined]
