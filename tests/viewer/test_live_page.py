@@ -19,7 +19,7 @@ from pretouch.viewer.controls import toggle_recording
 from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage, serve_live
 from pretouch.viewer.room import Faults, LiveSettings
-from pretouch.viewer.scene import GIZMO_M
+from pretouch.viewer.scene import CAMERA_FROM
 from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
 
@@ -239,7 +239,7 @@ def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Cloc
     clock.turn(0.1)
     give(clock.page, "x [m]", 0.9)
     give(clock.page, "Cones", False)
-    clock.page._drag(np.array([1.0, 0.4, 0.3]))
+    clock.page._drag(np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
     clock.turn(0.1)
     assert clock.page.notice.startswith("Not done: ")
     click(clock.page, "Resume")
@@ -262,7 +262,22 @@ def test_the_hand_begins_between_the_panels(simulation: LiveSimulation, width: i
     box = {"x": LEFT_PX, "y": 0, "width": width - LEFT_PX - RIGHT_PX, "height": height}
     assert simulation.frame.hand is not None
     np.testing.assert_allclose(simulation.frame.hand, LiveSettings().hand_start, atol=0.01)
-    for offset in np.vstack([np.zeros(3), GIZMO_M * np.eye(3)]):
-        x, y = seen_at(simulation.frame.hand + offset, box)
-        assert LEFT_PX < x < width - RIGHT_PX
-        assert 0 < y < height
+    x, y = seen_at(simulation.frame.hand, box)
+    assert LEFT_PX < x < width - RIGHT_PX
+    assert 0 < y < height
+
+
+def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(
+    clock: Clock, simulation: LiveSimulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulation.play_opening()
+    begun = simulation.time
+    clock.turn(1.0)
+    assert simulation.time == begun
+    monkeypatch.setattr(clock.page._server, "get_clients", lambda: {0: None})
+    clock.turn(3.0)
+    assert simulation.time > begun + 2.9
+    assert simulation.opening
+    click(clock.page, "Resume")
+    clock.turn(0.1)
+    assert simulation.opening is None

@@ -178,9 +178,10 @@ def test_the_hand_is_drawn_where_it_is_and_its_target_when_that_is_elsewhere(
     hand = np.array([0.8, 0.1, 0.4])
     scene.draw(frame(some_step, hand=hand, hand_target=hand + 0.001), 0.0)
     np.testing.assert_array_equal(nodes.nodes["/hand"].position, hand)
-    assert not nodes.nodes["/hand_target/ghost"].visible
+    assert not nodes.nodes["/hand_target"].visible
     scene.draw(frame(some_step, hand=hand, hand_target=hand + 0.2), 0.1)
-    assert nodes.nodes["/hand_target/ghost"].visible
+    assert nodes.nodes["/hand_target"].visible
+    np.testing.assert_array_equal(nodes.nodes["/hand_target"].position, hand + 0.2)
     scene.draw(frame(some_step), 0.2)
     assert not nodes.nodes["/hand"].visible
     assert not nodes.nodes["/hand_target"].visible

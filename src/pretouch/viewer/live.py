@@ -36,6 +36,8 @@ class LivePage:
         self.pace = Pace()
         self._actions = ActionQueue()
         self._pointed: FloatArray | None = None
+        self._visited = False
+        """Whether anybody has opened the page: an opening waits until then."""
         self._receiver_ended = False
         """Whether the receiver of the real units has ended."""
         style_page(server)
@@ -58,16 +60,18 @@ class LivePage:
         """Have something done between two ticks, from any thread, as `ActionQueue.put` does."""
         self._actions.put(action, kind, settle, quiet)
 
-    def _drag(self, target: FloatArray) -> None:
-        self.ask(lambda: self._move_hand(target), "hand", quiet=True)
+    def _drag(self, eye: FloatArray, place: FloatArray) -> None:
+        self.ask(lambda: self._move_hand(eye, place), "hand", quiet=True)
 
-    def _move_hand(self, target: FloatArray) -> None:
-        self._simulation.move_hand(target)
-        self.controls.show_hand(target)  # also while the arm is paused
+    def _move_hand(self, eye: FloatArray, place: FloatArray) -> None:
+        self.controls.show_hand(self._simulation.point_hand(eye, place))  # also while the arm is paused
 
     def turn(self, now: float) -> None:
         """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
         self._run_actions(now)
+        self._visited = self._visited or bool(self._server.get_clients())
+        if self._simulation.opening and not self._visited:
+            return
         running, recording = self.controls.running, self._simulation.recording
         before = self._simulation.time
         steps = self._pass_time()
@@ -101,6 +105,8 @@ class LivePage:
 
     def _run_actions(self, now: float) -> None:
         actions = self._actions.take(now)
+        if actions:
+            self._simulation.opening = None  # from the first drag or click on, the page is the visitor's
         for action in actions:
             if not action.quiet:
                 self._status.notice = ""
@@ -136,12 +142,11 @@ class LivePage:
                 self.controls.unit_panel.draw(now)
 
     def _follow_target(self, target: FloatArray | None) -> None:
-        """Have gizmo and sliders show where the hand is to be, wherever that came from."""
+        """Have the sliders show where the hand is to be, wherever that came from."""
         if target is None or (self._pointed is not None and np.array_equal(target, self._pointed)):
             return
         self.controls.show_hand(target)
-        if self._scene.place_target(target):
-            self._pointed = target.copy()
+        self._pointed = target.copy()
 
 
 def serve_live(

@@ -26,7 +26,8 @@ FORCE: Colour = (232, 119, 34)
 TRUE_FORCE: Colour = (38, 44, 54)
 PLACE: Colour = (190, 24, 120)
 """Of the forces at the places where the arm is said to be touched."""
-HAND: Colour = (232, 190, 160)
+HAND: Colour = (232, 178, 146)
+CUFF: Colour = (58, 92, 148)
 BOARD: Colour = (201, 176, 140)
 
 MODES: dict[Mode, Colour] = {Mode.TRACK: RECOVERING, Mode.REACT: REACTING, Mode.HOLD: HOLDING}

@@ -1,8 +1,7 @@
 """What a page shows in space: the room, the arm, what it senses, does and detects, and a person's hand."""
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,29 +12,24 @@ from pretouch.viewer import palette
 from pretouch.viewer.arm import Arm, capsule_surfaces
 from pretouch.viewer.expectation import expectation, in_levels
 from pretouch.viewer.frame import Frame, World
+from pretouch.viewer.person import Drag, PersonHand
 from pretouch.viewer.trail import Trail, binding
 from pretouch.viewer.units import Units
 from pretouch.viewer.vendor import vendor_surfaces
 
 if TYPE_CHECKING:
-    from viser import ArrowsHandle, SceneNodeHandle, TransformControlsHandle, ViserServer
+    from viser import ArrowsHandle, SceneNodeHandle, ViserServer
 
 CAMERA_FROM, CAMERA_AT = (1.75, 0.95, 0.85), (0.3, 0.0, 0.27)
 """Where the page looks from at first and at what [m]: from the arm's front right."""
 CAMERA_FOV = math.radians(42.0)
 """Vertical angle of what is seen [rad]."""
 
-GIZMO_M = 0.15
-"""Length of the arrows that the hand is dragged by [m]."""
-
 ARROW_M_PER_N, ARROW_MOST_M, ARROW_LEAST_N = 0.012, 0.45, 6.0
 """Length of a force arrow [m/N] and at most [m], and the force below which none is drawn [N]: noise is less."""
 
 PARTS = ("cones", "points", "pairs", "path", "trail", "forces")
 """What can be shown and hidden."""
-
-_APART_M = 0.015
-"""Distance between hand and target from which the target is shown [m]."""
 
 
 class Scene:
@@ -70,37 +64,17 @@ class Scene:
         self._touched = scene.add_frame("/touched", show_axes=False)
         self._true_force = self._arrow("/touched/true_force", palette.TRUE_FORCE)
         self._places = [self._arrow(f"/place/{number}", palette.PLACE) for number in range(2)]
-        self._hand, self._target = self._person(world)
-        self._dragged = False
+        self._hand = None if world.hand_radius is None else PersonHand(server, world.hand_radius)
 
     def _arrow(self, name: str, colour: palette.Colour) -> "ArrowsHandle":
         return self._server.scene.add_arrows(
             name, np.zeros((1, 2, 3)), colour, shaft_radius=0.007, head_radius=0.018, head_length=0.04, visible=False
         )
 
-    def _person(self, world: World) -> "tuple[SceneNodeHandle | None, TransformControlsHandle | None]":
-        if world.hand_radius is None:
-            return None, None
-        scene, radius = self._server.scene, world.hand_radius
-        plain: dict[str, Any] = {"subdivisions": 3, "cast_shadow": False, "receive_shadow": False}
-        hand = scene.add_icosphere("/hand", radius, color=palette.HAND, **plain)
-        target = scene.add_transform_controls(
-            "/hand_target", scale=GIZMO_M, line_width=3.0, disable_rotations=True, depth_test=False
-        )
-        self._ghost = scene.add_icosphere(
-            "/hand_target/ghost", 0.8 * radius, color=palette.HAND, opacity=0.35, visible=False, **plain
-        )
-        return hand, target
-
-    def on_hand(self, act: Callable[[FloatArray], None]) -> None:
-        """Have a function called with where the hand is dragged to (3,) [m], from the page's own thread."""
-        if self._target is None:
-            return
-
-        @self._target.on_update
-        async def _(event: Any) -> None:
-            self._dragged = event.phase != "end"
-            act(np.array(event.target.position, dtype=np.float64))
+    def on_hand(self, act: Drag) -> None:
+        """Have a function told of each drag of the hand."""
+        if self._hand:
+            self._hand.on_drag(act)
 
     def show(self, name: str, visible: bool) -> None:
         """Show or hide one of `PARTS`."""
@@ -150,7 +124,8 @@ class Scene:
         self.trail.draw(now)
         self._draw_pairs(step)
         self._draw_forces(frame, kin)
-        self._draw_hand(frame)
+        if self._hand:
+            self._hand.draw(frame.hand, frame.hand_target)
 
     def _draw_pairs(self, step: ControlStep) -> None:
         near = step.obstacles
@@ -179,24 +154,6 @@ class Scene:
                 shaft = force * (min(ARROW_M_PER_N * size, ARROW_MOST_M) / max(size, 1e-9))
                 # it ends at the place, for a contact pushes
                 handle.points = np.array([[touched.point[number] - shaft, touched.point[number]]], dtype=np.float32)
-
-    def _draw_hand(self, frame: Frame) -> None:
-        if self._hand is None or self._target is None:
-            return
-        there = frame.hand is not None and bool(np.all(np.isfinite(frame.hand)))
-        self._hand.visible = there
-        self._target.visible = there and frame.hand_target is not None
-        if there and frame.hand is not None:
-            self._hand.position = frame.hand
-            if frame.hand_target is not None:
-                self._ghost.visible = float(np.linalg.norm(frame.hand_target - frame.hand)) > _APART_M
-
-    def place_target(self, target: FloatArray) -> bool:
-        """Move the gizmo of the hand to a place (3,) [m], unless somebody has it at the mouse; returns whether."""
-        if self._target is None or self._dragged:
-            return False
-        self._target.position = target
-        return True
 
 
 def _segments(world: World, dashes: int = 80) -> FloatArray:
