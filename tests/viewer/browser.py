@@ -172,13 +172,12 @@ class Visitor:
         shot = self.page.screenshot(clip={"x": x, "y": y, "width": 1, "height": 1})
         return 255.0 * np.asarray(imread(BytesIO(shot)))[0, 0, :3]
 
-    def wait_for_colour(self, point: FloatArray, colour: tuple[int, int, int]) -> None:
-        """Wait until something of about a colour, lit as it may be, is seen where a point (3,) [m] is."""
-        wanted = np.array(colour) / np.linalg.norm(colour)
+    def wait_for_skin(self, point: FloatArray) -> None:
+        """Wait until something of the colour of skin is seen where a point (3,) [m] is."""
 
         def there() -> bool:
-            seen = self.colour_at(point)
-            return bool(seen @ wanted > 0.995 * np.linalg.norm(seen) and np.linalg.norm(seen) > 60.0)
+            red, _, blue = self.colour_at(point)
+            return bool(red > blue + 20.0)
 
         self.wait_until(there)
 

@@ -103,8 +103,9 @@ EYE = np.array([1.75, 0.95, 0.85])
 def test_a_place_pointed_to_on_the_arm_is_at_the_arms_depth(panda_model: RobotModel) -> None:
     q = panda_model.description.q_ready
     palm = panda_model.kinematics(q).position[panda_model.link_index("panda_hand")]
-    before = EYE + 0.75 * (palm - EYE)  # half a metre nearer, in the same place of the picture
+    before = EYE + 0.8 * (palm - EYE)  # nearer, in the same place of the picture
     place = at_depth(panda_model, q, EYE, before)
+    assert np.linalg.norm(before - palm) > 0.3
     assert np.linalg.norm(place - palm) < 0.08
     assert np.linalg.norm(np.cross(place - EYE, palm - EYE)) < 1e-9
 

@@ -19,7 +19,6 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.serving.simulate import SimulateOptions
 from pretouch.serving.simulate import run as simulate
 from pretouch.types import FloatArray, Mode
-from pretouch.viewer import palette
 from pretouch.viewer.live import LivePage, serve_live
 from pretouch.viewer.real_units import RealUnits
 from pretouch.viewer.replay import serve_replay
@@ -62,7 +61,7 @@ def test_a_hand_dragged_into_the_arm_leads_to_a_reaction_and_back_and_the_camera
     with live(simulation) as served, chromium() as visitor:
         visitor.open(served)
         visitor.wait_for("mode", Mode.TRACK.name)
-        visitor.wait_for_colour(start, palette.HAND)
+        visitor.wait_for_skin(start)
         before = camera(pages[0])
         drag = visitor.drag_by_finger if touch else visitor.drag
         drag(start, np.array([0.5, 0.25, 0.25]))

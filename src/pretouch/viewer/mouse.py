@@ -23,7 +23,7 @@ _SHELL_M = 0.02
 _DIRECTIONS = 200
 _DEPTHS, _LOOKS = (0.4, 1.6), 121
 """Shares of the distance from the eye between which a line of sight is looked along, and at how many points."""
-_NEAR_M, _OWN_M, _STAY = 0.04, 0.3, 0.03
+_NEAR_M, _OWN_M, _STAY = 0.04, 0.25, 0.2
 """How quickly a point of it counts less for the depth with its distance from the arm and from the place [m], and what
 the place's own depth counts."""
 
@@ -79,7 +79,7 @@ def at_depth(model: RobotModel, q: FloatArray, eye: FloatArray, place: FloatArra
     aside = np.tile([0.0, 0.0, 1.0], (_LOOKS, 1))
     gaps = closest_points(kin, model.capsules, kin.position[model.ee], none, points, aside).body_distance
     apart = np.linalg.norm(points - place, axis=1)
-    weight = np.exp(-np.maximum(gaps, 0.0) / _NEAR_M - apart / _OWN_M)
+    weight = np.exp(-np.maximum(gaps, 0.0) / _NEAR_M - (apart / _OWN_M) ** 2)
     farther = float(weight @ (shares - 1.0)) / (_STAY + float(weight.sum()))
     return np.asarray(place + farther * (place - eye))
 

@@ -12,6 +12,10 @@ PEDESTAL: Colour = (170, 177, 186)
 UNIT: Colour = (52, 63, 78)
 UNIT_SILENT: Colour = (214, 40, 57)
 CONE: Colour = (84, 150, 214)
+SEEING: Colour = (242, 150, 40)
+"""Of a unit, and of its cone, that sees an obstacle."""
+LIMITING: Colour = (214, 40, 57)
+"""Of one whose obstacle keeps the arm from what it would do."""
 SENSED: Colour = (38, 166, 91)
 PATH: Colour = (49, 104, 196)
 AVOIDING: Colour = (214, 40, 57)

@@ -30,7 +30,7 @@ GRIP = 1.7
 _FINGERS = ((-0.0255, 0.0115), (-0.0088, 0.0125), (0.0088, 0.0125), (0.0255, 0.0115))
 """Place across the fist, and radius of each finger [m]."""
 _CELL_M, _BLEND_M = 0.004, 0.005
-_SIDE_M = 0.25
+_SIDE_M = 0.08
 """Distance from the plane y = 0 from which on the forearm lies along y [m]."""
 _APART_M = 0.015
 """Distance between hand and target from which the target is shown [m]."""
