@@ -12,8 +12,12 @@ from tests.ports import free_port
 from tests.viewer.browser import seen_at
 from tests.viewer.sessions import set_speed
 
+from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import LIVE_SKIN, load_skin
 from pretouch.types import Mode
 from pretouch.viewer.controls import toggle_recording
 from pretouch.viewer.gui import LEFT_PX, RIGHT_PX, SETTLE_S, TYPED_S
@@ -281,3 +285,34 @@ def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(
     click(clock.page, "Resume")
     clock.turn(0.1)
     assert simulation.opening is None
+
+
+def test_three_arms_with_one_hand_go_through_the_same_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = RobotModel(panda())
+    simulation = LiveSimulation(LiveSettings(profile=PROFILES["pretouch"]), model, load_skin(LIVE_SKIN, model))
+    with served(ServeOptions(port=free_port()), "test") as server:
+        clock = Clock(LivePage(server, simulation))
+        monkeypatch.setattr(server, "get_clients", lambda: {0: SimpleNamespace(camera=SimpleNamespace())})
+        give(clock.page, "Arms", "three arms")
+        clock.turn(8.0)
+        beside = clock.page._companions
+        assert beside
+        assert [arm.name for arm in beside._arms] == ["blind", "paper"]
+        for arm in beside._arms:
+            assert arm.simulation.time == pytest.approx(simulation.time, abs=1e-9)
+            np.testing.assert_array_equal(arm.simulation.frame.hand_target, simulation.frame.hand_target)
+        assert beside._arms[0].most > 30.0
+        assert 0.0 < beside._most < 0.5 * beside._arms[0].most
+        assert beside._arms[0].label.text.endswith(f"touched with {beside._arms[0].most:.0f} N")
+        clock.page.ask(lambda: simulation.set_path("line"))
+        clock.page.ask(lambda: simulation.set_faults(frozenset({"hand_left"})))
+        clock.turn(0.1)
+        assert {arm.simulation.settings.path for arm in beside._arms} == {"line"}
+        assert {arm.simulation.settings.faults for arm in beside._arms} == {simulation.settings.faults}
+        clock.page.ask(simulation.reset)
+        clock.turn(0.1)
+        assert max(arm.simulation.time for arm in beside._arms) < 1.0
+        give(clock.page, "Arms", "one arm")
+        clock.turn(0.1)
+        assert clock.page._companions is None
+        assert not any("blind" in name for name in server.scene._handle_from_node_name)

@@ -208,3 +208,12 @@ def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path: Path) -> N
         finally:
             over.set()
             thread.join()
+
+
+def test_a_page_whose_server_has_ended_says_so() -> None:
+    with chromium() as visitor:
+        with live(LiveSimulation()) as served:
+            visitor.open(served)
+            assert not visitor.page.locator("#lost").is_visible()
+        visitor.page.locator("#lost").wait_for(state="visible")
+        assert visitor.text("lost").startswith("Connection lost")

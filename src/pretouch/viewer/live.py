@@ -9,8 +9,9 @@ from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.action_queue import Action, ActionQueue
+from pretouch.viewer.companions import Companions
 from pretouch.viewer.controls import Controls
-from pretouch.viewer.gui import PERIOD_S, add_plots, style_page
+from pretouch.viewer.gui import PERIOD_S, add_plots, style_page, when_changed
 from pretouch.viewer.pacing import Pace
 from pretouch.viewer.plots import History
 from pretouch.viewer.scene import Scene
@@ -20,6 +21,9 @@ from pretouch.viewer.status import Status, legend
 
 if TYPE_CHECKING:
     from viser import ViserServer
+
+
+_ARMS = ("one arm", "three arms")
 
 
 class LivePage:
@@ -38,11 +42,16 @@ class LivePage:
         self._pointed: FloatArray | None = None
         self._visited = False
         """Whether anybody has opened the page: an opening waits until then."""
+        self._companions: Companions | None = None
+        """Arms beside the page's own; None: it is alone."""
         self._receiver_ended = False
         """Whether the receiver of the real units has ended."""
         style_page(server)
         self._status = Status(server.gui)
         server.gui.add_html(legend())
+        if not simulation.real:
+            arms = server.gui.add_dropdown("Arms", _ARMS, hint="Three: blind, paper and pretouch with one hand.")
+            when_changed(arms, self._actions, self._show_arms, "arms")
         self.controls = Controls(server.gui, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
         self._status.notice = self._scene.said
@@ -66,6 +75,14 @@ class LivePage:
     def _move_hand(self, eye: FloatArray, place: FloatArray) -> None:
         self.controls.show_hand(self._simulation.point_hand(eye, place))  # also while the arm is paused
 
+    def _show_arms(self, arms: str) -> None:
+        """Begin again with two more arms, or go on with one."""
+        if self._companions:
+            self._companions.remove()
+        self._companions = Companions(self._server, self._simulation) if arms == _ARMS[1] else None
+        if self._companions:
+            self._simulation.play_opening()
+
     def turn(self, now: float) -> None:
         """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
         self._run_actions(now)
@@ -79,6 +96,8 @@ class LivePage:
         for step in steps:
             self._history.add(step, late=late)
             self._scene.trail.add(step)
+        if self._companions:
+            self._companions.follow(len(steps))
         self.pace.tick(now, max(0.0, self._simulation.time - before), 0.0 if running.paused else running.speed)
         if recording and recording.trouble:
             self._say(recording.trouble)
@@ -117,6 +136,8 @@ class LivePage:
         if actions:
             self.controls.refresh()
         if self._simulation.time < self._time:
+            if self._companions:
+                self._companions.begin()
             self._scene.trail.clear()
             self._history.clear()
         self._time = self._simulation.time
@@ -129,6 +150,8 @@ class LivePage:
         with self._server.atomic():
             self._scene.draw(frame, now)
             self._follow_target(frame.hand_target)
+            if self._companions:
+                self._companions.draw(now)
             self._plots.draw(now)
             recording = self._simulation.recording
             recorded = f" · recording {recording.place.name}" if recording else ""

@@ -35,36 +35,41 @@ PARTS = ("cones", "points", "pairs", "path", "trail", "forces")
 class Scene:
     """Draws worlds and frames; `now` is the time of the machine [s], which bounds how much is sent."""
 
-    def __init__(self, server: "ViserServer", world: World) -> None:
-        self._server, self._world = server, world
+    def __init__(self, server: "ViserServer", world: World, root: str = "", offset: float = 0.0) -> None:
+        """Draw a world under the node `root`, moved along y by an offset [m]; one without a root has the room."""
+        self._server, self._world, self._root = server, world, root
         scene = server.scene
-        scene.configure_default_lights(cast_shadow=False)
-        scene.set_background_image(_sky())
-        server.initial_camera.position, server.initial_camera.look_at = CAMERA_FROM, CAMERA_AT
-        server.initial_camera.fov = CAMERA_FOV
+        if root:
+            self._whole = scene.add_frame(root, show_axes=False, position=(0.0, offset, 0.0))
+        else:
+            scene.configure_default_lights(cast_shadow=False)
+            scene.set_background_image(_sky())
+            server.initial_camera.position, server.initial_camera.look_at = CAMERA_FROM, CAMERA_AT
+            server.initial_camera.fov = CAMERA_FOV
+            _floor(server, world)
         found, self.said = vendor_surfaces(world.model)
         """One sentence on what the arm is drawn by, where it is not the vendor's surfaces."""
-        self._arm = Arm(scene, world.model, world.skin, found or capsule_surfaces(world.model))
-        self.units = Units(scene, world.skin, world.model.links)
-        self.trail = Trail(scene)
-        _room(server, world)
+        self._arm = Arm(scene, world.model, world.skin, found or capsule_surfaces(world.model), root)
+        self.units = Units(scene, world.skin, world.model.links, root)
+        self.trail = Trail(scene, root)
+        _pedestal(server, world, root)
         self._boxes: list[SceneNodeHandle] = []
         self._show_boxes(world)
 
         self.path = scene.add_line_segments(
-            "/path", _segments(world), palette.PATH, thickness=5.0, thickness_units="screen"
+            f"{root}/path", _segments(world), palette.PATH, thickness=5.0, thickness_units="screen"
         )
         self.pairs = scene.add_line_segments(
-            "/pairs", np.zeros((1, 2, 3)), np.zeros((1, 2, 3), dtype=np.uint8), thickness=3.0,
+            f"{root}/pairs", np.zeros((1, 2, 3)), np.zeros((1, 2, 3), dtype=np.uint8), thickness=3.0,
             thickness_units="screen", visible=False,
         )  # fmt: skip
         self._shows_pairs = self._shows_forces = True
-        self._ee = scene.add_frame("/ee", show_axes=False)
-        self._force = self._arrow("/ee/force", palette.FORCE)
-        self._touched = scene.add_frame("/touched", show_axes=False)
-        self._true_force = self._arrow("/touched/true_force", palette.TRUE_FORCE)
-        self._places = [self._arrow(f"/place/{number}", palette.PLACE) for number in range(2)]
-        self._hand = None if world.hand_radius is None else PersonHand(server, world.hand_radius)
+        self._ee = scene.add_frame(f"{root}/ee", show_axes=False)
+        self._force = self._arrow(f"{root}/ee/force", palette.FORCE)
+        self._touched = scene.add_frame(f"{root}/touched", show_axes=False)
+        self._true_force = self._arrow(f"{root}/touched/true_force", palette.TRUE_FORCE)
+        self._places = [self._arrow(f"{root}/place/{number}", palette.PLACE) for number in range(2)]
+        self._hand = None if world.hand_radius is None else PersonHand(server, world.hand_radius, root)
 
     def _arrow(self, name: str, colour: palette.Colour) -> "ArrowsHandle":
         return self._server.scene.add_arrows(
@@ -75,6 +80,10 @@ class Scene:
         """Have a function told of each drag of the hand."""
         if self._hand:
             self._hand.on_drag(act)
+
+    def remove(self) -> None:
+        """Take a world that has a root out of the page."""
+        self._whole.remove()
 
     def show(self, name: str, visible: bool) -> None:
         """Show or hide one of `PARTS`."""
@@ -106,8 +115,8 @@ class Scene:
         for i, box in enumerate(world.boxes):
             self._boxes.append(
                 self._server.scene.add_box(
-                    f"/box/{i}", color=palette.BOARD, dimensions=tuple((2 * box.half_size).tolist()), opacity=0.85,
-                    position=box.center, cast_shadow=False, receive_shadow=False,
+                    f"{self._root}/box/{i}", color=palette.BOARD, dimensions=tuple((2 * box.half_size).tolist()),
+                    opacity=0.85, position=box.center, cast_shadow=False, receive_shadow=False,
                 )
             )  # fmt: skip
 
@@ -162,20 +171,23 @@ def _segments(world: World, dashes: int = 80) -> FloatArray:
     return points.reshape(dashes, 2, 3)
 
 
-def _room(server: "ViserServer", world: World) -> None:
-    """Floor, pedestal and base frame."""
-    scene, low = server.scene, world.floor_height
-    scene.add_grid(
-        "/floor", 4.0, 4.0, position=(0.0, 0.0, low), cell_size=0.1, section_size=0.5, cell_color=(222, 226, 231),
-        section_color=(196, 203, 212), plane_color=(246, 247, 249), plane_opacity=1.0, shadow_opacity=0.0,
-        fade_distance=6.0,
+def _floor(server: "ViserServer", world: World) -> None:
+    server.scene.add_grid(
+        "/floor", 4.0, 4.0, position=(0.0, 0.0, world.floor_height), cell_size=0.1, section_size=0.5,
+        cell_color=(222, 226, 231), section_color=(196, 203, 212), plane_color=(246, 247, 249), plane_opacity=1.0,
+        shadow_opacity=0.0, fade_distance=6.0,
     )  # fmt: skip
+
+
+def _pedestal(server: "ViserServer", world: World, root: str) -> None:
+    """Pedestal and base frame."""
+    scene, low = server.scene, world.floor_height
     if low < -0.01:
         scene.add_cylinder(
-            "/pedestal", 0.1, -low, color=palette.PEDESTAL, position=(0.0, 0.0, low / 2), cast_shadow=False,
+            f"{root}/pedestal", 0.1, -low, color=palette.PEDESTAL, position=(0.0, 0.0, low / 2), cast_shadow=False,
             receive_shadow=False,
         )  # fmt: skip
-    scene.add_frame("/base", axes_length=0.16, axes_radius=0.004, origin_radius=0.008)
+    scene.add_frame(f"{root}/base", axes_length=0.16, axes_radius=0.004, origin_radius=0.008)
 
 
 def _sky(height: int = 128) -> FloatArray:

@@ -33,8 +33,8 @@ _GONE = 1e-6
 class Units:
     """All units of a skin, each as a plate and a cone on its link, and a sphere where it senses something."""
 
-    def __init__(self, scene: "SceneApi", skin: Skin, links: Sequence[str]) -> None:
-        """Put the units under the nodes `/arm/LINK` of their links, whose names are given in order of their index."""
+    def __init__(self, scene: "SceneApi", skin: Skin, links: Sequence[str], root: str = "") -> None:
+        """Put the units under the nodes `ROOT/arm/LINK` of their links, named in order of their index."""
         self._skin, count = skin, len(skin)
         self._plates: list[tuple[IntArray, BatchedMeshHandle]] = []
         self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
@@ -43,7 +43,7 @@ class Units:
             units = np.flatnonzero(skin.link == link)
             pose = skin.T_link_sensor[units]
             place = quaternions(pose[:, :3, :3]), pose[:, :3, 3]
-            node, idle = f"/arm/{links[link]}", np.full(len(units), _IDLE_M)
+            node, idle = f"{root}/arm/{links[link]}", np.full(len(units), _IDLE_M)
             plates = scene.add_batched_meshes_simple(
                 f"{node}/units", *_plate(), *place, batched_colors=_all(palette.UNIT, units), flat_shading=True, **plain
             )
@@ -54,7 +54,7 @@ class Units:
             self._plates.append((units, plates))
             self._cones.append((units, cones))
         self.points = scene.add_batched_meshes_simple(
-            "/points", *_ball(), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
+            f"{root}/points", *_ball(), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
             batched_scales=np.full(count, _GONE), batched_colors=_all(palette.SENSED, np.arange(count)), **plain,
         )  # fmt: skip
 
