@@ -6,9 +6,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+from matplotlib.image import imread
 from tests.needs import skip_for
 from tests.ports import free_port
 
@@ -72,7 +74,7 @@ def chromium(width: int = 1280, height: int = 800) -> Iterator["Visitor"]:
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", *software])
         try:
-            yield Visitor(browser.new_page(viewport={"width": width, "height": height}))
+            yield Visitor(browser.new_page(viewport={"width": width, "height": height}, has_touch=True))
         finally:
             browser.close()
 
@@ -169,6 +171,36 @@ class Visitor:
         for share in np.linspace(0.1, 1.0, 10):
             mouse.move(x + share * (to_x - x), y + share * (to_y - y))
         mouse.up()
+
+    def colour_at(self, point: FloatArray) -> FloatArray:
+        """Red, green and blue (3,), from 0 to 255, of the pixel where a point (3,) [m] is seen."""
+        x, y = seen_at(point, self.page.locator("canvas").first.bounding_box())
+        shot = self.page.screenshot(clip={"x": x, "y": y, "width": 1, "height": 1})
+        return 255.0 * np.asarray(imread(BytesIO(shot)))[0, 0, :3]
+
+    def wait_for_skin(self, point: FloatArray) -> None:
+        """Wait until something of the colour of skin is seen where a point (3,) [m] is."""
+
+        def there() -> bool:
+            red, _, blue = self.colour_at(point)
+            return bool(red > blue + 20.0)
+
+        self.wait_until(there)
+
+    def drag_by_finger(self, start: FloatArray, end: FloatArray) -> None:
+        """Drag as `drag` does, on a touch screen."""
+        box = self.page.locator("canvas").first.bounding_box()
+        (x, y), (to_x, to_y) = (seen_at(point, box) for point in (start, end))
+        session = self.page.context.new_cdp_session(self.page)
+
+        def finger(kind: str, *at: float) -> None:
+            points = [{"x": at[0], "y": at[1]}] if at else []
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        finger("touchStart", x, y)
+        for share in np.linspace(0.1, 1.0, 10):
+            finger("touchMove", x + share * (to_x - x), y + share * (to_y - y))
+        finger("touchEnd")
 
     def keep(self, name: str, folder: Path) -> Path:
         """Keep a picture for a person to look at, in a folder of the test's and where they are gathered."""

@@ -12,14 +12,18 @@ from tests.ports import free_port
 from tests.viewer.browser import seen_at
 from tests.viewer.sessions import set_speed
 
+from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import LIVE_SKIN, load_skin
 from pretouch.types import Mode
 from pretouch.viewer.controls import toggle_recording
 from pretouch.viewer.gui import PANEL_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage, serve_live
 from pretouch.viewer.room import Faults, LiveSettings
-from pretouch.viewer.scene import GIZMO_M
+from pretouch.viewer.scene import CAMERA_FROM
 from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
 
@@ -239,7 +243,7 @@ def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Cloc
     clock.turn(0.1)
     give(clock.page, "x [m]", 0.9)
     give(clock.page, "Cones", False)
-    clock.page._drag(np.array([1.0, 0.4, 0.3]))
+    clock.page._drag(np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
     clock.turn(0.1)
     assert clock.page.notice.startswith("Not done: ")
     click(clock.page, "Pause")
@@ -262,10 +266,9 @@ def test_the_hand_begins_beside_the_panel(simulation: LiveSimulation, width: int
     box = {"x": 0, "y": 0, "width": width - PANEL_PX, "height": height}
     assert simulation.frame.hand is not None
     np.testing.assert_allclose(simulation.frame.hand, LiveSettings().hand_start, atol=0.01)
-    for offset in np.vstack([np.zeros(3), GIZMO_M * np.eye(3)]):
-        x, y = seen_at(simulation.frame.hand + offset, box)
-        assert 0 < x < width - PANEL_PX
-        assert 0 < y < height
+    x, y = seen_at(simulation.frame.hand, box)
+    assert 0 < x < width - PANEL_PX
+    assert 0 < y < height
 
 
 def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock: Clock, simulation: LiveSimulation) -> None:
@@ -294,3 +297,50 @@ def test_resuming_is_offered_only_where_a_hold_waits_for_it(clock: Clock, monkey
     assert button.disabled
     clock.page.controls.offer_resume(True)
     assert (button.label, button.disabled) == ("Resume", False)
+
+
+def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(
+    clock: Clock, simulation: LiveSimulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulation.play_opening()
+    begun = simulation.time
+    clock.turn(1.0)
+    assert simulation.time == begun
+    monkeypatch.setattr(clock.page._server, "get_clients", lambda: {0: None})
+    clock.turn(3.0)
+    assert simulation.time > begun + 2.9
+    assert simulation.opening
+    click(clock.page, "Pause")
+    clock.turn(0.1)
+    assert simulation.opening is None
+
+
+def test_three_arms_with_one_hand_go_through_the_same_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = RobotModel(panda())
+    simulation = LiveSimulation(LiveSettings(profile=PROFILES["pretouch"]), model, load_skin(LIVE_SKIN, model))
+    with served(ServeOptions(port=free_port()), "test") as server:
+        clock = Clock(LivePage(server, simulation))
+        monkeypatch.setattr(server, "get_clients", lambda: {0: SimpleNamespace(camera=SimpleNamespace())})
+        give(clock.page, "Arms", "three arms")
+        clock.turn(8.0)
+        beside = clock.page._companions
+        assert beside
+        assert [arm.name for arm in beside._arms] == ["blind", "paper"]
+        for arm in beside._arms:
+            assert arm.simulation.time == pytest.approx(simulation.time, abs=1e-9)
+            np.testing.assert_array_equal(arm.simulation.frame.hand_target, simulation.frame.hand_target)
+        assert beside._arms[0].most > 30.0
+        assert 0.0 < beside._most < 0.5 * beside._arms[0].most
+        assert beside._arms[0].label.text.endswith(f"touched with {beside._arms[0].most:.0f} N")
+        clock.page.ask(lambda: simulation.set_path("line"))
+        clock.page.ask(lambda: simulation.set_faults(frozenset({"hand_left"})))
+        clock.turn(0.1)
+        assert {arm.simulation.settings.path for arm in beside._arms} == {"line"}
+        assert {arm.simulation.settings.faults for arm in beside._arms} == {simulation.settings.faults}
+        clock.page.ask(simulation.reset)
+        clock.turn(0.1)
+        assert max(arm.simulation.time for arm in beside._arms) < 1.0
+        give(clock.page, "Arms", "one arm")
+        clock.turn(0.1)
+        assert clock.page._companions is None
+        assert not any("blind" in name for name in server.scene._handle_from_node_name)

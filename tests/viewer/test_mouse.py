@@ -11,7 +11,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
-from pretouch.viewer.mouse import GAP_M, HAND_FORCE_N, Mouse, clear_place
+from pretouch.viewer.mouse import GAP_M, HAND_FORCE_N, Mouse, at_depth, clear_place
 
 HAND = HandSpec()
 ROOM = HAND.radius + GAP_M
@@ -95,3 +95,32 @@ def test_what_is_no_place_is_refused_and_the_target_stays(target):
     with pytest.raises(ParameterError, match=r"The hand's target is .*: give x, y and z in metres"):
         mouse.move(np.array(target))
     np.testing.assert_array_equal(mouse.target, [0.5, 0.3, 0.2])
+
+
+EYE = np.array([1.75, 0.95, 0.85])
+
+
+def test_a_place_pointed_to_on_the_arm_is_at_the_arms_depth(panda_model: RobotModel) -> None:
+    q = panda_model.description.q_ready
+    palm = panda_model.kinematics(q).position[panda_model.link_index("panda_hand")]
+    before = EYE + 0.8 * (palm - EYE)  # nearer, in the same place of the picture
+    place = at_depth(panda_model, q, EYE, before)
+    assert np.linalg.norm(before - palm) > 0.3
+    assert np.linalg.norm(place - palm) < 0.08
+    assert np.linalg.norm(np.cross(place - EYE, palm - EYE)) < 1e-9
+
+
+def test_a_place_pointed_to_far_from_the_arm_stays_and_in_between_nothing_jumps(panda_model: RobotModel) -> None:
+    q = panda_model.description.q_ready
+    far = np.array([0.6, 1.1, 0.4])
+    np.testing.assert_allclose(at_depth(panda_model, q, EYE, far), far, atol=1e-3)
+    palm = panda_model.kinematics(q).position[panda_model.link_index("panda_hand")]
+    way = [at_depth(panda_model, q, EYE, far + share * (palm - far)) for share in np.linspace(0.0, 1.0, 400)]
+    assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() < 0.03
+
+
+@pytest.mark.parametrize("eye", [(np.nan, 0.0, 0.0), (1.0, 2.0)])
+def test_an_eye_that_is_no_place_is_refused(panda_model: RobotModel, eye: tuple[float, ...]) -> None:
+    mouse = Mouse(np.zeros(3), SceneSpec(), HandSpec())
+    with pytest.raises(ParameterError, match="The camera's position is"):
+        mouse.point(np.array(eye), np.zeros(3), panda_model, panda_model.description.q_ready)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from threading import Event, Thread
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,11 +20,10 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.serving.simulate import SimulateOptions
 from pretouch.serving.simulate import run as simulate
 from pretouch.types import FloatArray, Mode
-from pretouch.viewer.live import serve_live
+from pretouch.viewer.live import LivePage, serve_live
 from pretouch.viewer.real_units import RealUnits
 from pretouch.viewer.replay import serve_replay
 from pretouch.viewer.room import LiveSettings
-from pretouch.viewer.scene import GIZMO_M
 from pretouch.viewer.simulation import LiveSimulation
 
 pytestmark = pytest.mark.slow
@@ -33,23 +33,66 @@ def live(simulation: LiveSimulation) -> Served:
     return Served(lambda options, until, say: serve_live(simulation, options, until, say))
 
 
-def test_a_hand_dragged_into_the_arm_by_mouse_leads_to_a_reaction_and_back_to_the_path(tmp_path: Path) -> None:
+@pytest.fixture
+def pages(monkeypatch: pytest.MonkeyPatch) -> list[LivePage]:
+    """The live pages that are served, for their clients' cameras."""
+    made: list[LivePage] = []
+
+    class Kept(LivePage):
+        def __init__(self, *given: Any) -> None:
+            super().__init__(*given)
+            made.append(self)
+
+    monkeypatch.setattr("pretouch.viewer.live.LivePage", Kept)
+    return made
+
+
+def camera(page: LivePage) -> FloatArray:
+    """Where the one visitor looks from (3,) [m]."""
+    (client,) = page._server.get_clients().values()
+    return np.array(client.camera.position)
+
+
+@pytest.mark.parametrize("touch", [False, True])
+def test_a_hand_dragged_into_the_arm_leads_to_a_reaction_and_back_and_the_camera_stays(
+    tmp_path: Path, pages: list[LivePage], touch: bool
+) -> None:
     start = np.array([0.85, 0.25, 0.25])
     simulation = LiveSimulation(LiveSettings(profile=profile("blind"), hand_start=tuple(start)))
     with live(simulation) as served, chromium() as visitor:
         visitor.open(served)
         visitor.wait_for("mode", Mode.TRACK.name)
-        arrow = start + np.array([0.7 * GIZMO_M, 0.0, 0.0])
-        visitor.drag(arrow, arrow - (0.35, 0.0, 0.0))
-        # the hand is drawn onto the circle, where the arm comes by
-        visitor.wait_until(lambda: abs(target(simulation)[0] - 0.5) < 0.05)
-        assert np.allclose(target(simulation)[1:], start[1:], atol=1e-6)
+        visitor.wait_for_skin(start)
+        before = camera(pages[0])
+        drag = visitor.drag_by_finger if touch else visitor.drag
+        drag(start, np.array([0.5, 0.25, 0.25]))
+        # the hand is drawn onto the circle in the picture, at the arm's depth where that is near
+        at = np.array([0.5, 0.25, 0.25])
+        visitor.wait_until(lambda: off_line(target(simulation), before, at) < 0.03)
+        visitor.wait_until(lambda: off_line(hand(simulation), before, at) < 0.05)
+        np.testing.assert_allclose(camera(pages[0]), before, atol=1e-9)
+        simulation.move_hand(at)
         visitor.wait_for("mode", Mode.REACT.name)
-        visitor.keep("reacting", tmp_path)
+        visitor.keep(f"reacting-{touch}", tmp_path)
         visitor.tab("Hand")
         visitor.type("x [m]", 1.2)
         visitor.wait_for("mode", Mode.TRACK.name)
         assert target(simulation)[0] == 1.2
+        drag(np.array([0.3, -0.6, 0.1]), np.array([0.3, -0.4, 0.3]))  # beside hand and arm: turns the camera
+        visitor.wait_until(lambda: np.linalg.norm(camera(pages[0]) - before) > 0.1)
+        assert target(simulation)[0] == 1.2
+
+
+def off_line(point: FloatArray, eye: FloatArray, through: FloatArray) -> float:
+    """Distance of a point (3,) from the line of sight through another [m]."""
+    along = (through - eye) / np.linalg.norm(through - eye)
+    return float(np.linalg.norm(np.cross(point - eye, along)))
+
+
+def hand(simulation: LiveSimulation) -> FloatArray:
+    """Where the hand is (3,) [m]."""
+    assert simulation.frame.hand is not None
+    return simulation.frame.hand
 
 
 def target(simulation: LiveSimulation) -> FloatArray:
@@ -200,3 +243,12 @@ def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path: Path) -> N
         finally:
             over.set()
             thread.join()
+
+
+def test_a_page_whose_server_has_ended_says_so() -> None:
+    with chromium() as visitor:
+        with live(LiveSimulation()) as served:
+            visitor.open(served)
+            assert not visitor.page.locator("#lost").is_visible()
+        visitor.page.locator("#lost").wait_for(state="visible")
+        assert visitor.text("lost").startswith("Connection lost")

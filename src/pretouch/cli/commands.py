@@ -32,7 +32,10 @@ class Live:
     keys: str = ""
     """File of the keys of real sensor units, which the simulated arm then carries in place of simulated ones."""
     skin: str = ""
-    """Skin file; by default the seven units that come with the package."""
+    """Skin file; by default 34 units all over hand, wrist, forearm and elbow, and with --keys the seven of other
+    commands."""
+    opening: bool = True
+    """Whether a hand comes by itself at first, until somebody drags or clicks; never with --keys or --record."""
     units_host: str = HOST
     """Address to receive real units at. They need 0.0.0.0, which is every address of this machine."""
     units_port: int = PORT

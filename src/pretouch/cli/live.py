@@ -31,12 +31,12 @@ def live(command: "Live") -> None:
 
     from pretouch.robot.description import panda
     from pretouch.robot.model import RobotModel
-    from pretouch.sensing.skin import skin_for
+    from pretouch.sensing.skin import LIVE_SKIN, skin_for
     from pretouch.viewer.live import serve_live
     from pretouch.viewer.simulation import LiveSimulation
 
     model = RobotModel(panda())
-    skin = skin_for(model, command.skin)
+    skin = skin_for(model, command.skin or ("" if command.keys else LIVE_SKIN))
     believed = skin
     if command.world:
         from pretouch.sim.misplacement import Misplacement, misplaced
@@ -48,6 +48,8 @@ def live(command: "Live") -> None:
             believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), command.seed)
     with _units(command, skin.ids) as real:
         simulation = LiveSimulation(settings, model, believed, real, skin)
+        if command.opening and not real and not command.record:
+            simulation.play_opening()
         if command.record:
             simulation.start_recording(Path(command.record))
         serve_live(simulation, options, ended)

@@ -88,11 +88,13 @@ class PaintedLink:
 class Arm:
     """The links of an arm and the units on them, to be moved and coloured."""
 
-    def __init__(self, scene: "SceneApi", model: RobotModel, skin: Skin, surfaces: dict[int, Mesh]) -> None:
+    def __init__(
+        self, scene: "SceneApi", model: RobotModel, skin: Skin, surfaces: dict[int, Mesh], root: str = ""
+    ) -> None:
         self._frames = {}
         self._painted: list[tuple[IntArray, PaintedLink]] = []
         for link, mesh in surfaces.items():
-            name = f"/arm/{model.links[link]}"
+            name = f"{root}/arm/{model.links[link]}"
             self._frames[link] = scene.add_frame(name, show_axes=False)
             units, origin, beam = seen_from(model, skin, link)
             share = shares(mesh.vertices, mesh.normals, origin, beam)

@@ -10,8 +10,9 @@ from pretouch.explanation import explain, resumable
 from pretouch.loop import MonotonicClock
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.action_queue import Action, ActionQueue
+from pretouch.viewer.companions import Companions
 from pretouch.viewer.controls import Controls
-from pretouch.viewer.gui import PERIOD_S, style_page
+from pretouch.viewer.gui import PERIOD_S, style_page, when_changed
 from pretouch.viewer.pacing import Pace
 from pretouch.viewer.plots import History, Plots
 from pretouch.viewer.scene import Scene
@@ -21,6 +22,9 @@ from pretouch.viewer.status import Status
 
 if TYPE_CHECKING:
     from viser import ViserServer
+
+
+_ARMS = ("one arm", "three arms")
 
 
 class LivePage:
@@ -37,10 +41,17 @@ class LivePage:
         self.pace = Pace()
         self._actions = ActionQueue()
         self._pointed: FloatArray | None = None
+        self._visited = False
+        """Whether anybody has opened the page: an opening waits until then."""
+        self._companions: Companions | None = None
+        """Arms beside the page's own; None: it is alone."""
         self._receiver_ended = False
         """Whether the receiver of the real units has ended."""
         style_page(server)
         self._status = Status(server.gui)
+        if not simulation.real:
+            arms = server.gui.add_dropdown("Arms", _ARMS, hint="Three: blind, paper and pretouch with one hand.")
+            when_changed(arms, self._actions, self._show_arms, "arms")
         self.controls = Controls(server.gui, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
         self._status.notice = self._scene.said
@@ -59,16 +70,26 @@ class LivePage:
         """Have something done between two ticks, from any thread, as `ActionQueue.put` does."""
         self._actions.put(action, kind, settle, quiet)
 
-    def _drag(self, target: FloatArray) -> None:
-        self.ask(lambda: self._move_hand(target), "hand", quiet=True)
+    def _drag(self, eye: FloatArray, place: FloatArray) -> None:
+        self.ask(lambda: self._move_hand(eye, place), "hand", quiet=True)
 
-    def _move_hand(self, target: FloatArray) -> None:
-        self._simulation.move_hand(target)
-        self.controls.show_hand(target)  # also while the arm is paused
+    def _move_hand(self, eye: FloatArray, place: FloatArray) -> None:
+        self.controls.show_hand(self._simulation.point_hand(eye, place))  # also while the arm is paused
+
+    def _show_arms(self, arms: str) -> None:
+        """Begin again with two more arms, or go on with one."""
+        if self._companions:
+            self._companions.remove()
+        self._companions = Companions(self._server, self._simulation) if arms == _ARMS[1] else None
+        if self._companions:
+            self._simulation.play_opening()
 
     def turn(self, now: float) -> None:
         """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
         self._run_actions(now)
+        self._visited = self._visited or bool(self._server.get_clients())
+        if self._simulation.opening and not self._visited:
+            return
         running, recording = self.controls.running, self._simulation.recording
         before = self._simulation.time
         steps = self._pass_time()
@@ -76,6 +97,8 @@ class LivePage:
         for step in steps:
             self._history.add(step, late=late)
             self._scene.trail.add(step)
+        if self._companions:
+            self._companions.follow(len(steps))
         self.pace.tick(now, max(0.0, self._simulation.time - before), 0.0 if running.paused else running.speed)
         if recording and recording.trouble:
             self._say(recording.trouble)
@@ -102,6 +125,8 @@ class LivePage:
 
     def _run_actions(self, now: float) -> None:
         actions = self._actions.take(now)
+        if actions:
+            self._simulation.opening = None  # from the first drag or click on, the page is the visitor's
         for action in actions:
             if not action.quiet:
                 self._status.notice = ""
@@ -112,6 +137,8 @@ class LivePage:
         if actions:
             self.controls.refresh()
         if self._simulation.time < self._time:
+            if self._companions:
+                self._companions.begin()
             self._scene.trail.clear()
             self._history.clear()
         self._time = self._simulation.time
@@ -124,6 +151,8 @@ class LivePage:
         with self._server.atomic():
             self._scene.draw(frame, now)
             self._follow_target(frame.hand_target)
+            if self._companions:
+                self._companions.draw(now)
             self._plots.draw(now)
             recording = self._simulation.recording
             recorded = f" · recording {recording.place.name}" if recording else ""
@@ -141,12 +170,11 @@ class LivePage:
                 self.controls.unit_panel.draw(now)
 
     def _follow_target(self, target: FloatArray | None) -> None:
-        """Have gizmo and sliders show where the hand is to be, wherever that came from."""
+        """Have the sliders show where the hand is to be, wherever that came from."""
         if target is None or (self._pointed is not None and np.array_equal(target, self._pointed)):
             return
         self.controls.show_hand(target)
-        if self._scene.place_target(target):
-            self._pointed = target.copy()
+        self._pointed = target.copy()
 
 
 def serve_live(

@@ -21,6 +21,11 @@ _LOWEST, _HIGHEST = np.array([-1.0, -1.2, -1.0]), np.array([1.4, 1.2, 1.4])
 """Corners of the space the hand is led through [m], base frame: what the arm reaches, and half a metre round it."""
 _SHELL_M = 0.02
 _DIRECTIONS = 200
+_DEPTHS, _LOOKS = (0.4, 1.6), 121
+"""Shares of the distance from the eye between which a line of sight is looked along, and at how many points."""
+_NEAR_M, _OWN_M, _STAY = 0.04, 0.25, 0.2
+"""How quickly a point of it counts less for the depth with its distance from the arm and from the place [m], and what
+the place's own depth counts."""
 
 
 class Mouse:
@@ -36,14 +41,47 @@ class Mouse:
 
     def move(self, target: FloatArray) -> None:
         """Point to a place (3,) [m], or the nearest to it in the workspace; what is no place is a ParameterError."""
-        place = np.asarray(target, dtype=np.float64)
-        if place.shape != (3,) or not np.all(np.isfinite(place)):
-            raise ParameterError(f"The hand's target is {np.asarray(target).tolist()}: give x, y and z in metres.")
-        self.target = np.clip(place, self._lowest, _HIGHEST)
+        self.target = np.clip(_place("The hand's target", target), self._lowest, _HIGHEST)
+
+    def point(self, eye: FloatArray, place: FloatArray, model: RobotModel, q: FloatArray) -> None:
+        """Point to what a person sees at a place (3,) [m] from an `eye` (3,) [m], as `move` does; see `at_depth`."""
+        seen = _place("The hand's target", place)
+        self.move(at_depth(model, q, _place("The camera's position", eye), seen))
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
         """Go straight there, whatever is in the way."""
         return HandGoal(self.target, HAND_FORCE_N)
+
+
+def _place(what: str, given: FloatArray) -> FloatArray:
+    place = np.asarray(given, dtype=np.float64)
+    if place.shape != (3,) or not np.all(np.isfinite(place)):
+        raise ParameterError(f"{what} is {np.asarray(given).tolist()}: give x, y and z in metres.")
+    return place
+
+
+def at_depth(model: RobotModel, q: FloatArray, eye: FloatArray, place: FloatArray) -> FloatArray:
+    """Place (3,) [m] on the line of sight through another, at the arm's depth where that line passes the arm.
+
+    A pointer has no depth: without this a hand dragged onto the arm in the picture may pass half a metre before it.
+    Each point of the line counts for the depth by how near it is to the arm and to the place, so that nothing jumps
+    from one link to another behind it; far from the arm the place stays as it is.
+
+    Args:
+        model: the arm.
+        q: (n,) its joint positions [rad].
+        eye: (3,) where the person looks from [m], base frame.
+        place: (3,) [m], base frame.
+    """
+    shares = np.linspace(*_DEPTHS, _LOOKS)
+    points = eye + shares[:, None] * (place - eye)
+    kin, none = model.kinematics(q), np.zeros(_LOOKS, np.int64)
+    aside = np.tile([0.0, 0.0, 1.0], (_LOOKS, 1))
+    gaps = closest_points(kin, model.capsules, kin.position[model.ee], none, points, aside).body_distance
+    apart = np.linalg.norm(points - place, axis=1)
+    weight = np.exp(-np.maximum(gaps, 0.0) / _NEAR_M - (apart / _OWN_M) ** 2)
+    farther = float(weight @ (shares - 1.0)) / (_STAY + float(weight.sum()))
+    return np.asarray(place + farther * (place - eye))
 
 
 def clear_place(model: RobotModel, q: FloatArray, scene: SceneSpec, place: FloatArray, room: float) -> FloatArray:

@@ -12,6 +12,10 @@ PEDESTAL: Colour = (170, 177, 186)
 UNIT: Colour = (52, 63, 78)
 UNIT_SILENT: Colour = (214, 40, 57)
 CONE: Colour = (84, 150, 214)
+SEEING: Colour = (242, 150, 40)
+"""Of a unit, and of its cone, that sees an obstacle."""
+LIMITING: Colour = (214, 40, 57)
+"""Of one whose obstacle keeps the arm from what it would do."""
 SENSED: Colour = (38, 166, 91)
 PATH: Colour = (49, 104, 196)
 AVOIDING: Colour = (214, 40, 57)
@@ -26,7 +30,8 @@ FORCE: Colour = (232, 119, 34)
 TRUE_FORCE: Colour = (38, 44, 54)
 PLACE: Colour = (190, 24, 120)
 """Of the forces at the places where the arm is said to be touched."""
-HAND: Colour = (232, 190, 160)
+HAND: Colour = (232, 178, 146)
+CUFF: Colour = (58, 92, 148)
 BOARD: Colour = (201, 176, 140)
 
 MODES: dict[Mode, Colour] = {Mode.TRACK: RECOVERING, Mode.REACT: REACTING, Mode.HOLD: HOLDING}

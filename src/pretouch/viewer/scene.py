@@ -1,8 +1,7 @@
 """What a page shows in space: the room, the arm, what it senses, does and detects, and a person's hand."""
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,20 +12,18 @@ from pretouch.viewer import palette
 from pretouch.viewer.arm import Arm, capsule_surfaces
 from pretouch.viewer.expectation import expectation, in_levels
 from pretouch.viewer.frame import Frame, World
+from pretouch.viewer.person import Drag, PersonHand
 from pretouch.viewer.trail import Trail, binding
 from pretouch.viewer.units import Units
 from pretouch.viewer.vendor import vendor_surfaces
 
 if TYPE_CHECKING:
-    from viser import ArrowsHandle, SceneNodeHandle, TransformControlsHandle, ViserServer
+    from viser import ArrowsHandle, SceneNodeHandle, ViserServer
 
 CAMERA_FROM, CAMERA_AT = (1.75, 0.95, 0.85), (0.3, 0.0, 0.27)
 """Where the page looks from at first and at what [m]: from the arm's front right."""
 CAMERA_FOV = math.radians(42.0)
 """Vertical angle of what is seen [rad]."""
-
-GIZMO_M = 0.15
-"""Length of the arrows that the hand is dragged by [m]."""
 
 ARROW_M_PER_N, ARROW_MOST_M, ARROW_LEAST_N = 0.012, 0.45, 6.0
 """Length of a force arrow [m/N] and at most [m], and the force below which none is drawn [N]: noise is less."""
@@ -34,73 +31,59 @@ ARROW_M_PER_N, ARROW_MOST_M, ARROW_LEAST_N = 0.012, 0.45, 6.0
 PARTS = ("cones", "points", "pairs", "path", "trail", "forces")
 """What can be shown and hidden."""
 
-_APART_M = 0.015
-"""Distance between hand and target from which the target is shown [m]."""
-
 
 class Scene:
     """Draws worlds and frames; `now` is the time of the machine [s], which bounds how much is sent."""
 
-    def __init__(self, server: "ViserServer", world: World) -> None:
-        self._server, self._world = server, world
+    def __init__(self, server: "ViserServer", world: World, root: str = "", offset: float = 0.0) -> None:
+        """Draw a world under the node `root`, moved along y by an offset [m]; one without a root has the room."""
+        self._server, self._world, self._root = server, world, root
         scene = server.scene
-        scene.configure_default_lights(cast_shadow=False)
-        scene.set_background_image(_sky())
-        server.initial_camera.position, server.initial_camera.look_at = CAMERA_FROM, CAMERA_AT
-        server.initial_camera.fov = CAMERA_FOV
+        if root:
+            self._whole = scene.add_frame(root, show_axes=False, position=(0.0, offset, 0.0))
+        else:
+            scene.configure_default_lights(cast_shadow=False)
+            scene.set_background_image(_sky())
+            server.initial_camera.position, server.initial_camera.look_at = CAMERA_FROM, CAMERA_AT
+            server.initial_camera.fov = CAMERA_FOV
+            _floor(server, world)
         found, self.said = vendor_surfaces(world.model)
         """One sentence on what the arm is drawn by, where it is not the vendor's surfaces."""
-        self._arm = Arm(scene, world.model, world.skin, found or capsule_surfaces(world.model))
-        self.units = Units(scene, world.skin, world.model.links)
-        self.trail = Trail(scene)
-        _room(server, world)
+        self._arm = Arm(scene, world.model, world.skin, found or capsule_surfaces(world.model), root)
+        self.units = Units(scene, world.skin, world.model.links, root)
+        self.trail = Trail(scene, root)
+        _pedestal(server, world, root)
         self._boxes: list[SceneNodeHandle] = []
         self._show_boxes(world)
 
         self.path = scene.add_line_segments(
-            "/path", _segments(world), palette.PATH, thickness=5.0, thickness_units="screen"
+            f"{root}/path", _segments(world), palette.PATH, thickness=5.0, thickness_units="screen"
         )
         self.pairs = scene.add_line_segments(
-            "/pairs", np.zeros((1, 2, 3)), np.zeros((1, 2, 3), dtype=np.uint8), thickness=3.0,
+            f"{root}/pairs", np.zeros((1, 2, 3)), np.zeros((1, 2, 3), dtype=np.uint8), thickness=3.0,
             thickness_units="screen", visible=False,
         )  # fmt: skip
         self._shows_pairs = self._shows_forces = True
-        self._ee = scene.add_frame("/ee", show_axes=False)
-        self._force = self._arrow("/ee/force", palette.FORCE)
-        self._touched = scene.add_frame("/touched", show_axes=False)
-        self._true_force = self._arrow("/touched/true_force", palette.TRUE_FORCE)
-        self._places = [self._arrow(f"/place/{number}", palette.PLACE) for number in range(2)]
-        self._hand, self._target = self._person(world)
-        self._dragged = False
+        self._ee = scene.add_frame(f"{root}/ee", show_axes=False)
+        self._force = self._arrow(f"{root}/ee/force", palette.FORCE)
+        self._touched = scene.add_frame(f"{root}/touched", show_axes=False)
+        self._true_force = self._arrow(f"{root}/touched/true_force", palette.TRUE_FORCE)
+        self._places = [self._arrow(f"{root}/place/{number}", palette.PLACE) for number in range(2)]
+        self._hand = None if world.hand_radius is None else PersonHand(server, world.hand_radius, root)
 
     def _arrow(self, name: str, colour: palette.Colour) -> "ArrowsHandle":
         return self._server.scene.add_arrows(
             name, np.zeros((1, 2, 3)), colour, shaft_radius=0.007, head_radius=0.018, head_length=0.04, visible=False
         )
 
-    def _person(self, world: World) -> "tuple[SceneNodeHandle | None, TransformControlsHandle | None]":
-        if world.hand_radius is None:
-            return None, None
-        scene, radius = self._server.scene, world.hand_radius
-        plain: dict[str, Any] = {"subdivisions": 3, "cast_shadow": False, "receive_shadow": False}
-        hand = scene.add_icosphere("/hand", radius, color=palette.HAND, **plain)
-        target = scene.add_transform_controls(
-            "/hand_target", scale=GIZMO_M, line_width=3.0, disable_rotations=True, depth_test=False
-        )
-        self._ghost = scene.add_icosphere(
-            "/hand_target/ghost", 0.8 * radius, color=palette.HAND, opacity=0.35, visible=False, **plain
-        )
-        return hand, target
+    def on_hand(self, act: Drag) -> None:
+        """Have a function told of each drag of the hand."""
+        if self._hand:
+            self._hand.on_drag(act)
 
-    def on_hand(self, act: Callable[[FloatArray], None]) -> None:
-        """Have a function called with where the hand is dragged to (3,) [m], from the page's own thread."""
-        if self._target is None:
-            return
-
-        @self._target.on_update
-        async def _(event: Any) -> None:
-            self._dragged = event.phase != "end"
-            act(np.array(event.target.position, dtype=np.float64))
+    def remove(self) -> None:
+        """Take a world that has a root out of the page."""
+        self._whole.remove()
 
     def show(self, name: str, visible: bool) -> None:
         """Show or hide one of `PARTS`."""
@@ -132,8 +115,8 @@ class Scene:
         for i, box in enumerate(world.boxes):
             self._boxes.append(
                 self._server.scene.add_box(
-                    f"/box/{i}", color=palette.BOARD, dimensions=tuple((2 * box.half_size).tolist()), opacity=0.85,
-                    position=box.center, cast_shadow=False, receive_shadow=False,
+                    f"{self._root}/box/{i}", color=palette.BOARD, dimensions=tuple((2 * box.half_size).tolist()),
+                    opacity=0.85, position=box.center, cast_shadow=False, receive_shadow=False,
                 )
             )  # fmt: skip
 
@@ -150,7 +133,8 @@ class Scene:
         self.trail.draw(now)
         self._draw_pairs(step)
         self._draw_forces(frame, kin)
-        self._draw_hand(frame)
+        if self._hand:
+            self._hand.draw(frame.hand, frame.hand_target)
 
     def _draw_pairs(self, step: ControlStep) -> None:
         near = step.obstacles
@@ -180,24 +164,6 @@ class Scene:
                 # it ends at the place, for a contact pushes
                 handle.points = np.array([[touched.point[number] - shaft, touched.point[number]]], dtype=np.float32)
 
-    def _draw_hand(self, frame: Frame) -> None:
-        if self._hand is None or self._target is None:
-            return
-        there = frame.hand is not None and bool(np.all(np.isfinite(frame.hand)))
-        self._hand.visible = there
-        self._target.visible = there and frame.hand_target is not None
-        if there and frame.hand is not None:
-            self._hand.position = frame.hand
-            if frame.hand_target is not None:
-                self._ghost.visible = float(np.linalg.norm(frame.hand_target - frame.hand)) > _APART_M
-
-    def place_target(self, target: FloatArray) -> bool:
-        """Move the gizmo of the hand to a place (3,) [m], unless somebody has it at the mouse; returns whether."""
-        if self._target is None or self._dragged:
-            return False
-        self._target.position = target
-        return True
-
 
 def _segments(world: World, dashes: int = 80) -> FloatArray:
     """The desired path as dashes (dashes, 2, 3) [m]."""
@@ -205,20 +171,23 @@ def _segments(world: World, dashes: int = 80) -> FloatArray:
     return points.reshape(dashes, 2, 3)
 
 
-def _room(server: "ViserServer", world: World) -> None:
-    """Floor, pedestal and base frame."""
-    scene, low = server.scene, world.floor_height
-    scene.add_grid(
-        "/floor", 4.0, 4.0, position=(0.0, 0.0, low), cell_size=0.1, section_size=0.5, cell_color=(222, 226, 231),
-        section_color=(196, 203, 212), plane_color=(246, 247, 249), plane_opacity=1.0, shadow_opacity=0.0,
-        fade_distance=6.0,
+def _floor(server: "ViserServer", world: World) -> None:
+    server.scene.add_grid(
+        "/floor", 4.0, 4.0, position=(0.0, 0.0, world.floor_height), cell_size=0.1, section_size=0.5,
+        cell_color=(222, 226, 231), section_color=(196, 203, 212), plane_color=(246, 247, 249), plane_opacity=1.0,
+        shadow_opacity=0.0, fade_distance=6.0,
     )  # fmt: skip
+
+
+def _pedestal(server: "ViserServer", world: World, root: str) -> None:
+    """Pedestal and base frame."""
+    scene, low = server.scene, world.floor_height
     if low < -0.01:
         scene.add_cylinder(
-            "/pedestal", 0.1, -low, color=palette.PEDESTAL, position=(0.0, 0.0, low / 2), cast_shadow=False,
+            f"{root}/pedestal", 0.1, -low, color=palette.PEDESTAL, position=(0.0, 0.0, low / 2), cast_shadow=False,
             receive_shadow=False,
         )  # fmt: skip
-    scene.add_frame("/base", axes_length=0.16, axes_radius=0.004, origin_radius=0.008)
+    scene.add_frame(f"{root}/base", axes_length=0.16, axes_radius=0.004, origin_radius=0.008)
 
 
 def _sky(height: int = 128) -> FloatArray:

@@ -34,6 +34,17 @@ def url_of(options: ServeOptions) -> str:
     return f"http://[{host}]:{options.port}" if ":" in host else f"http://{host}:{options.port}"
 
 
+_GREYED = "div[style*='opacity: 0.5'][style*='pointer-events: none']"
+_LOST = (
+    f"<style>#lost{{display:none}}{_GREYED}:has(#lost){{opacity:1!important}}{_GREYED} #lost{{display:block;"
+    "position:fixed;top:0;left:0;right:0;z-index:99;padding:14px;text-align:center;font-size:17px;font-weight:700;"
+    "background:#d62839;color:#fff}</style><div id='lost'>Connection lost: the program behind this page has ended or"
+    " cannot be reached. What is drawn is out of date.</div>"
+)
+"""A sentence that the page shows by itself. viser's client only greys its controls while it is not connected, and lets
+nobody add a script; a style sheet can tell by the greying."""
+
+
 @contextmanager
 def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
     """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
@@ -46,6 +57,7 @@ def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
         try:
             if server.get_port() != options.port:
                 raise _busy(options, server.get_port())
+            server.gui.add_html(_LOST)
             yield server
         finally:
             server.stop()

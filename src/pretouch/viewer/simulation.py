@@ -24,6 +24,7 @@ from pretouch.session.push_outcome import PushOutcome
 from pretouch.sim.scene import described, fixtures
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.frame import Frame, World
+from pretouch.viewer.opening import Opening
 from pretouch.viewer.room import Faults, LiveSettings, PathName, Room, live_path
 
 if TYPE_CHECKING:
@@ -63,6 +64,8 @@ class LiveSimulation:
         """The recording under way."""
         self.notice = ""
         """The last notice for a person, as a sentence; whoever shows it may empty it."""
+        self.opening: Opening | None = None
+        """The hand's script under way; None: the hand is a person's."""
         self._begin(settings or LiveSettings())
 
     def _begin(self, settings: LiveSettings) -> None:
@@ -76,7 +79,7 @@ class LiveSimulation:
         self.controller = Controller(self.model, self.skin, fixtures(room.scene), path, settings.profile)
         self._room, self._state = room, self.controller.init(room.plant.read())
         self._boxes = surroundings({"scene": described(room.scene)}).boxes
-        self._resume, self._remainder = False, 0.0
+        self._resume, self._remainder, self.opening = False, 0.0, None
         self._pushes, self._push = Pushes(room.plant, (), 0.0), None
         self._update_world()
         self.single_step()
@@ -105,6 +108,9 @@ class LiveSimulation:
         """Let one control cycle pass and return its step."""
         room, resume = self._room, self._resume
         self._resume = False
+        if self.opening:
+            room.mouse.move(self.opening.target(self.frame.step))
+            self.opening = None if self.opening.over else self.opening
         tick = room.tick()
         cycle = turn(self.controller, self._state, room.plant, room.units, tick, resume)
         self._state = cycle.after
@@ -125,8 +131,18 @@ class LiveSimulation:
     # what a person does
 
     def move_hand(self, target: FloatArray) -> None:
-        """Draw the hand to a place (3,) [m], base frame, or the nearest to it in the workspace."""
+        """Draw the hand to a place (3,) [m], base frame, or the nearest to it in the workspace; ends an opening."""
+        self.opening = None
         self._room.mouse.move(target)
+
+    def point_hand(self, eye: FloatArray, place: FloatArray) -> FloatArray:
+        """Draw the hand to what is seen at a place (3,) [m] from an `eye` (3,) [m]; ends an opening.
+
+        Returns the place (3,) [m] the hand is drawn to: the pointer's, at the depth of the arm where that is near.
+        """
+        self.opening = None
+        self._room.mouse.point(eye, place, self.model, self.frame.step.q)
+        return self._room.mouse.target
 
     def set_profile(self, profile: Profile) -> None:
         """Go on with other parameters; another control period is a ParameterError."""
@@ -165,6 +181,11 @@ class LiveSimulation:
     def resume(self) -> None:
         """Ask to leave a latched HOLD, once."""
         self._resume = True
+
+    def play_opening(self) -> None:
+        """Begin again at time 0 with a scripted hand, which is a person's again as soon as it is moved."""
+        self.reset()
+        self.opening = Opening(self.model, self.controller.path, self.frame.step, self._room.mouse.target)
 
     def reset(self, **changes: Any) -> None:
         """Begin again at time 0 with all as it is set by now, but for changes of `LiveSettings`; ends a recording."""

@@ -10,7 +10,7 @@ from pretouch.types import FloatArray, IntArray
 CELL_M = 0.009
 """Distance between the vertices of a surface, about [m]."""
 
-_BLEND_M = 0.024
+BLEND_M = 0.024
 """Length over which capsules that meet run into each other [m]; at most a quarter of it fills a crease of two."""
 
 _CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
@@ -29,8 +29,11 @@ class Mesh:
     """(V, 3) unit vectors, outwards."""
 
 
-def signed_distance(points: FloatArray, capsules: Capsules) -> FloatArray:
-    """Distance (P,) [m] of points (P, 3) from the union of capsules, blended where they meet; negative inside."""
+def signed_distance(points: FloatArray, capsules: Capsules, blend: float = BLEND_M) -> FloatArray:
+    """Distance (P,) [m] of points (P, 3) from the union of capsules, blended over a length [m] where they meet.
+
+    It is negative inside.
+    """
     total: FloatArray | None = None
     for a, b, radius in zip(capsules.a, capsules.b, capsules.radius, strict=True):
         axis = b - a
@@ -39,26 +42,26 @@ def signed_distance(points: FloatArray, capsules: Capsules) -> FloatArray:
         if total is None:
             total = distance
         else:
-            near = np.maximum(_BLEND_M - np.abs(total - distance), 0.0)
-            total = np.minimum(total, distance) - near**2 / (4 * _BLEND_M)
+            near = np.maximum(blend - np.abs(total - distance), 0.0)
+            total = np.minimum(total, distance) - near**2 / (4 * blend)
     return np.full(len(points), np.inf) if total is None else total
 
 
-def surface_of(capsules: Capsules, cell: float = CELL_M) -> Mesh:
+def surface_of(capsules: Capsules, cell: float = CELL_M, blend: float = BLEND_M) -> Mesh:
     """Mesh the union of capsules (at least one) by surface nets on a grid of `cell` [m], drawn onto the surface."""
     reach = capsules.radius[:, None] + 2 * cell
     low = np.minimum(capsules.a - reach, capsules.b - reach).min(axis=0)
     high = np.maximum(capsules.a + reach, capsules.b + reach).max(axis=0)
     shape = tuple(np.ceil((high - low) / cell).astype(int) + 1)
     grid = low + cell * np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3)
-    field = signed_distance(grid, capsules).reshape(shape)
+    field = signed_distance(grid, capsules, blend).reshape(shape)
     places, vertices = _crossed_cells(field)
     points = low + cell * vertices
     for _ in range(3):
-        slope = _gradient(points, capsules)
-        points = points - signed_distance(points, capsules)[:, None] * slope
+        slope = _gradient(points, capsules, blend)
+        points = points - signed_distance(points, capsules, blend)[:, None] * slope
     faces = _faces(field, places)
-    return Mesh(points, faces, _gradient(points, capsules))
+    return Mesh(points, faces, _gradient(points, capsules, blend))
 
 
 def _crossed_cells(field: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -95,11 +98,11 @@ def _faces(field: FloatArray, places: IntArray) -> IntArray:
     return np.concatenate(found)
 
 
-def _gradient(points: FloatArray, capsules: Capsules, step: float = 1e-4) -> FloatArray:
+def _gradient(points: FloatArray, capsules: Capsules, blend: float, step: float = 1e-4) -> FloatArray:
     """Unit gradients (P, 3) of the signed distance, by central differences."""
     slope = np.stack(
         [
-            signed_distance(points + step * e, capsules) - signed_distance(points - step * e, capsules)
+            signed_distance(points + step * e, capsules, blend) - signed_distance(points - step * e, capsules, blend)
             for e in np.eye(3)
         ],
         axis=1,

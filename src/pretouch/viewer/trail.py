@@ -52,10 +52,10 @@ class Trail:
     Blocks are used over again: a page keeps what was ever added to it, and may be open for days.
     """
 
-    def __init__(self, scene: "SceneApi") -> None:
+    def __init__(self, scene: "SceneApi", root: str = "") -> None:
         self._blocks: list[LineSegmentsHandle] = [
             scene.add_line_segments(
-                f"/trail/{i}", np.zeros((1, 2, 3)), np.zeros((1, 2, 3), dtype=np.uint8), thickness=3.5,
+                f"{root}/trail/{i}", np.zeros((1, 2, 3)), np.zeros((1, 2, 3), dtype=np.uint8), thickness=3.5,
                 thickness_units="screen", visible=False,
             )
             for i in range(BLOCKS)

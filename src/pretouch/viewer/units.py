@@ -13,6 +13,7 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, ControlStep, FloatArray, IntArray
 from pretouch.viewer import palette
 from pretouch.viewer.arm import quaternions
+from pretouch.viewer.trail import binding
 
 if TYPE_CHECKING:
     from viser import BatchedMeshHandle, SceneApi
@@ -20,9 +21,9 @@ if TYPE_CHECKING:
 FIELD_OF_VIEW = math.radians(27.0)
 """Full angle of a unit's cone [rad] (VL53L1X data sheet)."""
 
-_IDLE_M = 0.12
+_IDLE_M = 0.06
 """Length at which a cone is drawn that shows nothing [m]."""
-_FAINT, _CLEAR = 0.25, 0.55
+_FAINT, _CLEAR = 0.2, 0.7
 _UNIT_HALF_M = np.array([0.010, 0.007, 0.002])
 _POINT_M = 0.014
 _GONE = 1e-6
@@ -32,8 +33,8 @@ _GONE = 1e-6
 class Units:
     """All units of a skin, each as a plate and a cone on its link, and a sphere where it senses something."""
 
-    def __init__(self, scene: "SceneApi", skin: Skin, links: Sequence[str]) -> None:
-        """Put the units under the nodes `/arm/LINK` of their links, whose names are given in order of their index."""
+    def __init__(self, scene: "SceneApi", skin: Skin, links: Sequence[str], root: str = "") -> None:
+        """Put the units under the nodes `ROOT/arm/LINK` of their links, named in order of their index."""
         self._skin, count = skin, len(skin)
         self._plates: list[tuple[IntArray, BatchedMeshHandle]] = []
         self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
@@ -42,7 +43,7 @@ class Units:
             units = np.flatnonzero(skin.link == link)
             pose = skin.T_link_sensor[units]
             place = quaternions(pose[:, :3, :3]), pose[:, :3, 3]
-            node, idle = f"/arm/{links[link]}", np.full(len(units), _IDLE_M)
+            node, idle = f"{root}/arm/{links[link]}", np.full(len(units), _IDLE_M)
             plates = scene.add_batched_meshes_simple(
                 f"{node}/units", *_plate(), *place, batched_colors=_all(palette.UNIT, units), flat_shading=True, **plain
             )
@@ -53,7 +54,7 @@ class Units:
             self._plates.append((units, plates))
             self._cones.append((units, cones))
         self.points = scene.add_batched_meshes_simple(
-            "/points", *_ball(), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
+            f"{root}/points", *_ball(), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
             batched_scales=np.full(count, _GONE), batched_colors=_all(palette.SENSED, np.arange(count)), **plain,
         )  # fmt: skip
 
@@ -67,13 +68,19 @@ class Units:
 
         A controller that is not `perceiving` has no obstacles: then every reading is a sensed point.
         """
-        off = silent[:, None]
-        plates, cones = (palette.as_vertex(np.where(off, palette.UNIT_SILENT, c)) for c in (palette.UNIT, palette.CONE))
+        seeing, limiting = self._glowing(step)
+        plates, cones = (
+            palette.as_vertex(np.select(
+                [silent[:, None], limiting[:, None], seeing[:, None]],
+                [palette.UNIT_SILENT, palette.LIMITING, palette.SEEING], plain,
+            )) for plain in (palette.UNIT, palette.CONE)
+        )  # fmt: skip
         reading = np.where(silent, np.nan, step.range_distance)
-        lengths = np.nan_to_num(np.round(reading, 2), nan=_IDLE_M).astype(np.float32)
         points = self._sensed(step, kin, reading, perceiving)
         seen = np.isfinite(points[:, 0])
-        opacities = np.where(seen | np.isfinite(reading), _CLEAR, _FAINT).astype(np.float32)
+        # a unit that sees the floor, or the arm itself, senses nothing
+        lengths = np.where(seen, np.round(reading, 2), _IDLE_M).astype(np.float32)
+        opacities = np.where(seen, _CLEAR, _FAINT).astype(np.float32)
         for units, handle in self._plates:
             handle.batched_colors = plates[units]
         for units, handle in self._cones:
@@ -81,6 +88,16 @@ class Units:
             handle.batched_opacities = opacities[units]
         self.points.batched_positions = np.nan_to_num(points).astype(np.float32)
         self.points.batched_scales = np.where(seen, _POINT_M, _GONE).astype(np.float32)
+
+    def _glowing(self, step: ControlStep) -> tuple[BoolArray, BoolArray]:
+        """Which units (K,) see an obstacle, and whose obstacles keep the arm from what it would do."""
+        seeing, limiting = np.zeros((2, len(self._skin)), np.bool_)
+        unit = step.obstacles.unit
+        own = unit < len(self._skin)  # what other sources see is at no unit
+        seeing[unit[own]] = True
+        held = unit[step.restricted[binding(step)]]
+        limiting[held[held < len(self._skin)]] = True
+        return seeing, limiting
 
     def _sensed(self, step: ControlStep, kin: Kinematics, reading: FloatArray, perceiving: bool) -> FloatArray:
         """Where each unit senses something (K, 3) [m], base frame; NaN where it does not."""

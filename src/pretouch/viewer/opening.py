@@ -1,0 +1,56 @@
+"""The opening of a live page: a person's hand comes into the arm's way, is touched, and withdraws.
+
+Only the hand is scripted. The arm, its sensors and its controller do what they do for any hand: a controller that does
+not see it runs into it at full speed.
+"""
+
+import numpy as np
+
+from pretouch.control.path import Path
+from pretouch.robot.model import RobotModel
+from pretouch.sim.pushes import PALM, hand_of
+from pretouch.types import ControlStep, FloatArray, Mode
+
+_BEGIN_S = 2.2
+"""Time in the simulation at which the hand sets out [s]: the arm is on its path, and the page is drawn."""
+_PHASE_M = 1.25
+"""Where on its path the arm meets the hand [m]: on the circle low, on the side of the person, after five seconds."""
+_COME_M_S, _GO_M_S = 0.35, 0.5
+"""Speeds of the hand, coming and going [m/s]."""
+_STAY_S = 0.25
+"""Time the hand stays after the arm has reacted to it [s]."""
+_PATIENCE_S = 12.0
+"""Time after which the hand withdraws from an arm that does not react [s]."""
+_HOME_M = 0.01
+"""Distance from where it set out at which the hand is back [m]."""
+
+
+class Opening:
+    """Where the hand is to be in each control cycle, until `over`."""
+
+    def __init__(self, model: RobotModel, path: Path, step: ControlStep, home: FloatArray) -> None:
+        """Begin with the first step, and with the hand at `home` (3,) [m], where it also returns to."""
+        kin = model.kinematics(step.q)
+        hand = hand_of(model)
+        palm = kin.position[hand] + kin.rotation[hand] @ PALM
+        self._place = path.point(_PHASE_M) + palm - kin.position[model.ee]
+        self._home, self._target, self._last = home, home.copy(), step.stamp
+        self._reacted: float | None = None
+        self.over = False
+        """Whether the hand is back where it set out."""
+
+    def target(self, step: ControlStep) -> FloatArray:
+        """Return where the hand is to be next (3,) [m], after a step of the controller."""
+        now, elapsed = step.stamp, step.stamp - self._last
+        self._last = now
+        if self._reacted is None and (step.mode is Mode.REACT or now > _PATIENCE_S):
+            self._reacted = now
+        if now < _BEGIN_S:
+            return self._target
+        going = self._reacted is not None and now > self._reacted + _STAY_S
+        goal, speed = (self._home, _GO_M_S) if going else (self._place, _COME_M_S)
+        left = goal - self._target
+        distance = float(np.linalg.norm(left))
+        self._target = self._target + left * min(1.0, speed * elapsed / max(distance, 1e-9))
+        self.over = going and distance < _HOME_M
+        return self._target
