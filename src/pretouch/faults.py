@@ -93,13 +93,7 @@ def examine(
     elif stamp is None:
         faults[Event.UNUSABLE] = f"the step's time stamp is {inputs.stamp}"
     elif abs(now - robot.stamp) > params.state_timeout_s:
-        age = now - robot.stamp
-        faults[Event.STATE_STALE] = (
-            f"{age:.3f} s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow:"
-            " close other programs and check the connection to the arm"
-            if age > 0
-            else f"{-age:.3f} s in the future: let one clock stamp states and steps"
-        )
+        faults[Event.STATE_STALE] = _stale(now - robot.stamp)
     sent = (*watch.sent[-int(params.state_timeout_s / period) - 1 :], (watch.stamp, command))
     if now < watch.stamp:
         faults[Event.TIME_BACKWARDS] = f"from {watch.stamp:.3f} s to {now:.3f} s"
@@ -122,6 +116,16 @@ def examine(
     if now - force_stamp > params.force_timeout_s:
         faults[Event.NO_FORCE] = f"{now - force_stamp:.2f} s"
     return robot, faults, Watch(now, robot, force_stamp, sent)
+
+
+def _stale(age: float) -> str:
+    """Say how old a state is [s], why that may be, and what to do."""
+    if age < 0:
+        return f"{-age:.3f} s in the future: let one clock stamp states and steps"
+    return (
+        f"{age:.3f} s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow:"
+        " close other programs and check the connection to the arm"
+    )
 
 
 def _moved_on(robot: RobotState, now: float, sent: tuple[tuple[float, FloatArray], ...]) -> FloatArray:
