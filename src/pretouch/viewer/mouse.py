@@ -23,7 +23,7 @@ _SHELL_M = 0.02
 _DIRECTIONS = 200
 _DEPTHS, _LOOKS = (0.4, 1.6), 121
 """Shares of the distance from the eye between which a line of sight is looked along, and at how many points."""
-_NEAR_M, _OWN_M, _STAY = 0.04, 0.25, 0.2
+_NEAR_M, _OWN_M, _STAY = 0.04, 0.35, 0.2
 """How quickly a point of it counts less for the depth with its distance from the arm and from the place [m], and what
 the place's own depth counts."""
 

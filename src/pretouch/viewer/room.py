@@ -67,7 +67,7 @@ class LiveSettings(Checked):
     """The kind of simulated arm."""
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
     """How simulated units err without faults."""
-    hand_start: tuple[float, float, float] = (0.6, 0.6, 0.2)
+    hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
     """Where the person's hand begins [m], base frame: in view, and clear of both paths; moved aside if that is inside
     something."""
 
