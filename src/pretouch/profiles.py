@@ -54,6 +54,7 @@ class Profile(Checked):
     perception: PerceptionParams | None = field(default_factory=PerceptionParams)
     """How readings become obstacle points (eq. 1); none: nothing is seen."""
     task: TaskParams = field(default_factory=TaskParams)
+    """How the hand follows its path (eq. 2)."""
     slow: SpeedReduction | None = field(default_factory=SpeedReduction)
     """What slows the arm near obstacles (eq. 3); none: nothing but silent units does."""
     approach: Restriction | None = field(default_factory=ApproachRestriction)
@@ -67,6 +68,7 @@ class Profile(Checked):
     react: Reaction = field(default_factory=DecayingVelocity)
     """How the arm answers a contact (eq. 12)."""
     failure: FailureParams = field(default_factory=FailureParams)
+    """When an input counts as missing, late or wrong."""
 
     @property
     def sight(self) -> PerceptionParams:
