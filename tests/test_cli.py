@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
-from pretouch import cli, plugins
+from pretouch import cli, extras, plugins
 from pretouch.cli.registry import GROUP, LAB, OWN
 
 
@@ -122,8 +122,7 @@ def test_a_command_of_the_lab_that_is_not_there_is_said_with_what_installs_it(in
     code, said = run(capsys, name, "--seeds", "3")
     assert code == 2
     assert said.err == (
-        f"`pretouch {name}` is a command of the lab, which is not installed: in a clone `make setup` installs it,"
-        " elsewhere `pip install pretouch-lab`.\n"
+        f"`pretouch {name}` is a command of the lab, which is not installed: run {extras.install_command(extras.LAB)}\n"
     )
 
 

@@ -6,7 +6,7 @@ What a program of your own needs is here by name and loaded when it is asked for
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 if TYPE_CHECKING:
     from pretouch import loop as loop
