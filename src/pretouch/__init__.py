@@ -8,7 +8,7 @@ import re
 from importlib import import_module
 from pathlib import Path as _File
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _STUB = _File(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _PLACE = {name: module for module, name in re.findall(r"^from (\S+) import (\w+) as \2$", _STUB, re.MULTILINE)}
