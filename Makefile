@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka ros2 meshes browser micropython test test-skipped test-slow golden golden-values lint house bench peers \
+.PHONY: setup demo live franka ros2 meshes browser docs micropython test test-skipped test-slow golden golden-values lint house bench peers \
 	format clean
 
 setup: $(STAMP)
@@ -15,7 +15,7 @@ $(STAMP): pyproject.toml lab/pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed: say make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bags,dev,figures,viewer]' -e './lab[sweep]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bags,dev,figures,live]' -e './lab[sweep]'
 	$(BIN)/pretouch warm-up
 	@touch $@
 
@@ -40,6 +40,11 @@ meshes: setup
 # what the tests of the page need beside a Chromium of the system's; without both they are skipped
 browser: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
+
+# the documentation site, as build/site
+docs: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(BIN)/python -m tools.site
 
 # MicroPython in Node, which the tests of the firmware run in beside CPython; without it that half is skipped
 micropython:

@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
-from pretouch import cli, plugins
+from pretouch import cli, extras, plugins
 from pretouch.cli.registry import GROUP, LAB, OWN
 
 
@@ -67,9 +67,11 @@ def test_signals_that_end_a_process_end_it_in_order(monkeypatch, number):
 
 @pytest.mark.parametrize("args", [(), ("dance",), ("live", "--seed", "many"), ("recover", "--nothing"), ("skin",)])
 def test_words_it_does_not_know_end_with_code_2(capsys, args):
-    with pytest.raises(SystemExit) as stop:
-        cli.main(list(args))
-    assert stop.value.code == 2
+    try:
+        code = cli.main(list(args))
+    except SystemExit as stop:
+        code = stop.code
+    assert code == 2
 
 
 def test_help_names_the_commands(capsys):
@@ -78,7 +80,7 @@ def test_help_names_the_commands(capsys):
     assert stop.value.code == 0
     said = capsys.readouterr().out
     for name in (*OWN, *LAB):
-        assert f"• {name} " in said
+        assert f" {name} " in said
 
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
@@ -122,8 +124,7 @@ def test_a_command_of_the_lab_that_is_not_there_is_said_with_what_installs_it(in
     code, said = run(capsys, name, "--seeds", "3")
     assert code == 2
     assert said.err == (
-        f"`pretouch {name}` is a command of the lab, which is not installed: in a clone `make setup` installs it,"
-        " elsewhere `pip install pretouch-lab`.\n"
+        f"`pretouch {name}` is a command of the lab, which is not installed: run {extras.install_command(extras.LAB)}\n"
     )
 
 

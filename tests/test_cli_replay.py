@@ -129,7 +129,7 @@ def test_the_page_is_given_recording_place_and_comparison(whole, page):
 
 def test_without_the_extra_the_page_is_one_sentence(whole, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(MissingExtraError, match="extra 'viewer'") as error:
+    with pytest.raises(MissingExtraError, match="extra 'live'") as error:
         replay(whole)
     assert "\n" not in str(error.value)
 

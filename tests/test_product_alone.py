@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pretouch.extras import BAGS, FIGURES, VIEWER
+from pretouch.extras import BAGS, FIGURES, LIVE
 from tests.importing.made import six_axis, written
 
 HIDDEN = ("pretouch_lab", "matplotlib", "mpl_toolkits", "rosbags", "SALib", "pyarrow", "distributed", "viser")
@@ -95,4 +95,4 @@ def test_a_command_of_the_lab_is_a_sentence(tmp_path: Path, name: str):
 def test_live_names_what_it_needs(tmp_path: Path):
     done = alone(tmp_path, "live")
     assert done.returncode == 2
-    assert done.stderr == f"The page needs viser of the extra 'viewer': run {VIEWER.command}\n"
+    assert done.stderr == f"The page needs viser of the extra 'live': run {LIVE.command}\n"

@@ -1,5 +1,7 @@
 """Compiled numerical functions, kept between runs wherever the machine has a place to keep them."""
 
+import logging
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -8,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Protocol, TypeVar, cast
 
 from numba import njit
+from numba.core import event
 
 from pretouch.errors import SourceError
 from pretouch.source_digest import source_digest
@@ -146,6 +149,34 @@ class _Taken:
             apart = " + ".join(part.apart for part in parts)
         arguments = [argument for part in parts for argument in part.arguments]
         return cls(before, apart, arguments, f"{group}({', '.join(part.together for part in parts)})")
+
+
+def is_large(told: event.Event) -> bool:
+    """Return whether an event "numba:compile" of Numba is about an `entry`, which may take a minute."""
+    return bool(told.data["dispatcher"].py_func.__name__.endswith("_flat"))
+
+
+class FirstStart(event.Listener):
+    """Says once that something large is compiled, to the logger `pretouch`: a warning to people at a terminal."""
+
+    said = False
+    """Whether somebody has said it."""
+
+    def on_start(self, event: event.Event) -> None:
+        """Say it, where nobody has."""
+        if not self.said and is_large(event):
+            self.said = True
+            level = logging.WARNING if sys.stderr and sys.stderr.isatty() else logging.INFO
+            logging.getLogger("pretouch").log(
+                level, "Compiling for this processor, once after an installation: up to two minutes ..."
+            )
+
+    def on_end(self, event: event.Event) -> None:
+        """Nothing: others may follow."""
+
+
+FIRST_START = FirstStart()
+event.register("numba:compile", FIRST_START)
 
 
 @compiled

@@ -4,11 +4,14 @@ A part is a set of parameters with behaviour, chosen by name: `class MyDetector(
 a name is known from its definition on; parts of other distributions are found through the entry points of their group.
 """
 
+import ast
+import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
+from itertools import pairwise
 from numbers import Real
-from types import NoneType, UnionType
+from types import MappingProxyType, NoneType, UnionType
 from typing import Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
 from pretouch.checks import Checked
@@ -145,6 +148,31 @@ def leaves(params: Any, where: str = "") -> Iterator[tuple[str, object]]:
             yield from leaves(value, path)
         else:
             yield path, value
+
+
+@cache
+def field_docs(kind: type) -> Mapping[str, str]:
+    """Return what the source says of each field of a dataclass, by name, on one line; inherited ones too."""
+    docs: dict[str, str] = {}
+    for base in filter(is_dataclass, reversed(kind.__mro__)):
+        (node,) = ast.parse(inspect.getsource(base)).body
+        docs |= {
+            field.target.id: " ".join(str(ast.literal_eval(text.value)).split())
+            for field, text in pairwise(getattr(node, "body", ()))
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr)
+        }
+    return MappingProxyType(docs)
+
+
+def describe(params: Any) -> str:
+    """Return a text with each parameter of a profile, a part or another set: path, value, and meaning with its unit."""
+    lines = []
+    for path, value in leaves(params):
+        *groups, name = path.split(".")
+        owner = at(params, ".".join(groups)) if groups else params
+        said = field_docs(type(owner)).get(name, "")  # type: ignore[arg-type]
+        lines.append(f"{path} = {_written(value)}: {said}".rstrip(": "))
+    return "\n".join(lines)
 
 
 def at(value: Any, path: str, where: str = "") -> Any:

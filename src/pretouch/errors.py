@@ -64,5 +64,9 @@ class ViewerError(PretouchError, RuntimeError):
     """The page cannot be shown."""
 
 
+class UsageError(PretouchError, ValueError):
+    """The words of a command line do not fit it."""
+
+
 class PluginError(PretouchError, RuntimeError):
     """A part that another distribution adds is missing, or cannot be loaded."""

@@ -1,14 +1,18 @@
 """What is installed only where it is wanted: which modules an extra brings, and what to run where they are missing."""
 
+import json
 import shlex
 import sys
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, distribution, version
 from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 from pretouch.errors import MissingExtraError
 
 _CLONE = Path(__file__).parents[2]
+LAB = "pretouch-lab"
 
 
 @dataclass(frozen=True)
@@ -28,11 +32,8 @@ class Extra:
 
     @property
     def command(self) -> str:
-        """What installs it: a target of make in the environment of a clone, or pip of the Python that runs."""
-        if Path(sys.prefix) != _CLONE / ".venv":
-            return f"{shlex.quote(sys.executable)} -m pip install '{self.distribution}[{self.name}]'"
-        there = "" if Path.cwd() == _CLONE else f"-C {shlex.quote(str(_CLONE))} "
-        return f"make {there}{self.target}"
+        """What installs it where this Python is; see `install_command`."""
+        return install_command(self.distribution, self.name, self.target)
 
     def need(self, what: str, *modules: str) -> None:
         """Raise MissingExtraError where it, or one of its modules that are named, is not installed.
@@ -46,6 +47,58 @@ class Extra:
 BAGS = Extra("bags", ("rosbags",), "setup")
 FIGURES = Extra("figures", ("matplotlib",), "setup")
 FRANKA = Extra("franka", ("panda_py", "pylibfranka", "ruckig"), "franka")
+LIVE = Extra("live", ("viser",), "setup")
 MESHES = Extra("meshes", ("collada",), "meshes")
 ROS2 = Extra("ros2", ("cyclonedds", "rosbags"), "ros2")
-VIEWER = Extra("viewer", ("viser",), "setup")
+
+
+def install_command(owner: str, extra: str = "", target: str = "setup") -> str:
+    """Return the command that installs a distribution, or an extra of it, where this Python is.
+
+    In a clone that is a target of make, or pip of the folder in an environment other than the clone's own. Elsewhere
+    it is what made the environment: pip and pipx add to a distribution that is there, wherever it came from; uvx makes
+    another environment, so it is given the origin. A missing lab is looked for beside the wheel of Pretouch too.
+    """
+    if (_CLONE / "lab" / "pyproject.toml").is_file():
+        if Path(sys.prefix) == _CLONE / ".venv":
+            there = "" if Path.cwd() == _CLONE else f"-C {shlex.quote(str(_CLONE))} "
+            return f"make {there}{target}"
+        folder = _CLONE / "lab" if owner == LAB else _CLONE
+        return f"{_pip()} -e {_quoted(folder, extra)}"
+    origin, beside, wanted = _origin(), "", _quoted(owner, extra)
+    if owner == LAB and not _installed(LAB):
+        wanted = _quoted(owner, extra, f"=={version('pretouch')}")
+        if origin.startswith("file:"):
+            beside = f"--find-links {shlex.quote(str(Path(unquote(urlsplit(origin).path)).parent))} "
+    if not {"archive-v0", "environments-v2"} & set(Path(sys.prefix).parts):  # of uv's cache
+        return f"{_pip()} {beside}{wanted}"
+    source = f" @ {origin}" if origin else ""
+    if owner == LAB:
+        return f"uvx {beside}--with {wanted} --from {_quoted('pretouch', '', source)} pretouch"
+    return f"uvx --from {_quoted(owner, extra, source)} pretouch"
+
+
+def _pip() -> str:
+    """Return what installs into the environment that runs: pipx, pip, or uv, which makes environments without pip."""
+    python = shlex.quote(sys.executable)
+    if (Path(sys.prefix) / "pipx_metadata.json").is_file():
+        return "pipx runpip pretouch install"
+    return f"{python} -m pip install" if find_spec("pip") else f"uv pip install --python {python}"
+
+
+def _installed(owner: str) -> bool:
+    try:
+        distribution(owner)
+    except PackageNotFoundError:
+        return False
+    return True
+
+
+def _origin() -> str:
+    """Return the URL that this distribution was installed from; '' for an index."""
+    text = distribution("pretouch").read_text("direct_url.json") if _installed("pretouch") else None
+    return str(json.loads(text)["url"]) if text else ""
+
+
+def _quoted(what: object, extra: str = "", source: str = "") -> str:
+    return f"'{what}{f'[{extra}]' if extra else ''}{source}'"

@@ -54,6 +54,7 @@ class Profile(Checked):
     perception: PerceptionParams | None = field(default_factory=PerceptionParams)
     """How readings become obstacle points (eq. 1); none: nothing is seen."""
     task: TaskParams = field(default_factory=TaskParams)
+    """How the hand follows its path (eq. 2)."""
     slow: SpeedReduction | None = field(default_factory=SpeedReduction)
     """What slows the arm near obstacles (eq. 3); none: nothing but silent units does."""
     approach: Restriction | None = field(default_factory=ApproachRestriction)
@@ -67,6 +68,7 @@ class Profile(Checked):
     react: Reaction = field(default_factory=DecayingVelocity)
     """How the arm answers a contact (eq. 12)."""
     failure: FailureParams = field(default_factory=FailureParams)
+    """When an input counts as missing, late or wrong."""
 
     @property
     def sight(self) -> PerceptionParams:
@@ -85,6 +87,7 @@ _BLIND = Profile(name="blind", perception=None, approach=None)
 
 PROFILES: dict[str, Profile] = {
     "paper": _PAPER,
+    "paper-off": replace(_PAPER, name="paper-off", approach=None),
     "blind": _BLIND,
     "slowing-only": replace(_PAPER, name="slowing-only", detect=MovingThresholds(f_d_n=0.0)),
     "thresholds-only": replace(_PAPER, name="thresholds-only", slow=None),
@@ -115,11 +118,11 @@ PROFILES: dict[str, Profile] = {
         ),
     ),
 }
-"""`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0.
-`slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity each (restrictions are apart from
-both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
-text (section V-C). `pretouch`: ours, each departure from the
-paper one switch (docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
+"""`paper`: the equations and Table I. `paper-off`: the same without restrictions of the body. `blind`: the same without
+proximity, eqs. 8-10 with F_obs = 0. `slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity
+each (restrictions are apart from both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles
+affect the arm by the paper's text (section V-C). `pretouch`: ours, each departure from the paper one switch
+(docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
 
 
 def profile_names() -> tuple[str, ...]:

@@ -11,10 +11,10 @@ import pytest
 from pretouch import extras
 from pretouch.cli.registry import command_names
 from pretouch.errors import MissingExtraError
-from pretouch.extras import BAGS, FIGURES, FRANKA, MESHES, ROS2, VIEWER
+from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, ROS2
 from pretouch_lab.sweep.run import SWEEP
 
-EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, VIEWER)
+EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, LIVE)
 
 URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename="a.dae"/></geometry></collision></link>
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
@@ -24,15 +24,15 @@ LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")  # requires 
 X = ("--vary", "threshold.f_base_n=7:20", "--samples", "2", "--processes", "1")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
 ASKED = [
-    (("live", "--path", "spiral"), VIEWER),
-    (("replay", "gone.mcap"), VIEWER),
+    (("live", "--path", "spiral"), LIVE),
+    (("replay", "gone.mcap"), LIVE),
     (("replay", "gone.mcap", "--no-page"), None),
-    (ARM, "franka"),
+    (ARM, FRANKA),
     ((*ARM, "--arm", "fr3"), FRANKA),
     ((*ARM, "--lockstep", "--seconds", "1"), FRANKA),
     (
         ("run", "--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--no-skin", "--profile", "blind"),
-        "ros2",
+        ROS2,
     ),
     (("run", "--skin", "gone.toml"), None),
     (("sweep", "static", *X, "--out", "sweep"), SWEEP),
@@ -122,22 +122,86 @@ def asked_without(extra):
     return [(words, needed) for words, needed in there if needed in (None, extra)]
 
 
-def test_the_sentence_names_make_in_a_clone_and_pip_elsewhere(monkeypatch, tmp_path):
-    monkeypatch.setattr(extras, "find_spec", lambda name: None)
+@pytest.fixture
+def clone(monkeypatch, tmp_path):
+    """A clone whose Python has a name that a shell would take apart."""
+    monkeypatch.setattr(extras, "find_spec", lambda name: object() if name == "pip" else None)
     monkeypatch.setattr(extras, "_CLONE", tmp_path)
     monkeypatch.setattr(sys, "executable", "/a b/python")
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab" / "pyproject.toml").touch()
+    return tmp_path
+
+
+def test_the_sentence_names_make_in_a_clone_and_pip_of_the_folder_in_another_environment(clone, monkeypatch):
     with pytest.raises(MissingExtraError) as caught:
         ROS2.need("An arm on ROS 2")
     assert str(caught.value) == (
         "An arm on ROS 2 needs cyclonedds, rosbags of the extra 'ros2': run"
-        " '/a b/python' -m pip install 'pretouch[ros2]'"
+        f" '/a b/python' -m pip install -e '{clone}[ros2]'"
     )
-    monkeypatch.setattr(sys, "prefix", str(tmp_path / ".venv"))
-    monkeypatch.chdir(tmp_path)
+    assert SWEEP.command == f"'/a b/python' -m pip install -e '{clone}/lab[sweep]'"
+    monkeypatch.setattr(sys, "prefix", str(clone / ".venv"))
+    monkeypatch.chdir(clone)
     assert ROS2.command == "make ros2"
-    assert VIEWER.command == "make setup"
+    assert LIVE.command == "make setup"
     monkeypatch.chdir("/")
-    assert ROS2.command == f"make -C {tmp_path} ros2"
+    assert ROS2.command == f"make -C {clone} ros2"
+
+
+INDEX, FILE = "", "file:///a%20b/pretouch-0.2.0-py3-none-any.whl"
+
+
+@pytest.mark.parametrize(
+    ("maker", "origin", "extra", "lab"),
+    [
+        ("pip", INDEX, "/v/python -m pip install 'pretouch[live]'", "/v/python -m pip install 'pretouch-lab==0.2.0'"),
+        (
+            "pip",
+            FILE,
+            "/v/python -m pip install 'pretouch[live]'",
+            "/v/python -m pip install --find-links '/a b' 'pretouch-lab==0.2.0'",
+        ),
+        (
+            "uv",
+            INDEX,
+            "uv pip install --python /v/python 'pretouch[live]'",
+            "uv pip install --python /v/python 'pretouch-lab==0.2.0'",
+        ),
+        (
+            "pipx",
+            INDEX,
+            "pipx runpip pretouch install 'pretouch[live]'",
+            "pipx runpip pretouch install 'pretouch-lab==0.2.0'",
+        ),
+        (
+            "uvx",
+            INDEX,
+            "uvx --from 'pretouch[live]' pretouch",
+            "uvx --with 'pretouch-lab==0.2.0' --from 'pretouch' pretouch",
+        ),
+        (
+            "uvx",
+            FILE,
+            f"uvx --from 'pretouch[live] @ {FILE}' pretouch",
+            f"uvx --find-links '/a b' --with 'pretouch-lab==0.2.0' --from 'pretouch @ {FILE}' pretouch",
+        ),
+    ],
+)
+def test_a_hint_is_for_what_made_the_environment(monkeypatch, tmp_path, maker, origin, extra, lab):
+    prefix = tmp_path / ("archive-v0" if maker == "uvx" else "v")
+    prefix.mkdir()
+    if maker == "pipx":
+        (prefix / "pipx_metadata.json").touch()
+    monkeypatch.setattr(extras, "find_spec", lambda name: object() if maker == "pip" else None)
+    monkeypatch.setattr(extras, "_CLONE", tmp_path)
+    monkeypatch.setattr(extras, "_origin", lambda: origin)
+    monkeypatch.setattr(extras, "_installed", lambda owner: owner != extras.LAB)
+    monkeypatch.setattr(extras, "version", lambda owner: "0.2.0")
+    monkeypatch.setattr(sys, "prefix", str(prefix))
+    monkeypatch.setattr(sys, "executable", "/v/python")
+    assert LIVE.command == extra
+    assert extras.install_command(extras.LAB) == lab
 
 
 @pytest.mark.parametrize("extra", [*EXTRAS, SWEEP], ids=lambda extra: extra.name)

@@ -2,13 +2,18 @@
 
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Any, Union
+from contextlib import redirect_stderr
+from difflib import get_close_matches
+from io import StringIO
+from typing import Annotated, Any, NoReturn, Union, cast
 
 import tyro
 from rich.console import Console
 
+from pretouch.cli.overview import SHELLS, overview
 from pretouch.cli.registry import Command, check_moved, command_class, command_names
-from pretouch.errors import PluginError, PretouchError
+from pretouch.cli.usage_error import usage_error
+from pretouch.errors import PluginError, PretouchError, UsageError
 from pretouch.signals import Terminated, ends_raise, exit_code
 
 # the rest of the package takes a second to import: only the commands that run something do
@@ -37,13 +42,50 @@ def _read(args: Sequence[str], errors: Console) -> Command:
     name = args[0] if args else ""
     wanted: Any = None if name.startswith("-") else command_class(name)
     if wanted is not None:
-        return tyro.cli(wanted, prog=f"pretouch {name}", args=args[1:], config=_CONFIG)
-    # help on all of them, or words that are none: tyro says which there are
-    known: list[Any] = []
+        return cast(Command, _parsed(wanted, args[1:], f"pretouch {name}"))
+    if name == "completion":
+        _write_completion(args[1:], errors)
+    if name in ("", "-h", "--help"):
+        print(overview({each: _summary(kind) for each, kind in _every(errors).items()}))
+        raise SystemExit(_USAGE if not name else 0)
+    near = get_close_matches(name, command_names(), 1)
+    raise PluginError(
+        f"{name} is no command of pretouch: {f'perhaps {near[0]}' if near else 'pretouch --help lists them'}."
+    )
+
+
+def _parsed(wanted: Any, args: Sequence[str], prog: str) -> Any:
+    """Return what tyro makes of words; what is wrong with them is a UsageError."""
+    said = StringIO()
+    try:
+        with redirect_stderr(said):
+            return tyro.cli(wanted, prog=prog, args=args, config=_CONFIG)
+    except SystemExit as end:
+        if end.code != _USAGE:
+            raise
+        raise UsageError(usage_error(said.getvalue(), args, prog)) from None
+
+
+def _every(errors: Console) -> dict[str, Any]:
+    """Return the class of each command that can be loaded; what keeps another from it is printed."""
+    known: dict[str, Any] = {}
     for each in command_names():
         try:
-            known.append(Annotated[command_class(each), tyro.conf.subcommand(each)])
+            known[each] = command_class(each)
         except PluginError as error:
             errors.print(str(error), markup=False)
-    every: Any = Union[tuple(known)]  # noqa: UP007  # made when it is asked for
-    return tyro.cli(every, prog="pretouch", description="Contact-anticipating robot arms.", args=args, config=_CONFIG)
+    return known
+
+
+def _summary(command: Any) -> str:
+    return (command.__doc__ or "").strip().partition("\n")[0]
+
+
+def _write_completion(shells: Sequence[str], errors: Console) -> NoReturn:
+    """Print what a shell needs to complete the words of all commands, and end."""
+    if len(shells) != 1 or shells[0] not in SHELLS:
+        raise UsageError(f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}.")
+    kinds = [Annotated[kind, tyro.conf.subcommand(name)] for name, kind in _every(errors).items()]
+    every: Any = Union[tuple(kinds)]  # noqa: UP007  # made when it is asked for
+    tyro.cli(every, prog="pretouch", args=["--tyro-print-completion", *shells], config=_CONFIG)
+    raise SystemExit(0)

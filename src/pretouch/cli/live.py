@@ -3,15 +3,16 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from pretouch.errors import HardwareError, ParameterError
-from pretouch.extras import VIEWER
+from pretouch.extras import LIVE
 from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.profiles import profile as find_profile
 from pretouch.signals import ended
-from pretouch.viewer.room import LiveSettings, PathName
+from pretouch.viewer.room import LiveSettings, PathName, Room, live_path
 from pretouch.viewer.server import ServeOptions, check_port
 
 if TYPE_CHECKING:
@@ -22,13 +23,14 @@ if TYPE_CHECKING:
 def live(command: "Live") -> None:
     """Serve the page until interrupted."""
     options = ServeOptions(command.host, command.port)
-    VIEWER.need("The page")
+    LIVE.need("The page")
     check_port(options)  # before the seconds that the simulation takes to begin
     if command.path not in ("circle", "line"):
         raise ParameterError(f"The path is {command.path!r}: choose circle or line.")
     path, profile = cast(PathName, command.path), find_profile(command.profile)
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
 
+    from pretouch.cli.warm_up import prepare
     from pretouch.robot.description import panda
     from pretouch.robot.model import RobotModel
     from pretouch.sensing.skin import LIVE_SKIN, skin_for
@@ -46,13 +48,14 @@ def live(command: "Live") -> None:
         settings = replace(settings, plant=world.plant, ranging=world.ranging)
         if not command.keys:
             believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), command.seed)
+    prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick(), first_contact=True)
     with _units(command, skin.ids) as real:
         simulation = LiveSimulation(settings, model, believed, real, skin)
         if command.opening and not real and not command.record:
             simulation.play_opening()
         if command.record:
             simulation.start_recording(Path(command.record))
-        serve_live(simulation, options, ended)
+        serve_live(simulation, options, ended, partial(print, flush=True))
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, Protocol, cast
 
-from pretouch import plugins
+from pretouch import extras, plugins
 from pretouch.errors import PluginError
 
 GROUP = "pretouch.commands"
@@ -67,8 +67,8 @@ def command_class(name: str) -> type[Command] | None:
         return found
     if name in LAB:
         raise PluginError(
-            f"`pretouch {name}` is a command of the lab, which is not installed: in a clone `make setup` installs it,"
-            " elsewhere `pip install pretouch-lab`."
+            f"`pretouch {name}` is a command of the lab, which is not installed:"
+            f" run {extras.install_command(extras.LAB)}"
         )
     return None
 

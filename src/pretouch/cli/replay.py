@@ -10,7 +10,8 @@ from rich.table import Table
 
 from pretouch.cli.detect import axes_shown
 from pretouch.cli.tables import grid
-from pretouch.extras import VIEWER
+from pretouch.cli.warm_up import prepare
+from pretouch.extras import LIVE
 from pretouch.profiles import profile as find_profile
 from pretouch.recording import recover as recovering
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
@@ -38,7 +39,7 @@ def replay(
     if page and not verify:  # what keeps it from being shown is said before the work for it
         from pretouch.viewer.server import ServeOptions, check_port
 
-        VIEWER.need("The page")
+        LIVE.need("The page")
         check_port(ServeOptions(host, port))
     recorded = open_recording(place)
     if recorded.said:
@@ -49,6 +50,7 @@ def replay(
         with _Progress("Reading", len(recorded)) as advance:
             console.print(f"{told(recorded)[:-1]}: {happened(recorded, advance)}.", markup=False)
     if verify:
+        prepare(recorded.runs[0].profile)
         with _Progress("Recomputing", len(recorded)) as advance:
             verdict = recompute(recorded, advance)
         console.print(verdict.said, markup=False)

@@ -160,6 +160,7 @@ def skin_for(model: RobotModel, file: Path | str = "") -> Skin:
 
 
 _KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad", "touch")
+_ARRAYS = ("position_m", "quaternion_wxyz")
 _TOUCH_KEYS = {"radius_m": "radius", "force_min_n": "force_min", "measures_force": "measures_force"}
 
 
@@ -179,6 +180,17 @@ def _entry(unit: SensorUnit) -> dict[str, Any]:
 def _touch_entry(touch: TouchPatch) -> bool | dict[str, float | bool]:
     """Return what stands of a touch sensor in a skin file: true for the usual one."""
     return touch == TouchPatch() or {key: getattr(touch, name) for key, name in _TOUCH_KEYS.items()}
+
+
+def sensor_unit(**entry: Any) -> SensorUnit:
+    """Return a unit from what stands of it in a skin file; wrong or unknown values are a SkinError.
+
+    Args:
+        entry: `id`, `link`, `position_m` (3,) [m] from the link's origin, `quaternion_wxyz` (4,) of the sensor's axes
+            in the link's, and, where they are known, `position_sigma_m` [m], `orientation_sigma_rad` [rad] and `touch`
+            (true, or its values).
+    """
+    return _unit_from({key: np.asarray(value).tolist() if key in _ARRAYS else value for key, value in entry.items()})
 
 
 def _unit_from(entry: Any) -> SensorUnit:

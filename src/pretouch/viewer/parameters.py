@@ -1,14 +1,12 @@
 """The parameters of Table I as a page offers them: names, units, and what each does."""
 
-import ast
-import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from itertools import pairwise
 from types import MappingProxyType
 
 from pretouch.composition import at, changed, leaves
+from pretouch.composition import field_docs as of_kind
 from pretouch.errors import ParameterError
 from pretouch.profiles import PROFILES, Profile
 
@@ -81,11 +79,8 @@ TABLE_1: tuple[TableEntry, ...] = (
 @cache
 def field_docs() -> Mapping[tuple[str, str], str]:
     """What the source says of each field of the parameters, by (class, field), on one line; inherited ones too."""
-    docs: dict[tuple[str, str], str] = {}
     kinds: set[type] = {type(group) for profile in PROFILES.values() for group in groups_of(profile)}
-    for kind in kinds | {Profile}:
-        for base in reversed(kind.__mro__):
-            docs |= {(kind.__name__, field): said for field, said in _told(base).items()}
+    docs = {(kind.__name__, name): said for kind in kinds | {Profile} for name, said in of_kind(kind).items()}
     return MappingProxyType(docs)
 
 
@@ -97,17 +92,3 @@ def groups_of(params: object) -> Iterator[object]:
             if is_dataclass(group):
                 yield group
                 yield from groups_of(group)
-
-
-@cache
-def _told(kind: type) -> Mapping[str, str]:
-    """What the source of a class says of the fields that it adds."""
-    if not is_dataclass(kind):
-        return {}
-    (node,) = ast.parse(inspect.getsource(kind)).body
-    body = node.body if isinstance(node, ast.ClassDef) else []
-    return {
-        field.target.id: " ".join(str(ast.literal_eval(text.value)).split())
-        for field, text in pairwise(body)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr)
-    }

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pretouch.errors import ViewerError
-from pretouch.extras import VIEWER
+from pretouch.extras import LIVE
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -48,7 +48,7 @@ nobody add a script; a style sheet can tell by the greying."""
 @contextmanager
 def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
     """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
-    VIEWER.need("The page")
+    LIVE.need("The page")
     check_port(options)
     import viser
 

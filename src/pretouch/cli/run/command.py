@@ -10,6 +10,7 @@ import numpy as np
 from pretouch.cli.run.motion import PlannedRun, execute
 from pretouch.cli.run.robots import need_extra, opened
 from pretouch.cli.run.setup import OpenedRobot, RunSetup, free_motion, run_setup
+from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import check_writable
 from pretouch.errors import RecordingError, RobotError
 from pretouch.loop import MonotonicClock
@@ -37,6 +38,7 @@ def run(command: "Run") -> int:
         _check_free(Path(command.record))
     made = run_setup(command)
     need_extra(command)
+    prepare(made.profile)
     if command.robot.lockstep:
         from pretouch.cli.run.lockstep import run_lockstep
 

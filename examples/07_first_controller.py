@@ -1,0 +1,49 @@
+"""A first controller program: a simulated Panda, two sensor units, a line, and a board that stands in its way.
+
+    python examples/07_first_controller.py
+
+docs/tutorial/first-controller.md explains it step by step.
+"""
+
+import numpy as np
+
+import pretouch as pt
+
+# an arm, and two units on its hand that look forward and to the left
+arm = pt.RobotModel(pt.panda())
+units = [
+    pt.sensor_unit(id="left", link="panda_hand", position_m=[0, -0.108, 0.045], quaternion_wxyz=[0.7071, 0.7071, 0, 0]),
+    pt.sensor_unit(
+        id="right", link="panda_hand", position_m=[0, 0.108, 0.045], quaternion_wxyz=[0.7071, -0.7071, 0, 0]
+    ),
+]
+skin = pt.Skin(units, arm)
+
+# a room with a board, and a path that leads into it
+start, end = (0.45, -0.2, 0.5), (0.45, 0.3, 0.5)
+board = pt.Box("board", center=(0.45, 0.25, 0.5), half_size=(0.2, 0.02, 0.2), stiffness=25_000.0)
+room = pt.SceneSpec(boxes=(board,))
+
+# the simulated arm and its sensors; the controller knows the room's floor, and nothing of the board
+plant = pt.Plant(arm, room, pt.PlantParams(), pt.brought_to(arm, np.array(start)), seed=1)
+sensors = pt.RangeFinders(plant, skin, pt.RangeFinderParams(), seed=1)
+controller = pt.Controller(arm, skin, pt.fixtures(room), pt.line(start, end), pt.profile("pretouch"))
+
+
+class Narrator:
+    """A recorder that tells what the arm does, each time that it changes or half a second has passed."""
+
+    def __init__(self) -> None:
+        self.told, self.mode = -1.0, ""
+
+    def record(self, cycle: pt.Cycle) -> None:
+        """Print a step that is worth it."""
+        step = cycle.step
+        if step.mode.value != self.mode or step.stamp - self.told >= 0.5:
+            self.told, self.mode = step.stamp, step.mode.value
+            near, speed = step.obstacles.body_distance.min(initial=np.inf), np.linalg.norm(step.ee_velocity)
+            print(f"{step.stamp:4.1f} s  {self.mode:5}  {speed:.2f} m/s  nearest {near:4.2f} m  {step.reason}")
+
+
+clock = pt.PlantClock(plant, controller.limits.period)
+pt.loop.run(controller, plant, sensors, clock, Narrator(), lambda step: step.stamp >= 5.0)

@@ -1,0 +1,76 @@
+"""What the command line says of itself, and of words that it does not take."""
+
+import subprocess
+from dataclasses import replace
+
+import pytest
+
+from pretouch import cli
+from pretouch.cli.overview import GROUPS, SHELLS, overview
+from pretouch.cli.registry import LAB, OWN
+from pretouch.profiles import profile
+
+
+def test_the_overview_fits_a_screen_and_has_each_command_once():
+    names = [name for group in GROUPS.values() for name in group]
+    assert sorted(names) == sorted((*OWN, *LAB))
+    lines = overview(dict.fromkeys((*OWN, *LAB, "mine"), "Do a thing of my own. " * 5)).splitlines()
+    assert len(lines) < 24
+    assert max(map(len, lines)) <= 80
+    assert "live" in lines[1]
+    assert any(line.startswith("Added") and " mine " in line for line in lines)
+
+
+def test_the_overview_leaves_out_what_is_not_installed():
+    said = overview(dict.fromkeys(OWN, ""))
+    assert " demo " not in said
+    assert "Experiments" not in said
+
+
+@pytest.mark.parametrize("width", ["40", "80", "200"])
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("live --seed many", "--seed is 'many': give a whole number. See pretouch live --help."),
+        ("live --seed=many", "--seed is 'many': give a whole number. See pretouch live --help."),
+        ("run --radius wide", "--radius is 'wide': give a number. See pretouch run --help."),
+        ("run --cpu x", "--cpu is 'x': give a whole number. See pretouch run --help."),
+        ("live --prot 8080", "--prot is unknown: perhaps --port. See pretouch live --help."),
+        (
+            "run --robot kuka",
+            "--robot is 'kuka': choose from simulated, franka, ros2. See pretouch run --help.",
+        ),
+        ("live --seed", "--seed lacks a value: give 1. See pretouch live --help."),
+        ("live here", "here is unknown. See pretouch live --help."),
+        (
+            "replay",
+            "pretouch replay lacks an argument: Recording; that of a killed process works too."
+            " See pretouch replay --help.",
+        ),
+        (
+            "skin dance",
+            "dance is unknown: choose from monitor, calibrate, coverage, simulate, provision, keys."
+            " See pretouch skin --help.",
+        ),
+        ("repaly", "repaly is no command of pretouch: perhaps replay."),
+        ("xyz", "xyz is no command of pretouch: pretouch --help lists them."),
+        ("completion fish", f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}."),
+    ],
+)
+def test_wrong_words_are_one_sentence(capsys, monkeypatch, words, said, width):
+    monkeypatch.setenv("COLUMNS", width)
+    assert cli.main(words.split()) == 2
+    assert capsys.readouterr().err == f"{said}\n"
+
+
+def test_bash_takes_the_completion(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["completion", "bash"])
+    assert not stop.value.code
+    script = capsys.readouterr().out
+    assert "--profile" in script
+    subprocess.run(["bash", "-n"], input=script, text=True, check=True)  # noqa: S607
+
+
+def test_the_name_of_the_table_is_a_profile():
+    assert profile("paper-off") == replace(profile("paper:restriction.mode=off"), name="paper-off")

@@ -1,0 +1,115 @@
+"""The built site: its links, pictures and search, and that it asks nobody for anything."""
+
+from html.parser import HTMLParser
+from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from tests.needs import skip_for
+from tests.viewer.browser import chromium
+
+import pretouch
+
+
+class Page(HTMLParser):
+    """What a page of the site refers to, and what it can be referred to by."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.pictures: list[tuple[str, str]] = []
+        self.text = ""
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.anchors.add(given.get("id") or "")
+        if tag == "a" and given.get("href"):
+            self.links.append(given["href"])
+        if tag in ("script", "img", "iframe", "source") and given.get("src"):
+            self.loaded.append(given["src"])
+        if tag == "link" and given.get("href"):
+            self.loaded.append(given["href"])
+        if tag == "img":
+            self.pictures.append((given.get("src", ""), given.get("alt") or ""))
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    if find_spec("zensical") is None:
+        skip_for("make docs")
+    from tools.site.__main__ import build
+
+    out = tmp_path_factory.mktemp("site")
+    assert build(out) == 0
+    return out / "site"
+
+
+@pytest.fixture(scope="module")
+def pages(site):
+    return {path: Page(path) for path in sorted(site.rglob("*.html")) if path.name != "404.html"}
+
+
+def test_every_link_leads_to_a_page_and_a_place_on_it(pages):
+    lost, followed = [], 0
+    for path, page in pages.items():
+        for link in [*page.links, *page.loaded]:
+            parts = urlsplit(link)
+            if parts.scheme:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            anchor, followed = unquote(parts.fragment), followed + 1
+            if not target.is_file() or (anchor and target in pages and anchor not in pages[target].anchors):
+                lost.append(f"{path.name}: {link}")
+    assert lost == []
+    assert followed > 5000
+
+
+def test_nothing_is_loaded_from_elsewhere(site, pages):
+    assert {url for page in pages.values() for url in page.loaded if urlsplit(url).scheme} == set()
+    sheets = [path.read_text(encoding="utf-8") for path in site.rglob("*.css")]
+    assert sheets
+    assert not [sheet for sheet in sheets if "url(http" in sheet or "@import" in sheet]
+
+
+def test_every_picture_says_in_words_what_it_shows(pages):
+    pictures = [picture for page in pages.values() for picture in page.pictures]
+    assert len(pictures) > 20
+    assert [src for src, alt in pictures if len(alt) < 10] == []
+
+
+def test_every_public_name_has_its_place(pages):
+    anchors = {anchor for page in pages.values() for anchor in page.anchors}
+    names = {f"{place}.{name}" for name, place in pretouch._PLACE.items()}
+    assert names - anchors == set()
+
+
+def test_lists_are_lists(pages):
+    """A Markdown list that follows its sentence without a blank line would stay a part of it."""
+    broken = [path.name for path in pages if "<p>- " in path.read_text() or "\n- " in _prose(path)]
+    assert broken == []
+
+
+def _prose(path):
+    text = path.read_text(encoding="utf-8")
+    while (start := text.find("<pre")) >= 0:
+        text = text[:start] + text[text.find("</pre>", start) + 6 :]
+    return text
+
+
+def test_the_search_finds_things_without_a_server(site):
+    with chromium() as visitor:
+        asked = []
+        visitor.page.on("request", lambda request: asked.append(request.url))
+        visitor.page.goto((site / "how-to" / "run.html").as_uri())
+        visitor.page.keyboard.press("Control+k")
+        field = visitor.page.locator("input[placeholder='Search']").first
+        field.fill("touch sensor")
+        visitor.page.get_by_text("A touch sensor", exact=False).first.wait_for()
+        assert [url for url in asked if urlsplit(url).scheme in ("http", "https")] == []

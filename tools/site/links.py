@@ -1,0 +1,53 @@
+"""Links that lead to files of the repository lead to pages of the site."""
+
+import os
+import re
+from pathlib import Path
+
+_LINK = re.compile(r"(\]\()(?!https?:)([^)#\s]+)(#[^)\s]*)?(\))")
+_CODE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
+
+
+class Layout:
+    """Where each file of the repository stands on the site: documents as they are, other files as pages of source."""
+
+    def __init__(self, root: Path, pages: Path, beside: dict[str, str]) -> None:
+        self.root, self.pages = root, pages
+        self._beside = beside
+        self.shown: dict[Path, Path] = {}
+        """Files and folders that are linked to and are no documents, and the page that shows each."""
+
+    def page_of(self, file: Path) -> Path:
+        """Return the page of a file or folder of the repository; what is no document gets one that shows it."""
+        name = str(file.relative_to(self.root))
+        if name in self._beside:
+            return self.pages / self._beside[name]
+        if file.is_relative_to(self.root / "docs"):
+            return self.pages / file.relative_to(self.root / "docs")
+        return self.shown.setdefault(file, self.pages / "source" / f"{name}.md")
+
+    def documents(self) -> list[Path]:
+        """Return the repository's documents."""
+        return [*sorted((self.root / "docs").rglob("*.md")), *(self.root / name for name in self._beside)]
+
+    def rebased(self, document: Path) -> str:
+        """Return a document's text with links to where things stand on the site."""
+        page = self.page_of(document)
+
+        def moved(link: re.Match[str]) -> str:
+            target = self.page_of((document.parent / link[2]).resolve())
+            return f"{link[1]}{os.path.relpath(target, page.parent)}{link[3] or ''}{link[4]}"
+
+        parts = _CODE.split(document.read_text(encoding="utf-8"))
+        return "".join(part if part.startswith("```") else _LINK.sub(moved, part) for part in parts)
+
+
+def source_page(file: Path, root: Path) -> str:
+    """Return a page that shows a file, or the files of a folder, as they are."""
+    files = [file] if file.is_file() else sorted(path for path in file.iterdir() if path.is_file())
+    kinds = {".py": "python", ".toml": "toml"}
+    shown = [
+        f"## {path.name}\n\n````{kinds.get(path.suffix, 'text')}\n{path.read_text(encoding='utf-8').rstrip()}\n````\n"
+        for path in files
+    ]
+    return "\n".join([f"# {file.relative_to(root)}\n", *shown])
