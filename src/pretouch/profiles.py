@@ -87,7 +87,6 @@ _BLIND = Profile(name="blind", perception=None, approach=None)
 
 PROFILES: dict[str, Profile] = {
     "paper": _PAPER,
-    "paper-off": replace(_PAPER, name="paper-off", approach=None),
     "blind": _BLIND,
     "slowing-only": replace(_PAPER, name="slowing-only", detect=MovingThresholds(f_d_n=0.0)),
     "thresholds-only": replace(_PAPER, name="thresholds-only", slow=None),
@@ -118,11 +117,15 @@ PROFILES: dict[str, Profile] = {
         ),
     ),
 }
-"""`paper`: the equations and Table I. `paper-off`: the same without restrictions of the body. `blind`: the same without
-proximity, eqs. 8-10 with F_obs = 0. `slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity
-each (restrictions are apart from both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles
-affect the arm by the paper's text (section V-C). `pretouch`: ours, each departure from the paper one switch
-(docs/explanation/detection.md, docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
+"""`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0.
+`slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity each (restrictions are apart from
+both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
+text (section V-C). `pretouch`: ours, each departure from the paper one switch (docs/explanation/detection.md,
+docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
+
+
+SHORT = {"paper-off": "paper:approach=none"}
+"""Short names that tables of results use for variants."""
 
 
 def profile_names() -> tuple[str, ...]:
@@ -145,8 +148,11 @@ def profile(text: str) -> Profile:
 def _named(name: str) -> Profile:
     if name in PROFILES:
         return PROFILES[name]
+    if name in SHORT:
+        return replace(profile(SHORT[name]), name=name)
     if name not in names(GROUP):
-        raise ParameterError(f"The profile {name!r} is unknown: choose from {', '.join(profile_names())}.")
+        known = ", ".join((*profile_names(), *SHORT))
+        raise ParameterError(f"The profile {name!r} is unknown: choose from {known}.")
     found = load(GROUP, name)
     if not isinstance(found, Profile):
         raise ParameterError(f"The profile {name!r} is {found!r} in its distribution: it must be a Profile.")

@@ -1,6 +1,7 @@
 """What the command line says of itself, and of words that it does not take."""
 
 import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
@@ -74,3 +75,12 @@ def test_bash_takes_the_completion(capsys):
 
 def test_the_name_of_the_table_is_a_profile():
     assert profile("paper-off") == replace(profile("paper:restriction.mode=off"), name="paper-off")
+
+
+def test_a_reader_that_has_seen_enough_is_no_error():
+    command = [sys.executable, "-m", "pretouch.cli", "run", "--help"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as done:
+        assert done.stdout is not None
+        assert done.stderr is not None
+        done.stdout.close()
+        assert (done.stderr.read(), done.wait()) == (b"", 141)

@@ -33,7 +33,7 @@ def test_a_missing_extra_is_one_sentence_with_the_command(
 ) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["live"]) == 2
-    assert capsys.readouterr().err == f"The page needs viser of the extra 'viewer': run {LIVE.command}\n"
+    assert capsys.readouterr().err == f"The page needs viser of the extra 'live': run {LIVE.command}\n"
 
 
 def test_an_unknown_path_is_refused_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:

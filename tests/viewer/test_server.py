@@ -60,4 +60,4 @@ def test_a_missing_extra_is_one_sentence_with_the_command(monkeypatch: pytest.Mo
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(MissingExtraError) as caught, served(ServeOptions(port=free_port()), "page"):
         pass
-    assert str(caught.value) == f"The page needs viser of the extra 'viewer': run {LIVE.command}"
+    assert str(caught.value) == f"The page needs viser of the extra 'live': run {LIVE.command}"

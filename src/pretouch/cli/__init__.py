@@ -1,5 +1,6 @@
 """The command `pretouch`."""
 
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import redirect_stderr
@@ -18,7 +19,7 @@ from pretouch.signals import Terminated, ends_raise, exit_code
 
 # the rest of the package takes a second to import: only the commands that run something do
 
-_USAGE, _INTERRUPTED = 2, 130
+_USAGE, _INTERRUPTED, _PIPE = 2, 130, 141
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 
 
@@ -31,6 +32,9 @@ def main(args: list[str] | None = None) -> int:
     except PretouchError as error:
         errors.print(str(error), markup=False)
         return _USAGE
+    except BrokenPipeError:  # the reader of a pipe has seen enough, as `head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _PIPE
     except (KeyboardInterrupt, Terminated):
         return exit_code() or _INTERRUPTED
     return exit_code() if code is None else code

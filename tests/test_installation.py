@@ -1,0 +1,82 @@
+"""Wheel and source distribution as somebody gets them: in an environment that holds nothing else."""
+
+import os
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from email import message_from_bytes
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+CLEAN = {name: text for name, text in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+VERSION = "0.2.0"
+
+
+def ran(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(words, cwd=folder, env=CLEAN, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("built")
+    done = ran(sys.executable, "-m", "venv", "builder", folder=folder)
+    assert done.returncode == 0, done.stderr
+    python = str(folder / "builder/bin/python")
+    done = ran(python, "-m", "pip", "install", "-q", "build", "twine", folder=folder)
+    assert done.returncode == 0, done.stderr
+    for project in (ROOT, ROOT / "lab"):
+        done = ran(python, "-m", "build", "-q", "-o", str(folder / "dist"), str(project), folder=folder)
+        assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_what_an_index_is_given_is_whole_and_holds_no_more(built: Path):
+    files = sorted(map(str, (built / "dist").iterdir()))
+    assert len(files) == 4
+    done = ran(str(built / "builder/bin/python"), "-m", "twine", "check", "--strict", *files, folder=built)
+    assert done.returncode == 0, done.stdout
+    with zipfile.ZipFile(built / f"dist/pretouch-{VERSION}-py3-none-any.whl") as wheel:
+        text = message_from_bytes(wheel.read(f"pretouch-{VERSION}.dist-info/METADATA")).get_payload()
+    assert "](docs/" not in text
+    assert "](https://github.com/pretouch/pretouch/blob/main/docs/" in text
+    with tarfile.open(built / f"dist/pretouch-{VERSION}.tar.gz") as source:
+        tops = {Path(name).parts[1] for name in source.getnames()}
+    expected = {"src", "examples", "CHANGELOG.md", "CITATION.cff", "LICENSE", "NOTICE", "README.md", "PKG-INFO"}
+    assert tops == expected | {"pyproject.toml", ".gitignore"}
+    assert f"version: {VERSION}\n" in (ROOT / "CITATION.cff").read_text()
+    assert tomllib.loads((ROOT / "lab/pyproject.toml").read_text())["project"]["version"] == VERSION
+
+
+@pytest.mark.slow
+def test_each_hint_works_in_an_installation_from_a_wheel(built: Path):
+    """Follow what each command says is missing, in the words it says it in, until nothing is."""
+    done = ran(sys.executable, "-m", "venv", "user", folder=built)
+    assert done.returncode == 0, done.stderr
+    wheel = f"dist/pretouch-{VERSION}-py3-none-any.whl"
+    done = ran(str(built / "user/bin/python"), "-m", "pip", "install", "-q", wheel, folder=built)
+    assert done.returncode == 0, done.stderr
+    (built / "a.bag").touch()
+    asked = {
+        "replay gone.mcap": "gone.mcap cannot be read",
+        "report gone.mcap": "gone.mcap cannot be read",
+        "detect a.bag": "a.bag",
+        "run --robot franka --ip 127.0.0.1 --no-skin --profile blind --lockstep --seconds 1": "127.0.0.1",
+        "figure nothing": "nothing",
+    }
+    for words, otherwise in asked.items():
+        command = (str(built / "user/bin/pretouch"), *words.split())
+        done = ran(*command, folder=built)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        said, _, hint = done.stderr.partition(": run ")
+        assert hint, said
+        installed = subprocess.run(hint, shell=True, cwd=built, env=CLEAN, capture_output=True, text=True)  # noqa: S602
+        assert installed.returncode == 0, installed.stderr
+        done = ran(*command, folder=built)
+        assert "Traceback" not in done.stderr
+        assert ": run " not in done.stderr
+        assert otherwise in done.stderr
