@@ -24,9 +24,12 @@ class Demo:
 
     def run(self) -> None:
         """Play it, with results, figures and page."""
+        from pretouch.cli.warm_up import prepare
+        from pretouch.profiles import profile
         from pretouch_lab.campaign import Request
         from pretouch_lab.cli.campaigns import run_all
 
+        prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
         out = Path(self.out) if self.out else new_folder("demo")
         few = Request(("avoidance", "dynamic"), seeds=1, profiles=_DEMONSTRATED)
         many = Request(("static",), seeds=self.seeds, profiles=_DEMONSTRATED)
