@@ -20,7 +20,7 @@ _IMPORT = "import time; t = time.process_time(); import pretouch; print(time.pro
 class Measure:
     """A number of the house. Beyond `held` the check fails: lower it when the number falls.
 
-    Lines and files were raised once, by 1110 and 4, for what a first hour needs: the opening, the hand and three arms of
+    Lines and files were raised once, by 1110 and 4, for what a first hour needs: the opening, hand and three arms of
     the live page, the sentence that explains a step, a first start that says what it does, hints for each installation.
     """
 
