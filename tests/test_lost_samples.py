@@ -122,7 +122,7 @@ def test_a_state_too_old_latches(panda_model: RobotModel, paper_skin: Skin):
     world = World(panda_model, len(paper_skin), delay=60)
     modes = turn(panda_model, paper_skin, world, 0.5)
     assert modes[-1] is Mode.HOLD
-    assert "old: check the connection" in world.steps[-1].reason
+    assert "0.060 s old, for this machine is busy" in world.steps[-1].reason
     assert_within_limits(panda_model, world)
 
 

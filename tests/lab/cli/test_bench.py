@@ -69,7 +69,7 @@ def test_bench_both_says_which_goals_were_reached_and_writes_the_documents(nothi
     assert cli.main([*given, "--docs", str(tmp_path), "--readme", str(readme)]) == 0
     assert capsys.readouterr().out.count("not measured") == 14
     assert "detection quick, development seeds, avoidance quick" in document.read_text()
-    assert "Blind, paper and pretouch" in readme.read_text()
+    assert "What happens when it touches something" in readme.read_text()
 
 
 def test_bench_both_refuses_a_first_page_without_a_place_for_the_table(capsys, tmp_path):
