@@ -150,15 +150,6 @@ def test_the_page_shows_word_and_sentence_of_the_step_and_the_panel_covers_no_sc
         visitor.keep(f"panel-{width}", tmp_path)
 
 
-def test_a_server_that_has_ended_is_said() -> None:
-    with chromium() as visitor:
-        with live(LiveSimulation()) as served:
-            visitor.open(served)
-            assert not visitor.page.locator("#lost").is_visible()
-        visitor.page.wait_for_selector("#lost", state="visible")
-        assert not visitor.page.locator("#word").is_visible()
-
-
 def test_a_number_typed_key_by_key_is_the_one_that_counts(tmp_path: Path) -> None:
     simulation = LiveSimulation()
     with live(simulation) as served, chromium() as visitor:

@@ -25,8 +25,6 @@ _STYLE = (
     "div:has(> #status){position:sticky;top:0;z-index:10;background:var(--mantine-color-body,#fff)}"
     ".mantine-ScrollArea-content div:has(#status){overflow:clip!important;min-width:0!important}"
     ".mantine-ScrollArea-content:has(#status){width:100%!important;min-width:0!important}"
-    "#lost{display:none}:root:has(.mantine-Loader-root) #lost{display:block}"
-    ":root:has(.mantine-Loader-root) #now{display:none}"
     f"@media (max-width:{PHONE_PX}px){{"
     f".mantine-Paper-root:has(#status){{max-height:{_SHEET}%!important}}"
     "div[style*='width: 20em']:has(#status){width:100%!important}"
@@ -35,14 +33,6 @@ _STYLE = (
     "</style>"
 )
 """Keeps the lines above the controls that scroll beneath them; on a phone, the sheet beneath the scene."""
-
-_LOST = (
-    f"<div id='lost' style='border-left:6px solid {palette.css(palette.AVOIDING)};padding:0 0 2px 10px'>"
-    f"<div style='color:{palette.css(palette.AVOIDING)};font-weight:800;font-size:24px'>CONNECTION LOST</div>"
-    "<div style='font-size:14px;line-height:1.35'>What you see is over: pretouch has ended, or cannot be reached. Start"
-    " it again; the page connects by itself.</div></div>"
-)
-"""Shown in place of the rest while the client waits for a server, which it says by its only loader."""
 
 _COLOURS = {
     Doing.MOVING: palette.RECOVERING, Doing.SLOWED: palette.FORCE, Doing.AVOIDING: palette.AVOIDING,
@@ -88,7 +78,7 @@ def _page(mode: Mode, found: Explanation, rates: str, warning: str, notice: str)
         _banner("warning", warning, palette.HOLDING),
     ]
     box = f"box-sizing:border-box;min-height:{_HEIGHT_PX}px;padding:6px 12px"
-    return f"<div id='status' style='{box}'>{_LOST}<div id='now'>{''.join(lines)}</div></div>"
+    return f"<div id='status' style='{box}'>{''.join(lines)}</div>"
 
 
 def _banner(name: str, said: str, tint: palette.Colour) -> str:
