@@ -75,8 +75,13 @@ def commands_page() -> str:
 def parameter_sets() -> list[type]:
     """Return all sets of parameters of the product but those that another one extends."""
     for module in pkgutil.walk_packages(pretouch.__path__, "pretouch."):
-        if not module.name.endswith("__main__"):
+        if module.name.endswith("__main__"):
+            continue
+        try:
             import_module(module.name)
+        except ModuleNotFoundError as error:  # of a vendor's library: no parameters are in a module that needs one
+            if str(error.name).startswith("pretouch"):
+                raise
     found = [kind for kind in _below(Checked) if is_dataclass(kind) and not kind.__name__.startswith("_")]
     own = [kind for kind in found if kind.__module__.startswith("pretouch.")]
     return sorted({k for k in own if not any(is_dataclass(o) and o in own for o in k.__subclasses__())}, key=str)
