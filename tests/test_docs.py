@@ -61,7 +61,8 @@ def test_links_between_documents_lead_somewhere(document):
 
 def test_the_index_has_every_document():
     index = (ROOT / "docs" / "index.md").read_text()
-    documents = {str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")} - {"index.md"}
+    found = [path for kind in ("*.md", "*.ipynb") for path in (ROOT / "docs").rglob(kind)]
+    documents = {str(path.relative_to(ROOT / "docs")) for path in found} - {"index.md"}
     assert documents == set(re.findall(r"^- .*?\]\(([^)]*)\)", index, flags=re.MULTILINE))
 
 

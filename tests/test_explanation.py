@@ -82,6 +82,16 @@ def test_a_row_slows_to_the_share_of_the_speed_that_it_leaves(step: ControlStep)
     assert both.sentence == "Slowed to 20 %: hand_front sees something at 0.20 m."
 
 
+def test_a_row_across_the_normal_is_said_of_what_is_nearest(step: ControlStep) -> None:
+    # the solution says that a row is violated, and has none: those across a normal are not in it
+    across = replace(limited(multiplier=0.0), slack=np.zeros(2), multipliers=np.zeros(9))
+    near = {"obstacles": seen((0, 0.4, 0.2, 2), (1, 0.2, 0.06, 2)), "restricted": np.array([0, 1])}
+    slow = {**near, "approach_limit": np.array([0.4, 0.2]), "ee_velocity": 0.4 * AHEAD}
+    found = said(step, **slow, qp=replace(across, status="solved, an approach row is violated"))
+    assert found == Explanation(Doing.SLOWED, "Slowed to 40 %: hand_left sees something at 0.06 m.")
+    assert said(step, **slow, qp=across).doing is Doing.MOVING
+
+
 @pytest.mark.parametrize(
     ("limit", "words"), [(0.05, "link5 may near it at 0.05 m/s at most"), (-0.1, "link5 has to back away from it")]
 )

@@ -31,6 +31,7 @@ from pretouch.controller import Controller as Controller
 from pretouch.controller import ControllerState as ControllerState
 from pretouch.errors import PretouchError as PretouchError
 from pretouch.errors import RecordingError as RecordingError
+from pretouch.explanation import explain as explain
 from pretouch.loop import Cycle as Cycle
 from pretouch.loop import MonotonicClock as MonotonicClock
 from pretouch.loop import Recorder as Recorder
@@ -47,6 +48,7 @@ from pretouch.recording.last_seconds import LastSeconds as LastSeconds
 from pretouch.recording.reader import open_recording as open_recording
 from pretouch.recording.verify import verify as verify
 from pretouch.recording.writer import Recording as Recording
+from pretouch.reporting.measures import measure as measure
 from pretouch.robot.description import RobotDescription as RobotDescription
 from pretouch.robot.description import fr3 as fr3
 from pretouch.robot.description import panda as panda

@@ -78,10 +78,13 @@ def answers(step: ControlStep) -> bool:
 def binding(step: ControlStep) -> BoolArray:
     """Which of the restricted obstacles (K',) keep the arm from what it would do."""
     count, qp = len(step.restricted), step.qp
-    pushed, violated = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    bound = np.zeros(count, dtype=np.bool_)
     if count and len(qp.slack) == count:
-        pushed, violated = qp.multipliers[-count:] > 1e-9, qp.slack > 1e-6
-    return pushed | violated
+        bound = (qp.multipliers[-count:] > 1e-9) | (qp.slack > 1e-6)
+        if "violated" in qp.status and not bound.any():
+            # a row across a normal, which the solution leaves out: it is of what is nearest
+            bound[step.obstacles.body_distance[step.restricted].argmin()] = True
+    return bound
 
 
 @dataclass(frozen=True)

@@ -114,11 +114,16 @@ class Visitor:
         return float(self.page.evaluate("name => document.getElementById(name).getBoundingClientRect().top", name))
 
     def wait_for(self, name: str, contained: str) -> None:
-        """Wait until a line of the status holds some words."""
-        self.page.wait_for_function(
-            "([name, words]) => (document.getElementById(name)?.textContent ?? '').includes(words)",
-            arg=[name, contained],
-        )
+        """Wait until a line of the status holds some words; fails with all that the status says instead."""
+        try:
+            self.page.wait_for_function(
+                "([name, words]) => (document.getElementById(name)?.textContent ?? '').includes(words)",
+                arg=[name, contained],
+            )
+        except Exception as error:
+            shown = {line: self.page.evaluate("name => document.getElementById(name)?.textContent", line)
+                     for line in ("word", "reason", "mode", "rates", "warning", "notice")}  # fmt: skip
+            raise AssertionError(f"{name} never said {contained!r}: {shown}") from error
 
     def wait_until(self, true: Callable[[], bool]) -> None:
         """Wait until something holds outside of the page."""

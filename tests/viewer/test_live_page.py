@@ -238,6 +238,18 @@ def test_a_clock_speed_out_of_range_is_the_nearest_in_it(clock: Clock, speed: fl
     assert handle(clock.page, "Clock speed").value == np.clip(speed, 0.1, 1.0)
 
 
+def test_what_a_person_gives_the_hand_holds_though_the_sliders_show_another_place_before_it_is_done(
+    clock: Clock, simulation: LiveSimulation
+) -> None:
+    clock.turn(0.1)
+    give(clock.page, "x [m]", 1.2)
+    give(clock.page, "z [m]", 0.7)
+    clock.page.controls.show_hand(np.array([0.5, 0.25, 0.25]))
+    y = simulation.hand_target[1]
+    clock.turn(0.1)
+    np.testing.assert_array_equal(simulation.hand_target, [1.2, y, 0.7])
+
+
 def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Clock, simulation: LiveSimulation) -> None:
     clock.page.ask(lambda: set_speed(simulation, -1.0))
     clock.turn(0.1)

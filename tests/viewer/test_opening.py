@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pretouch.explanation import Doing, explain
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import LIVE_SKIN, load_skin
@@ -56,11 +57,18 @@ def test_the_arm_sees_the_hand_slows_is_touched_yields_and_goes_on(protected: Pl
     before = protected.steps[protected.touch - 1]
     seen = {protected.simulation.skin.ids[unit] for unit in before.obstacles.unit}
     assert "hand_left" in seen
+    model, skin = protected.simulation.model, protected.simulation.skin
+    told = [explain(s, skin.ids, model.links) for s in protected.steps[protected.touch - 50 : protected.touch]]
+    slowed = [found.sentence for found in told if found.doing is Doing.SLOWED]
+    assert len(slowed) > 40, "the half second before the touch is told as what it is"
+    assert all("hand_left sees something at 0.0" in sentence for sentence in slowed)
     contacts = [s.stamp for s in protected.steps if s.contact is not None]
     touched = protected.steps[protected.touch].stamp
     assert len(contacts) == 1
     assert touched <= contacts[0] < touched + 0.1
     modes = [s.mode for i, s in enumerate(protected.steps) if i == 0 or s.mode is not protected.steps[i - 1].mode]
+    off = [np.linalg.norm(s.ee_position - s.path_position) for s in protected.steps if s.mode is Mode.REACT]
+    assert max(off) > 0.08, "it has moved with the push"
     assert modes[-3:] == [Mode.TRACK, Mode.REACT, Mode.TRACK]
     assert protected.steps[-1].stamp < SHOWN_S
     assert protected.simulation.opening is None

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import tomli_w
+from tools.notebook import page_of
 from tools.site.generated import PAGES, generated_pages
 from tools.site.links import Layout, source_page
 from tools.site.navigation import navigation
@@ -25,6 +26,8 @@ def write_pages(pages: Path) -> None:
     layout = Layout(ROOT, pages, _BESIDE)
     texts = {layout.page_of(document): layout.rebased(document) for document in layout.documents()}
     texts |= {page: source_page(file, ROOT) for file, page in layout.shown.items()}
+    for notebook in sorted((ROOT / "docs").rglob("*.ipynb")):
+        texts[layout.page_of(notebook)] = page_of(notebook, layout.page_of(notebook))
     texts |= {pages / page: text for page, text in generated_pages().items()}
     for page, text in texts.items():
         page.parent.mkdir(parents=True, exist_ok=True)

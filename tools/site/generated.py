@@ -17,9 +17,9 @@ from pretouch.composition import field_docs
 
 API = {
     "arm-and-skin": ("Arm and skin", ("robot", "sensing")),
-    "controller": ("Controller and profiles", ("controller", "profiles", "composition", "params")),
+    "controller": ("Controller and profiles", ("controller", "profiles", "composition", "params", "explanation")),
     "parts": ("Parts of a controller", ("contact", "control", "perception")),
-    "loop": ("Loop and recordings", ("loop", "realtime", "recording")),
+    "loop": ("Loop and recordings", ("loop", "realtime", "recording", "reporting")),
     "simulation": ("Simulation", ("sim",)),
     "values": ("Values and errors", ("types", "errors")),
 }

@@ -23,7 +23,8 @@ class Layout:
         if name in self._beside:
             return self.pages / self._beside[name]
         if file.is_relative_to(self.root / "docs"):
-            return self.pages / file.relative_to(self.root / "docs")
+            page = self.pages / file.relative_to(self.root / "docs")
+            return page.with_suffix(".md") if file.suffix == ".ipynb" else page
         return self.shown.setdefault(file, self.pages / "source" / f"{name}.md")
 
     def documents(self) -> list[Path]:

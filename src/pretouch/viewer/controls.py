@@ -108,8 +108,8 @@ class Controls:
             self._gui.add_slider(f"{axis} [m]", low, high, 0.01, 0.0, hint="Or drag the hand.")
             for axis, low, high in (("x", -1.0, 1.4), ("y", -1.2, 1.2), ("z", -0.15, 1.4))
         ]
-        for slider in self._hand:
-            when_changed(slider, self._actions, lambda _: self._move_hand(), "hand", quiet=True)
+        for axis, slider in enumerate(self._hand):
+            when_changed(slider, self._actions, partial(self._move_hand, axis), f"hand {axis}", quiet=True)
 
     def _clock_folder(self) -> None:
         running = self.running
@@ -235,8 +235,9 @@ class Controls:
     def _set_clock(self, speed: float) -> None:
         self.running.speed = float(np.clip(speed, *_CLOCK))
 
-    def _move_hand(self) -> None:
-        self._simulation.move_hand(np.array([float(slider.value) for slider in self._hand]))
+    def _move_hand(self, axis: int, value: float) -> None:
+        """Draw the hand along one axis from where it is to be; the sliders may show by now what was so before."""
+        self._simulation.move_hand(np.where(np.arange(3) == axis, value, self._simulation.hand_target))
 
     def _set_faults(self, _: object) -> None:
         silenced = frozenset(unit for unit, box in self._units.items() if not box.value)

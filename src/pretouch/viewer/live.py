@@ -74,7 +74,8 @@ class LivePage:
         self.ask(lambda: self._move_hand(eye, place), "hand", quiet=True)
 
     def _move_hand(self, eye: FloatArray, place: FloatArray) -> None:
-        self.controls.show_hand(self._simulation.point_hand(eye, place))  # also while the arm is paused
+        self._simulation.point_hand(eye, place)
+        self.controls.show_hand(self._simulation.hand_target)  # also while the arm is paused
 
     def _show_arms(self, arms: str) -> None:
         """Begin again with two more arms, or go on with one."""

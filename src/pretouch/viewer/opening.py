@@ -1,4 +1,4 @@
-"""The opening of a live page: a person's hand comes into the arm's way, is touched, and withdraws.
+"""The opening of a live page: a person's hand comes into the arm's way, is touched, pushes it back, and withdraws.
 
 Only the hand is scripted. The arm, its sensors and its controller do what they do for any hand: a controller that does
 not see it runs into it at full speed.
@@ -15,12 +15,14 @@ _BEGIN_S = 2.2
 """Time in the simulation at which the hand sets out [s]: the arm is on its path, and the page is drawn."""
 _PHASE_M = 1.25
 """Where on its path the arm meets the hand [m]: on the circle low, on the side of the person, after five seconds."""
-_COME_M_S, _GO_M_S = 0.35, 0.5
-"""Speeds of the hand, coming and going [m/s]."""
-_STAY_S = 0.25
+_PUSH_M = 0.1
+"""How far back along its path the hand pushes the arm that has touched it [m]."""
+_COME_M_S, _PUSH_M_S, _GO_M_S = 0.35, 0.2, 0.5
+"""Speeds of the hand, coming, pushing and going [m/s]."""
+_STAY_S = 0.7
 """Time the hand stays after the arm has reacted to it [s]."""
 _PATIENCE_S = 12.0
-"""Time after which the hand withdraws from an arm that does not react [s]."""
+"""Time after which the hand goes on as if an arm that does not react had reacted [s]."""
 _HOME_M = 0.01
 """Distance from where it set out at which the hand is back [m]."""
 
@@ -33,7 +35,8 @@ class Opening:
         kin = model.kinematics(step.q)
         hand = hand_of(model)
         palm = kin.position[hand] + kin.rotation[hand] @ PALM
-        self._place = path.point(_PHASE_M) + palm - kin.position[model.ee]
+        beside = palm - kin.position[model.ee]
+        self._place, self._pushed = path.point(_PHASE_M) + beside, path.point(_PHASE_M - _PUSH_M) + beside
         self._home, self._target, self._last = home, home.copy(), step.stamp
         self._reacted: float | None = None
         self.over = False
@@ -48,7 +51,9 @@ class Opening:
         if now < _BEGIN_S:
             return self._target
         going = self._reacted is not None and now > self._reacted + _STAY_S
-        goal, speed = (self._home, _GO_M_S) if going else (self._place, _COME_M_S)
+        goal, speed = (self._place, _COME_M_S) if self._reacted is None else (self._pushed, _PUSH_M_S)
+        if going:
+            goal, speed = self._home, _GO_M_S
         left = goal - self._target
         distance = float(np.linalg.norm(left))
         self._target = self._target + left * min(1.0, speed * elapsed / max(distance, 1e-9))

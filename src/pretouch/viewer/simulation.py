@@ -130,19 +130,20 @@ class LiveSimulation:
 
     # what a person does
 
+    @property
+    def hand_target(self) -> FloatArray:
+        """Where the hand is to be (3,) [m], base frame."""
+        return self._room.mouse.target
+
     def move_hand(self, target: FloatArray) -> None:
         """Draw the hand to a place (3,) [m], base frame, or the nearest to it in the workspace; ends an opening."""
         self.opening = None
         self._room.mouse.move(target)
 
-    def point_hand(self, eye: FloatArray, place: FloatArray) -> FloatArray:
-        """Draw the hand to what is seen at a place (3,) [m] from an `eye` (3,) [m]; ends an opening.
-
-        Returns the place (3,) [m] the hand is drawn to: the pointer's, at the depth of the arm where that is near.
-        """
+    def point_hand(self, eye: FloatArray, place: FloatArray) -> None:
+        """Draw the hand to what an `eye` (3,) [m] sees at a place (3,) [m], as `Mouse.point` does; ends an opening."""
         self.opening = None
         self._room.mouse.point(eye, place, self.model, self.frame.step.q)
-        return self._room.mouse.target
 
     def set_profile(self, profile: Profile) -> None:
         """Go on with other parameters; another control period is a ParameterError."""

@@ -1,0 +1,103 @@
+"""README's moving picture: the live page's opening, drawn from a recording by the page of a recording.
+
+    python -m tools.picture record build/opening.mcap
+    python -m tools.picture draw build/opening.mcap docs/images/opening.webp
+
+It takes what the tests of the page take, `make browser` and a Chromium, and a few minutes. The browser draws one frame
+after the other, so a slow machine draws the same picture.
+"""
+
+import io
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+from PIL import Image
+from tests.ports import free_port
+from tests.viewer.browser import Visitor, chromium
+
+import pretouch as pt
+from pretouch.recording.reader import Recorded
+from pretouch.sensing.skin import LIVE_SKIN
+from pretouch.viewer.gui import PANEL_PX
+from pretouch.viewer.replay import ReplayPage
+from pretouch.viewer.room import LiveSettings
+from pretouch.viewer.server import ServeOptions, served
+from pretouch.viewer.simulation import LiveSimulation
+
+FROM_S, TO_S, FRAMES_PER_S = 2.2, 10.2, 10
+"""Part of the opening that is shown, in the simulation's time [s]: from the hand's setting out on."""
+WIDTH_PX, HEIGHT_PX = 720, 450
+_EDGE_PX = 20
+"""Width of what the panel casts to its left [px]."""
+_FOV, _LOOK_AT = 0.62, (0.25, 0.22, 0.31)
+_STYLE = """
+    div#caption {position: fixed !important; left: 385px; top: 14px !important; width: 320px}
+    div#caption {background: none !important}
+    #caption #word {font-size: 40px !important} #caption #reason {font-size: 21px !important; color: #202124}
+    #caption #rates {display: none}
+"""
+_CAPTION = """() => {
+    const caption = document.getElementById('caption') ?? document.body.appendChild(document.createElement('div'));
+    caption.id = 'caption';
+    caption.replaceChildren(document.getElementById('status').cloneNode(true));
+}"""
+"""Word and sentence, large and over the scene: beside it, in the panel, they are too small for a picture."""
+
+
+def record(place: Path, until: float = TO_S) -> None:
+    """Record the opening, up to a time in the simulation [s]."""
+    model = pt.RobotModel(pt.panda())
+    settings = LiveSettings(profile=pt.profile("pretouch"))
+    simulation = LiveSimulation(settings, model, pt.skin_for(model, LIVE_SKIN))
+    simulation.play_opening()
+    simulation.start_recording(place)
+    simulation.advance(until)
+    simulation.stop_recording()
+
+
+def drawn(recorded: Recorded, times: Sequence[float]) -> Iterator[Image.Image]:
+    """Draw a recording at some times on its steps' clock [s], which grow."""
+    options = ServeOptions(port=free_port())
+    with served(options, "Pretouch") as server, chromium(WIDTH_PX + PANEL_PX + _EDGE_PX, HEIGHT_PX) as visitor:
+        page = ReplayPage(server, recorded, None)
+        server.initial_camera.fov, server.initial_camera.look_at = _FOV, _LOOK_AT
+        page.draw(-1.0)
+        visitor.open(SimpleNamespace(options=options))
+        visitor.page.add_style_tag(content=_STYLE)
+        for number, time in enumerate(times):
+            page.player.seek(time - recorded.stamps()[0])
+            # the first time sends the arm's colours, the second shows them: to the page these are seconds
+            for now in (2 * number, 2 * number + 1):
+                page.draw(float(now))
+                visitor.wait_for("rates", f"{page.player.time:.2f} of ")
+                shot = _settled(visitor)
+            yield Image.open(io.BytesIO(shot)).convert("RGB")
+
+
+def _settled(visitor: Visitor) -> bytes:
+    """Return what the page shows once it no longer changes."""
+    visitor.page.evaluate(_CAPTION)
+    clip, before, shot = {"x": 0, "y": 0, "width": WIDTH_PX, "height": HEIGHT_PX}, None, b""
+    while shot != before:
+        before, shot = shot, visitor.page.screenshot(clip=clip)
+    return shot
+
+
+def write(frames: Sequence[Image.Image], place: Path) -> None:
+    """Write frames as a picture that moves for ever, in real time."""
+    more = {"duration": round(1000 / FRAMES_PER_S), "loop": 0, "quality": 75, "method": 6}
+    frames[0].save(place, save_all=True, append_images=frames[1:], **more)
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["record", place]:
+            record(Path(place))
+        case ["draw", source, place]:
+            shown = np.arange(FROM_S, TO_S - 1e-9, 1 / FRAMES_PER_S)
+            write(list(drawn(pt.open_recording(Path(source)), shown)), Path(place))
+        case _:
+            sys.exit(__doc__)
