@@ -14,7 +14,7 @@ PERIOD_S = 0.2
 """Time between two updates of a page [s], unless what the arm does changes."""
 PHONE_PX = 576
 """Width of a window up to which viser puts all controls into a sheet at the bottom [px]."""
-_SHEET = 44
+_SHEET = 46
 """Share of a phone's height that the sheet takes at most [%]; the scene has the rest, so that none of it is covered."""
 
 _HEIGHT_PX = 118
@@ -29,7 +29,7 @@ _STYLE = (
     f".mantine-Paper-root:has(#status){{max-height:{_SHEET}%!important}}"
     "div[style*='width: 20em']:has(#status){width:100%!important}"
     f"div:has(> div > canvas){{height:{100 - _SHEET}dvh!important}}"
-    "#status{min-height:86px!important}#word{font-size:22px!important}}"
+    "#status{min-height:92px!important}#word{font-size:22px!important}#reason{font-size:13px!important}}"
     "</style>"
 )
 """Keeps the lines above the controls that scroll beneath them; on a phone, the sheet beneath the scene."""
