@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import entry
+from pretouch.compiled import compiled, entry
 from pretouch.types import FloatArray
 
 
@@ -39,6 +39,21 @@ class Friction(NamedTuple):
     f1: FloatArray  # [Nm]
     f2: FloatArray  # [s/rad]
     f3: FloatArray  # [rad/s]
+    bristle: FloatArray  # how far the bristles are bent [rad]
+    bristle_nm: float
+    bristle_rad: float
+    stribeck: float
+    stribeck_rad_s: float
+    load: float  # by what part of the torque friction grows
+    cold: FloatArray  # (1,) by what part of itself it is larger now
+
+
+class Cogging(NamedTuple):
+    """How the gears (n,) shake the arm."""
+
+    torque: FloatArray  # amplitude [Nm]
+    cycles: FloatArray  # cycles of it in a turn
+    phase: FloatArray  # [rad]
 
 
 class TorqueSensors(NamedTuple):
@@ -52,14 +67,17 @@ class TorqueSensors(NamedTuple):
     keep: float  # share of it that the next step keeps
     armature: float  # rotor inertia, on the motor's side of the sensors [kg m^2]
     compensated: float  # share of the friction that is known and taken off
+    spring: FloatArray  # (2, n) torques of the joints' springs [Nm], and how fast they grow, times the time step [Nm]
+    turn: float  # how far these turn in a step [rad]; 0: rigid joints
+    damping: float  # as a fraction of critical
 
 
 @entry
 def drive(
     qd_set: FloatArray, bias: FloatArray, joints: Joints, generator: MotionGenerator, impedance: Impedance,
-    friction: Friction,
+    friction: Friction, cogging: Cogging,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Advance the motion generator, apply motor torques less friction, and return both (n,) [Nm].
+    """Advance the motion generator, apply the gears' torques less friction, and return both (n,) [Nm].
 
     `qd_set` (n,) are the velocity set-points [rad/s], `bias` (n,) Coriolis and gravity torques of the nominal model.
     """
@@ -76,8 +94,27 @@ def drive(
         # Gaz et al. 2019; the second term makes it vanish at rest
         f1, f2, f3 = friction.f1[i], friction.f2[i], friction.f3[i]
         lost[i] = f1 / (1 + np.exp(-f2 * (joints.qd[i] + f3))) - f1 / (1 + np.exp(-f2 * f3))
+        if friction.bristle_nm > 0.0:
+            lost[i] += _bent(joints.qd[i], i, friction, generator.dt)
+        lost[i] *= 1.0 + friction.cold[0]
+        lost[i] += friction.load * abs(tau[i]) * np.tanh(joints.qd[i] / friction.stribeck_rad_s)
+        tau[i] += cogging.torque[i] * np.sin(cogging.cycles[i] * joints.q[i] + cogging.phase[i])
         joints.applied[i] = tau[i] - lost[i]
     return tau, lost
+
+
+@compiled
+def _bent(qd: float, i: int, friction: Friction, dt: float) -> float:
+    """Bend a joint's bristles on, and return the torque they take [Nm].
+
+    LuGre's friction (Canudas de Wit et al. 1995): z' = qd - |qd| z / z_s(qd), z_s = z_c (1 + s exp(-(qd / v_s)^2)), and
+    the torque is F_c z / z_c.
+    """
+    z_c, z = friction.bristle_rad, friction.bristle[i]
+    most = z_c * (1.0 + friction.stribeck * np.exp(-((qd / friction.stribeck_rad_s) ** 2)))
+    # implicit in z, and so stable at any speed
+    friction.bristle[i] = (z + dt * qd) / (1.0 + dt * abs(qd) / most)
+    return float(friction.bristle_nm * friction.bristle[i] / z_c)
 
 
 @entry
@@ -95,5 +132,13 @@ def sensed(
         rippled = sensors.ripple[i] * np.sin(sensors.cycles[i] * q[i] + sensors.phase[i])
         # the torque that accelerates the rotor never reaches a sensor on the link's side
         passed = tau[i] - sensors.armature * qdd[i]
+        if sensors.turn > 0.0:
+            # a link on a spring: y'' = w^2 (passed - y) - 2 d w y'
+            grows = sensors.turn * (
+                sensors.turn * (passed - sensors.spring[0, i]) - 2.0 * sensors.damping * sensors.spring[1, i]
+            )
+            sensors.spring[1, i] += grows
+            sensors.spring[0, i] += sensors.spring[1, i]
+            passed = sensors.spring[0, i]
         sensed[i] = passed + sensors.offset[i] + rippled + noise[i] - sensors.compensated * lost[i]
     return sensed

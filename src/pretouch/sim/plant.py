@@ -12,9 +12,9 @@ from pretouch.compiled import flattened
 from pretouch.contact.observer import ObserverState, observe, observer_init, wrench_from_torques
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
-from pretouch.sim.drive import Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
+from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.scene import ArmError, SceneSpec, build, stiffen
+from pretouch.sim.scene import ArmError, CableSpec, SceneSpec, build, stiffen
 from pretouch.sim.under_way import ROUNDING_S
 from pretouch.types import FloatArray, RobotState
 
@@ -65,8 +65,11 @@ class Plant:
             mass_factor=1.0 + params.mass_error * rng.uniform(-1, 1, len(model.links)),
             payload=params.payload_max_kg * rng.uniform(),
             armature=params.armature_kg_m2,
-        )
+            cable=CableSpec(params.cable_n_m, params.cable_slack_m, params.cable_kg, params.cable_friction_n)
+            if params.cable_n_m else None,
+        )  # fmt: skip
         self._offset = np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n)
+        self._wander = np.random.default_rng([seed, 3])
         self._ripple_phase = rng.uniform(0, 2 * np.pi, self._n)
         self._know(params)
         self.mj_model = build(model, scene, self.error)
@@ -88,7 +91,7 @@ class Plant:
 
     @property
     def offset_nm(self) -> FloatArray:
-        """Constant errors (n,) of the torque sensors [Nm], which a real arm's owner cannot know."""
+        """Errors (n,) of the torque sensors that stay [Nm], which a real arm's owner cannot know."""
         return self._offset
 
     def _on_arm(self, geom: int) -> bool:
@@ -109,9 +112,9 @@ class Plant:
         damping = 2.0 * self.params.damping_ratio * np.sqrt(stiffness * inertia)
         # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
         self._q_d, self._qd_set = q + (data.qfrc_bias[:n] - bias) / stiffness, np.zeros(n)
-        self._group(joints, Impedance(stiffness, damping, self.model.description.tau_max))
         self._q_meas, self._qd_meas = q.copy(), np.zeros(n)
         self._bias = bias
+        self._group(joints, Impedance(stiffness, damping, self.model.description.tau_max))
         self._observer: ObserverState = observer_init(mass, self._qd_meas)
         self.time = 0.0
         dt = self.params.period_s
@@ -132,13 +135,21 @@ class Plant:
         keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
         follow = 1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s))
         generator = MotionGenerator(self._q_d, np.zeros(n), p.period_s, follow)
+        self._cold, self._drift = np.array([p.cold_friction]), np.zeros(n)
         f1, f2, f3 = np.array([p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s])
-        ripple, cycles = np.array([p.ripple_nm, p.ripple_cycles])
-        sensors = TorqueSensors(
-            self._offset, ripple, cycles, self._ripple_phase, np.zeros(n), keep, p.armature_kg_m2,
-            p.friction_compensated,
+        friction = Friction(
+            f1, f2, f3, np.zeros(n), p.bristle_nm,
+            p.bristle_rad, p.stribeck, p.stribeck_rad_s, p.load_friction, self._cold,
         )  # fmt: skip
-        self._driven = flattened(joints, generator, impedance, Friction(f1, f2, f3))
+        ripple, cycles = np.array([p.ripple_nm, p.ripple_cycles])
+        self._err = self._offset.copy()
+        sensors = TorqueSensors(
+            self._err, ripple, cycles, self._ripple_phase, np.zeros(n), keep, p.armature_kg_m2,
+            p.friction_compensated, np.stack([self._bias, np.zeros(n)]), 2 * np.pi * p.ring_hz * p.period_s,
+            p.ring_damping,
+        )  # fmt: skip
+        cogging = Cogging(p.cogging * ripple, cycles, self._ripple_phase)
+        self._driven = flattened(joints, generator, impedance, friction, cogging)
         self._sensing = flattened(sensors)
         # what is added to coloured noise at each step, so that its variance stays that of the sensor
         self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
@@ -173,7 +184,8 @@ class Plant:
         time, q, qd, q_d, qd_set, tau_ext = self._states[0] if p.state_delay_s else self._now()
         kin = self.model.kinematics(q)
         wrench = wrench_from_torques(self.model.ee_jacobian(kin), tau_ext, p.wrench_damping, p.singular_value_min)
-        return RobotState(time, q, qd, q_d, qd_set, tau_ext, wrench)
+        late = p.stamp_jitter_s * self._wander.uniform() if p.stamp_jitter_s else 0.0
+        return RobotState(time + late, q, qd, q_d, qd_set, tau_ext, wrench)
 
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point."""
@@ -199,6 +211,7 @@ class Plant:
         velocity_noise = p.velocity_noise_rad_s * draws[:, 0]
         torque_noise = self._torque_noise * draws[:, 1]
         model, data, driving, sensing = self.mj_model, self.mj_data, drive.flat, sensed.flat
+        self._age(duration)
         for i in range(steps):
             for call in self._before_step:
                 call(self.time)
@@ -221,6 +234,25 @@ class Plant:
             self.true_log.append((self.time, self.true_force))
             if self.true_force is not _NO_FORCE and not touched:
                 self.touches.append(self._touch(before))
+
+    def _age(self, duration: float) -> None:
+        """Let the arm warm up and its sensors drift (Ornstein-Uhlenbeck) for a time [s]."""
+        p = self.params
+        self._cold[0] = p.cold_friction * np.exp(-self.time / p.warm_up_s)
+        if p.drift_nm:
+            keep = np.exp(-duration / p.drift_s)
+            self._drift = keep * self._drift + p.drift_nm * np.sqrt(1.0 - keep**2) * self._wander.standard_normal(
+                self._n
+            )
+            self._err[:] = self._offset + self._drift
+
+    def grip(self, load_kg: float) -> None:
+        """Carry a load at the TCP from now on [kg]; 0 puts it down. An arm that was built without a payload cannot."""
+        if not self.error.payload > 0.0:
+            raise ParameterError(
+                "This arm has nothing at its TCP that could grip: give PlantParams.payload_kg above 0."
+            )
+        self.mj_model.body("payload").mass[:] = self.error.payload + load_kg
 
     def _touch(self, qd: FloatArray) -> Touch:
         """Describe the first contact there is; `qd` (n,) are the joint velocities before it [rad/s]."""

@@ -61,6 +61,42 @@ class PlantParams(Checked):
     """Age of the state that the interface reports [s], in whole physics steps; its stamp says so."""
     command_delay_s: NonNegative = 0.0
     """Time from a command to when the arm takes it [s], in whole physics steps."""
+    bristle_nm: NonNegative = 0.0
+    """Friction of each joint that remembers how it came to be where it is (`sim.drive`), where the joint slides fast
+    [Nm]; 0: none."""
+    bristle_rad: Positive = 0.002
+    """Angle over which that friction turns round [rad]: the presliding displacement."""
+    stribeck: NonNegative = 0.0
+    """By what part of itself it is larger where the joint barely slides [1]."""
+    stribeck_rad_s: Positive = 0.05
+    """Speed at which that has gone [rad/s]."""
+    load_friction: NonNegative = 0.0
+    """By what part of a joint's torque its friction grows [1]."""
+    cold_friction: NonNegative = 0.0
+    """By what part of itself friction is larger in a cold arm [1]."""
+    warm_up_s: Positive = 900.0
+    """Time constant with which an arm warms up [s]."""
+    cogging: NonNegative = 0.0
+    """Amplitude with which a gear itself shakes the arm, which the sensors measure, times `ripple_nm` [1]."""
+    ring_hz: NonNegative = 0.0
+    """Frequency at which the links ring on the joints' springs, which the torque sensors measure and the encoders do
+    not see [Hz]; 0: rigid joints."""
+    ring_damping: Annotated[float, Check(low=0.0, high=1.0, open_low=True)] = 0.1
+    """Damping of that as a fraction of critical."""
+    drift_nm: NonNegative = 0.0
+    """Standard deviation to which the torque sensors' offsets wander [Nm]."""
+    drift_s: Positive = 120.0
+    """Time constant of that [s]."""
+    cable_n_m: NonNegative = 0.0
+    """Stiffness of a cable from a hook above the base to the hand, once it is taut [N/m]; 0: no cable."""
+    cable_slack_m: Positive = 0.45
+    """How much longer than the distance at the ready posture it may become before it is taut [m]."""
+    cable_kg: NonNegative = 0.0
+    """What of its mass hangs at the hand [kg]."""
+    cable_friction_n: NonNegative = 0.0
+    """Friction along it [N]."""
+    stamp_jitter_s: NonNegative = 0.0
+    """How much later than the truth a state's stamp may be, uniformly [s]."""
     offsets_nm: Joints = ()
     """Constant error of each torque sensor of one known arm [Nm]; none: drawn up to `torque_offset_nm`."""
     ripple_phases_rad: Joints = ()

@@ -15,7 +15,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 
 FOLDER = Path(__file__).parent / "worlds"
-SETS = ("nominal", "realistic", "stress")
+SETS = ("nominal", "realistic", "stress", "hard")
 """Sets that come with the package."""
 _STREAM = 51
 """Number of the random stream of worlds; a field has a stream of its own in it."""

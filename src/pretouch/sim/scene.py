@@ -80,6 +80,24 @@ def fixtures(spec: SceneSpec) -> Fixtures:
 
 
 @dataclass(frozen=True)
+class CableSpec:
+    """A cable from a hook above the base to the hand."""
+
+    stiffness: float
+    """Once it is taut [N/m]."""
+    slack: float
+    """How much longer than at the ready posture it may become before it is [m]."""
+    mass: float
+    """What of its mass hangs at the hand [kg]."""
+    friction: float
+    """Along it [N]."""
+
+
+_HOOK_M = (0.0, 0.0, 1.4)
+"""Where the cable begins [m], base frame."""
+
+
+@dataclass(frozen=True)
 class ArmError:
     """How the simulated arm differs from its model."""
 
@@ -89,6 +107,7 @@ class ArmError:
     """Unknown mass at the TCP [kg]."""
     armature: float
     """Rotor inertia reflected to the joint [kg m^2]."""
+    cable: CableSpec | None = None
 
 
 def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:
@@ -109,6 +128,8 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
         body = mj.body(model.description.ee_body).add_body(name="payload")
         body.mass, body.inertia = error.payload, np.full(3, 1e-5)
         body.explicitinertial = True
+    if error.cable:
+        _add_cable(mj, model, error.cable)
     stiffness = _add_objects(mj, spec)
     pairs = [(link, thing) for link in arm for thing in stiffness]
     if spec.hand:
@@ -126,6 +147,22 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
     for thing, of_it in stiffness.items():
         stiffen(built, thing, of_it, spec.damping_ratio)
     return built
+
+
+def _add_cable(mj: mujoco.MjSpec, model: RobotModel, cable: CableSpec) -> None:
+    """Hang a cable at the hand: a tendon with a range of lengths at which it is slack."""
+    hand = mj.body(model.description.ee_body)
+    mj.worldbody.add_site(name="hook", pos=_HOOK_M)
+    hand.add_site(name="plug")
+    weight = hand.add_body(name="cable")
+    weight.mass, weight.inertia, weight.explicitinertial = max(cable.mass, 1e-6), np.full(3, 1e-6), True
+    ready = model.kinematics(model.description.q_ready).position[model.ee]
+    taut = float(np.linalg.norm(ready - _HOOK_M)) + cable.slack
+    tendon = mj.add_tendon(
+        name="cable", stiffness=cable.stiffness, springlength=[0.0, taut], frictionloss=cable.friction
+    )
+    for site in ("hook", "plug"):
+        tendon.wrap_site(site)
 
 
 def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:

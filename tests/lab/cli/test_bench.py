@@ -15,7 +15,7 @@ from pretouch_lab.documents import begin_mark, end_mark
 def nothing_to_do(monkeypatch):
     monkeypatch.setattr(Bench, "every", lambda _: [])
     monkeypatch.setattr(Bench, "run", lambda *_: None)
-    monkeypatch.setattr(campaign.DetectionBench, "rows", lambda _: campaign.Rows([], [], []))
+    monkeypatch.setattr(campaign.DetectionBench, "rows", lambda _: campaign.Rows([], [], [], []))
 
 
 def test_bench_detection_writes_numbers_figures_and_document(nothing_to_do, capsys, tmp_path):

@@ -12,6 +12,7 @@ from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells, record_free, warm_up_s
+from pretouch_lab.benchmarks.detection.hard import HardCell, hard_cells, record_hard
 from pretouch_lab.benchmarks.detection.judge import judge_contacts, judge_free
 from pretouch_lab.benchmarks.detection.results import Rows
 from pretouch_lab.benchmarks.detection.stream import PROFILE
@@ -19,7 +20,9 @@ from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.engine import Task, rows_of
 from pretouch_lab.result_key import result_key
 
-_RECORD: dict[str, Callable[..., None]] = {"free": record_free, "contacts": record_contacts}
+_RECORD: dict[str, Callable[..., None]] = {
+    "free": record_free, "contacts": record_contacts, "hard": record_hard,
+}  # fmt: skip
 """What records the streams of a family."""
 _CONTACT_S = 3.5
 """Time a contact takes with the gap after it, about [s]."""
@@ -38,11 +41,11 @@ class DetectionBench(Bench):
 
     def stages(self) -> list[list[Task]]:
         """Return the streams to record, then what is made of them and the trials in the closed loop."""
-        return [self.streams(), [*self.free(), *self.contacts(), *self.boards()]]
+        return [self.streams(), [*self.free(), *self.contacts(), *self.hard(), *self.boards()]]
 
     def rows(self) -> Rows:
         """Return the rows of what is done."""
-        return Rows(rows_of(self.free()), rows_of(self.contacts()), rows_of(self.boards()))
+        return Rows(rows_of(self.free()), rows_of(self.contacts()), rows_of(self.boards()), rows_of(self.hard()))
 
     def found(self) -> Found | None:
         """See `Bench`."""
@@ -60,7 +63,13 @@ class DetectionBench(Bench):
             Task(self._stream(cell), partial(record_contacts, cell), _RECORDING_COST["contacts"] * _contacts_s(cell))
             for cell in self._contacts()
         ]
-        return free + touched
+        hard = [
+            Task(
+                self._stream(cell), partial(record_hard, cell, self.quick), _RECORDING_COST["contacts"] * _free_s(cell)
+            )
+            for cell in self._hard()
+        ]
+        return free + touched + hard
 
     def free(self) -> list[Task]:
         """Return the replays on streams of free motion."""
@@ -84,6 +93,19 @@ class DetectionBench(Bench):
             )
             for cell in self._contacts()
             for baseline in self._replayed(cell)
+        ]
+
+    def hard(self) -> list[Task]:
+        """Return the replays on streams of arms as unkind as real ones."""
+        judges = {cell: judge_contacts if cell.near == "touched" else judge_free for cell in self._hard()}
+        return [
+            Task(
+                self._row("hard", cell.name, baseline, record_hard, judge),
+                partial(judge, cell, baseline, self._stream(cell)),
+                _replay_cost(baseline) * _free_s(cell),
+            )
+            for cell, judge in judges.items()
+            for baseline in BASELINES
         ]
 
     def boards(self) -> list[Task]:
@@ -113,8 +135,12 @@ class DetectionBench(Bench):
     def _boards(self) -> list[BoardCell]:
         return [replace(cell, world=self.world) for cell in board_cells(self.seeds, self.quick)]
 
-    def _stream(self, cell: FreeCell | ContactCell) -> Path:
-        family = "free" if isinstance(cell, FreeCell) else "contacts"
+    def _hard(self) -> list[HardCell]:
+        # they have a world of their own: with another they are left out
+        return [] if self.world else hard_cells(self.seeds, self.quick)
+
+    def _stream(self, cell: FreeCell | ContactCell | HardCell) -> Path:
+        family = {FreeCell: "free", ContactCell: "contacts", HardCell: "hard"}[type(cell)]
         made_by = result_key(_RECORD[family], profile=profile(PROFILE))
         return self.out / f"streams-{made_by}" / f"{family}_{cell.name}.npz"
 
@@ -124,7 +150,7 @@ class DetectionBench(Bench):
         return self.out / family / f"{name}-{result_key(*made_by, profile=baseline.profile)}" / f"{cell}.json"
 
 
-def _free_s(cell: FreeCell) -> float:
+def _free_s(cell: FreeCell | HardCell) -> float:
     return warm_up_s() + cell.counted_s
 
 

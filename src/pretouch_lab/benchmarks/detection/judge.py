@@ -13,6 +13,7 @@ from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, Touching, touches_of
 from pretouch_lab.benchmarks.detection.free import FreeCell, warm_up_s
+from pretouch_lab.benchmarks.detection.hard import HardCell
 from pretouch_lab.benchmarks.detection.replay import REST, Replayed, replay
 from pretouch_lab.benchmarks.detection.stream import Stream, load_stream
 from pretouch_lab.benchmarks.scenario_files import scenario
@@ -28,7 +29,7 @@ def sweep_values(baseline: Baseline) -> list[float]:
     return [float(value) for value in scenario("free")["curve"][baseline.sweep]]
 
 
-def judge_free(cell: FreeCell, baseline: Baseline, stream: Path, file: Path) -> None:
+def judge_free(cell: FreeCell | HardCell, baseline: Baseline, stream: Path, file: Path) -> None:
     """Count a detector's alarms in free motion after the warm-up, as it is and at each value of its sweep."""
     made = replay(load_stream(stream), baseline, model())
     counted = made.stamp >= warm_up_s()
@@ -46,7 +47,7 @@ def judge_free(cell: FreeCell, baseline: Baseline, stream: Path, file: Path) -> 
     write_json(row, file)
 
 
-def judge_contacts(cell: ContactCell, baseline: Baseline, stream: Path, file: Path) -> None:
+def judge_contacts(cell: ContactCell | HardCell, baseline: Baseline, stream: Path, file: Path) -> None:
     """Match a detector's alarms with the contacts of a stream, as it is and at each value of its sweep."""
     kept = load_stream(stream)
     made = replay(kept, baseline, model())

@@ -9,6 +9,7 @@ from pretouch_lab.benchmarks.detection.results import (
     contact_rows,
     curves,
     free_rows,
+    hard_rows,
     resolution,
 )
 from pretouch_lab.benchmarks.detection.tables import detection_tables
@@ -38,6 +39,9 @@ def summary_of(bench: Bench, rows: Rows) -> Row:
     return {
         "about": bench.about(),
         "resolution": resolution(rows),
-        "rows": [*free_rows(rows, known), *contact_rows(rows, known), *board_rows(rows, known), *ablation_rows(rows)],
+        "rows": [
+            *free_rows(rows, known), *contact_rows(rows, known), *hard_rows(rows, known), *board_rows(rows, known),
+            *ablation_rows(rows),
+        ],
         "curves": curves(rows, known),
-    }
+    }  # fmt: skip

@@ -28,6 +28,8 @@ class Rows:
     free: list[Row]
     contacts: list[Row]
     boards: list[Row]
+    hard: list[Row]
+    """Of arms as unkind as real ones, free or touched."""
 
 
 def free_scenarios() -> dict[str, Callable[[Row], bool]]:
@@ -160,11 +162,35 @@ def ablation_rows(rows: Rows) -> list[Row]:
         return [cell for cell in cells if cell["seed"] in seeds]
 
     compared = (BASELINES[-1], *ablated())
-    part = Rows(given(rows.free), given(rows.contacts), [])
+    part = Rows(given(rows.free), given(rows.contacts), [], [])
     return [
         *free_rows(part, compared, {ABLATED_FREE: lambda row: True}),
         *contact_rows(part, compared, {ABLATED_CONTACTS: wanted}),
     ]
+
+
+HARD, UNTOLD = "hard: all", "untold-load"
+"""Scenario of the goals on arms as unkind as real ones, and the motion that is no part of it: its loads may give an
+alarm each."""
+
+
+def hard_rows(rows: Rows, baselines: Iterable[Baseline]) -> list[Row]:
+    """Return false alarms, delays and misses of each baseline on arms as unkind as real ones, by motion."""
+    free = [row for row in rows.hard if row["near"] != "touched"]
+    touched = [row for row in rows.hard if row["near"] == "touched"]
+    groups: dict[str, Callable[[Row], bool]] = {
+        HARD: lambda row: row["motion"] != UNTOLD,
+        "hard: all, nobody near": lambda row: row["motion"] != UNTOLD and row["near"] == "nothing",
+        "hard: all, somebody standing": lambda row: row["motion"] != UNTOLD and row["near"] == "standing",
+    }
+    for motion in dict.fromkeys(row["motion"] for row in rows.hard):
+        groups[f"hard: {motion}"] = lambda row, motion=motion: row["motion"] == motion  # type: ignore[misc]
+    of_contacts: dict[str, Callable[[Row, Row], bool]] = {
+        name.replace("hard", "hard, touched"): lambda cell, contact, of=of: of(cell) and contact["detectable"]  # type: ignore[misc]
+        for name, of in groups.items()
+    }
+    parts = Rows(free, touched, [], [])
+    return [*free_rows(parts, baselines, groups), *contact_rows(parts, baselines, of_contacts)]
 
 
 def board_rows(rows: Rows, baselines: Iterable[Baseline]) -> list[Row]:

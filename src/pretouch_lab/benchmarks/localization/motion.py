@@ -15,7 +15,7 @@ from pretouch_lab.benchmarks.scenario_files import scenario
 _TRIES = 4000
 _ALONG = 12
 """Places looked at on the way from one posture to the next."""
-_PEAK = 1.875
+PEAK = 1.875
 """Largest speed of a quintic from rest to rest over its mean speed."""
 _PULL_1_S = 2.0
 """Gain on what the arm is off its course [1/s]."""
@@ -44,29 +44,29 @@ class Wandering:
 def wandering(seed: int, until: float) -> Wandering:
     """Draw the motion of an arm for so long [s]; the seed says which."""
     chosen, rng = scenario("localization")["motion"], np.random.default_rng([seed, 41])
-    q, start, duration, at = [_posture(rng, None)], [], [], 1.0
+    q, start, duration, at = [posture(rng, None)], [], [], 1.0
     while at < until:
-        after = _posture(rng, q[-1])
+        after = posture(rng, q[-1])
         fastest = float(np.abs(after - q[-1]).max())
         start.append(at)
-        duration.append(_PEAK * fastest / rng.uniform(*chosen["speed_rad_s"]))
+        duration.append(PEAK * fastest / rng.uniform(*chosen["speed_rad_s"]))
         at += duration[-1] + rng.uniform(*chosen["rest_s"])
         q.append(after)
     return Wandering(np.array(q), np.array(start), np.array(duration))
 
 
-def _posture(rng: np.random.Generator, before: FloatArray | None) -> FloatArray:
+def posture(rng: np.random.Generator, before: FloatArray | None) -> FloatArray:
     """Draw a posture (n,) that is free, as is the straight way to it; where none is found it is the one before."""
     arm, part = model(), scenario("localization")["motion"]["range"]
     for _ in range(_TRIES):
         q = np.asarray(arm.q_mid + part * (arm.q_max - arm.q_min) / 2 * rng.uniform(-1, 1, arm.n))
         ways = [q] if before is None else [before + k / _ALONG * (q - before) for k in range(_ALONG, 0, -1)]
-        if all(_free(way) for way in ways):
+        if all(is_free(way) for way in ways):
             return q
     return arm.description.q_ready if before is None else before
 
 
-def _free(q: FloatArray) -> bool:
+def is_free(q: FloatArray) -> bool:
     """Whether the arm is clear of the floor and of itself."""
     chosen, arm = scenario("localization")["motion"], model()
     body = arm.capsules

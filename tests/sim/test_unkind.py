@@ -1,0 +1,137 @@
+"""What real arms do and the usual simulated one does not: friction that remembers, ringing, drift, cables, loads."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tests.sim.test_plant import NONE, PERFECT, record
+
+from pretouch.errors import ParameterError
+from pretouch.robot.model import RobotModel
+from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.randomisation import drawn, world_set
+from pretouch.sim.scene import SceneSpec
+from pretouch.types import FloatArray
+
+GRAVITY = 9.81
+
+
+def plant(model: RobotModel, params: PlantParams) -> Plant:
+    return Plant(model, SceneSpec(), params, model.description.q_ready, 1)
+
+
+def at_rest(model: RobotModel, params: PlantParams) -> FloatArray:
+    """Mean external torques (n,) of an arm that stands [Nm]."""
+    return np.mean([state.tau_ext for state in record(plant(model, params), 1.0)[50:]], axis=0)
+
+
+def lost(speeds: FloatArray, **given: float) -> FloatArray:
+    """Friction of one joint at some speeds one millisecond after the other [Nm]."""
+    numbers = {"bristle_nm": 0.3, "bristle_rad": 0.002, "stribeck": 0.0, "stribeck_rad_s": 0.05, "load": 0.0} | given
+    cold = np.array([numbers.pop("cold", 0.0)])
+    one, none = np.ones(1), np.zeros(1)
+    friction = Friction(none, one, none, np.zeros(1), **numbers, cold=cold)
+    moved, found = np.zeros(1), []
+    for speed in speeds:
+        joints = Joints(np.zeros(1), np.array([speed]), np.zeros(1))
+        generator = MotionGenerator(np.zeros(1), moved, 0.001, 1.0)
+        _, taken = drive(
+            none, 5.0 * one, joints, generator, Impedance(none, none, 90.0 * one), friction, Cogging(none, one, none)
+        )
+        found.append(taken[0])
+    return np.array(found)
+
+
+def test_friction_remembers_where_a_joint_came_from_until_it_has_turned_far_enough():
+    forth, back = np.full(50, 0.5), np.full(50, -0.5)
+    after = lost(np.concatenate([forth, back, np.zeros(100)]))
+    assert_allclose(after[49], 0.3, atol=1e-3)
+    assert after[50] > 0.1  # half a milliradian back it still holds
+    assert_allclose(after[99], -0.3, atol=1e-3)
+    assert_allclose(after[100:], after[99])  # a joint at rest keeps what it has
+
+
+def test_friction_is_larger_where_a_joint_barely_slides_under_load_and_in_the_cold():
+    slow = np.full(20_000, 0.002)
+    assert_allclose(lost(slow, stribeck=0.5)[-1], 0.3 * 1.5, rtol=0.01)
+    assert_allclose(lost(np.full(200, 1.0), stribeck=0.5)[-1], 0.3, rtol=0.01)
+    assert_allclose(lost(np.full(200, 1.0), cold=0.5)[-1], 0.45, rtol=0.01)
+    assert_allclose(lost(np.full(200, 1.0), load=0.02)[-1], 0.3 + 0.02 * 5.0, rtol=0.01)
+
+
+@pytest.mark.parametrize("speed", [1e-6, 10.0, 1e4])
+def test_bristles_stay_within_their_bounds_at_any_speed(speed):
+    found = lost(np.tile([speed, -speed, -speed, speed], 300), stribeck=0.6)
+    assert np.abs(found).max() <= 0.3 * 1.6 + 1e-12
+
+
+def test_a_joint_on_a_spring_rings_at_its_frequency_and_settles_at_the_torque():
+    found = []
+    none, one = np.zeros(1), np.ones(1)
+    turn = 2 * np.pi * 15.0 * 0.001
+    sensors = TorqueSensors(none, none, one, none, np.zeros(1), 0.0, 0.0, 0.0, np.zeros((2, 1)), turn, 0.05)
+    for _ in range(3000):
+        found.append(sensed(2.0 * one, none, none, none, none, sensors)[0])
+    rung = np.array(found)
+    assert rung.max() > 3.5  # a step overshoots by exp(-pi d): 0.85
+    crossings = np.flatnonzero(np.diff(np.sign(rung[:400] - 2.0)))
+    assert_allclose(np.diff(crossings).mean(), 1000 / 15 / 2, rtol=0.03)
+    assert_allclose(rung[-1], 2.0, atol=1e-3)
+
+
+def test_a_load_hangs_at_the_hand_from_when_it_is_gripped_until_it_is_put_down(panda_model: RobotModel):
+    arm = plant(panda_model, replace(PERFECT, payload_kg=0.1))
+
+    def pulled() -> float:
+        return float(np.mean([state.wrench[2] for state in record(arm, 1.0)[50:] if state.wrench is not None]))
+
+    assert_allclose(pulled(), -0.1 * GRAVITY, atol=0.1)
+    arm.grip(0.7)
+    assert_allclose(pulled(), -0.8 * GRAVITY, rtol=0.02)
+    arm.grip(0.0)
+    assert_allclose(pulled(), -0.1 * GRAVITY, atol=0.1)
+    with pytest.raises(ParameterError, match="payload_kg above 0"):
+        plant(panda_model, PERFECT).grip(0.5)
+
+
+def test_a_cable_pulls_once_it_is_taut_and_hangs_before(panda_model: RobotModel):
+    slack = replace(PERFECT, cable_n_m=25.0, cable_kg=0.2, cable_slack_m=0.5)
+    ee = panda_model.ee_jacobian(panda_model.kinematics(panda_model.description.q_ready))[:3]
+    assert_allclose(at_rest(panda_model, slack), ee.T @ [0.0, 0.0, -0.2 * GRAVITY], atol=0.05)
+    taut = replace(slack, cable_slack_m=0.0001, cable_n_m=500.0)
+    arm = plant(panda_model, taut)
+    arm.command(np.array([0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0]))  # bends forward, away from the hook
+    pulled = record(arm, 1.0)[-1]
+    assert pulled.wrench is not None
+    assert pulled.wrench[2] > 5.0
+
+
+def test_offsets_wander_by_so_much_and_the_seed_says_how(panda_model: RobotModel):
+    arm = plant(panda_model, replace(PERFECT, drift_nm=0.2, drift_s=0.05))
+    seen = np.array([arm._err.copy() for _ in range(400) if arm.advance(0.01) is None])
+    assert_allclose(seen.std(axis=0), 0.2, rtol=0.3)
+    still = plant(panda_model, replace(PERFECT, drift_nm=0.2, drift_s=1e6))
+    still.advance(1.0)
+    assert np.abs(still._err).max() < 1e-3
+
+
+def test_stamps_come_late_by_less_than_said_and_never_early(panda_model: RobotModel):
+    states = record(plant(panda_model, replace(PERFECT, stamp_jitter_s=0.003)), 1.0)
+    late = np.array([state.stamp - 0.01 * (k + 1) for k, state in enumerate(states)])
+    assert late.min() >= -1e-9
+    assert late.max() < 0.003
+    assert np.ptp(late) > 0.002
+
+
+def test_every_arm_of_the_hard_world_moves_without_coming_apart(panda_model: RobotModel):
+    for seed in range(1000, 1004):
+        params = drawn(world_set("hard"), seed).plant
+        arm = Plant(panda_model, SceneSpec(), params, panda_model.description.q_ready, seed)
+        arm.command(np.full(7, 0.2))
+        states = record(arm, 1.0)
+        assert_allclose(states[-1].q - states[0].q, 0.2, atol=0.05)
+        assert max(np.abs(state.tau_ext).max() for state in states) < 40.0
+    assert PlantParams().torque_noise_nm != NONE
