@@ -294,6 +294,7 @@ def test_a_run_leaves_rows_for_every_baseline_and_goes_on_after_a_kill(tmp_path,
         monkeypatch.setattr(module, "warm_up_s", lambda: 1.5)
     monkeypatch.setattr(campaign, "free_cells", lambda *_: [FreeCell("nominal", "circle", 0.3, "standing", 1000, 1.0)])
     monkeypatch.setattr(campaign, "board_cells", lambda *_: [])
+    monkeypatch.setattr(campaign, "hard_cells", lambda *_: [])
     cell = ContactCell("nominal", "seven", 0.3, 1000, 1)
     monkeypatch.setattr(campaign, "contact_cells", lambda *_: [cell])
     monkeypatch.setattr(contacts, "plan", lambda *_: [touching(1.8)])
