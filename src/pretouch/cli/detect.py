@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from pretouch.cli.tables import grid
+from pretouch.cli.tables import Grid
 from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
@@ -133,13 +132,13 @@ def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> No
         console.print(guidance(d, found, p), markup=False)
 
 
-def contact_table(contacts: Sequence[tuple[str, Found]]) -> Table:
+def contact_table(contacts: Sequence[tuple[str, Found]]) -> Grid:
     """Make a table of contacts, each with who found it, in time order."""
     rows = []
     for name, found in sorted(contacts, key=lambda pair: pair[1].time):
         force = [f"{value:.1f}" for value in (*found.force, np.linalg.norm(found.force))]
         rows.append((name, f"{found.time:.3f}", *force, axes_shown(found)))
-    return grid(("", "time [s]", "x", "y", "z", "norm", "axes"), rows or [("none",)], whole=1)
+    return Grid(("", "time [s]", "x", "y", "z", "norm", "axes"), rows or [("none", *[""] * 6)])
 
 
 def axes_shown(found: Found) -> str:
@@ -147,13 +146,13 @@ def axes_shown(found: Found) -> str:
     return "".join(axis for axis, crossed in zip("xyz", found.axes, strict=True) if crossed)
 
 
-def _noise_table(columns: list[Column]) -> Table:
+def _noise_table(columns: list[Column]) -> Grid:
     rows = []
     for _, d, s in columns:
         name = f"{d.name}, {s.free:.1f} of {s.duration:.1f} s"
         for axis, *values in zip("xyz", s.mean, s.sigma, s.sigma_window, s.width, strict=True):
             rows.append((name if axis == "x" else "", axis, *(f"{value:.2f}" for value in values)))
-    return grid(("", "along", "mean", "sigma", "sigma in window", "thresholds at +-"), rows, whole=1)
+    return Grid(("", "along", "mean", "sigma", "sigma in window", "thresholds at +-"), rows)
 
 
 def _numbers(imported: ImportedData, columns: list[Column], notes: list[str]) -> dict[str, Any]:

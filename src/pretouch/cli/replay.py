@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
 from pretouch.cli.detect import axes_shown
-from pretouch.cli.tables import grid
+from pretouch.cli.tables import Grid
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import numbers_to
 from pretouch.extras import LIVE
@@ -195,13 +194,13 @@ def _pairs(comparison: Comparison) -> list[tuple[Found | None, Found | None]]:
     return sorted(pairs, key=lambda pair: min(found.time for found in pair if found))
 
 
-def _table(comparison: Comparison) -> Table:
+def _table(comparison: Comparison) -> Grid:
     rows = [
         (*_cells(mine), *_cells(other), f"{other.time - mine.time:+.2f}" if mine and other else "")
         for mine, other in _pairs(comparison)
     ]
     header = "recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"
-    return grid(header, rows or [("none", "", "", "none", "", "", "")], left=())
+    return Grid(header, rows or [("none", "", "", "none", "", "", "")], names=0, left=())
 
 
 def _cells(found: Found | None) -> tuple[str, str, str]:

@@ -5,9 +5,8 @@ from collections.abc import Callable
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from pretouch.cli.tables import grid
+from pretouch.cli.tables import Grid
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import ExperimentError
 from pretouch.realtime import check_wishes
@@ -70,7 +69,7 @@ def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
         console.print(f"With {', '.join(idle)} points the arm did not follow its path in every cycle.", markup=False)
 
 
-def _times(measured: list[Row], rate: float) -> Table:
+def _times(measured: list[Row], rate: float) -> Grid:
     rows = []
     runs = {"CPU": "", "CPU, all new": "all_new_", f"CPU at {rate:g} Hz": "at_rate_", f"wall at {rate:g} Hz": "wall_"}
     for row in measured:
@@ -80,9 +79,9 @@ def _times(measured: list[Row], rate: float) -> Table:
             overruns = str(row["overruns"]) if prefix == "wall_" else ""
             restricting = f"{row['restricting_median']:.0f}" if not prefix else ""
             rows.append((first, name, *took, overruns, restricting))
-    return grid(("points", "", *_SPREAD, "overruns", "restricting"), rows, left=(1,))
+    return Grid(("points", "", *_SPREAD, "overruns", "restricting"), rows, 2, left=(1,))
 
 
-def _shares(rows: list[Row]) -> Table:
+def _shares(rows: list[Row]) -> Grid:
     lines = [(stage, *(f"{100 * row['stages'][stage]:.0f}" for row in rows)) for stage in rows[0]["stages"]]
-    return grid(("points", *(str(row["points"]) for row in rows)), lines, left=())
+    return Grid(("points", *(str(row["points"]) for row in rows)), lines, left=())

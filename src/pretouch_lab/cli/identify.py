@@ -92,17 +92,18 @@ def _model(arm: str) -> "RobotModel | None":
 def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     from rich.console import Console
 
-    from pretouch.cli.tables import grid
+    from pretouch.cli.tables import Grid
 
-    console = Console(highlight=False, soft_wrap=True, width=20 * (model.n + 2))
+    console = Console(highlight=False, soft_wrap=True)
     console.print(f"{said}. {found.seconds:.0f} s of free motion are used.", markup=False)
     for note in found.notes:
         console.print(note, markup=False)
-    rows = [
+    columns = [
         (name, *(_shown(*each) for each in zip(values, errors, identifiable, strict=True)))
         for name, values, errors, identifiable in joint_rows(found, model)
     ]
-    console.print(grid(("", *model.joints), rows, whole=1))
+    heading, *rows = zip(("joint", *model.joints), *columns, strict=True)
+    console.print(Grid(heading, rows))
     payload, error = float(found.fit.numbers[-2]), float(found.fit.errors[-2])
     console.print(f"Payload {payload:.3f} +- {error:.3f} kg.", markup=False)
     noise = found.noise

@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 from scipy.spatial.transform import Rotation
 
 from pretouch.calibration.observability import Observability
 from pretouch.calibration.result import Calibration, Finding, Place, UnitCalibration
 from pretouch.calibration.skin_of import skin_of
 from pretouch.cli.calibrate.outputs import Outputs
-from pretouch.cli.tables import grid
+from pretouch.cli.tables import Grid
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, save_skin
@@ -52,10 +51,10 @@ def give(answer: Answer, outputs: Outputs) -> int:
     return int(not all(unit.accepted for unit in answer.calibration.units))
 
 
-def _table(answer: Answer) -> Table:
+def _table(answer: Answer) -> Grid:
     units = answer.calibration.units
     styles = ["bold red" if not unit.accepted else "yellow" if unit.findings else "" for unit in units]
-    return grid(_COLUMNS, map(_cells, units), left=_TEXT, whole=2, styles=styles)
+    return Grid(_COLUMNS, [_cells(unit) for unit in units], 2, _TEXT, broken=2, styles=styles)
 
 
 def _cells(unit: UnitCalibration) -> tuple[str, ...]:
