@@ -3,18 +3,17 @@
 import json
 import math
 from dataclasses import fields
-from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli.registry import command_class, command_names
 from pretouch.cli.writing import numbers_to, plain
 from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
 from pretouch.session.push import GuidedPush
 from pretouch.types import Inputs
+from tests.cli.commands import COMMANDS
 from tests.following_arm import DT, Arm
 from tests.imported_data.files import pushed
 from tests.importing.made import six_axis, written
@@ -30,21 +29,6 @@ WITHOUT = {
     "figure": "writes a picture",
 }
 """Commands that conclude with no numbers."""
-
-
-def single(name, kind):
-    """Yield name and class of a command, or of each one that stands below it."""
-    what = get_type_hints(kind).get("what")
-    if what in (None, str):
-        yield name, kind
-        return
-    hints = get_type_hints(kind, include_extras=True)["what"]
-    for each in get_args(hints):
-        below, *_ = (one.name for one in each.__metadata__)
-        yield from single(f"{name} {below}", each.__origin__)
-
-
-COMMANDS = dict(pair for name in command_names() for pair in single(name, command_class(name)))
 
 
 @pytest.mark.parametrize("name", COMMANDS)
