@@ -1,5 +1,6 @@
 """What the command line says of itself, and of words that it does not take."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -111,3 +112,16 @@ def test_help_wraps_the_sentences_of_an_option_anew(capsys, monkeypatch):
         "                           identify` writes one, of which the seed draws its\n"
         "                           own; by default the usual ones.\n"
     )
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_is_no_number_is_one_sentence(capsys, monkeypatch, name):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        cli.main([*name.split(), "--help"])
+    for option in re.findall(r"^  (--[\w-]+) (?:\{None\}\|)?(?:INT|FLOAT)\b", capsys.readouterr().out, re.MULTILINE):
+        assert cli.main([*name.split(), option, "many"]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.count("\n") == 1
+        assert f"{option} is 'many': give a" in said.err

@@ -32,10 +32,10 @@ class Demo:
         from pretouch_lab.campaign import Request
         from pretouch_lab.cli.campaigns import run_all
 
-        prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
         out = Path(self.out) if self.out else new_folder("demo")
         few = Request(("avoidance", "dynamic"), seeds=1, profiles=_DEMONSTRATED)
         many = Request(("static",), seeds=self.seeds, profiles=_DEMONSTRATED)
+        prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
         # the long trials first, so that the bar moves on in small steps towards the end; tables are on the page
         run_all([(few, out / "people"), (many, out / "static")], out, self.json, lambda _: [])
 
