@@ -114,14 +114,29 @@ def test_help_wraps_the_sentences_of_an_option_anew(capsys, monkeypatch):
     )
 
 
+REQUIRED = {
+    "skin monitor": ("--keys", "k"), "skin simulate": ("--keys", "k"), "robot import": ("a",), "replay": ("a",),
+    "skin provision": ("--id", "a", "--keys", "k", "--ssid", "s", "--host", "h"), "detect": ("a",), "figure": ("a",),
+    "sweep": ("a",),
+}  # fmt: skip
+"""Words that a command needs."""
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_what_is_no_number_is_one_sentence(capsys, monkeypatch, name):
     monkeypatch.setenv("COLUMNS", "80")
     with pytest.raises(SystemExit):
         cli.main([*name.split(), "--help"])
-    for option in re.findall(r"^  (--[\w-]+) (?:\{None\}\|)?(?:INT|FLOAT)\b", capsys.readouterr().out, re.MULTILINE):
-        assert cli.main([*name.split(), option, "many"]) == 2
+    for option in re.findall(
+        r"^  (--[\w-]+) (?:\{None\}\|)?(?:INT|FLOAT)(?:  |$)", capsys.readouterr().out, re.MULTILINE
+    ):
+        assert cli.main([*name.split(), *REQUIRED.get(name, ()), option, "many"]) == 2
         said = capsys.readouterr()
         assert said.out == ""
         assert said.err.count("\n") == 1
         assert f"{option} is 'many': give a" in said.err
+
+
+def test_an_option_that_is_missing_is_named(capsys):
+    assert cli.main(["skin", "keys"]) == 2
+    assert capsys.readouterr().err.startswith("pretouch skin keys lacks --keys: File of the units' keys")

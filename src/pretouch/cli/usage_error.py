@@ -37,8 +37,8 @@ def usage_error(boxed: str, args: Sequence[str], prog: str) -> str:
         known = re.search(r"Available subcommands: ([\w, -]+?) (?:For|$)", more)
         near = f"perhaps {' or '.join(dict.fromkeys(meant))}" if meant else f"choose from {known[1]}" if known else ""
         return f"{word} is unknown{': ' if near else ''}{near}.{end}"
-    if found := re.match(r"Missing from (.*?): (?:\[.*?\]\]|\S+) (.*?) ?\(required\)", said):
-        return f"{found[1]} lacks an argument: {found[2].rstrip('.')}. See {found[1]} --help."
+    if found := re.match(r"Missing from (.*?): (--\S+ )?(?:\[.*?\]\]|\S+) (.*?) ?\(required\)", said):
+        return f"{found[1]} lacks {(found[2] or 'an argument').strip()}: {found[3].rstrip('.')}. See {found[1]} --help."
     return f"{said.rstrip('.')}.{end}"
 
 
