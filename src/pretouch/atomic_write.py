@@ -42,4 +42,9 @@ def atomic_replacement(place: Path) -> Iterator[Path]:
 
 def write_json(value: Any, path: Path) -> None:
     """Write a value as JSON by `atomic_write`. Raises OSError, and ValueError for numbers that are not finite."""
-    atomic_write(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+    atomic_write(path, json_text(value))
+
+
+def json_text(value: Any) -> str:
+    """Return a value as JSON, indented. Raises ValueError for numbers that are not finite."""
+    return json.dumps(value, indent=1, allow_nan=False) + "\n"

@@ -4,9 +4,9 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from signal import SIGINT, SIGTERM
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -82,6 +82,12 @@ class Timing:
     """Cycles that were busy for longer than a period."""
     missed: int
     """Ticks left out, because the loop was late by a period or more."""
+
+    def numbers(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        spreads = {"period_s": self.measured, "wake_up_s": self.wake_up, "busy_s": self.busy, "cpu_s": self.cpu}
+        counts = {"cycles": self.cycles, "overruns": self.overruns, "missed": self.missed}
+        return counts | {name: asdict(spread) for name, spread in spreads.items()}
 
     def __str__(self) -> str:
         lines = [

@@ -1,5 +1,6 @@
 """What the command line says of itself, and of words that it does not take."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,6 +11,7 @@ from pretouch import cli
 from pretouch.cli.overview import GROUPS, SHELLS, overview
 from pretouch.cli.registry import LAB, OWN
 from pretouch.profiles import profile
+from tests.cli.commands import COMMANDS
 
 
 def test_the_overview_fits_a_screen_and_has_each_command_once():
@@ -84,3 +86,57 @@ def test_a_reader_that_has_seen_enough_is_no_error():
         assert done.stderr is not None
         done.stdout.close()
         assert (done.stderr.read(), done.wait()) == (b"", 141)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_fits_a_terminal_of_80_columns_and_shows_no_empty_default(capsys, monkeypatch, name):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit) as stop:
+        cli.main([*name.split(), "--help"])
+    assert stop.value.code == 0
+    said = capsys.readouterr().out
+    assert max(map(len, said.splitlines())) <= 80
+    for nothing in ("(default: '')", "(default: )", "(default: None)"):
+        assert nothing not in " ".join(said.split())
+
+
+def test_help_wraps_the_sentences_of_an_option_anew(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        cli.main(["live", "--help"])
+    said = capsys.readouterr().out
+    begin = said.index("  --world STR")
+    assert said[begin : said.index("  --record")] == (
+        "  --world STR              Set of simulated arms, sensors and delays: nominal,\n"
+        "                           realistic, stress, or a TOML file, as `pretouch\n"
+        "                           identify` writes one, of which the seed draws its\n"
+        "                           own; by default the usual ones.\n"
+    )
+
+
+REQUIRED = {
+    "skin monitor": ("--keys", "k"), "skin simulate": ("--keys", "k"), "robot import": ("a",), "replay": ("a",),
+    "skin provision": ("--id", "a", "--keys", "k", "--ssid", "s", "--host", "h"), "detect": ("a",), "figure": ("a",),
+    "sweep": ("a",),
+}  # fmt: skip
+"""Words that a command needs."""
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_is_no_number_is_one_sentence(capsys, monkeypatch, name):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        cli.main([*name.split(), "--help"])
+    for option in re.findall(
+        r"^  (--[\w-]+) (?:\{None\}\|)?(?:INT|FLOAT)(?:  |$)", capsys.readouterr().out, re.MULTILINE
+    ):
+        assert cli.main([*name.split(), *REQUIRED.get(name, ()), option, "many"]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.count("\n") == 1
+        assert f"{option} is 'many': give a" in said.err
+
+
+def test_an_option_that_is_missing_is_named(capsys):
+    assert cli.main(["skin", "keys"]) == 2
+    assert capsys.readouterr().err.startswith("pretouch skin keys lacks --keys: File of the units' keys")

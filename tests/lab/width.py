@@ -4,7 +4,7 @@ from pretouch.text_table import TextTable
 
 
 def width(table: TextTable) -> int:
-    """Characters of the widest row, with a space between columns: too many are cut short in a terminal of 80."""
+    """Characters of the widest row, with a space between columns: beyond 80 a terminal shows the table in parts."""
     columns = zip(table.header, *table.rows, strict=True)
     widths = [max(len(line) for text in column for line in text.split("\n")) for column in columns]
     return sum(widths) + len(widths) - 1

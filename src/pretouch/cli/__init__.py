@@ -3,9 +3,10 @@
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, redirect_stdout
 from difflib import get_close_matches
 from io import StringIO
+from shutil import get_terminal_size
 from typing import Annotated, Any, NoReturn, Union, cast
 
 import tyro
@@ -13,7 +14,7 @@ from rich.console import Console
 
 from pretouch.cli.overview import SHELLS, overview
 from pretouch.cli.registry import Command, check_moved, command_class, command_names
-from pretouch.cli.usage_error import usage_error
+from pretouch.cli.usage_error import tidied, usage_error
 from pretouch.errors import PluginError, PretouchError, UsageError
 from pretouch.signals import Terminated, ends_raise, exit_code
 
@@ -60,12 +61,13 @@ def _read(args: Sequence[str], errors: Console) -> Command:
 
 def _parsed(wanted: Any, args: Sequence[str], prog: str) -> Any:
     """Return what tyro makes of words; what is wrong with them is a UsageError."""
-    said = StringIO()
+    said, shown = StringIO(), StringIO()
     try:
-        with redirect_stderr(said):
+        with redirect_stderr(said), redirect_stdout(shown):
             return tyro.cli(wanted, prog=prog, args=args, config=_CONFIG)
     except SystemExit as end:
         if end.code != _USAGE:
+            print(tidied(shown.getvalue(), get_terminal_size().columns), end="")
             raise
         raise UsageError(usage_error(said.getvalue(), args, prog)) from None
 

@@ -60,6 +60,8 @@ class Replay:
     """Profile whose decisions on the same force and range data are shown beside the recorded ones."""
     page: bool = True
     """Whether to open the page; --no-page only prints."""
+    json: str = ""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
     host: str = "127.0.0.1"
     """Address to serve the page at."""
     port: int = 8080
@@ -69,7 +71,7 @@ class Replay:
         """Describe the recording, and check, compare or show it."""
         from pretouch.cli.replay import replay
 
-        return replay(Path(self.file), self.verify, self.profile, self.page, self.host, self.port)
+        return replay(Path(self.file), self.verify, self.profile, self.page, self.host, self.port, self.json)
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ class Detect:
     out: str = ""
     """Figure to write, ending in .png, .pdf or .svg."""
     json: str = ""
-    """File for the numbers."""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> None:
         """Run the detectors, and show and write what they found."""

@@ -1,6 +1,5 @@
 """What `pretouch detect` does: the detector of some profiles on a recording of any arm, as tables, figure and file."""
 
-import json
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
@@ -8,10 +7,9 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from pretouch.cli.tables import grid
-from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.cli.tables import Grid
+from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
@@ -58,29 +56,27 @@ def detect(
         raise RecordingError(f"The figure {out} has an unknown format: use one of the endings {', '.join(_ENDINGS)}.")
     if out:
         FIGURES.need("A figure")
-    for what, target in (("figure", out), ("file", json_file)):
-        if target:
-            check_writable(what, target)
-    imported = read_imported(place, choice)
-    skin = load_skin(skin_file, _model(imported)) if skin_file else None
-    columns = [(p, d, summary(d, p)) for p in used for d in [detect_imported(imported, p, skin)]]
-    notes = list(dict.fromkeys([*imported.notes, *_unheard(skin, imported), *_said(imported, columns, skin)]))
-    if out:
-        from pretouch.imported_data.figure import decisions_figure
+        check_writable("figure", out)
+    with numbers_to(json_file) as write:
+        imported = read_imported(place, choice)
+        skin = load_skin(skin_file, _model(imported)) if skin_file else None
+        columns = [(p, d, summary(d, p)) for p in used for d in [detect_imported(imported, p, skin)]]
+        notes = list(dict.fromkeys([*imported.notes, *_unheard(skin, imported), *_said(imported, columns, skin)]))
+        if out:
+            _draw(columns, place.name, out)
+        write(_numbers(imported, columns, notes))
+        _show(imported, columns, notes)
+        if out:
+            print(f"Figure: {out}")
 
-        image = BytesIO()
-        figure = decisions_figure([d for _, d, _ in columns], place.name)
-        figure.savefig(image, format=out.suffix[1:], dpi=_DOTS_PER_INCH)
-        with unwritable_said("figure", out):
-            out.write_bytes(image.getvalue())
-    if json_file:
-        text = json.dumps(_plain(_numbers(imported, columns, notes)), indent=1, allow_nan=False)
-        with unwritable_said("file", json_file):
-            json_file.write_text(text + "\n", encoding="utf-8")
-    _show(imported, columns, notes)
-    for what, target in (("Figure", out), ("Numbers", json_file)):
-        if target:
-            print(f"{what}: {target}")
+
+def _draw(columns: list[Column], title: str, out: Path) -> None:
+    from pretouch.imported_data.figure import decisions_figure
+
+    image = BytesIO()
+    decisions_figure([d for _, d, _ in columns], title).savefig(image, format=out.suffix[1:], dpi=_DOTS_PER_INCH)
+    with unwritable_said("figure", out):
+        out.write_bytes(image.getvalue())
 
 
 def _profile(name: str, rate: float) -> Profile:
@@ -136,13 +132,13 @@ def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> No
         console.print(guidance(d, found, p), markup=False)
 
 
-def contact_table(contacts: Sequence[tuple[str, Found]]) -> Table:
+def contact_table(contacts: Sequence[tuple[str, Found]]) -> Grid:
     """Make a table of contacts, each with who found it, in time order."""
     rows = []
     for name, found in sorted(contacts, key=lambda pair: pair[1].time):
         force = [f"{value:.1f}" for value in (*found.force, np.linalg.norm(found.force))]
         rows.append((name, f"{found.time:.3f}", *force, axes_shown(found)))
-    return grid(("", "time [s]", "x", "y", "z", "norm", "axes"), rows or [("none",)], whole=1)
+    return Grid(("", "time [s]", "x", "y", "z", "norm", "axes"), rows or [("none", *[""] * 6)])
 
 
 def axes_shown(found: Found) -> str:
@@ -150,13 +146,13 @@ def axes_shown(found: Found) -> str:
     return "".join(axis for axis, crossed in zip("xyz", found.axes, strict=True) if crossed)
 
 
-def _noise_table(columns: list[Column]) -> Table:
+def _noise_table(columns: list[Column]) -> Grid:
     rows = []
     for _, d, s in columns:
         name = f"{d.name}, {s.free:.1f} of {s.duration:.1f} s"
         for axis, *values in zip("xyz", s.mean, s.sigma, s.sigma_window, s.width, strict=True):
             rows.append((name if axis == "x" else "", axis, *(f"{value:.2f}" for value in values)))
-    return grid(("", "along", "mean", "sigma", "sigma in window", "thresholds at +-"), rows, whole=1)
+    return Grid(("", "along", "mean", "sigma", "sigma in window", "thresholds at +-"), rows)
 
 
 def _numbers(imported: ImportedData, columns: list[Column], notes: list[str]) -> dict[str, Any]:
@@ -180,14 +176,3 @@ def _numbers(imported: ImportedData, columns: list[Column], notes: list[str]) ->
             for p, d, s in columns
         ],
     }  # fmt: skip
-
-
-def _plain(value: Any) -> Any:
-    """Make what JSON can hold: arrays become lists, numbers that are not finite null."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | np.ndarray):
-        return [_plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return int(value) if isinstance(value, np.integer) else value

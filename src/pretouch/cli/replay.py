@@ -1,29 +1,33 @@
 """What `pretouch replay` and `pretouch recover` do: a recording told, recomputed, compared, shown, mended."""
 
 from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
 from pretouch.cli.detect import axes_shown
-from pretouch.cli.tables import grid
+from pretouch.cli.tables import Grid
 from pretouch.cli.warm_up import prepare
+from pretouch.cli.writing import numbers_to
 from pretouch.extras import LIVE
 from pretouch.profiles import profile as find_profile
 from pretouch.recording import recover as recovering
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
 from pretouch.recording.reader import Recorded, open_recording
+from pretouch.recording.verify import Verdict
 from pretouch.recording.verify import verify as recompute
 from pretouch.signals import ended
 from pretouch.types import Mode
 
 
 def replay(
-    place: Path, verify: bool = False, profile: str = "", page: bool = True, host: str = "127.0.0.1", port: int = 8080
-) -> int:
+    place: Path, verify: bool = False, profile: str = "", page: bool = True, host: str = "127.0.0.1", port: int = 8080,
+    json: str = "",
+) -> int:  # fmt: skip
     """Tell of a recording, and check, compare or show it. Return the exit code.
 
     Args:
@@ -33,6 +37,7 @@ def replay(
         page: whether to serve the page.
         host: address to serve it at.
         port: port to serve it at.
+        json: where the numbers go, see `numbers_to`.
     """
     console = Console(highlight=False, soft_wrap=True)
     other = find_profile(profile) if profile else None
@@ -41,30 +46,32 @@ def replay(
 
         LIVE.need("The page")
         check_port(ServeOptions(host, port))
-    recorded = open_recording(place)
-    if recorded.said:
-        console.print(recorded.said, markup=False)
-    if page and not verify:
-        console.print(told(recorded), markup=False)
-    else:
-        with _Progress("Reading", len(recorded)) as advance:
-            console.print(f"{told(recorded)[:-1]}: {happened(recorded, advance)}.", markup=False)
-    if verify:
-        prepare(recorded.runs[0].profile)
-        with _Progress("Recomputing", len(recorded)) as advance:
-            verdict = recompute(recorded, advance)
-        console.print(verdict.said, markup=False)
-        return 0 if verdict.agrees else 1
-    comparison = None
-    if other:
-        with _Progress("Comparing", len(recorded)) as advance:
-            comparison = compare(recorded, other, advance)
-        _show(console, comparison)
-    if page:
-        from pretouch.viewer.replay import serve_replay
+    with numbers_to(json) as write:
+        recorded, found = open_recording(place), None
+        if recorded.said:
+            console.print(recorded.said, markup=False)
+        if page and not verify and not json:
+            console.print(told(recorded), markup=False)
+        else:
+            with _Progress("Reading", len(recorded)) as advance:
+                found = happened(recorded, advance)
+            console.print(f"{told(recorded)[:-1]}: {found.said}.", markup=False)
+        verdict = comparison = None
+        if verify:
+            prepare(recorded.runs[0].profile)
+            with _Progress("Recomputing", len(recorded)) as advance:
+                verdict = recompute(recorded, advance)
+            console.print(verdict.said, markup=False)
+        elif other:
+            with _Progress("Comparing", len(recorded)) as advance:
+                comparison = compare(recorded, other, advance)
+            _show(console, comparison)
+        write(_numbers(recorded, found, verdict, comparison))
+        if page and not verify:
+            from pretouch.viewer.replay import serve_replay
 
-        serve_replay(recorded, ServeOptions(host, port), comparison, ended)
-    return 0
+            serve_replay(recorded, ServeOptions(host, port), comparison, ended)
+    return int(verdict is not None and not verdict.agrees)
 
 
 def recover(place: Path, out: Path | None = None) -> None:
@@ -72,19 +79,34 @@ def recover(place: Path, out: Path | None = None) -> None:
     print(recovering.recover(place, out).said)
 
 
-def happened(recorded: Recorded, advance: Callable[[int], None] = lambda done: None) -> str:
-    """Count contacts and holds, and say for how long it was held; `advance` is told how many steps were read."""
+@dataclass(frozen=True)
+class Happened:
+    """What happened in a recording."""
+
+    contacts: int
+    holds: int
+    """After the start: the arm begins in HOLD, until its window is full."""
+    held_share: float
+    """Of the time."""
+
+    @property
+    def said(self) -> str:
+        """All of it in words."""
+        holds = f"{_many(self.holds, 'hold')} after the start"
+        return f"{_many(self.contacts, 'contact')}, {holds}, held for {self.held_share:.0%} of the time"
+
+
+def happened(recorded: Recorded, advance: Callable[[int], None] = lambda done: None) -> Happened:
+    """Count contacts and holds; `advance` is told how many steps were read."""
     contacts = holds = held = 0
     before: Mode | None = None
     for i, kept in enumerate(recorded):
         contacts += kept.step.contact is not None
-        # the arm begins in HOLD, until its window is full
         holds += kept.step.mode is Mode.HOLD and before in (Mode.TRACK, Mode.REACT)
         held += kept.step.mode is Mode.HOLD
         before = kept.step.mode
         advance(i + 1)
-    share = held / len(recorded)
-    return f"{_many(contacts, 'contact')}, {_many(holds, 'hold')} after the start, held for {share:.0%} of the time"
+    return Happened(contacts, holds, held / len(recorded))
 
 
 def told(recorded: Recorded) -> str:
@@ -137,16 +159,48 @@ def _show(console: Console, comparison: Comparison) -> None:
     )  # fmt: skip
 
 
-def _table(comparison: Comparison) -> Table:
+def _numbers(
+    recorded: Recorded, found: Happened | None, verdict: Verdict | None, comparison: Comparison | None
+) -> dict[str, Any]:
+    stamps, run = recorded.stamps(), recorded.runs[0]
+    return {
+        "recording": str(recorded.place), "complete": recorded.complete, "arm": run.model.description.name,
+        "profiles": [run.profile.name for run in recorded.runs], "units": run.skin.ids, "steps": len(recorded),
+        "duration_s": stamps[-1] - stamps[0], **(asdict(found) if found else {}),
+        **({"verified": _verdict_numbers(verdict)} if verdict else {}),
+        **({"compared": _comparison_numbers(comparison)} if comparison else {}),
+    }  # fmt: skip
+
+
+def _verdict_numbers(verdict: Verdict) -> dict[str, Any]:
+    kept = ("checked", "skipped", "exact", "differing", "largest", "largest_field", "agrees", "said")
+    return {name: getattr(verdict, name) for name in kept}
+
+
+def _comparison_numbers(comparison: Comparison) -> dict[str, Any]:
+    pairs = [{"recorded": _found_numbers(mine), "other": _found_numbers(other)} for mine, other in _pairs(comparison)]
+    return {"other": comparison.other.name, "contacts": pairs, "left_out": comparison.left_out}
+
+
+def _found_numbers(found: Found | None) -> dict[str, Any] | None:
+    return None if found is None else {"time_s": found.time, "force_n": found.force, "axes": axes_shown(found)}
+
+
+def _pairs(comparison: Comparison) -> list[tuple[Found | None, Found | None]]:
+    """Return contacts of both, or of one of them, in time order."""
     pairs: list[tuple[Found | None, Found | None]] = [*comparison.both]
     pairs += [(found, None) for found in comparison.only_recorded]
     pairs += [(None, found) for found in comparison.only_other]
+    return sorted(pairs, key=lambda pair: min(found.time for found in pair if found))
+
+
+def _table(comparison: Comparison) -> Grid:
     rows = [
         (*_cells(mine), *_cells(other), f"{other.time - mine.time:+.2f}" if mine and other else "")
-        for mine, other in sorted(pairs, key=lambda pair: min(found.time for found in pair if found))
+        for mine, other in _pairs(comparison)
     ]
     header = "recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"
-    return grid(header, rows or [("none", "", "", "none", "", "", "")], left=())
+    return Grid(header, rows or [("none", "", "", "none", "", "", "")], names=0, left=())
 
 
 def _cells(found: Found | None) -> tuple[str, str, str]:

@@ -1,11 +1,12 @@
 """Checking an imported arm on the command line."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from pretouch.cli.tables import show
+from pretouch.cli.writing import numbers_to
 from pretouch.errors import RobotModelError
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
 from pretouch.robot.description_file import FILE, load_description
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 
 def check_arm(command: "Check") -> None:
     """Load an arm and its skin, and print what is known of them; what is wrong is an error of this package."""
+    with numbers_to(command.json) as write:
+        write(_checked(command))
+
+
+def _checked(command: "Check") -> dict[str, Any]:
     folder = Path(command.folder)
     description = load_description(folder)
     file = folder / FILE if folder.is_dir() else folder
@@ -41,6 +47,24 @@ def check_arm(command: "Check") -> None:
     if ready.conflict:
         raise RobotModelError(f"{ready.conflict} ({file}: q_ready)")
     console.print(f"No problem found: {folder}.", markup=False, soft_wrap=True)
+    return arm_numbers(model, ready) | {"units": skin.ids if skin else None}
+
+
+def arm_numbers(model: RobotModel, ready: Ready) -> dict[str, Any]:
+    """Return limits of an arm's joints, and its ready posture, as JSON is to have them."""
+    arm = model.description
+    limits = {
+        "lower_rad": model.q_min, "upper_rad": model.q_max, "speed_rad_s": arm.qd_max,
+        "acceleration_rad_s2": arm.qdd_max, "torque_nm": arm.tau_max, "ready_rad": ready.q,
+    }  # fmt: skip
+    return {
+        "name": arm.name, "end_effector": arm.ee_body, "capsules": len(model.capsules),
+        "joints": [
+            {"name": name, **{key: values[j] for key, values in limits.items()}} for j, name in enumerate(model.joints)
+        ],
+        "manipulability": ready.manipulability, "smallest_singular_value": ready.singular_value,
+        "clear_m": ready.clear, "never_apart": never_apart(model),
+    }  # fmt: skip
 
 
 def joint_table(model: RobotModel, ready: Ready, note: str) -> TextTable:

@@ -39,7 +39,7 @@ class Import:
     force: bool = False
     """Write to an existing folder: its contents are kept under another name."""
     json: str = ""
-    """File for the numbers of the fit."""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> None:
         """Import the arm."""
@@ -56,6 +56,8 @@ class Check:
     """Folder of the arm, or its robot.toml."""
     skin: str = ""
     """Skin file; by default the folder's own."""
+    json: str = ""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> None:
         """Check the arm."""

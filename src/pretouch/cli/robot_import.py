@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from pretouch.atomic_write import write_json
-from pretouch.cli.robot_check import joint_table, ready_said
+from pretouch.cli.robot_check import arm_numbers, joint_table, ready_said
 from pretouch.cli.tables import show
 from pretouch.cli.words import words
-from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.cli.writing import numbers_to
 from pretouch.errors import ParameterError
 from pretouch.importing.body import FARTHEST, FitError
 from pretouch.importing.folder import check_free, write_folder
@@ -42,8 +41,12 @@ def import_arm(command: "Import") -> None:
     file = Path(command.file)
     folder = Path(command.out or _file_name(command.name or read_source(file, options.packages).name))
     check_free(folder, command.force)
-    if command.json:
-        check_writable("file", Path(command.json))
+    with numbers_to(command.json) as write:
+        write(_imported(command, file, options, folder))
+
+
+def _imported(command: "Import", file: Path, options: ImportOptions, folder: Path) -> dict[str, Any]:
+    """Import an arm, write its folder, and print what came of it; return the numbers."""
     found = import_robot(file, options)
     kept = write_folder(found, folder, command.force)
     console = Console(highlight=False)
@@ -56,9 +59,7 @@ def import_arm(command: "Import") -> None:
     console.print(
         f"\nWritten: {folder}. Try it: pretouch reproduce static --arm {folder} --seeds 1", markup=False, soft_wrap=True
     )
-    if command.json:
-        with unwritable_said("file", Path(command.json)):
-            write_json(_numbers_of(found), Path(command.json))
+    return _numbers_of(found)
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:
@@ -121,14 +122,14 @@ def _sticking_out(found: Imported) -> list[str]:
 def _numbers_of(found: Imported) -> dict[str, Any]:
     links = {
         found.arm.source.links[body.link].name: {
-            "capsules": len(body.rods), "fitted": body.fitted, "sticks_out": body.sticks_out, **_fit_numbers(body.error)
+            "capsules": len(body.rods), "fitted": body.fitted, "sticks_out_m": body.sticks_out,
+            **_fit_numbers(body.error),
         }
         for body in found.bodies
     }  # fmt: skip
-    return {"name": found.description.name, "whole_arm": _fit_numbers(found.error), "links": links,
-            "q_ready": found.ready.q.tolist(), "remarks": list(found.remarks)}  # fmt: skip
+    fit = {"whole_arm": _fit_numbers(found.error), "links": links, "remarks": found.remarks}
+    return arm_numbers(found.model, found.ready) | fit
 
 
-def _fit_numbers(error: FitError) -> dict[str, float | None]:
-    """Numbers of a fit; null where no point was compared."""
-    return {key: value if error.points or key == "points" else None for key, value in asdict(error).items()}
+def _fit_numbers(error: FitError) -> dict[str, float]:
+    return {key if key == "points" else f"{key}_m": value for key, value in asdict(error).items()}

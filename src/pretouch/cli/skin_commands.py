@@ -51,7 +51,7 @@ class Coverage:
     figure: str = ""
     """File for a figure of the arm, ending in .png, .pdf or .svg."""
     json: str = ""
-    """File for the numbers."""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
     replace: bool = False
     """Overwrite existing files."""
 
@@ -89,7 +89,7 @@ class Monitor:
     once: bool = False
     """Watch for 5 s and print one table."""
     json: str = ""
-    """File for the numbers at the end."""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> int:
         """Watch the units."""
@@ -148,12 +148,16 @@ class Keys:
     """File of the units' keys; created if it is missing, readable only by you."""
     new: str = ""
     """Names of units to add, separated by commas."""
+    json: str = ""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> int:
         """List the units, including added ones."""
         from pretouch.cli.skin_keys import keys_file, list_keys
+        from pretouch.cli.writing import numbers_to
 
-        list_keys(keys_file(self.keys), self.new)
+        with numbers_to(self.json) as write:
+            write(list_keys(keys_file(self.keys), self.new))
         return 0
 
 

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from pretouch.atomic_write import write_json
 from pretouch.cli.calibrate.outputs import check_free, same_file
 from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
 from pretouch.cli.tables import show
-from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.cli.writing import STANDARD_OUTPUT, check_writable, numbers_to, unwritable_said
 from pretouch.coverage.blind import BlindSpot, blind_spots
 from pretouch.coverage.measure import Coverage, Share, covered
 from pretouch.coverage.measuring import Setting, coverage_of
@@ -36,6 +35,12 @@ def skin_coverage(command: "Asked") -> None:
     """Measure, print and write what is asked for."""
     model, skin, source = _arm_and_skin(command)
     _check_outputs(command, source)
+    with numbers_to(command.json) as write:
+        write(_measured(command, model, skin))
+
+
+def _measured(command: "Asked", model: RobotModel, skin: Skin) -> dict[str, Any]:
+    """Measure, print and draw; return the numbers."""
     setting = Setting(
         model, floor_and_pedestal(command.floor), _params(command), command.workspace,
         command.postures, command.seed,
@@ -59,10 +64,7 @@ def skin_coverage(command: "Asked") -> None:
     if command.figure:
         _draw(command.figure, ways if not new else setting.ways(1), found, shown, new)
         console.print(f"Figure: {command.figure}", markup=False, soft_wrap=True)
-    if command.json:
-        with unwritable_said("file", Path(command.json)):
-            write_json(numbers, Path(command.json))
-        console.print(f"Numbers: {command.json}", markup=False, soft_wrap=True)
+    return numbers
 
 
 def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path]:
@@ -97,7 +99,7 @@ def _check_outputs(command: "Asked", source: Path) -> None:
     if command.figure:
         FIGURES.need("A figure")
     places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
-    given = [(what, Path(text)) for what, text in places if text]
+    given = [(what, Path(text)) for what, text in places if text and text != STANDARD_OUTPUT]
     for i, (what, place) in enumerate(given):
         others = [other for _, other in given[:i]] + [source]
         if any(same_file(other, place) or same_file(place, other) for other in others):

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 from pretouch.cli.words import words
 from pretouch.errors import HardwareError
@@ -10,15 +11,17 @@ from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
 from pretouch.hardware.provision import fingerprint
 
 
-def list_keys(place: Path, new: str = "") -> None:
-    """Print name, number and fingerprint of each unit in a file, after adding those of new names."""
+def list_keys(place: Path, new: str = "") -> dict[str, Any]:
+    """Print name, number and fingerprint of each unit in a file, after adding those of new names; return them."""
     names = words(new)
     keys = keys_or_none(place) if names else load_keys(place)
     if names:
         keys = with_new(keys, names)
         save_keys(keys, place)
-    for unit in keys.values():
-        print(f"{unit.id}: number {unit.number}, key {fingerprint(unit.key)}...")
+    listed = [{"unit": u.id, "number": u.number, "fingerprint": fingerprint(u.key)} for u in keys.values()]
+    for unit in listed:
+        print("{unit}: number {number}, key {fingerprint}...".format(**unit))
+    return {"units": listed}
 
 
 def keys_file(text: str) -> Path:

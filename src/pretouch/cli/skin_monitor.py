@@ -1,9 +1,8 @@
 """What `pretouch skin monitor` does: units watched in the terminal, and recorded."""
 
-import json
 import math
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import asdict
 from functools import cache
@@ -19,7 +18,7 @@ from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_record import record
 from pretouch.cli.skin_table import line, thrown_away, view
 from pretouch.cli.words import words
-from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
 from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.hardware.health import HealthParams
@@ -46,9 +45,11 @@ _INTERRUPTED = 130
 def monitor(command: "Monitor") -> int:
     """Watch units; return 1 if one is faulty after a given time or recording failed, 130 after Ctrl-C, or else 0."""
     duration = _duration(command)
-    json_file = Path(command.json) if command.json else None
-    if json_file:
-        check_writable("file", json_file)
+    with numbers_to(command.json) as write:
+        return _monitored(command, duration, write)
+
+
+def _monitored(command: "Monitor", duration: float, write: Callable[[Any], None]) -> int:
     if not command.host:
         raise HardwareError(
             f"The address to listen on is empty: give {HOST}, or {EVERYWHERE} for every address of this machine."
@@ -71,10 +72,7 @@ def monitor(command: "Monitor") -> int:
     console = Console(highlight=False, soft_wrap=True)
     if last is not None:
         console.print(view(last, receiver.rejected, notes))
-        if json_file:
-            text = json.dumps(_numbers(last, receiver, notes), indent=1, allow_nan=False)
-            with unwritable_said("file", json_file):
-                json_file.write_text(text + "\n", encoding="utf-8")
+        write(_numbers(last, receiver, notes))
         if math.isfinite(duration):
             code = code or int(any(f.level == "fault" for f in last.findings))
     elif sentence:
@@ -195,15 +193,8 @@ def only_here(host: str) -> bool:
 def _numbers(update: MonitorUpdate, receiver: SkinReceiver, notes: list[str]) -> dict[str, Any]:
     return {
         "elapsed_s": update.elapsed,
-        "units": [_plain(asdict(unit)) for unit in update.units],
+        "units": [asdict(unit) for unit in update.units],
         "findings": [asdict(finding) for finding in update.findings],
         "rejected": dict(receiver.rejected),
         "notes": [*notes, *filter(None, [thrown_away(receiver.rejected)])],
     }
-
-
-def _plain(value: Any) -> Any:
-    """Return numbers as JSON has them: none that is not finite."""
-    if isinstance(value, dict):
-        return {name: _plain(part) for name, part in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,7 +1,8 @@
-"""What is wrong with the words of a command line, as one sentence in place of the boxes that tyro draws."""
+"""What tyro says, in our words: one sentence for what is wrong with a command line, and help as wide as a terminal."""
 
 import re
 from collections.abc import Sequence
+from textwrap import wrap
 
 _BORDER = re.compile(r"^[╭╰│+|]|[╮╯│+|]$")
 _RULE = re.compile(r"^\s*[-─]{3,}\s*$", re.MULTILINE)
@@ -36,9 +37,39 @@ def usage_error(boxed: str, args: Sequence[str], prog: str) -> str:
         known = re.search(r"Available subcommands: ([\w, -]+?) (?:For|$)", more)
         near = f"perhaps {' or '.join(dict.fromkeys(meant))}" if meant else f"choose from {known[1]}" if known else ""
         return f"{word} is unknown{': ' if near else ''}{near}.{end}"
-    if found := re.match(r"Missing from (.*?): (?:\[.*?\]\]|\S+) (.*?) ?\(required\)", said):
-        return f"{found[1]} lacks an argument: {found[2].rstrip('.')}. See {found[1]} --help."
+    if found := re.match(r"Missing from (.*?): (--\S+ )?(?:\[.*?\]\]|\S+) (.*?) ?\(required\)", said):
+        return f"{found[1]} lacks {(found[2] or 'an argument').strip()}: {found[3].rstrip('.')}. See {found[1]} --help."
     return f"{said.rstrip('.')}.{end}"
+
+
+_OPTION = re.compile(r"  (?P<name>[-\[{A-Z]\S*(?: \S+)*)(?:  +(?P<said>\S.*))?")
+_NOTHING = re.compile(r" ?\(default: (?:''|None)?\)")
+
+
+def tidied(text: str, width: int) -> str:
+    """Return a command's help with its sentences wrapped anew: without the source's line ends and empty defaults."""
+    parts: list[list[str]] = []
+    for line in map(str.rstrip, text.rstrip().splitlines()):
+        joined = line.startswith("      ") if parts and _OPTION.fullmatch(parts[-1][0]) else line[:1].strip()
+        if parts and parts[-1][0] and joined:
+            parts[-1].append(line)
+        else:
+            parts.append([line])
+    return "\n".join(line for part in parts for line in _wrapped(part, width)) + "\n"
+
+
+def _wrapped(lines: list[str], width: int) -> list[str]:
+    """Return the lines of an option, its name and beside or below it what it is, or of a paragraph."""
+    found = _OPTION.fullmatch(lines[0])
+    if found is None:
+        return lines if lines[0].startswith(" ") else wrap(" ".join(lines), width) or [""]
+    beside = found["said"] is not None
+    if not beside and not lines[1:]:
+        return lines
+    column = found.start("said") if beside else len(lines[1]) - len(lines[1].lstrip())
+    said = _NOTHING.sub("", " ".join((found["said"] or "", *map(str.strip, lines[1:]))).strip())
+    below = [" " * column + line for line in wrap(said, max(width - column, 20))]
+    return [lines[0][:column] + below[0].lstrip(), *below[1:]] if beside else [lines[0], *below]
 
 
 def _value(option: str, args: Sequence[str]) -> str:

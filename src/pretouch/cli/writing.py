@@ -1,12 +1,20 @@
-"""Files to write: that they can be written is found out first, and said in a sentence."""
+"""What commands write: that a file can be written is found out first, and said in a sentence."""
 
 import os
+import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from pretouch.atomic_write import json_text, write_json
 from pretouch.errors import ExperimentError
+
+STANDARD_OUTPUT = "-"
+"""What --json takes for the standard output."""
 
 
 @contextmanager
@@ -32,3 +40,39 @@ def check_writable(what: str, place: Path) -> None:
             os.stat(place)  # a name too long, for one
         if place.is_dir():
             raise IsADirectoryError(21, "Is a directory")
+
+
+@contextmanager
+def numbers_to(place: str | Path | None) -> Iterator[Callable[[Any], None]]:
+    """Give what writes a command's numbers as JSON, where --json says: a file, '-', or nowhere for '' and None.
+
+    With '-' they go to standard output, and all text that is printed in the context to standard error. Raises
+    ExperimentError, at once, for a file that cannot be written.
+    """
+    if not place:
+        yield lambda _numbers: None
+    elif str(place) == STANDARD_OUTPUT:
+        out = sys.stdout
+        with redirect_stdout(sys.stderr):
+            yield lambda numbers: print(json_text(plain(numbers)), end="", file=out, flush=True)
+    else:
+        file = Path(place)
+        check_writable("file", file)
+
+        def write(numbers: Any) -> None:
+            with unwritable_said("file", file):
+                write_json(plain(numbers), file)
+            print(f"Numbers: {file}", flush=True)
+
+        yield write
+
+
+def plain(value: Any) -> Any:
+    """Return what JSON can hold: arrays and tuples become lists, numbers that are not finite None."""
+    if isinstance(value, dict):
+        return {name: plain(part) for name, part in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value

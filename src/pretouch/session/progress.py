@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,13 @@ class RunSummary:
     """Contacts that the arm did not move with, for they were below what moves it."""
     holds: dict[str, float] = field(default_factory=dict)
     """Time held [s] by the reason, without its numbers."""
+
+    def numbers(self, period: float) -> dict[str, Any]:
+        """Return the summary for JSON."""
+        return {
+            "steps": self.steps, "duration_s": self.steps * period, "contacts": self.contacts,
+            "contacts_without_motion": self.unmoved, "held_s": self.holds,
+        }  # fmt: skip
 
     def sentences(self, period: float) -> tuple[str, ...]:
         """Return the summary in sentences."""

@@ -21,7 +21,8 @@ class FreeMotion:
     out: str = ""
     """Folder for results, figures and page; by default runs/bench-free-motion."""
     json: str = ""
-    """File for all trials and their summary; by default results.json in the folder."""
+    """File for all trials and their summary; by default results.json in the folder. -: also to standard output, and
+    text to standard error."""
 
     def run(self) -> None:
         """Run what is missing, with results, figures and page."""
@@ -30,7 +31,7 @@ class FreeMotion:
 
         out = Path(self.out or "runs/bench-free-motion")
         request = Request(("free-motion",), self.seeds)
-        run_all([(request, out)], out, Path(self.json) if self.json else out / "results.json")
+        run_all([(request, out)], out, self.json)
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class Cycle:
     profile: str = "paper"
     """Profile of the controller, or PROFILE:GROUP.FIELD=VALUE."""
     json: str = ""
-    """File for the numbers; by default they are only shown."""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
     priority: int | None = None
     """Real-time priority, 1 to 99 (80 is usual); by default the process keeps its own."""
     cpu: int | None = None
@@ -58,7 +59,7 @@ class Cycle:
         from pretouch_lab.cli.bench_cycle import bench_cycle
 
         request = CycleRequest(self.rate, self.cycles, self.profile, self.priority, self.cpu)
-        bench_cycle(_counts(self.points), request, Path(self.json) if self.json else None)
+        bench_cycle(_counts(self.points), request, self.json)
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,13 @@
 """`pretouch bench calibration`: random skins calibrated in simulation, and how far the answers are off."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pretouch.cli.calibrate.options import MotionOptions
 from pretouch.errors import CalibrationError
+
+if TYPE_CHECKING:  # the help is to need none of the heavy packages
+    from pretouch_lab.studies.calibration.study import Study
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class Calibration:
     arm: str = "panda"
     """panda, fr3, a name that another package adds, or the folder of an imported arm."""
     json: str = ""
-    """File for all numbers."""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
     seed: int = 0
     """Decides all that is random."""
 
@@ -34,35 +37,36 @@ def bench_calibration(command: Calibration) -> None:
     """Calibrate random skins, show how far the answers are off, and write them down."""
     from rich.console import Console
 
-    from pretouch.atomic_write import write_json
-    from pretouch.calibration.motion.planner import plan_motion
-    from pretouch.cli.calibrate.motion import plan_params
     from pretouch.cli.tables import show
-    from pretouch.cli.writing import check_writable, unwritable_said
-    from pretouch.robot.model import RobotModel
-    from pretouch.robot.named import robot_named
-    from pretouch_lab.cli.progress import bar
-    from pretouch_lab.studies.calibration.study import study
+    from pretouch.cli.writing import numbers_to
     from pretouch_lab.studies.calibration.table import tables
 
-    json_file = Path(command.json) if command.json else None
     if command.skins < 1:
         raise CalibrationError(f"The number of skins is {command.skins}: give at least 1.")
     if command.seed < 0:
         raise CalibrationError(f"The seed is {command.seed}: it must be at least 0.")
-    if json_file:
-        check_writable("file", json_file)
+    with numbers_to(command.json) as write:
+        found = study_of(command)
+        show(Console(highlight=False), tables(found))
+        write(found.as_json())
+
+
+def study_of(command: Calibration) -> "Study":
+    """Calibrate random skins, with a bar."""
+    from rich.console import Console
+
+    from pretouch.calibration.motion.planner import plan_motion
+    from pretouch.cli.calibrate.motion import plan_params
+    from pretouch.robot.model import RobotModel
+    from pretouch.robot.named import robot_named
+    from pretouch_lab.cli.progress import bar
+    from pretouch_lab.studies.calibration.study import study
+
     model = RobotModel(robot_named(command.arm))
     plan = None if command.motion == MotionOptions() else plan_motion(model, plan_params(command.motion))
     name = "simulations"
     with bar(Console(stderr=True), name, command.skins * (1 + command.compared)) as advance:
-        found = study(
+        return study(
             model, command.skins, command.seed, command.compared, not command.find_links, plan,
             progress=lambda: advance(1, name),
         )  # fmt: skip
-    console = Console(highlight=False)
-    show(console, tables(found))
-    if json_file:
-        with unwritable_said("file", json_file):
-            write_json(found.as_json(), json_file)
-        console.print(f"Numbers: {json_file}", soft_wrap=True, markup=False)

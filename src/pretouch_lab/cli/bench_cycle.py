@@ -1,14 +1,13 @@
 """What `pretouch bench cycle` does: measure for each number of points, and show tables."""
 
 import sys
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from pretouch.atomic_write import write_json
-from pretouch.cli.tables import grid
-from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.cli.tables import Grid
+from pretouch.cli.writing import numbers_to
 from pretouch.errors import ExperimentError
 from pretouch.realtime import check_wishes
 from pretouch_lab.benchmarks.cycle import CycleRequest, about, measure
@@ -18,8 +17,8 @@ from pretouch_lab.rows import Row
 _SPREAD = {"median": "median_us", "99 %": "p99_us", "99.9 %": "p999_us", "largest": "max_us"}
 
 
-def bench_cycle(points: tuple[int, ...], request: CycleRequest, json_file: Path | None) -> None:
-    """Measure the control step, show what it takes, and write the numbers if a file is given.
+def bench_cycle(points: tuple[int, ...], request: CycleRequest, json: str = "") -> None:
+    """Measure the control step, show what it takes, and write the numbers where `numbers_to` takes `json` to say.
 
     What was measured before something ended the run is shown and written all the same.
     """
@@ -27,8 +26,11 @@ def bench_cycle(points: tuple[int, ...], request: CycleRequest, json_file: Path 
     if wrong:
         raise ExperimentError(f"The number of points is {wrong[0]}: give 1 to {LARGEST_SKIN}.")
     check_wishes(request.priority, request.cpu)
-    if json_file:
-        check_writable("file", json_file)
+    with numbers_to(json) as write:
+        _measure(points, request, write)
+
+
+def _measure(points: tuple[int, ...], request: CycleRequest, write: Callable[[Any], None]) -> None:
     rows: list[Row] = []
     said: list[str] = []
     try:
@@ -39,15 +41,11 @@ def bench_cycle(points: tuple[int, ...], request: CycleRequest, json_file: Path 
     finally:
         if rows:
             missing = list(dict.fromkeys(said))
-            if json_file:  # first, for the terminal may be gone
-                with unwritable_said("file", json_file):
-                    facts = {**about(request), "missing": missing, "asked": list(points)}
-                    write_json({"about": facts, "rows": rows}, json_file)
+            # first, for the terminal may be gone
+            write({"about": {**about(request), "missing": missing, "asked": points}, "rows": rows})
             _show(rows, request, missing)
         if len(rows) < len(points):
             print(f"Stopped: {len(rows)} of {len(points)} numbers of points were measured.", file=sys.stderr)
-    if json_file:
-        Console(highlight=False).print(f"Numbers: {json_file}", soft_wrap=True, markup=False)
 
 
 def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
@@ -71,7 +69,7 @@ def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
         console.print(f"With {', '.join(idle)} points the arm did not follow its path in every cycle.", markup=False)
 
 
-def _times(measured: list[Row], rate: float) -> Table:
+def _times(measured: list[Row], rate: float) -> Grid:
     rows = []
     runs = {"CPU": "", "CPU, all new": "all_new_", f"CPU at {rate:g} Hz": "at_rate_", f"wall at {rate:g} Hz": "wall_"}
     for row in measured:
@@ -81,9 +79,9 @@ def _times(measured: list[Row], rate: float) -> Table:
             overruns = str(row["overruns"]) if prefix == "wall_" else ""
             restricting = f"{row['restricting_median']:.0f}" if not prefix else ""
             rows.append((first, name, *took, overruns, restricting))
-    return grid(("points", "", *_SPREAD, "overruns", "restricting"), rows, left=(1,))
+    return Grid(("points", "", *_SPREAD, "overruns", "restricting"), rows, 2, left=(1,))
 
 
-def _shares(rows: list[Row]) -> Table:
+def _shares(rows: list[Row]) -> Grid:
     lines = [(stage, *(f"{100 * row['stages'][stage]:.0f}" for row in rows)) for stage in rows[0]["stages"]]
-    return grid(("points", *(str(row["points"]) for row in rows)), lines, left=())
+    return Grid(("points", *(str(row["points"]) for row in rows)), lines, left=())

@@ -3,7 +3,7 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -60,7 +60,8 @@ class Detection(BenchOptions):
     """
 
     json: str = ""
-    """File for the numbers; by default results.json in the folder."""
+    """File for the numbers; by default results.json in the folder. -: also to standard output, and
+    text to standard error."""
 
     def run(self) -> None:
         """Run it, with tables, figures and numbers."""
@@ -78,7 +79,8 @@ class Avoidance(BenchOptions):
     """
 
     json: str = ""
-    """File for the numbers, with a row for each baseline and scenario; by default results.json in the folder."""
+    """File for the numbers, with a row for each baseline and scenario; by default results.json in the folder.
+    -: also to standard output, and text to standard error."""
     baselines: Annotated[str, tyro.conf.arg(aliases=["--contenders"])] = ""
     """Baselines, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
     profile; by default all, and pretouch with each switch off alone."""
@@ -103,7 +105,8 @@ class Localization(BenchOptions):
     docs: str = ""
     """Folder of documents (docs) whose results/localization.md is to be made anew; by default none."""
     json: str = ""
-    """File for the numbers; by default results.json in the folder."""
+    """File for the numbers; by default results.json in the folder. -: also to standard output, and
+    text to standard error."""
 
     def run(self) -> None:
         """Run it, with tables and numbers."""
@@ -123,24 +126,37 @@ class Both(BenchOptions):
 
     readme: str = ""
     """Document for the one table, between its marks; by default none."""
+    json: str = ""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> None:
         """Run both, with tables, figures and numbers."""
-        run_both(self)
+        from pretouch.cli.writing import numbers_to
+
+        with numbers_to(self.json) as write:
+            write(run_both(self))
 
 
 def run_bench(bench: "Bench", options: BenchOptions, json: str) -> None:
     """Run what is missing of a benchmark, and show, write and draw what came out."""
-    from pretouch.cli.writing import check_writable
-    from pretouch_lab.cli.progress import worked
+    from pretouch_lab.cli.campaigns import results_to
     from pretouch_lab.documents import around
-    from pretouch_lab.domain_randomisation import sentence
-    from pretouch_lab.engine import missing
 
-    docs, json_file = options.documents, Path(json) if json else bench.out / "results.json"
+    docs = options.documents
     if docs:
         around(docs / bench.document, bench.name)  # an hour later would be late
     bench.open()
+    with results_to(json, bench.out) as (json_file, write):
+        _play(bench, json_file, docs)
+        write(_report(bench, json_file, docs))
+
+
+def _play(bench: "Bench", json_file: Path, docs: Path | None) -> None:
+    from pretouch.cli.writing import check_writable
+    from pretouch_lab.cli.progress import worked
+    from pretouch_lab.domain_randomisation import sentence
+    from pretouch_lab.engine import missing
+
     if bench.world:
         print(sentence(bench.world))
     check_writable("file", json_file)
@@ -154,10 +170,10 @@ def run_bench(bench: "Bench", options: BenchOptions, json: str) -> None:
             done = f"{len(tasks) - len(missing(tasks))} of {len(tasks)} pieces of work are there"
             print(f"Stopped: {done}; the same command with --out {bench.out} goes on.", file=sys.stderr)
         raise
-    _report(bench, json_file, docs)
 
 
-def _report(bench: "Bench", json_file: Path, docs: Path | None) -> None:
+def _report(bench: "Bench", json_file: Path, docs: Path | None) -> Any:
+    """Show, write and draw what was found, and return its numbers; None where there are none yet."""
     from rich.console import Console
 
     from pretouch.atomic_write import write_json
@@ -167,7 +183,7 @@ def _report(bench: "Bench", json_file: Path, docs: Path | None) -> None:
 
     found = bench.found()
     if found is None:
-        return
+        return None
     with unwritable_said("file", json_file):
         write_json(found.json, json_file)
     console, places = Console(highlight=False), [json_file]
@@ -183,10 +199,11 @@ def _report(bench: "Bench", json_file: Path, docs: Path | None) -> None:
         console.print(found.resolution, soft_wrap=True, markup=False)
     for place in places:
         console.print(f"Written: {place}", soft_wrap=True, markup=False)
+    return found.json
 
 
-def run_both(command: Both) -> None:
-    """Run what is missing of both, and show and write what came out of them together."""
+def run_both(command: Both) -> dict[str, Any]:
+    """Run what is missing of both, show and write what came out of them together, and return the numbers."""
     import json
 
     from rich.console import Console
@@ -217,3 +234,4 @@ def run_both(command: Both) -> None:
         if part in made:
             put(document, part, markdown(made[part]))
             print(f"Written: {document}")
+    return {"detection": detection, "avoidance": avoidance}

@@ -2,8 +2,8 @@
 
 import os
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from rich.console import Console
 
 from pretouch.atomic_write import write_json
 from pretouch.cli.tables import show
-from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.cli.writing import STANDARD_OUTPUT, check_writable, numbers_to, unwritable_said
 from pretouch.errors import ExperimentError, PretouchError
 from pretouch.text_table import TextTable
 from pretouch_lab.campaign import Request
@@ -23,12 +23,28 @@ from pretouch_lab.rows import Row
 
 
 def run_all(
-    parts: list[tuple[Request, Path]], folder: Path, json_file: Path, what: Callable[[Row], list[TextTable]] = tables
+    parts: list[tuple[Request, Path]], folder: Path, json: str = "", what: Callable[[Row], list[TextTable]] = tables
 ) -> None:
     """Run one or more campaigns; whatever happens, summarise and keep what was finished.
 
-    In the end it says what came out, after the tables that `what` makes of the summary.
+    In the end it says what came out, after the tables that `what` makes of the summary. `json` is as `results_to`
+    takes it.
     """
+    with results_to(json, folder) as (json_file, write):
+        write(_run_all(parts, folder, json_file, what))
+
+
+@contextmanager
+def results_to(json: str, folder: Path) -> Iterator[tuple[Path, Callable[[Any], None]]]:
+    """Give the file for the results, results.json in a folder unless --json names one, and what writes them for '-'."""
+    printed = json == STANDARD_OUTPUT
+    with numbers_to(json if printed else "") as write:
+        yield Path(json) if json and not printed else folder / "results.json", write
+
+
+def _run_all(
+    parts: list[tuple[Request, Path]], folder: Path, json_file: Path, what: Callable[[Row], list[TextTable]]
+) -> dict[str, Any]:
     for _, out in parts:
         _check_apart(json_file, out)
     for request, out in parts:
@@ -50,13 +66,15 @@ def run_all(
             said = str(error)
         print(said, file=sys.stderr)
         raise
-    summary = _keep(parts, json_file)["summary"]
+    results = _keep(parts, json_file)
+    summary = results["summary"]
     console = Console(highlight=False)
     show(console, what(summary))
     for said in conclusions(summary):
         console.print(f"{said}\n")
     console.print(f"Figures and page: {write_report(parts, summary, folder)}", soft_wrap=True, markup=False)
     console.print(f"Numbers: {json_file}", soft_wrap=True, markup=False)
+    return results
 
 
 def _keep(parts: list[tuple[Request, Path]], json_file: Path) -> dict[str, Any]:

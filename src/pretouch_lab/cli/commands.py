@@ -21,6 +21,9 @@ class Demo:
     """Trials of each cell of the static experiment; the other two take one."""
     out: str = ""
     """Folder for results, figures and page; by default a new one under runs/."""
+    json: str = ""
+    """File for all trials and their summary; by default results.json in the folder. -: also to standard output, and
+    text to standard error."""
 
     def run(self) -> None:
         """Play it, with results, figures and page."""
@@ -29,12 +32,12 @@ class Demo:
         from pretouch_lab.campaign import Request
         from pretouch_lab.cli.campaigns import run_all
 
-        prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
         out = Path(self.out) if self.out else new_folder("demo")
         few = Request(("avoidance", "dynamic"), seeds=1, profiles=_DEMONSTRATED)
         many = Request(("static",), seeds=self.seeds, profiles=_DEMONSTRATED)
+        prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
         # the long trials first, so that the bar moves on in small steps towards the end; tables are on the page
-        run_all([(few, out / "people"), (many, out / "static")], out, out / "results.json", lambda _: [])
+        run_all([(few, out / "people"), (many, out / "static")], out, self.json, lambda _: [])
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,8 @@ class Reproduce:
     out: str = ""
     """Folder for results, recordings, figures and page; by default runs/reproduce-EXPERIMENT."""
     json: str = ""
-    """File for all trials and their summary; by default results.json in the folder."""
+    """File for all trials and their summary; by default results.json in the folder. -: also to standard output, and
+    text to standard error."""
 
     def run(self) -> None:
         """Run the experiments, with results, recordings, figures and page."""
@@ -99,7 +103,7 @@ class Reproduce:
             print(context.placement.sentence(context.model.description.name))
         out = Path(self.out or f"runs/reproduce-{self.experiment}{folder_part(self.world)}")
         runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
-        run_all(runs, out, Path(self.json) if self.json else out / "results.json")
+        run_all(runs, out, self.json)
 
 
 @dataclass(frozen=True)

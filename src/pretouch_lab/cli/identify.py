@@ -1,6 +1,5 @@
 """`pretouch identify`: from recordings of free motion to a simulated arm like it, as table, figure and file."""
 
-import json
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -35,7 +34,7 @@ class Identify:
     figure: str = ""
     """Figure to write, ending in .png, .pdf or .svg: what is explained over time, and the autocorrelation."""
     json: str = ""
-    """File for the numbers."""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> None:
         """Identify the arm, and show and write what was found."""
@@ -44,26 +43,30 @@ class Identify:
 
 def identify_arm(command: Identify) -> None:
     """Read, identify, show, and write what is asked for."""
-    from pretouch.atomic_write import atomic_write
-    from pretouch.cli.writing import check_writable, unwritable_said
+    from pretouch.cli.writing import check_writable, numbers_to
     from pretouch.errors import RecordingError
+
+    out, figure = (Path(text) if text else None for text in (command.out, command.figure))
+    if figure and figure.suffix not in (".png", ".pdf", ".svg"):
+        raise RecordingError(f"The figure {figure} has no ending that says its format: use .png, .pdf or .svg.")
+    for what, place in (("file", out), ("figure", figure)):
+        if place:
+            check_writable(what, place)
+    with numbers_to(command.json) as write:
+        write(_identified(command, out, figure))
+
+
+def _identified(command: Identify, out: Path | None, figure: Path | None) -> dict[str, Any]:
+    from pretouch.atomic_write import atomic_write
+    from pretouch.cli.writing import unwritable_said
     from pretouch.sim.plant_params import plant_params_of
     from pretouch_lab.identification.arm_file import arm_toml
     from pretouch_lab.identification.free_motion import read_free_motion
     from pretouch_lab.identification.identify import identify
     from pretouch_lab.identification.params import usual_of
 
-    out, figure, json_file = (Path(text) if text else None for text in (command.out, command.figure, command.json))
-    if figure and figure.suffix not in (".png", ".pdf", ".svg"):
-        raise RecordingError(f"The figure {figure} has no ending that says its format: use .png, .pdf or .svg.")
-    for what, place in (("file", out), ("figure", figure), ("file", json_file)):
-        if place:
-            check_writable(what, place)
     samples, model, said = read_free_motion(Path(command.file), _model(command.arm), command.sign)
     found = identify(samples, model, usual_of(plant_params_of(model.description)))
-    if json_file:
-        with unwritable_said("file", json_file):
-            atomic_write(json_file, json.dumps(_numbers(found, model, command.file), indent=1, allow_nan=False) + "\n")
     if figure:
         image = BytesIO()
         _figure(found, model, command.file).savefig(image, format=figure.suffix[1:], dpi=120)
@@ -73,9 +76,10 @@ def identify_arm(command: Identify) -> None:
         with unwritable_said("file", out):
             atomic_write(out, arm_toml(found, model, Path(command.file).name))
     _show(found, model, said)
-    for what, place in (("Arm", out), ("Figure", figure), ("Numbers", json_file)):
+    for what, place in (("Arm", out), ("Figure", figure)):
         if place:
             print(f"{what}: {place}")
+    return _numbers(found, model, command.file)
 
 
 def _model(arm: str) -> "RobotModel | None":
@@ -88,17 +92,18 @@ def _model(arm: str) -> "RobotModel | None":
 def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     from rich.console import Console
 
-    from pretouch.cli.tables import grid
+    from pretouch.cli.tables import Grid
 
-    console = Console(highlight=False, soft_wrap=True, width=20 * (model.n + 2))
+    console = Console(highlight=False, soft_wrap=True)
     console.print(f"{said}. {found.seconds:.0f} s of free motion are used.", markup=False)
     for note in found.notes:
         console.print(note, markup=False)
-    rows = [
+    columns = [
         (name, *(_shown(*each) for each in zip(values, errors, identifiable, strict=True)))
         for name, values, errors, identifiable in joint_rows(found, model)
     ]
-    console.print(grid(("", *model.joints), rows, whole=1))
+    heading, *rows = zip(("joint", *model.joints), *columns, strict=True)
+    console.print(Grid(heading, rows))
     payload, error = float(found.fit.numbers[-2]), float(found.fit.errors[-2])
     console.print(f"Payload {payload:.3f} +- {error:.3f} kg.", markup=False)
     noise = found.noise
@@ -153,24 +158,20 @@ def joint_rows(found: "Identified", model: "RobotModel") -> list[tuple[str, Any,
 
 
 def _numbers(found: "Identified", model: "RobotModel", source: str) -> dict[str, Any]:
+    import numpy as np
+
     noise = found.noise
-    velocity = noise.velocity_rad_s if noise.velocity_rad_s == noise.velocity_rad_s else None
     return {
-        "recording": source, "arm": model.description.name, "joints": list(model.joints), "used_s": found.seconds,
-        "notes": list(found.notes), "contact_spans_s": [list(span) for span in found.spans],
+        "recording": source, "arm": model.description.name, "joints": model.joints, "used_s": found.seconds,
+        "notes": found.notes, "contact_spans_s": found.spans,
         "of_joints": [
-            {
-                "name": name, "values": values.tolist(), "standard_errors": errors.tolist(),
-                "told": [bool(t) for t in identifiable],
-            }
+            {"name": name, "values": values, "standard_errors": errors, "told": identifiable}
             for name, values, errors, identifiable in joint_rows(found, model)
         ],
-        "payload_kg": [float(found.fit.numbers[-2]), float(found.fit.errors[-2])],
-        "velocity_noise_rad_s": velocity,
-        "observer_gain_1_s": [found.fit.gain, float(found.fit.errors[-1])] if velocity else None,
+        "payload_kg": [found.fit.numbers[-2], found.fit.errors[-2]], "velocity_noise_rad_s": noise.velocity_rad_s,
+        "observer_gain_1_s": [found.fit.gain, found.fit.errors[-1]] if np.isfinite(noise.velocity_rad_s) else None,
         "observer_gain_by_autocorrelation_1_s": [noise.gain_1_s, noise.gain_error_1_s],
-        "correlation": noise.correlation.tolist(), "lag_s": noise.period_s,
-        "autocorrelation": noise.autocorrelation.tolist(),
+        "correlation": noise.correlation, "lag_s": noise.period_s, "autocorrelation": noise.autocorrelation,
     }  # fmt: skip
 
 

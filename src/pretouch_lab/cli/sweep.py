@@ -3,7 +3,7 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
@@ -58,14 +58,19 @@ class Sweep:
     """Folder for everything; by default runs/sweep or runs/sweep-sensitivity."""
     docs: str = ""
     """Folder of documents (docs) whose results/sensitivity.md and images are to be made anew; by default none."""
+    json: str = ""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> None:
         """Play what is missing, with tables, indices and figures."""
-        sweep(self)
+        from pretouch.cli.writing import numbers_to
+
+        with numbers_to(self.json) as write:
+            write(sweep(self))
 
 
-def sweep(command: Sweep) -> None:
-    """Play what is missing, and write and show what came out."""
+def sweep(command: Sweep) -> dict[str, Any]:
+    """Play what is missing, write and show what came out, and return the indices of each sweep."""
     from rich.console import Console
 
     from pretouch.cli.tables import show
@@ -97,6 +102,7 @@ def sweep(command: Sweep) -> None:
     for run in runs:
         console.print(f"Numbers: {run.folder / 'results.parquet'} and indices.json", soft_wrap=True, markup=False)
     _say_failures(runs)
+    return {run.sweep.name: about for run, about in made}
 
 
 def defined(command: Sweep) -> "list[Defined]":

@@ -127,10 +127,10 @@ def test_bench_free_motion_is_a_campaign(monkeypatch):
     runs = []
     monkeypatch.setattr("pretouch_lab.cli.campaigns.run_all", lambda *given: runs.append(given))
     assert cli.main(["bench", "free-motion", "--seeds", "3"]) == 0
-    (((request, out),), folder, numbers) = runs[0]
+    (((request, out),), folder, json) = runs[0]
     assert (request.experiments, request.seeds) == (("free-motion",), 3)
     assert str(out) == str(folder) == "runs/bench-free-motion"
-    assert str(numbers) == "runs/bench-free-motion/results.json"
+    assert json == ""
 
 
 def test_bench_cycle_shows_and_writes_what_it_measured(capsys, tmp_path):

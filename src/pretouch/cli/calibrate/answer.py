@@ -6,16 +6,13 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 from scipy.spatial.transform import Rotation
 
-from pretouch.atomic_write import write_json
 from pretouch.calibration.observability import Observability
 from pretouch.calibration.result import Calibration, Finding, Place, UnitCalibration
 from pretouch.calibration.skin_of import skin_of
 from pretouch.cli.calibrate.outputs import Outputs
-from pretouch.cli.tables import grid
-from pretouch.cli.writing import unwritable_said
+from pretouch.cli.tables import Grid
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, save_skin
@@ -48,19 +45,16 @@ def give(answer: Answer, outputs: Outputs) -> int:
     notes = [*answer.notes, *(finding.sentence for finding in answer.calibration.findings)]
     for sentence in (*notes, *_sentences(answer)):
         console.print(sentence, soft_wrap=True, markup=False)
-    if outputs.json:
-        with unwritable_said("file", outputs.json):
-            write_json(numbers(answer.model, answer.calibration, answer.clock_ahead, notes), outputs.json)
-        console.print(f"Numbers: {outputs.json}", soft_wrap=True, markup=False)
+    outputs.write(numbers(answer.model, answer.calibration, answer.clock_ahead, notes))
     if outputs.skin:
         console.print(_written(answer, outputs), soft_wrap=True, markup=False)
     return int(not all(unit.accepted for unit in answer.calibration.units))
 
 
-def _table(answer: Answer) -> Table:
+def _table(answer: Answer) -> Grid:
     units = answer.calibration.units
     styles = ["bold red" if not unit.accepted else "yellow" if unit.findings else "" for unit in units]
-    return grid(_COLUMNS, map(_cells, units), left=_TEXT, whole=2, styles=styles)
+    return Grid(_COLUMNS, [_cells(unit) for unit in units], 2, _TEXT, broken=2, styles=styles)
 
 
 def _cells(unit: UnitCalibration) -> tuple[str, ...]:
@@ -106,8 +100,8 @@ def _written(answer: Answer, outputs: Outputs) -> str:
 
 
 def numbers(model: RobotModel, calibration: Calibration, clock_ahead: float, notes: Sequence[str]) -> dict[str, Any]:
-    """Return all numbers of a calibration; what is not finite is None."""
-    told = {
+    """Return all numbers of a calibration."""
+    return {
         "arm": model.description.name,
         "clock_ahead_s": clock_ahead,
         "board_misalignment_sigma_rad": calibration.orientation_floor,
@@ -115,8 +109,6 @@ def numbers(model: RobotModel, calibration: Calibration, clock_ahead: float, not
         "units": [_unit(unit) for unit in calibration.units],
         "findings": [_finding(finding) for finding in calibration.findings],
     }
-    plain: dict[str, Any] = _plain(told)
-    return plain
 
 
 def _unit(unit: UnitCalibration) -> dict[str, Any]:
@@ -161,14 +153,3 @@ def _observability(seen: Observability) -> dict[str, Any]:
 
 def _finding(finding: Finding) -> dict[str, Any]:
     return {"kind": finding.kind, "sentence": finding.sentence, "refused": finding.refused}
-
-
-def _plain(value: Any) -> Any:
-    """Return arrays as lists, and numbers that are not finite as None."""
-    if isinstance(value, dict):
-        return {name: _plain(part) for name, part in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(part) for part in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

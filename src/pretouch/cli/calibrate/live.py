@@ -50,7 +50,7 @@ def calibrate_live(command: "Calibrate", outputs: Outputs) -> int:
         raise CalibrationError("--out is missing: name the skin file to write.")
     if not command.live.units_host:
         raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
-    place = _recording_place(command, outputs)
+    place = _recording_place(command)
     model, again = RobotModel(robot_named(command.arm)), _again(command, place)
     with _session(command, model) as session:
         ways = _ways(session, model, command.motion)
@@ -71,9 +71,9 @@ def calibrate_live(command: "Calibrate", outputs: Outputs) -> int:
         raise
 
 
-def _recording_place(command: "Calibrate", outputs: Outputs) -> Path:
+def _recording_place(command: "Calibrate") -> Path:
     """Return the recording to write, which is not there yet."""
-    out, others = Path(command.out), [file for file in (outputs.skin, outputs.json) if file]
+    out, others = Path(command.out), [Path(file) for file in (command.out, command.json) if file]
     beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
     free = (one for one in beside if not one.exists() and not any(same_file(file, one) for file in others))
     place = Path(command.live.record or next(free))

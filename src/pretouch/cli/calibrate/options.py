@@ -80,7 +80,7 @@ class Calibrate:
     out: str = ""
     """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
     json: str = ""
-    """File for all numbers."""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
     replace: bool = False
     """Overwrite existing files."""
     arm: str = "panda"
@@ -155,7 +155,7 @@ def calibrate_skin(command: Calibrate, mode: Mode) -> int:
 
 
 def _calibrated(command: Calibrate, mode: Mode) -> int:
-    from pretouch.cli.calibrate.outputs import Outputs
+    from pretouch.cli.calibrate.outputs import outputs_of
     from pretouch.cli.calibrate.recording import Sources, calibrate_recording
     from pretouch.robot.model import RobotModel
     from pretouch.robot.named import robot_named
@@ -165,13 +165,12 @@ def _calibrated(command: Calibrate, mode: Mode) -> int:
 
         write_motion(command)
         return 0
-    outputs = Outputs.of(command)
-    if mode == "robot":
-        from pretouch.cli.calibrate.live import calibrate_live
+    with outputs_of(command) as outputs:
+        if mode == "robot":
+            from pretouch.cli.calibrate.live import calibrate_live
 
-        return calibrate_live(command, outputs)
-    c = command.recorded
-    joints, skin = (Path(text) if text else None for text in (c.joints, command.skin))
-    return calibrate_recording(
-        RobotModel(robot_named(command.arm)), Sources(Path(c.recording), joints, c.topic, skin), outputs
-    )
+            return calibrate_live(command, outputs)
+        c = command.recorded
+        joints, skin = (Path(text) if text else None for text in (c.joints, command.skin))
+        sources = Sources(Path(c.recording), joints, c.topic, skin)
+        return calibrate_recording(RobotModel(robot_named(command.arm)), sources, outputs)

@@ -1,12 +1,14 @@
 """Files that `pretouch skin calibrate` writes."""
 
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any
 
-from pretouch.cli.writing import check_writable
+from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.errors import CalibrationError
 
 if TYPE_CHECKING:
@@ -20,23 +22,24 @@ class Outputs:
     """Where the answer goes, besides the terminal."""
 
     skin: Path | None
-    json: Path | None
+    write: Callable[[Any], None]
+    """Takes the numbers."""
 
-    @classmethod
-    def of(cls, command: "Calibrate") -> Self:
-        """Return what is asked for.
 
-        CalibrationError or ExperimentError for what could not be written, or is also another input or output file.
-        """
-        made = cls(Path(command.out) if command.out else None, Path(command.json) if command.json else None)
-        _check_apart(command)
-        if made.skin:
-            check_free("skin file", made.skin, command.replace)
-            check_writable("skin file", made.skin)
-        if made.json:
-            check_free("file", made.json, command.replace)
-            check_writable("file", made.json)
-        return made
+@contextmanager
+def outputs_of(command: "Calibrate") -> Iterator[Outputs]:
+    """Give what is asked for.
+
+    CalibrationError or ExperimentError for what could not be written, or is also another input or output file.
+    """
+    _check_apart(command)
+    skin = Path(command.out) if command.out else None
+    if skin:
+        check_free("skin file", skin, command.replace)
+        check_writable("skin file", skin)
+    check_free("file", Path(command.json), command.replace)
+    with numbers_to(command.json) as write:
+        yield Outputs(skin, write)
 
 
 def check_free(what: str, place: Path, replace: bool) -> None:

@@ -1,9 +1,9 @@
 """What `pretouch run` does, in order: checks, guided push, announcement, motion, report."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,8 +31,8 @@ PREFLIGHT, PUSH = PreflightParams(), PushParams()
 """What arm and pushes must be like."""
 
 
-def run(command: "Run") -> int:
-    """Move an arm; return 1 if the run ended early or its recording failed, or else 0."""
+def run(command: "Run", write: Callable[[Any], None]) -> int:
+    """Move an arm, and write its numbers; return 1 if the run ended early or its recording failed, or else 0."""
     check_wishes(command.priority, command.cpu)
     if command.record:
         _check_free(Path(command.record))
@@ -42,15 +42,15 @@ def run(command: "Run") -> int:
     if command.robot.lockstep:
         from pretouch.cli.run.lockstep import run_lockstep
 
-        return run_lockstep(command, made)
+        return run_lockstep(command, made, write)
     with ExitStack() as last, opened(command, made) as found:
         try:
-            return _run(command, made, found, last)
+            return _run(command, made, found, last, write)
         finally:
             last.enter_context(noted_in_motion())  # until arm and units are closed
 
 
-def _run(command: "Run", made: RunSetup, found: OpenedRobot, last: ExitStack) -> int:
+def _run(command: "Run", made: RunSetup, found: OpenedRobot, last: ExitStack, write: Callable[[Any], None]) -> int:
     """Check, ask, and let the arm move; see `execute`."""
     remembered = ConfirmedRobots(state_folder())
     known = found.identity is not None and remembered.is_confirmed(found.identity)  # a damaged file is found out first
@@ -67,7 +67,7 @@ def _run(command: "Run", made: RunSetup, found: OpenedRobot, last: ExitStack) ->
         if found.identity:
             remembered.keep(found.identity)
         say("The force sign is confirmed: the robot reports the force on the arm, in the base frame.")
-    return execute(command, session, found, _confirm_motion(command, session, made, rest), learnt, last)
+    return execute(command, session, found, _confirm_motion(command, session, made, rest), learnt, last, write)
 
 
 def _checked(session: Session, approach: bool, notes: Sequence[str]) -> Standstill:

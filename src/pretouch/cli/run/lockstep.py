@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from pretouch.cli.run.options import Run
 
 
-def run_lockstep(command: "Run", setup: RunSetup) -> int:
-    """Let a controller move a simulated arm that waits for it; return 1 if that ended early, or else 0.
+def run_lockstep(command: "Run", setup: RunSetup, write: Callable[[Any], None]) -> int:
+    """Let a controller move a simulated arm that waits for it, and write the numbers; return 1 if that ended early.
 
     Nobody is asked anything: nothing is real.
     """
@@ -57,6 +57,7 @@ def run_lockstep(command: "Run", setup: RunSetup) -> int:
             finally:
                 said = (*reporter.summary.sentences(controller.limits.period), *kept.close())
                 say("\n".join((*ending.sentences(), *said)))
+                write(reporter.summary.numbers(controller.limits.period) | ending.numbers())
     return int(ending.early or bool(kept.trouble))
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,8 +43,9 @@ class PlannedRun:
 
 
 def execute(
-    command: "Run", session: Session, found: OpenedRobot, way: PlannedRun, learnt: FreeMotion | None, last: ExitStack
-) -> int:
+    command: "Run", session: Session, found: OpenedRobot, way: PlannedRun, learnt: FreeMotion | None, last: ExitStack,
+    write: Callable[[Any], None],
+) -> int:  # fmt: skip
     """Let the arm move and report, whatever ends it; return 1 if it did not end as asked, or else 0.
 
     All that the run is kept in is opened first. From the report to the end of `last`, signals are only noted.
@@ -67,6 +68,7 @@ def execute(
             last.enter_context(noted_in_motion())
             tell.close()
             _report(session, reporter, clock, kept, ending, further.notes if further else ())
+            write(reporter.summary.numbers(clock.period) | ending.numbers() | {"timing": clock.timing().numbers()})
     return int(ending.early or bool(kept.trouble))
 
 

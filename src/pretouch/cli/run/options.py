@@ -111,6 +111,8 @@ class Run:
     task: TaskOptions = field(default_factory=TaskOptions)
     record: str = ""
     """Recording to write."""
+    json: str = ""
+    """File for the numbers at the end, or - for standard output: text then goes to standard error."""
     holds: str = "runs/holds"
     """Folder for the last seconds before a HOLD that lasts until a person resumes."""
     priority: int | None = None
@@ -125,9 +127,11 @@ class Run:
     def run(self) -> int | None:
         """Move the arm. Where a signal ended the run in order, its code is the exit code."""
         from pretouch.cli.run.command import run
+        from pretouch.cli.writing import numbers_to
 
         check_options(self)
-        return run(self) or None
+        with numbers_to(self.json) as write:
+            return run(self, write) or None
 
 
 def check_options(command: Run) -> None:

@@ -1,0 +1,120 @@
+"""--json: every command that shows numbers has it, and - gives one document and nothing else."""
+
+import json
+import math
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from pretouch import cli
+from pretouch.cli.writing import numbers_to, plain
+from pretouch.loop import Cycle
+from pretouch.recording.writer import Recording
+from pretouch.session.push import GuidedPush
+from pretouch.types import Inputs
+from tests.cli.commands import COMMANDS
+from tests.following_arm import DT, Arm
+from tests.imported_data.files import pushed
+from tests.importing.made import six_axis, written
+
+WITHOUT = {
+    "live": "serves a page",
+    "recover": "writes a recording, and says so",
+    "report": "writes a page",
+    "skin simulate": "sends what units send",
+    "skin provision": "sets a unit up, and says so",
+    "warm-up": "compiles",
+    "serve-fci": "serves an arm",
+    "figure": "writes a picture",
+}
+"""Commands that conclude with no numbers."""
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_has_json_or_a_reason_to_have_none(name):
+    kept = {one.name: one for one in fields(COMMANDS[name])}
+    assert ("json" in kept) != (name in WITHOUT)
+    if "json" in kept:
+        assert kept["json"].default == ""
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in WITHOUT])
+def test_help_says_what_a_dash_does(capsys, name):
+    with pytest.raises(SystemExit):
+        cli.main([*name.split(), "--help"])
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split()).partition("--json STR ")[2]
+    assert "standard output" in said.partition("--")[0]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory, panda_model, paper_skin):
+    """A folder with a force, an arm, keys, and a recording with a push."""
+    folder = tmp_path_factory.mktemp("files")
+    forces = pushed(5.0, ((2.0, 0.6, (0.0, 40.0, 0.0)),))
+    np.savetxt(
+        folder / "force.csv", np.column_stack([DT * np.arange(len(forces)), np.array(forces)[:, :3]]), delimiter=",",
+        header="time_s,force_x_N,force_y_N,force_z_N", comments="",
+    )  # fmt: skip
+    arm = Arm(panda_model, paper_skin)
+    with Recording(folder / "run.mcap", arm.controller) as recording:
+        for sample in forces:
+            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings()), arm.state
+            step, arm.state = arm.controller.step(before, inputs)
+            recording.record(Cycle(inputs, before, step, arm.state))
+            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
+    told = ["robot", "import", str(written(folder, six_axis())), "--capsules", "1", "--ready", "0,0.3,1.2,0,1.6,0"]
+    assert cli.main([*told, "--out", str(folder / "arm")]) == 0
+    assert cli.main(["skin", "keys", "--keys", str(folder / "keys.toml"), "--new", "a,b"]) == 0
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("words", "holds"),
+    [
+        ("skin keys --keys keys.toml", {"units"}),
+        ("skin monitor --keys keys.toml --port 0 --duration 0.3", {"elapsed_s", "units", "findings"}),
+        ("skin coverage --postures 2", {"links", "blind_spots"}),
+        ("robot check arm", {"joints", "manipulability", "clear_m"}),
+        ("detect force.csv --profiles paper,blind", {"first_sample_s", "profiles"}),
+        ("replay run.mcap --no-page", {"contacts", "held_share", "duration_s"}),
+        ("replay run.mcap --verify", {"verified"}),
+        ("replay run.mcap --no-page --profile blind", {"compared"}),
+        ("run --no-skin --profile blind --path hold --seconds 0.2 --yes", {"contacts", "held_s", "timing"}),
+        ("bench cycle --points 3 --cycles 20", {"about", "rows"}),
+    ],
+)
+def test_a_dash_is_one_document_on_standard_output_and_text_beside_it(files, capsys, monkeypatch, words, holds):
+    monkeypatch.chdir(files)
+    monkeypatch.setenv("XDG_STATE_HOME", str(files))
+    monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
+    code = cli.main([*words.split(), "--json", "-"])
+    said = capsys.readouterr()
+    assert code == int("monitor" in words)  # no unit is heard
+    found = json.loads(said.out, parse_constant=pytest.fail)
+    assert holds <= set(found)
+    assert said.err.strip()
+    assert not (files / "-").exists()
+
+
+def test_what_ends_a_command_leaves_standard_output_empty(capsys, tmp_path):
+    assert cli.main(["replay", str(tmp_path / "gone.mcap"), "--no-page", "--json", "-"]) == 2
+    assert capsys.readouterr().out == ""
+
+
+def test_a_file_of_numbers_is_named(capsys, tmp_path):
+    with numbers_to(tmp_path / "new" / "a.json") as write:
+        print("text")
+        write({"force_n": np.array([1.0, math.nan]), "count": np.int64(3), "pair": (1, None)})
+    assert capsys.readouterr().out == f"text\nNumbers: {tmp_path / 'new' / 'a.json'}\n"
+    assert json.loads((tmp_path / "new" / "a.json").read_text()) == {
+        "force_n": [1, None],
+        "count": 3,
+        "pair": [1, None],
+    }
+
+
+def test_what_is_not_finite_is_null():
+    assert plain({"a": math.inf, "b": [-math.inf, {"c": np.float32("nan")}], "d": True}) == {
+        "a": None, "b": [None, {"c": None}], "d": True,
+    }  # fmt: skip
