@@ -52,7 +52,7 @@ micropython:
 	npm install --prefix build/micropython --no-package-lock --no-audit --no-fund --silent
 
 test: setup
-	$(BIN)/pytest -n 2 --dist worksteal -m "not slow" --list-skipped build/skipped
+	$(BIN)/pytest -n 2 --dist worksteal -m "not slow" --list-skipped=build/skipped
 
 # the files in which the last `make test` skipped something, once what they need is installed; nothing may be skipped now
 test-skipped: setup
