@@ -1,6 +1,7 @@
 """What the command line says of itself, and of words that it does not take."""
 
 import re
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -79,9 +80,11 @@ def test_the_name_of_the_table_is_a_profile():
     assert profile("paper-off") == replace(profile("paper:restriction.mode=off"), name="paper-off")
 
 
-def test_a_reader_that_has_seen_enough_is_no_error():
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_has_seen_enough_is_no_error(unbuffered):
     command = [sys.executable, "-m", "pretouch.cli", "run", "--help"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as done:
+    env = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+    with subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as done:
         assert done.stdout is not None
         assert done.stderr is not None
         done.stdout.close()

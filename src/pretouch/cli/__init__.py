@@ -29,7 +29,10 @@ def main(args: list[str] | None = None) -> int:
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
     try:
         with ends_raise():
-            code = _read(sys.argv[1:] if args is None else args, errors).run()
+            try:
+                code = _read(sys.argv[1:] if args is None else args, errors).run()
+            finally:
+                sys.stdout.flush()  # help ends in SystemExit: a closed pipe is noticed here, not when Python ends
     except PretouchError as error:
         errors.print(str(error), markup=False)
         return _USAGE
