@@ -1,7 +1,7 @@
 """What the command line says of itself, and of words that it does not take."""
 
-import re
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
