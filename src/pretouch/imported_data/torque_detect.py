@@ -23,7 +23,7 @@ _NOTHING = Obstacles(
     unit=np.zeros(0, np.int64), point=np.zeros((0, 3)), ee_distance=np.zeros(0), body_point=np.zeros((0, 3)),
     link=np.zeros(0, np.int64), direction=np.zeros((0, 3)), body_distance=np.zeros(0), closing_speed=np.zeros(0),
 )  # fmt: skip
-_MOVING_RAD_S = 0.02
+MOVING_RAD_S = 0.02
 """Speed of any joint from which the arm moves [rad/s]."""
 _DAMPING, _SINGULAR = 0.01, 0.02
 """Of the least squares by which a robot's interface makes a wrench of torques, and the smallest singular value of the
@@ -131,7 +131,7 @@ def detect_torques(recording: TorqueRecording, profile: Profile) -> TorqueDecisi
         name=profile.name, time=stream.time, tau_ext=recording.tau_ext[stream.newest],
         residual=np.array([d.residual for d in found]), evidence=np.array([d.evidence for d in found]),
         one_sample=np.array([(d.thresholds.upper - d.thresholds.mean).max() for d in found]),
-        armed=np.array([d.armed for d in found]), moving=np.abs(qd).max(axis=1) > _MOVING_RAD_S,
+        armed=np.array([d.armed for d in found]), moving=np.abs(qd).max(axis=1) > MOVING_RAD_S,
         contacts=events.all(), kept=tuple(kept),
     )  # fmt: skip
 

@@ -1,0 +1,167 @@
+"""`pretouch detect` on joint torques: what the profiles find, as tables, figure or page, and numbers."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from pretouch.cli.detect_drawing import write_drawing
+from pretouch.cli.tables import show
+from pretouch.errors import RecordingError
+from pretouch.imported_data.events import ContactEvent
+from pretouch.imported_data.torque_results import ProfileResult, result_of
+from pretouch.imported_data.torque_summary import PUSH_S
+from pretouch.imported_data.torques import TorqueRecording
+from pretouch.profiles import Profile
+from pretouch.text_table import TextTable
+
+_NO = "–"
+
+
+def show_torques(
+    recording: TorqueRecording, profiles: Sequence[Profile], out: Path | None, write: Callable[[Any], None]
+) -> None:
+    """Run profiles over a recording of torques, show what they found, and write figure or page and numbers."""
+    results = [result_of(recording, profile) for profile in profiles]
+    if not any(r.by_torques or r.by_force for r in results):
+        raise RecordingError(results[0].notes[0])
+    notes = list(dict.fromkeys([*recording.notes, *(note for r in results for note in r.notes)]))
+    said = [*(_guidance(r) for r in results), recording.said, *notes]
+    tables = [_contacts(results), _profiles(results), *_joints(recording, results)]
+    if out:
+        _draw(recording, results, said, tables, out)
+    write(_numbers(recording, results, notes))
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(
+        f"{recording.place}: {len(recording.time)} samples in {recording.time[-1]:.1f} s, {recording.rate:.4g} Hz, the"
+        f" first at {recording.first_s:.3f} s: times below count from it.",
+        markup=False,
+    )
+    for sentence in [recording.said, *notes]:
+        console.print(sentence, markup=False)
+    show(console, tables)
+    for r in results:
+        console.print(_guidance(r), markup=False)
+    if out:
+        print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
+
+
+def _guidance(r: ProfileResult) -> str:
+    count = len(r.contacts)
+    contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.duration / 60:.1f} min"
+    if not r.motion:
+        return f"{r.profile.name}: {contacts}; the arm does not move."
+    return (
+        f"{r.profile.name}: {contacts}, {r.in_motion} of them in {r.motion / 60:.1f} min of motion; if nobody touched the"
+        f" arm, these are {r.per_hour:.3g} false alarms an hour."
+    )
+
+
+def _contacts(results: Sequence[ProfileResult]) -> TextTable:
+    found = sorted(((r.profile.name, c) for r in results for c in r.contacts), key=lambda pair: pair[1].time)
+    rows = [_contact_row(name, c) for name, c in found] or [("none", *[""] * 9)]
+    header = ("profile", "link", "time [s]", *(f"{axis} [m]" for axis in "xyz"), "force x [N]", "y", "z", "norm")
+    note = (
+        "Link, place and force on the robot are those where the contact stands out most, base frame; without a link the"
+        " force is that at the end-effector."
+    )
+    return TextTable("Contacts", header, tuple(rows), note)
+
+
+def _contact_row(name: str, c: ContactEvent) -> tuple[str, ...]:
+    place = [_shown(value, 3) for value in c.point]
+    return name, c.link or _NO, f"{c.time:.3f}", *place, *(_shown(v, 1) for v in (*c.force, np.linalg.norm(c.force)))
+
+
+def _profiles(results: Sequence[ProfileResult]) -> TextTable:
+    rows = []
+    for r in results:
+        one, push = (r.by_torques[1].one_sample, r.by_torques[1].push) if r.by_torques else (r.width, np.zeros(0))
+        parts = [_shown(float(np.quantile(push, q)), 1) if len(push) else _NO for q in (0.5, 0.9)]
+        largest = _shown(r.by_torques[1].evidence, 2) if r.by_torques else _NO
+        rows.append((
+            r.profile.name, str(len(r.contacts)), f"{r.duration:.1f}", f"{r.motion:.1f}", _shown(r.per_hour, 1), largest,
+            _shown(one, 1), *parts,
+        ))  # fmt: skip
+    header = (
+        "profile", "contacts", "armed [s]", "in motion [s]", "contacts an hour of motion", "evidence without contact",
+        "force in one sample [N]", f"in {1000 * PUSH_S:.0f} ms [N]", "in 90 % [N]",
+    )  # fmt: skip
+    note = (
+        "A contact is evidence from 1 on. The last three are forces at the end-effector that are found: by one sample"
+        f" alone along the worst axis (median), and pushes of {1000 * PUSH_S:.0f} ms laid on the recorded torques in free"
+        " motion along all axes, which half and 90 % of the places need."
+    )
+    return TextTable("Detection", header, tuple(rows), note, 1)
+
+
+def _joints(recording: TorqueRecording, results: Sequence[ProfileResult]) -> list[TextTable]:
+    made = []
+    for r in results:
+        if r.by_torques:
+            s = r.by_torques[1]
+            columns = zip(recording.model.joints, s.before, s.mean, s.sigma, strict=True)
+            rows = tuple((name, *(_shown(value, 3) for value in values)) for name, *values in columns)
+            header = ("joint", "external torque, sigma", "residual, mean", "residual, sigma")
+            note = "Outside contacts; the residual is what learnt free motion does not explain."
+            made.append(TextTable(f"Torques in free motion [Nm], {r.profile.name}", header, rows, note, 1))
+    return made
+
+
+def _shown(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else "inf" if value > 0 else _NO
+
+
+def _draw(
+    recording: TorqueRecording, results: Sequence[ProfileResult], said: list[str], tables: list[TextTable], out: Path
+) -> None:
+    from pretouch.imported_data.figure import decisions_figure
+    from pretouch.imported_data.torque_figure import torque_figure
+
+    title = recording.place.name
+    figures = [
+        (torque_figure(r.by_torques[0], recording.model.joints, f"{title}: {r.profile.name}"), f"{r.profile.name}: joint"
+         " torques, what free motion does not explain of them, and the evidence. Red: contacts.")
+        for r in results if r.by_torques
+    ]  # fmt: skip
+    if forces := [r.by_force for r in results if r.by_force]:
+        figures.append((decisions_figure(forces, title), "Force at the end-effector, from the torques, and thresholds."))
+    write_drawing(title, said, tables, figures, out)
+
+
+def _numbers(recording: TorqueRecording, results: Sequence[ProfileResult], notes: list[str]) -> dict[str, Any]:
+    found = [_of_profile(r) for r in results]
+    return {
+        "recording": str(recording.place), "assumed": recording.said, "notes": notes, "samples": len(recording.time),
+        "first_sample_s": recording.first_s, "duration_s": recording.time[-1], "rate_hz": recording.rate,
+        "arm": recording.model.description.name, "joints": recording.model.joints,
+        "contacts": found[0]["contacts"], "profiles": found,
+    }  # fmt: skip
+
+
+def _of_profile(r: ProfileResult) -> dict[str, Any]:
+    numbers = {
+        "profile": r.profile.name, "control_rate_hz": 1 / r.profile.task.control_period_s,
+        "contacts": [_contact_numbers(c) for c in r.contacts],
+        "armed_s": r.duration, "motion_s": r.motion, "contacts_in_motion": r.in_motion,
+        "contacts_per_hour_of_motion": r.per_hour,
+    }  # fmt: skip
+    if r.by_torques is None:
+        return numbers | {"threshold_width_n": r.width}
+    s = r.by_torques[1]
+    half, most = np.quantile(s.push, (0.5, 0.9)) if len(s.push) else (np.nan, np.nan)
+    return numbers | {
+        "residual_mean_nm": s.mean, "residual_sigma_nm": s.sigma, "external_torque_sigma_nm": s.before,
+        "largest_evidence_without_contact": s.evidence, "one_sample_force_n": s.one_sample,
+        "push_s": PUSH_S, "push_force_median_n": half, "push_force_90_percent_n": most,
+    }  # fmt: skip
+
+
+def _contact_numbers(c: ContactEvent) -> dict[str, Any]:
+    known = bool(c.link)
+    return {
+        "time_s": c.time, "link": c.link if known else None, "point_m": c.point if known else None, "force_n": c.force,
+        "norm_n": np.linalg.norm(c.force), "end_s": c.end, "probability": c.probability, "evidence": c.evidence,
+    }  # fmt: skip
