@@ -18,6 +18,8 @@ from pretouch.profiles import Profile
 from pretouch.text_table import TextTable
 
 _NO = "–"
+_LONGEST = 24
+"""Characters of a profile's name that a table has room for."""
 
 
 def show_torques(
@@ -28,8 +30,10 @@ def show_torques(
     if not any(r.by_torques or r.by_force for r in results):
         raise RecordingError(results[0].notes[0])
     notes = list(dict.fromkeys([*recording.notes, *(note for r in results for note in r.notes)]))
-    said = [*(_guidance(r) for r in results), recording.said, *notes]
-    tables = [_contacts(results), _profiles(results), *_joints(recording, results)]
+    labels = _labels(results)
+    notes += [f"{label} is {r.profile.name}." for label, r in zip(labels, results, strict=True) if label != r.profile.name]
+    said = [*(_guidance(label, r) for label, r in zip(labels, results, strict=True)), recording.said, *notes]
+    tables = [_contacts(labels, results), _profiles(labels, results), *_joints(recording, labels, results)]
     if out:
         _draw(recording, results, said, tables, out)
     write(_numbers(recording, results, notes))
@@ -42,25 +46,32 @@ def show_torques(
     for sentence in [recording.said, *notes]:
         console.print(sentence, markup=False)
     show(console, tables)
-    for r in results:
-        console.print(_guidance(r), markup=False)
+    for label, r in zip(labels, results, strict=True):
+        console.print(_guidance(label, r), markup=False)
     if out:
         print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
 
 
-def _guidance(r: ProfileResult) -> str:
+def _labels(results: Sequence[ProfileResult]) -> list[str]:
+    """Names of profiles for tables: those of long changes are numbered."""
+    names = [r.profile.name for r in results]
+    return [name if len(name) <= _LONGEST else f"{name.partition(':')[0]} ({k})" for k, name in enumerate(names, 1)]
+
+
+def _guidance(name: str, r: ProfileResult) -> str:
     count = len(r.contacts)
     contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.duration / 60:.1f} min"
     if not r.motion:
-        return f"{r.profile.name}: {contacts}; the arm does not move."
+        return f"{name}: {contacts}; the arm does not move."
     return (
-        f"{r.profile.name}: {contacts}, {r.in_motion} of them in {r.motion / 60:.1f} min of motion; if nobody touched the"
+        f"{name}: {contacts}, {r.in_motion} of them in {r.motion / 60:.1f} min of motion; if nobody touched the"
         f" arm, these are {r.per_hour:.3g} false alarms an hour."
     )
 
 
-def _contacts(results: Sequence[ProfileResult]) -> TextTable:
-    found = sorted(((r.profile.name, c) for r in results for c in r.contacts), key=lambda pair: pair[1].time)
+def _contacts(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTable:
+    pairs = zip(labels, results, strict=True)
+    found = sorted(((name, c) for name, r in pairs for c in r.contacts), key=lambda pair: pair[1].time)
     rows = [_contact_row(name, c) for name, c in found] or [("none", *[""] * 9)]
     header = ("profile", "link", "time [s]", *(f"{axis} [m]" for axis in "xyz"), "force x [N]", "y", "z", "norm")
     note = (
@@ -75,14 +86,14 @@ def _contact_row(name: str, c: ContactEvent) -> tuple[str, ...]:
     return name, c.link or _NO, f"{c.time:.3f}", *place, *(_shown(v, 1) for v in (*c.force, np.linalg.norm(c.force)))
 
 
-def _profiles(results: Sequence[ProfileResult]) -> TextTable:
+def _profiles(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTable:
     rows = []
-    for r in results:
+    for name, r in zip(labels, results, strict=True):
         one, push = (r.by_torques[1].one_sample, r.by_torques[1].push) if r.by_torques else (r.width, np.zeros(0))
         parts = [_shown(float(np.quantile(push, q)), 1) if len(push) else _NO for q in (0.5, 0.9)]
         largest = _shown(r.by_torques[1].evidence, 2) if r.by_torques else _NO
         rows.append((
-            r.profile.name, str(len(r.contacts)), f"{r.duration:.1f}", f"{r.motion:.1f}", _shown(r.per_hour, 1), largest,
+            name, str(len(r.contacts)), f"{r.duration:.1f}", f"{r.motion:.1f}", _shown(r.per_hour, 1), largest,
             _shown(one, 1), *parts,
         ))  # fmt: skip
     header = (
@@ -97,16 +108,16 @@ def _profiles(results: Sequence[ProfileResult]) -> TextTable:
     return TextTable("Detection", header, tuple(rows), note, 1)
 
 
-def _joints(recording: TorqueRecording, results: Sequence[ProfileResult]) -> list[TextTable]:
+def _joints(recording: TorqueRecording, labels: Sequence[str], results: Sequence[ProfileResult]) -> list[TextTable]:
     made = []
-    for r in results:
+    for label, r in zip(labels, results, strict=True):
         if r.by_torques:
             s = r.by_torques[1]
             columns = zip(recording.model.joints, s.before, s.mean, s.sigma, strict=True)
             rows = tuple((name, *(_shown(value, 3) for value in values)) for name, *values in columns)
             header = ("joint", "external torque, sigma", "residual, mean", "residual, sigma")
             note = "Outside contacts; the residual is what learnt free motion does not explain."
-            made.append(TextTable(f"Torques in free motion [Nm], {r.profile.name}", header, rows, note, 1))
+            made.append(TextTable(f"Torques in free motion [Nm], {label}", header, rows, note, 1))
     return made
 
 

@@ -22,7 +22,6 @@ def torque_figure(d: TorqueDecisions, joints: tuple[str, ...], title: str) -> Fi
     evidence = panels[-1]
     evidence.plot(*_drawn(d.time, d.evidence), color="black", lw=0.9)
     evidence.axhline(1.0, color="tab:red", lw=0.8, ls="--", label="a contact from here on")
-    evidence.set_yscale("symlog", linthresh=1.0)
     evidence.set_ylim(bottom=0.0)
     evidence.set_ylabel("evidence", fontsize="x-small")
     evidence.set_xlabel("time [s]")

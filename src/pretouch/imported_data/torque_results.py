@@ -1,5 +1,7 @@
 """What each profile finds in recorded joint torques: by the torques, or by the force that they amount to."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from pretouch.errors import RecordingError
@@ -11,11 +13,16 @@ from pretouch.imported_data.summary import summary
 from pretouch.imported_data.torque_detect import MOVING_RAD_S, Stream, TorqueDecisions, detect_torques, forces
 from pretouch.imported_data.torque_summary import TorqueSummary, torque_summary
 from pretouch.imported_data.torques import TorqueRecording
+from pretouch.params import SequentialParams
 from pretouch.profiles import Profile
 from pretouch.recording.compare import Decisions
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
+_OF_CURRENTS = {"friction_prior_nm": 0.1, "offset_prior_nm": 0.03, "torque_prior_nm": 0.02}
+"""What is not known of torques by currents, as parts of the usual torque limit of a joint [1]; by the UR10e's."""
+_LONG_S = 15.0
+"""Time from which on a contact is doubted [s]."""
 _SLOWER = 0.95
 """Share of the detector's rate below which data count as slower."""
 
@@ -45,12 +52,13 @@ class ProfileResult:
 
 
 def result_of(recording: TorqueRecording, profile: Profile) -> ProfileResult:
-    """Let a profile's detector run over a recording. RecordingError for one too short to detect anything."""
+    """Let a profile's detector run over a recording; a profile that cannot run says why in its notes."""
     return _by_torques(recording, profile) if profile.detect.by_torques else _by_force(recording, profile)
 
 
 def _by_torques(recording: TorqueRecording, profile: Profile) -> ProfileResult:
-    d, notes = detect_torques(recording, profile), []
+    profile, notes = _for_currents(recording, profile)
+    d = detect_torques(recording, profile)
     found = torque_summary(Stream(recording, profile), d)
     if getattr(profile.detect, "learn", "") == "watched":
         notes.append(
@@ -67,9 +75,28 @@ def _by_torques(recording: TorqueRecording, profile: Profile) -> ProfileResult:
         notes.append(
             f"{profile.name} was never armed: the recording is shorter than its window, or too near a singularity."
         )
+    if d.contacts and (longest := max(d.contacts, key=lambda c: c.end - c.time)).end - longest.time > _LONG_S:
+        notes.append(
+            f"{profile.name}: the contact at {longest.time:.1f} s lasts {longest.end - longest.time:.0f} s; if nobody"
+            " leant on the arm, its model or load is wrong (--arm, --payload, units), or more has to be allowed for"
+            " (detect.friction_prior_nm, detect.offset_prior_nm, detect.torque_prior_nm)."
+        )
     return ProfileResult(
         profile, d.contacts, found.duration, found.motion, found.in_motion, (d, found), None, np.nan, tuple(notes)
     )
+
+
+def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile, list[str]]:
+    """Allow for what currents do not tell, as the friction of gears, where the profile leaves that as usual."""
+    p, usual = profile.detect, SequentialParams()
+    if not (recording.of_currents and isinstance(p, SequentialParams)):
+        return profile, []
+    large = float(np.median(recording.model.description.tau_max))
+    wide = {name: share * large for name, share in _OF_CURRENTS.items()} | {"mass_prior": 0.3, "payload_prior_kg": 2.0}
+    wide = {name: number for name, number in wide.items() if getattr(p, name) == getattr(usual, name)}
+    said = ", ".join(f"{name} = {number:.3g}" for name, number in wide.items())
+    note = f"{profile.name}: currents have the gears' friction in them, so more is allowed for before it is learnt: {said}."
+    return replace(profile, detect=replace(p, **wide)), [note] if wide else []
 
 
 def _by_force(recording: TorqueRecording, profile: Profile) -> ProfileResult:

@@ -45,6 +45,8 @@ class TorqueRecording:
     """(N, n) [rad/s]; where the recording has none, the measured ones smoothed."""
     tau_ext: FloatArray
     """(N, n) on the robot by its environment [Nm], NaN where there is none."""
+    of_currents: bool
+    """Whether motor currents were measured, with the friction of the gears in them."""
     notes: tuple[str, ...]
     """What was found on the way and a person should know, a sentence each."""
 
@@ -101,7 +103,9 @@ def torque_recording(place: Path, source: JointSource, model: RobotModel, choice
         f"{_WHAT[kind].capitalize()}, from {source.said}, {_whose(kind, sign)} The arm is assumed to be"
         f" {model.description.name} (--arm)."
     )
-    return TorqueRecording(place, said, model, time[0] / 1e9, stamp, q, qd, qd_commanded, torque, source.notes + notes)
+    return TorqueRecording(
+        place, said, model, time[0] / 1e9, stamp, q, qd, qd_commanded, torque, kind == "current", source.notes + notes
+    )
 
 
 def _whose(kind: str, sign: float) -> str:
