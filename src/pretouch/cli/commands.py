@@ -113,7 +113,8 @@ class Detect:
     joints: str = ""
     """Topic of the joint positions, if there are several."""
     torques: str = ""
-    """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default what is found."""
+    """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default what is
+    found."""
     arm: str = "auto"
     """The arm: panda, fr3, or the folder of `pretouch robot import`; auto: by the names of its joints, otherwise a
     Panda."""

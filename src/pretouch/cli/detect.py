@@ -76,7 +76,9 @@ def detect(
         imported = read_imported(place, choice)
         skin = load_skin(skin_file, _model(imported)) if skin_file else None
         columns = [(p, d, summary(d, p)) for p in used for d in [detect_imported(imported, p, skin)]]
-        notes = list(dict.fromkeys([*unused, *imported.notes, *_unheard(skin, imported), *_said(imported, columns, skin)]))
+        notes = list(
+            dict.fromkeys([*unused, *imported.notes, *_unheard(skin, imported), *_said(imported, columns, skin)])
+        )
         if out:
             _draw(imported, columns, notes, out)
         write(_numbers(imported, columns, notes))
@@ -92,7 +94,7 @@ def gains_of(text: str) -> tuple[float, ...]:
     except ValueError:
         gains = (0.0,)
     if not all(np.isfinite(gain) and gain != 0.0 for gain in gains):
-        raise ParameterError(f"--gains is {text!r}: give a torque by current of each joint [Nm/A], separated by commas.")
+        raise ParameterError(f"--gains is {text!r}: give torques by current [Nm/A], one a joint, separated by commas.")
     return gains
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -16,6 +16,9 @@ from pretouch.imported_data.torque_summary import PUSH_S
 from pretouch.imported_data.torques import TorqueRecording
 from pretouch.profiles import Profile
 from pretouch.text_table import TextTable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _NO = "–"
 _LONGEST = 24
@@ -31,11 +34,13 @@ def show_torques(
         raise RecordingError(results[0].notes[0])
     notes = list(dict.fromkeys([*recording.notes, *(note for r in results for note in r.notes)]))
     labels = _labels(results)
-    notes += [f"{label} is {r.profile.name}." for label, r in zip(labels, results, strict=True) if label != r.profile.name]
-    said = [*(_guidance(label, r) for label, r in zip(labels, results, strict=True)), recording.said, *notes]
+    pairs = list(zip(labels, results, strict=True))
+    notes += [f"{label} is {r.profile.name}." for label, r in pairs if label != r.profile.name]
+    said = [*(_guidance(label, r) for label, r in pairs), recording.said, *notes]
     tables = [_contacts(labels, results), _profiles(labels, results), *_joints(recording, labels, results)]
     if out:
-        _draw(recording, results, said, tables, out)
+        figures = _figures(recording, labels, results)
+        write_drawing(recording.place.name, said, tables, figures, out)
     write(_numbers(recording, results, notes))
     console = Console(highlight=False, soft_wrap=True)
     console.print(
@@ -46,7 +51,7 @@ def show_torques(
     for sentence in [recording.said, *notes]:
         console.print(sentence, markup=False)
     show(console, tables)
-    for label, r in zip(labels, results, strict=True):
+    for label, r in pairs:
         console.print(_guidance(label, r), markup=False)
     if out:
         print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
@@ -102,8 +107,8 @@ def _profiles(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTa
     )  # fmt: skip
     note = (
         "A contact is evidence from 1 on. The last three are forces at the end-effector that are found: by one sample"
-        f" alone along the worst axis (median), and pushes of {1000 * PUSH_S:.0f} ms laid on the recorded torques in free"
-        " motion along all axes, which half and 90 % of the places need."
+        f" alone along the worst axis (median), and pushes of {1000 * PUSH_S:.0f} ms laid on the recorded torques in"
+        " free motion along all axes: half of these are found, and 90 %."
     )
     return TextTable("Detection", header, tuple(rows), note, 1)
 
@@ -125,21 +130,22 @@ def _shown(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if np.isfinite(value) else "inf" if value > 0 else _NO
 
 
-def _draw(
-    recording: TorqueRecording, results: Sequence[ProfileResult], said: list[str], tables: list[TextTable], out: Path
-) -> None:
+def _figures(
+    recording: TorqueRecording, labels: Sequence[str], results: Sequence[ProfileResult]
+) -> list[tuple["Figure", str]]:
     from pretouch.imported_data.figure import decisions_figure
     from pretouch.imported_data.torque_figure import torque_figure
 
     title = recording.place.name
+    shown = "joint torques, what free motion does not explain of them, and the evidence. Red: contacts."
     figures = [
-        (torque_figure(r.by_torques[0], recording.model.joints, f"{title}: {r.profile.name}"), f"{r.profile.name}: joint"
-         " torques, what free motion does not explain of them, and the evidence. Red: contacts.")
-        for r in results if r.by_torques
+        (torque_figure(r.by_torques[0], recording.model.joints, f"{title}: {name}"), f"{name}: {shown}")
+        for name, r in zip(labels, results, strict=True) if r.by_torques
     ]  # fmt: skip
     if forces := [r.by_force for r in results if r.by_force]:
-        figures.append((decisions_figure(forces, title), "Force at the end-effector, from the torques, and thresholds."))
-    write_drawing(title, said, tables, figures, out)
+        shown = "Force at the end-effector by the torques, and thresholds."
+        figures.append((decisions_figure(forces, title), shown))
+    return figures
 
 
 def _numbers(recording: TorqueRecording, results: Sequence[ProfileResult], notes: list[str]) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def _efforts(place: Path, reader: AnyReader, connections: list[Any]) -> bool:
     """Whether the first message of joint states has positions and efforts."""
     with read_errors_said(place):
         for connection, _, raw in reader.messages(connections):
-            message = reader.deserialize(raw, connection.msgtype)
+            message: Any = reader.deserialize(raw, connection.msgtype)
             return len(message.position) > 0 and len(message.effort) == len(message.position)
     return False
 
@@ -73,11 +73,15 @@ def _torque_topic(place: Path, there: list[Any], named: str) -> Any:
     else:
         found = [c for c in able if c.topic.endswith(_EXTERNAL)] or [c for c in able if c.msgtype in _STATES] or able
     if not found:
-        held = ", ".join(topics) or "none"
-        what = f"no topic {named!r} of" if named else "no topic of"
-        raise RecordingError(f"{place} has {what} sensor_msgs/JointState, FrankaState or FrankaRobotState: it has {held}.")
+        what = f"no topic {named!r}" if named else "no topic"
+        raise RecordingError(
+            f"{place} has {what} of sensor_msgs/JointState, FrankaState or FrankaRobotState: choose --torques from"
+            f" those it has ({', '.join(topics) or 'none'})."
+        )
     if len({c.topic for c in found}) > 1:
-        raise RecordingError(f"{place} has several topics of joint torques: choose one by --torques, {', '.join(topics)}.")
+        raise RecordingError(
+            f"{place} has several topics of joint torques: choose one by --torques, {', '.join(topics)}."
+        )
     return found[0]
 
 

@@ -1,4 +1,4 @@
-"""Joint positions, velocities and torques as they stand in a table: q1_rad, dq1_rad_s, tau_ext1_Nm, and Franka's names."""
+"""Joint positions, velocities and torques in a table: q1_rad, dq1_rad_s, tau_ext1_Nm, and Franka's names."""
 
 import math
 import re
@@ -87,7 +87,9 @@ def read_joint_table(place: Path, choice: Choice) -> JointSource:
     used = next((kind for kind in TORQUES if kind in kinds), "")
     for kind, shown in (("q", "q1_rad"), (used, "tau_ext1_Nm or tau1_Nm")):
         if kind not in kinds:
-            raise RecordingError(f"{place} has no column {shown} (it has {listed(opened.names)}): add them, or --columns.")
+            raise RecordingError(
+                f"{place} has no column {shown} (it has {listed(opened.names)}): add them, or say which by --columns."
+            )
     wanted = ["q", *(kind for kind in ("dq", "dq_d") if kind in kinds), used]
     order = {kind: sorted(kinds[kind], key=lambda i: keys[i].joint) for kind in wanted}
     for kind, places in order.items():

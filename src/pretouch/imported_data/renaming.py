@@ -19,7 +19,8 @@ def mapping_of(text: str) -> Mapping:
     pairs = [part.strip().rpartition("=") for part in text.split(",") if part.strip()]
     for theirs, _, ours in pairs:
         if not (theirs.strip() and ours.strip()):
-            raise ParameterError(f"--columns has {theirs + ours!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm, or FILE.toml.")
+            said = theirs + ours
+            raise ParameterError(f"--columns has {said!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm, or FILE.toml.")
     return tuple((theirs.strip(), ours.strip()) for theirs, _, ours in pairs)
 
 

@@ -91,7 +91,9 @@ def check_exists(place: Path) -> None:
         extras.BAGS.need("A bag or MCAP file")
     elif not is_table(place):
         known = ", ".join((*BAGS, *TABLES, PARQUET))
-        raise RecordingError(f"{place} has an unknown format: give a file that ends in {known}, or the folder of a bag.")
+        raise RecordingError(
+            f"{place} has an unknown format: give a file that ends in {known}, or the folder of a bag."
+        )
 
 
 def is_table(place: Path) -> bool:

@@ -17,6 +17,8 @@ from pretouch.types import FloatArray, IntArray
 
 _OUT_RAD = 0.5
 """How far positions may lie beyond the arm's range [rad]; `source.check_reach` takes the same."""
+_TURN_RAD = 7.0
+"""More than a whole turn [rad]: beyond it positions may be in degrees."""
 _MOVING_RAD_S = 0.01
 """Speed of a joint, root mean square, from which its velocity tells something [rad/s]."""
 _ALIKE, _UNLIKE = 0.9, 0.5
@@ -25,7 +27,7 @@ _FAR_BETTER = 0.25
 """Part of the squared error that another explanation may leave to be believed [1]."""
 _BETTER = 0.6
 """The same, to be mentioned."""
-_POOR = 0.3
+_POOR = 0.02
 """Part of the squared torques left unexplained by the model from which on other orders of the joints are tried [1]."""
 _SAMPLES, _FEW = 400, 30
 """How many samples are looked at, and with each order of the joints."""
@@ -41,12 +43,6 @@ def check_positions(place: Path, q: FloatArray, model: RobotModel) -> None:
     low, high = model.q_min - _OUT_RAD, model.q_max + _OUT_RAD
     if ((q >= low) & (q <= high)).all():
         return
-    turned = np.deg2rad(q)
-    if ((turned >= low) & (turned <= high)).all():
-        raise RecordingError(
-            f"The positions in {place} reach {np.abs(q).max():.4g} rad and would be in the range of"
-            f" {model.description.name} as degrees: name the columns q1_deg and so on."
-        )
     beyond = np.array([[max(low[j] - c.min(), c.max() - high[j], 0.0) for j in range(model.n)] for c in q.T])
     moved = np.abs(np.subtract.outer(np.arange(model.n), np.arange(model.n)))
     columns, joints = linear_sum_assignment(beyond + 1e-6 * moved)
@@ -55,9 +51,15 @@ def check_positions(place: Path, q: FloatArray, model: RobotModel) -> None:
             f"The positions in {place} are out of the range of {model.description.name}, and would be in it in another"
             f" order, as joints {_listed(joints)}: give the columns in the arm's order, or another --arm."
         )
+    turned = np.deg2rad(q)
+    if np.abs(q).max() > _TURN_RAD and ((turned >= low) & (turned <= high)).all():
+        raise RecordingError(
+            f"The positions in {place} reach {np.abs(q).max():.4g} rad and would be in the range of"
+            f" {model.description.name} as degrees: name the columns q1_deg and so on."
+        )
 
 
-def check_velocities(place: Path, time: FloatArray, q: FloatArray, qd: FloatArray, model: RobotModel) -> tuple[str, ...]:
+def check_velocities(place: Path, time: FloatArray, q: FloatArray, qd: FloatArray) -> tuple[str, ...]:
     """Hold velocities (N, n) [rad/s] against the derivatives of positions; RecordingError for another unit or order."""
     true = velocities(time, q)
     moving = np.flatnonzero(np.sqrt((true**2).mean(axis=0)) > _MOVING_RAD_S)
@@ -104,6 +106,7 @@ def check_torques(
     if measured:
         _check_sign(place, tau, expected)
         _check_order(place, q, qd, tau, expected, model)
+        _check_signs(place, tau, expected)
         return _load(tau - expected, carried, "measured torques" if not payload else "")
     left = float((tau**2).sum())
     for sign in (1.0, -1.0):
@@ -125,8 +128,8 @@ def _check_unit(place: Path, tau: FloatArray, expected: FloatArray, model: Robot
     largest = float(np.median((np.abs(tau) / model.description.tau_max).max(axis=1)))
     if largest > 2.0 and _THOUSAND[0] < (times if measured else 1000.0) < _THOUSAND[1]:
         raise RecordingError(
-            f"The torques in {place} are usually {largest:.3g} times the largest that {model.description.name} can give:"
-            " in mNm, name the columns tau1_mNm or tau_ext1_mNm and so on."
+            f"The torques in {place} are {largest:.3g} times the largest that {model.description.name} can give: in"
+            " mNm, name the columns tau1_mNm or tau_ext1_mNm and so on."
         )
     if measured and 1.0 / _THOUSAND[1] < times < 1.0 / _THOUSAND[0]:
         raise RecordingError(
@@ -136,12 +139,15 @@ def _check_unit(place: Path, tau: FloatArray, expected: FloatArray, model: Robot
 
 
 def _check_sign(place: Path, tau: FloatArray, expected: FloatArray) -> None:
-    same, other = ((tau - expected) ** 2).sum(axis=0), ((tau + expected) ** 2).sum(axis=0)
-    if other.sum() < _FAR_BETTER * same.sum():
+    if ((tau + expected) ** 2).sum() < _FAR_BETTER * ((tau - expected) ** 2).sum():
         raise RecordingError(
             f"The torques in {place} are minus those that hold the arm: they have the other sign, so give --sign"
             " by-robot (or on-robot, if you gave that)."
         )
+
+
+def _check_signs(place: Path, tau: FloatArray, expected: FloatArray) -> None:
+    same, other = ((tau - expected) ** 2).sum(axis=0), ((tau + expected) ** 2).sum(axis=0)
     tells = (expected**2).mean(axis=0) > 1.0
     wrong = np.flatnonzero(tells & (other < _FAR_BETTER * same))
     if len(wrong):
@@ -155,7 +161,8 @@ def _check_order(
 ) -> None:
     """Refuse torques, or all columns, that another order of the joints explains far better."""
     errors = ((tau[:, :, None] - expected[:, None, :]) ** 2).sum(axis=0)
-    columns, joints = linear_sum_assignment(errors)
+    stay = 0.01 * float((tau**2).sum()) * (1.0 - np.eye(model.n))  # what little tells of a joint leaves it in place
+    columns, joints = linear_sum_assignment(errors + stay)
     given = float(np.trace(errors))
     if float(errors[columns, joints].sum()) < _FAR_BETTER * given:
         raise RecordingError(
@@ -166,17 +173,19 @@ def _check_order(
         return
     some = np.unique(np.linspace(0, len(q) - 1, _FEW).astype(np.int64))
     q, qd, tau = q[some], qd[some], tau[some]
-    given, best, order = float(((tau - expected[some]) ** 2).sum()), np.inf, tuple(range(model.n))
+    given, best, order, what = float(((tau - expected[some]) ** 2).sum()), np.inf, tuple(range(model.n)), ""
     for tried in permutations(range(model.n)):
         turned = q[:, tried]
         if ((turned >= model.q_min) & (turned <= model.q_max)).all():
-            error = float(((tau[:, tried] - _model_torques(model, turned, qd[:, tried])) ** 2).sum())
-            if error < best:
-                best, order = error, tried
+            expected = _model_torques(model, turned, qd[:, tried])
+            for columns_of, torques in (("all columns", tau[:, tried]), ("positions and velocities", tau)):
+                error = float(((torques - expected) ** 2).sum())
+                if error < best:
+                    best, order, what = error, tried, columns_of
     if best < _FAR_BETTER * given:
         raise RecordingError(
-            f"The recording {place} fits {model.description.name} far better with its joints in the order"
-            f" {_listed(np.array(order))}: give the columns in the arm's order."
+            f"The recording {place} fits {model.description.name} far better with {what} in the order of joints"
+            f" {_listed(np.array(order))}: give them in the arm's order."
         )
 
 

@@ -1,9 +1,8 @@
 """What each profile finds in recorded joint torques: by the torques, or by the force that they amount to."""
 
-from dataclasses import replace
-
 import numpy as np
 
+from pretouch.composition import changed
 from pretouch.errors import RecordingError
 from pretouch.imported_data.detect import detect_imported
 from pretouch.imported_data.events import ContactEvent
@@ -68,8 +67,8 @@ def _by_torques(recording: TorqueRecording, profile: Profile) -> ProfileResult:
     own = 1.0 / profile.task.control_period_s
     if recording.rate < _SLOWER * own:
         notes.append(
-            f"The torques come at {recording.rate:.4g} Hz and {profile.name} runs at {own:.4g} Hz: repeated samples look"
-            f" like more than they are; --rate {recording.rate:.4g} runs it at the data's own rate."
+            f"The torques come at {recording.rate:.4g} Hz and {profile.name} runs at {own:.4g} Hz: repeated samples"
+            f" look like more than they are; --rate {recording.rate:.4g} runs it at the data's own rate."
         )
     if not d.armed.any():
         notes.append(
@@ -93,10 +92,12 @@ def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile
         return profile, []
     large = float(np.median(recording.model.description.tau_max))
     wide = {name: share * large for name, share in _OF_CURRENTS.items()} | {"mass_prior": 0.3, "payload_prior_kg": 2.0}
-    wide = {name: number for name, number in wide.items() if getattr(p, name) == getattr(usual, name)}
-    said = ", ".join(f"{name} = {number:.3g}" for name, number in wide.items())
-    note = f"{profile.name}: currents have the gears' friction in them, so more is allowed for before it is learnt: {said}."
-    return replace(profile, detect=replace(p, **wide)), [note] if wide else []
+    texts = {name: f"{number:.3g}" for name, number in wide.items() if getattr(p, name) == getattr(usual, name)}
+    if not texts:
+        return profile, []
+    said = ", ".join(f"{name} = {text}" for name, text in texts.items())
+    note = f"{profile.name}: currents have gear friction in them, so more is allowed for before it is learnt: {said}."
+    return changed(profile, {f"detect.{name}": text for name, text in texts.items()}), [note]
 
 
 def _by_force(recording: TorqueRecording, profile: Profile) -> ProfileResult:

@@ -14,7 +14,7 @@ from pretouch.imported_data.velocities import GAP_S, smoothed, velocities
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
-from pretouch.types import FloatArray
+from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
 _LEAST_HZ = 40.0
@@ -88,7 +88,7 @@ def torque_recording(place: Path, source: JointSource, model: RobotModel, choice
     check_positions(place, q, model)
     check_reach(place, q, model)
     qd = parts.get("dq", velocities(stamp, q))
-    notes += check_velocities(place, stamp, q, qd, model) if "dq" in parts else ("Velocities are those of positions.",)
+    notes += check_velocities(place, stamp, q, qd) if "dq" in parts else ("Velocities are those of positions.",)
     sign = -1.0 if choice.sign == "by-robot" or (choice.sign == "auto" and source.by_robot) else 1.0
     torque = sign * parts[kind] * (np.array(choice.gains) if kind == "current" else 1.0)
     notes += check_torques(place, q, qd, torque, model, kind != "tau_ext", choice.payload_kg)
@@ -115,7 +115,7 @@ def _whose(kind: str, sign: float) -> str:
     return f"assumed to be {whose} the robot (otherwise --sign {other})."
 
 
-def _usable(place: Path, source: JointSource) -> tuple[FloatArray, dict[str, FloatArray], tuple[str, ...]]:
+def _usable(place: Path, source: JointSource) -> tuple[IntArray, dict[str, FloatArray], tuple[str, ...]]:
     """Instants [ns] in order, and what was measured then; samples that are not numbers are left out."""
     kinds = [*source.joints]
     whole = Series(source.time, np.hstack([source.joints[kind] for kind in kinds]))
