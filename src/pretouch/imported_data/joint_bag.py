@@ -115,8 +115,11 @@ class _States:
 
     def __call__(self, message: Any) -> tuple[float, ...] | None:
         """Positions, velocities and efforts of all joints, NaN where there are none; None of other joints."""
-        kept = [i for i, name in enumerate(message.name) if "finger" not in name] or [*range(self._size(message))]
+        all_of = range(max(len(message.position), len(message.effort)))
+        kept = [i for i, name in enumerate(message.name) if "finger" not in name] if message.name else [*all_of]
         names = tuple(message.name[i] for i in kept) if message.name else ()
+        if not kept:
+            return None
         order = sorted(range(len(names)), key=lambda i: names[i]) if _numbered(names) else range(len(kept))
         if not self.n:
             self.n, self.names = len(kept), tuple(names[i] for i in order) if names else ()
@@ -125,10 +128,6 @@ class _States:
         at = [kept[names.index(name)] for name in self.names] if names else kept
         rows = message.position, message.velocity, message.effort
         return tuple(float(row[i]) if len(row) > i else np.nan for row in rows for i in at)
-
-    @staticmethod
-    def _size(message: Any) -> int:
-        return max(len(message.position), len(message.effort))
 
 
 def _numbered(names: tuple[str, ...]) -> bool:
@@ -164,21 +163,18 @@ def _series(
     connections = [c for c in there if c.topic == name and c.msgtype == JOINTS]
     if not connections:
         raise RecordingError(f"{place} has no topic {name!r} of sensor_msgs/JointState: choose another --joints.")
-    first = next(message for message in [_first(place, reader, connections)])
     picker = _States()
-    if picker(first) is None or not picker.n:
-        raise RecordingError(f"{name} of {place} has a message without joints: choose another topic.")
+    with read_errors_said(place):
+        for connection, _, raw in reader.messages(connections):
+            if picker(reader.deserialize(raw, connection.msgtype)) is not None:
+                break
+    if not picker.n:
+        raise RecordingError(f"{name} of {place} has no message with joints: choose another topic.")
     topic = Topic(name, 3 * picker.n, picker)
     fill(place, reader, connections, [topic])
     headers, notes = believed([topic])
     series, more = in_order(topic.series(headers), name)
     return (series, picker.names), (*notes, *more)
-
-
-def _first(place: Path, reader: AnyReader, connections: list[Any]) -> Any:
-    with read_errors_said(place):
-        connection, _, raw = next(iter(reader.messages(connections)))
-        return reader.deserialize(raw, connection.msgtype)
 
 
 def _joined(
@@ -199,4 +195,4 @@ def _joined(
     whole = " ".join(names)
     arm = "fr3" if "fr3" in whole else "panda" if "panda" in whole else "auto"
     said = f"the topic {torques[0]}" + ("" if name == torques[0] else f", positions from {name}")
-    return JointSource(said, time, parts, external, arm, notes)
+    return JointSource(said, time, parts, external, arm, notes, names)

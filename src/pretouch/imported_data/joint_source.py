@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,16 @@ class JointSource:
     arm: str
     """The arm that its joints' names tell of, or auto."""
     notes: tuple[str, ...]
+    names: tuple[str, ...] = ()
+    """Of the joints, where it has them."""
+
+    def ordered(self, joints: tuple[str, ...]) -> "JointSource":
+        """Return it with its joints in the order of a model's, if its names end in theirs."""
+        ends = [[i for i, name in enumerate(self.names) if name.endswith(joint)] for joint in joints]
+        if len(self.names) != len(joints) or any(len(found) != 1 for found in ends):
+            return self
+        order = [found[0] for found in ends]
+        return replace(self, joints={kind: values[:, order] for kind, values in self.joints.items()}, names=joints)
 
     @property
     def torque(self) -> str:

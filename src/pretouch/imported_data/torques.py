@@ -67,7 +67,7 @@ def read_torques(place: Path, choice: Choice) -> TorqueRecording:
         source = read_joint_bag(place, choice)
     arm = source.arm if choice.arm == "auto" else choice.arm
     model = RobotModel(robot_named("panda" if arm == "auto" else arm))
-    return torque_recording(place, source, model, choice)
+    return torque_recording(place, source.ordered(model.joints), model, choice)
 
 
 def torque_recording(place: Path, source: JointSource, model: RobotModel, choice: Choice) -> TorqueRecording:
