@@ -71,7 +71,7 @@ def test_efforts_of_joint_states_are_measured_torques_whatever_the_order_of_name
 
 
 def test_joints_are_in_the_order_of_the_model_by_their_names(tmp_path, short):
-    names = tuple(f"left_{name}" for name in PANDA)  # with names that do not end in numbers their order would stay
+    names = tuple(f"left_{name}" for name in PANDA)
     kinds = {"q": short.q[:, ::-1], "tau": short.driving[:, ::-1]}
     source = JointSource("", stamps(short), kinds, False, "auto", (), names[::-1])
     np.testing.assert_array_equal(source.ordered(PANDA).joints["q"], short.q)

@@ -94,8 +94,8 @@ def _contact_row(name: str, c: ContactEvent) -> tuple[str, ...]:
 def _profiles(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTable:
     rows = []
     for name, r in zip(labels, results, strict=True):
-        one, push = (r.by_torques[1].one_sample, r.by_torques[1].push) if r.by_torques else (r.width, np.zeros(0))
-        parts = [_shown(float(np.quantile(push, q)), 1) if len(push) else _NO for q in (0.5, 0.9)]
+        one = r.by_torques[1].one_sample if r.by_torques else r.width
+        parts = [_shown(r.by_torques[1].push_quantile(q), 1) if r.by_torques else _NO for q in (0.5, 0.9)]
         largest = _shown(r.by_torques[1].evidence, 2) if r.by_torques else _NO
         rows.append((
             name, str(len(r.contacts)), f"{r.duration:.1f}", f"{r.motion:.1f}", _shown(r.per_hour, 1), largest,
@@ -168,11 +168,10 @@ def _of_profile(r: ProfileResult) -> dict[str, Any]:
     if r.by_torques is None:
         return numbers | {"threshold_width_n": r.width}
     s = r.by_torques[1]
-    half, most = np.quantile(s.push, (0.5, 0.9)) if len(s.push) else (np.nan, np.nan)
     return numbers | {
         "residual_mean_nm": s.mean, "residual_sigma_nm": s.sigma, "external_torque_sigma_nm": s.before,
         "largest_evidence_without_contact": s.evidence, "one_sample_force_n": s.one_sample,
-        "push_s": PUSH_S, "push_force_median_n": half, "push_force_90_percent_n": most,
+        "push_s": PUSH_S, "push_force_median_n": s.push_quantile(0.5), "push_force_90_percent_n": s.push_quantile(0.9),
     }  # fmt: skip
 
 

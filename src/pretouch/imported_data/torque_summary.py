@@ -44,6 +44,10 @@ class TorqueSummary:
     """(M,) smallest forces at the end-effector that are found if they last `PUSH_S`, tried at some instants along all
     axes [N]; infinite beyond `_MOST_N`."""
 
+    def push_quantile(self, share: float) -> float:
+        """Force with which such a share of the pushes is found [N]; NaN where none was tried."""
+        return float(np.quantile(self.push, share, method="inverted_cdf")) if len(self.push) else np.nan
+
 
 def torque_summary(stream: Stream, d: TorqueDecisions) -> TorqueSummary:
     """Sum decisions up, and try pushes."""

@@ -1,5 +1,6 @@
 """Recordings of any arm's joint torques: read, checked, and brought to external torques on the robot."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +68,11 @@ def read_torques(place: Path, choice: Choice) -> TorqueRecording:
         source = read_joint_bag(place, choice)
     arm = source.arm if choice.arm == "auto" else choice.arm
     model = RobotModel(robot_named("panda" if arm == "auto" else arm))
-    return torque_recording(place, source.ordered(model.joints), model, choice)
+    ordered = source.ordered(model.joints)
+    if ordered.names and ordered.names != model.joints:
+        note = f"The joints are named otherwise than the arm's, and taken in the order {', '.join(ordered.names)}."
+        ordered = replace(ordered, notes=(*ordered.notes, note))
+    return torque_recording(place, ordered, model, choice)
 
 
 def torque_recording(place: Path, source: JointSource, model: RobotModel, choice: Choice) -> TorqueRecording:
