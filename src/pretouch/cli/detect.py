@@ -101,6 +101,8 @@ def gains_of(text: str) -> tuple[float, ...]:
 def _torques_wanted(place: Path, choice: Choice, given: Sequence[Profile] | None) -> bool:
     """Whether the detectors run on joint torques: where there are some, unless only thresholds of a force are asked."""
     asked = bool(choice.torques or choice.gains or choice.payload_kg)
+    if choice.wrench and not asked:
+        return False
     if given is not None and not asked and not any(p.detect.by_torques for p in given):
         return not holds_force(place, choice) and holds_torques(place, choice)
     return asked or holds_torques(place, choice)

@@ -88,6 +88,8 @@ def torque_recording(place: Path, source: JointSource, model: RobotModel, choice
             f"{place} has currents of {n} motors and {len(choice.gains)} gains: give --gains, {n} torques by current in"
             " Nm/A, separated by commas."
         )
+    if choice.gains and kind != "current":
+        raise RecordingError(f"{place} has torques, and --gains is for motor currents (current1_A ...): leave it out.")
     time, parts, notes = _usable(place, source)
     q, stamp = parts["q"], (time - time[0]) / 1e9
     check_positions(place, q, model)
@@ -139,6 +141,7 @@ def _usable(place: Path, source: JointSource) -> tuple[IntArray, dict[str, Float
         )
     long = np.diff(series.time) / 1e9
     if (gaps := long[long > GAP_S]).size:
-        more += (f"{len(gaps)} gaps of more than {GAP_S:g} s, {gaps.sum():.2f} s in all: after each it begins anew.",)
+        many = "A gap" if len(gaps) == 1 else f"{len(gaps)} gaps"
+        more += (f"{many} of more than {GAP_S:g} s, {gaps.sum():.2f} s in all: what comes after begins anew.",)
     parts = np.split(series.values, len(kinds), axis=1)
     return series.time, dict(zip(kinds, parts, strict=True)), notes + more
