@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from pretouch.cli.detect import detect
+from pretouch.cli.detect import detect, gains_of
 from pretouch.errors import ParameterError, PretouchError, RecordingError
 from pretouch.imported_data.source import Choice
 from pretouch.loop import Cycle
@@ -18,6 +18,7 @@ from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
 from tests.hardware.traffic import heard
 from tests.imported_data.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
+from tests.imported_data.joint_files import Moving
 
 
 @pytest.fixture
@@ -120,3 +121,78 @@ def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, 
     assert len(contacts) == 1
     assert [c["time_s"] for c in paper["contacts"]] == pytest.approx([s.stamp + 0.005 for s in contacts])
     assert paper["contacts"][0]["force_n"] == pytest.approx(list(contacts[0].contact.force), abs=0.05)
+
+
+@pytest.fixture(scope="module")
+def pushed_arm(tmp_path_factory, panda_model):
+    moving = Moving(panda_model, 26.0, ((22.0, 0.4, "panda_link5", (0.0, 25.0, 0.0)),))
+    return moving.external_csv(tmp_path_factory.mktemp("torques") / "arm.csv"), moving
+
+
+def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm, tmp_path):
+    numbers, page, figure = tmp_path / "a.json", tmp_path / "a.html", tmp_path / "a.png"
+    detect(pushed_arm[0], Choice(), json_file=numbers, out=page)
+    said = capsys.readouterr().out
+    assert "arm.csv: 13000 samples in 26.0 s, 500 Hz" in said
+    assert "assumed to be on the robot (otherwise --sign by-robot). The arm is assumed to be panda (--arm)." in said
+    assert "pretouch: no skin watches" in said
+    assert "pretouch: 1 contact in 0.4 min, 1 of them in 0.4 min of motion; if nobody touched the arm" in said
+    assert f"Page: {page}" in said
+    told = json.loads(numbers.read_text())
+    assert [p["profile"] for p in told["profiles"]] == ["pretouch", "paper"]
+    (contact,) = told["contacts"]
+    assert contact == told["profiles"][0]["contacts"][0]
+    assert 22.0 < contact["time_s"] < 22.1
+    assert contact["link"] == "panda_link5"
+    assert contact["force_n"] == pytest.approx([0.0, 25.0, 0.0], abs=4.0)
+    assert len(contact["point_m"]) == 3
+    assert len(told["profiles"][0]["residual_sigma_nm"]) == 7
+    assert 1.0 < told["profiles"][0]["push_force_median_n"] < told["profiles"][0]["push_force_90_percent_n"] < 20.0
+    assert all(c["link"] is None and c["point_m"] is None for c in told["profiles"][1]["contacts"])
+    text = page.read_text()
+    assert text.count("<img src=") == 2
+    assert "panda_link5" in text
+    assert 'src="http' not in text
+    detect(pushed_arm[0], Choice(), ("pretouch",), out=figure)
+    assert imread(figure).std() > 0.05
+
+
+def test_long_names_of_profiles_are_numbered_in_tables_and_whole_in_numbers(capsys, pushed_arm, tmp_path):
+    name, numbers = "pretouch:detect.slack_nats=0:detect.tails=8", tmp_path / "a.json"
+    detect(pushed_arm[0], Choice(), (name,), json_file=numbers)
+    assert f"pretouch (1) is {name}." in capsys.readouterr().out
+    assert json.loads(numbers.read_text())["profiles"][0]["profile"] == name
+
+
+def test_with_a_force_beside_torques_each_can_be_had(capsys, pushed_arm, tmp_path):
+    _, moving = pushed_arm
+    kinds = (("q*_rad", moving.q), ("tau_ext*_Nm", moving.tau_ext))
+    columns = moving.columns(*kinds) | {f"force_{axis}_N": np.zeros(len(moving.time)) for axis in "xyz"}
+    both = write_csv(tmp_path / "both.csv", columns)
+    detect(both, Choice(), ("paper",))
+    assert "Force from the columns force_x, force_y, force_z" in capsys.readouterr().out
+    detect(both, Choice())
+    assert "External torques, from the columns" in capsys.readouterr().out
+    del columns["q7_rad"]
+    detect(write_csv(tmp_path / "six.csv", columns), Choice())
+    said = capsys.readouterr().out
+    assert "Joint torques are not used: " in said
+    assert "Force from the columns force_x, force_y, force_z" in said
+    with pytest.raises(RecordingError, match="positions of 6 joints"):
+        detect(tmp_path / "six.csv", Choice(), ("pretouch",))
+    with pytest.raises(RecordingError, match="gives only a force: choose one with"):
+        detect(write_csv(tmp_path / "force.csv", force_columns(pushed(5.0, ()))), Choice(), ("pretouch",))
+
+
+def test_a_page_of_forces_has_tables_and_figure(capsys, file, tmp_path):
+    detect(file, Choice(), out=tmp_path / "a.html")
+    assert "Page: " in capsys.readouterr().out
+    text = (tmp_path / "a.html").read_text()
+    assert "3 false contacts" in text
+    assert text.count("<img src=") == 1
+
+
+@pytest.mark.parametrize("text", ["a,b", "1,0", "1,inf"])
+def test_gains_that_are_none_are_refused(text):
+    with pytest.raises(ParameterError, match="--gains is "):
+        gains_of(text)

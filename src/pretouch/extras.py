@@ -49,6 +49,7 @@ FIGURES = Extra("figures", ("matplotlib",), "setup")
 FRANKA = Extra("franka", ("panda_py", "pylibfranka", "ruckig"), "franka")
 LIVE = Extra("live", ("viser",), "setup")
 MESHES = Extra("meshes", ("collada",), "meshes")
+PARQUET = Extra("parquet", ("pyarrow",), "setup")
 ROS2 = Extra("ros2", ("cyclonedds", "rosbags"), "ros2")
 
 

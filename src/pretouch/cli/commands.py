@@ -92,15 +92,18 @@ class Recover:
 
 @dataclass(frozen=True)
 class Detect:
-    """Try the contact thresholds on a recording of your own arm: a ROS bag, an MCAP file, or a CSV file."""
+    """Detect contacts in a recording of your own arm: a ROS bag, an MCAP file, a CSV or a Parquet file."""
 
     file: tyro.conf.Positional[str]
-    """ROS 2 bag (folder, .mcap, .db3), ROS 1 .bag, or .csv with columns time_s, force_x_N, force_y_N, force_z_N."""
-    profiles: str = "paper"
-    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter."""
+    """ROS 2 bag (folder, .mcap, .db3), ROS 1 .bag, or .csv or .parquet with columns time_s, q1_rad ..., dq1_rad_s ...
+    and tau_ext1_Nm ... (or tau1_Nm ..., current1_A ...), or force_x_N, force_y_N, force_z_N; or a log of libfranka."""
+    profiles: str = "auto"
+    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. auto:
+    pretouch,paper where there are joint torques, else paper."""
     # the choices of pretouch.imported_data.source, spelt out: the help is to need none of the heavy packages
-    sign: Literal["on-robot", "by-robot"] = "on-robot"
-    """Whether the force is on the robot (by its environment) or by the robot, as Franka's O_F_ext_hat_K."""
+    sign: Literal["auto", "on-robot", "by-robot"] = "auto"
+    """Whether force and external torques are on the robot (by its environment) or by the robot, as Franka's
+    O_F_ext_hat_K; auto: on the robot, but for torques by the name tau_ext_hat_filtered."""
     frame: Literal["base", "ee"] = "base"
     """Frame of the force; ee, the end-effector's, needs joint positions of a Panda or FR3."""
     zeros: Literal["auto", "missing", "kept"] = "auto"
@@ -109,25 +112,41 @@ class Detect:
     """Topic of the force, if there are several."""
     joints: str = ""
     """Topic of the joint positions, if there are several."""
-    arm: Literal["auto", "panda", "fr3"] = "auto"
-    """The arm; auto: by the names of its joints, otherwise a Panda."""
+    torques: str = ""
+    """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default what is
+    found."""
+    arm: str = "auto"
+    """The arm: panda, fr3, or the folder of `pretouch robot import`; auto: by the names of its joints, otherwise a
+    Panda."""
+    columns: str = ""
+    """Columns of other names, THEIRS=OURS separated by commas, or FILE.toml: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all
+    joints."""
+    gains: str = ""
+    """Torque by motor current of each joint, gear included [Nm/A], separated by commas: for current1_A."""
+    payload: float = 0.0
+    """Load at the end-effector that the arm's model does not have [kg]: for measured torques."""
     skin: str = ""
     """Skin file, to use the recording's ranges; by default only the force is used."""
     rate: float = 0.0
     """Rate of the detector [Hz]; by default the profile's own, 100."""
     out: str = ""
-    """Figure to write, ending in .png, .pdf or .svg."""
+    """Figure to write, ending in .png, .pdf or .svg, or page, ending in .html."""
     json: str = ""
     """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> None:
         """Run the detectors, and show and write what they found."""
-        from pretouch.cli.detect import detect
+        from pretouch.cli.detect import detect, gains_of
+        from pretouch.imported_data.renaming import mapping_of
         from pretouch.imported_data.source import Choice
 
-        choice = Choice(self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, ranges=bool(self.skin))
+        choice = Choice(
+            self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, bool(self.skin), self.torques,
+            mapping_of(self.columns), gains_of(self.gains), self.payload,
+        )  # fmt: skip
         skin, out, json = (Path(text) if text else None for text in (self.skin, self.out, self.json))
-        detect(Path(self.file), choice, words(self.profiles), skin, self.rate, out, json)
+        profiles = None if self.profiles == "auto" else words(self.profiles)
+        detect(Path(self.file), choice, profiles, skin, self.rate, out, json)
 
 
 @dataclass(frozen=True)

@@ -1,30 +1,32 @@
 """What `pretouch detect` does: the detector of some profiles on a recording of any arm, as tables, figure and file."""
 
 from collections.abc import Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 
+from pretouch.cli.detect_drawing import ENDINGS, write_drawing
+from pretouch.cli.detect_torques import show_torques
 from pretouch.cli.tables import Grid
-from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
+from pretouch.cli.words import words
+from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
 from pretouch.imported_data.detect import detect_imported, units_topics
+from pretouch.imported_data.held import holds_force, holds_torques
 from pretouch.imported_data.samples import ImportedData, read_imported
 from pretouch.imported_data.source import Choice
 from pretouch.imported_data.summary import Summary, findings, guidance, summary
+from pretouch.imported_data.torques import read_torques
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.compare import Decisions, Found, matched
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin
-
-_ENDINGS = (".png", ".pdf", ".svg")
-_DOTS_PER_INCH = 150
+from pretouch.text_table import TextTable
 
 Column = tuple[Profile, Decisions, Summary]
 
@@ -32,7 +34,7 @@ Column = tuple[Profile, Decisions, Summary]
 def detect(
     place: Path,
     choice: Choice,
-    profiles: Sequence[str] = ("paper",),
+    profiles: Sequence[str] | None = None,
     skin_file: Path | None = None,
     rate: float = 0.0,
     out: Path | None = None,
@@ -43,40 +45,80 @@ def detect(
     Args:
         place: bag, MCAP or CSV file.
         choice: what the recording does not say of itself; a skin file asks for its ranges.
-        profiles: names of the profiles to compare.
+        profiles: names of the profiles to compare; None: `pretouch` and `paper` where there are joint torques, else
+            `paper`.
         skin_file: skin whose units the recording's ranges are of.
         rate: of the detector [Hz]; 0 for the profile's own.
-        out: figure to write.
+        out: figure to write, or page.
         json_file: file for the numbers.
     """
-    used = [_profile(name, rate) for name in profiles]
-    if not used:
+    given = None if profiles is None else [_profile(name, rate) for name in profiles]
+    if given is not None and not given:
         raise ParameterError("No profile is given: name one or more, separated by commas.")
-    if out and out.suffix not in _ENDINGS:
-        raise RecordingError(f"The figure {out} has an unknown format: use one of the endings {', '.join(_ENDINGS)}.")
+    if out and out.suffix not in ENDINGS:
+        raise RecordingError(f"The figure {out} has an unknown format: use one of the endings {', '.join(ENDINGS)}.")
     if out:
         FIGURES.need("A figure")
         check_writable("figure", out)
     with numbers_to(json_file) as write:
+        unused: tuple[str, ...] = ()
+        if skin_file is None and choice.frame == "base" and _torques_wanted(place, choice, given):
+            try:
+                recording = read_torques(place, choice)
+            except RecordingError as error:
+                if given is not None or not holds_force(place, choice):
+                    raise
+                unused = (f"Joint torques are not used: {error}",)
+            else:
+                show_torques(recording, given or [_profile(name, rate) for name in ("pretouch", "paper")], out, write)
+                return
+        used = given or [_profile("paper", rate)]
         imported = read_imported(place, choice)
         skin = load_skin(skin_file, _model(imported)) if skin_file else None
         columns = [(p, d, summary(d, p)) for p in used for d in [detect_imported(imported, p, skin)]]
-        notes = list(dict.fromkeys([*imported.notes, *_unheard(skin, imported), *_said(imported, columns, skin)]))
+        notes = list(
+            dict.fromkeys([*unused, *imported.notes, *_unheard(skin, imported), *_said(imported, columns, skin)])
+        )
         if out:
-            _draw(columns, place.name, out)
+            _draw(imported, columns, notes, out)
         write(_numbers(imported, columns, notes))
         _show(imported, columns, notes)
         if out:
-            print(f"Figure: {out}")
+            print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
 
 
-def _draw(columns: list[Column], title: str, out: Path) -> None:
+def gains_of(text: str) -> tuple[float, ...]:
+    """Read the gains of motors [Nm/A]; ParameterError for what is no list of numbers above zero."""
+    try:
+        gains = tuple(float(word) for word in words(text))
+    except ValueError:
+        gains = (0.0,)
+    if not all(np.isfinite(gain) and gain != 0.0 for gain in gains):
+        raise ParameterError(f"--gains is {text!r}: give torques by current [Nm/A], one a joint, separated by commas.")
+    return gains
+
+
+def _torques_wanted(place: Path, choice: Choice, given: Sequence[Profile] | None) -> bool:
+    """Whether the detectors run on joint torques: where there are some, unless only thresholds of a force are asked."""
+    asked = bool(choice.torques or choice.gains or choice.payload_kg)
+    if choice.wrench and not asked:
+        return False
+    if given is not None and not asked and not any(p.detect.by_torques for p in given):
+        return not holds_force(place, choice) and holds_torques(place, choice)
+    return asked or holds_torques(place, choice)
+
+
+def _draw(imported: ImportedData, columns: list[Column], notes: list[str], out: Path) -> None:
     from pretouch.imported_data.figure import decisions_figure
 
-    image = BytesIO()
-    decisions_figure([d for _, d, _ in columns], title).savefig(image, format=out.suffix[1:], dpi=_DOTS_PER_INCH)
-    with unwritable_said("figure", out):
-        out.write_bytes(image.getvalue())
+    title, (contacts, noise) = imported.place.name, (_contacts(columns), _noise_table(columns))
+    tables = [
+        TextTable("Contacts, force on the robot [N]", tuple(contacts.header), tuple(map(tuple, contacts.rows)), "", 1),
+        TextTable("Free motion [N]", tuple(noise.header), tuple(map(tuple, noise.rows)), "", 1),
+    ]
+    said = [*(guidance(d, found, p) for p, d, found in columns), imported.said, *notes]
+    shown = "Force along each axis between its thresholds, and contacts."
+    write_drawing(title, said, tables, [(decisions_figure([d for _, d, _ in columns], title), shown)], out)
 
 
 def _profile(name: str, rate: float) -> Profile:
@@ -116,7 +158,7 @@ def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> No
     for note in notes:
         console.print(note, markup=False)
     console.print("\nContacts, force on the robot [N]", style="bold", markup=False)
-    console.print(contact_table([(d.name, found) for _, d, _ in columns for found in d.contacts]))
+    console.print(_contacts(columns))
     first = columns[0][1]
     for _, d, _ in columns[1:]:
         both, only_first, only_other = matched(first.contacts, d.contacts)
@@ -130,6 +172,10 @@ def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> No
     console.print()
     for p, d, found in columns:
         console.print(guidance(d, found, p), markup=False)
+
+
+def _contacts(columns: list[Column]) -> Grid:
+    return contact_table([(d.name, found) for _, d, _ in columns for found in d.contacts])
 
 
 def contact_table(contacts: Sequence[tuple[str, Found]]) -> Grid:

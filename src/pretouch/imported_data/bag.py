@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.source import Arm, Choice, RangeTopic, Series, Source
+from pretouch.imported_data.source import Choice, RangeTopic, Series, Source
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.types import RangeStatus
 
@@ -189,7 +189,7 @@ class JointPicker:
         return tuple(float(message.position[i]) for i in order)
 
     @property
-    def arm(self) -> Arm:
+    def arm(self) -> str:
         """The arm the names tell of, if they do."""
         named = " ".join(name for names, order in self._orders.items() if order for name in names)
         return "fr3" if "fr3" in named else "panda" if "panda" in named else "auto"

@@ -4,12 +4,15 @@ import csv
 import math
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from pretouch import extras
 from pretouch.errors import RecordingError
+from pretouch.imported_data.renaming import listed, renamed
 from pretouch.imported_data.source import Choice, Series, Source
 from pretouch.types import FloatArray, IntArray
 
@@ -39,13 +42,36 @@ def read_csv(place: Path, choice: Choice) -> Source:
         raise RecordingError(f"{place} is a CSV file and has no topics: leave out --wrench and --joints.")
     if choice.ranges:
         raise RecordingError(f"{place} is a CSV file, which has no ranges: leave out --skin, or give a bag.")
-    rows, names = read_header(place, "time_s,force_x_N,force_y_N,force_z_N")
-    columns, factors = _columns(place, names)
-    table, time, notes = read_table(place, rows, names, {i: factors[key] for key, i in columns.items()})
+    opened = open_table(place, choice.columns)
+    columns, factors = _columns(place, opened.names)
+    table, time, notes = opened.read({i: factors[key] for key, i in columns.items()})
     force = table[:, [k for k, key in enumerate(columns) if key.startswith(("force", "torque"))]]
     angles = [k for k, key in enumerate(columns) if key.startswith("q")]
     joints = Series(time, table[:, angles]) if angles and choice.posture else None
     return Source("the columns force_x, force_y, force_z", Series(time, force), "", joints, "auto", (), tuple(notes))
+
+
+class OpenTable(NamedTuple):
+    """A table whose header was read."""
+
+    names: list[str]
+    """Of its columns, by our names where a mapping says so."""
+    read: Callable[[dict[int, float]], tuple[FloatArray, IntArray, list[str]]]
+    """Reads columns as `read_table` does."""
+
+
+def open_table(place: Path, mapping: tuple[tuple[str, str], ...] = ()) -> OpenTable:
+    """Open a CSV or Parquet file; RecordingError for one that cannot be read, and for a mapping of columns it lacks."""
+    if place.suffix.lower() == ".parquet":
+        extras.PARQUET.need("A Parquet file")
+        from pretouch.imported_data.parquet import read_parquet
+
+        theirs, columns = read_parquet(place)
+        names = renamed(place, theirs, mapping)
+        return OpenTable(names, lambda factors: in_si(place, columns(list(factors)), names, factors))
+    rows, theirs = read_header(place, "time_s,force_x_N,force_y_N,force_z_N")
+    names = renamed(place, theirs, mapping)
+    return OpenTable(names, lambda factors: read_table(place, rows, names, factors))
 
 
 def read_header(place: Path, example: str) -> tuple[Rows, list[str]]:
@@ -115,11 +141,6 @@ def _columns(place: Path, names: list[str]) -> tuple[dict[str, int], dict[str, f
     return {key: columns[key] for key in order}, factors
 
 
-def listed(names: list[str]) -> str:
-    """Names of columns, as a part of a sentence."""
-    return ", ".join(repr(name) for name in names[:8]) + (", ..." if len(names) > 8 else "")
-
-
 def read_table(
     place: Path, rows: Rows, names: list[str], factors: dict[int, float]
 ) -> tuple[FloatArray, IntArray, list[str]]:
@@ -136,7 +157,13 @@ def read_table(
             cells.extend([float(row[i]) for i in wanted])
         except (ValueError, IndexError):
             cells.extend([_number(place, line, names, row, i) for i in wanted])
-    numbers = np.array(cells, dtype=np.float64).reshape(-1, len(wanted))
+    return in_si(place, np.array(cells, dtype=np.float64).reshape(-1, len(wanted)), names, factors)
+
+
+def in_si(
+    place: Path, numbers: FloatArray, names: list[str], factors: dict[int, float]
+) -> tuple[FloatArray, IntArray, list[str]]:
+    """Bring columns (N, m) that were read to what `read_table` returns."""
     table = np.where(np.isfinite(numbers), numbers, np.nan) * np.array(list(factors.values()))
     time, notes = _relative_time(place, table[:, 0])
     unused = [name for i, name in enumerate(names) if i not in factors]

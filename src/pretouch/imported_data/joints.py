@@ -7,7 +7,8 @@ import numpy as np
 
 from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.imported_data.csv import UNITS, listed, read_header, read_table
+from pretouch.imported_data.csv import UNITS, read_header, read_table
+from pretouch.imported_data.renaming import listed
 from pretouch.imported_data.samples import BAGS, TABLES
 from pretouch.imported_data.source import Series, check_reach, in_order
 from pretouch.robot.model import RobotModel

@@ -9,8 +9,8 @@ import numpy as np
 from pretouch import extras
 from pretouch.errors import RecordingError
 from pretouch.imported_data.source import Choice, RangeTopic, Series, Source, check_reach, in_order, interpolated
-from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
@@ -18,6 +18,7 @@ POSTURE_GAP_S = 0.2
 """Time between two joint positions within which the posture is taken to move evenly [s]."""
 BAGS = (".mcap", ".db3", ".bag")
 TABLES = (".csv", ".tsv", ".txt")
+PARQUET = ".parquet"
 _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 
 
@@ -69,29 +70,40 @@ def read_imported(place: Path, choice: Choice) -> ImportedData:
 
 
 def _read(place: Path, choice: Choice) -> Source:
-    if not os.path.exists(place):
-        raise RecordingError(f"The recording {place} does not exist: check its name.")
-    ending = place.suffix.lower()
-    if place.is_dir() or ending in BAGS:
-        if place.is_dir() and not (place / "metadata.yaml").is_file():
-            raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
-        extras.BAGS.need("A bag or MCAP file")
-        from pretouch.imported_data.bag import read_bag
-
-        return read_bag(place, choice)
-    if ending in TABLES:
+    check_exists(place)
+    if is_table(place):
         from pretouch.imported_data.csv import read_csv
 
         return read_csv(place, choice)
-    raise RecordingError(
-        f"{place} has an unknown format: give a file that ends in {', '.join((*BAGS, *TABLES))}, or the folder of a"
-        " bag."
-    )
+    from pretouch.imported_data.bag import read_bag
+
+    return read_bag(place, choice)
+
+
+def check_exists(place: Path) -> None:
+    """Refuse a recording that is not there, or not of a known format."""
+    if not os.path.exists(place):
+        raise RecordingError(f"The recording {place} does not exist: check its name.")
+    if place.is_dir() and not (place / "metadata.yaml").is_file():
+        raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
+    ending = place.suffix.lower()
+    if place.is_dir() or ending in BAGS:
+        extras.BAGS.need("A bag or MCAP file")
+    elif not is_table(place):
+        known = ", ".join((*BAGS, *TABLES, PARQUET))
+        raise RecordingError(
+            f"{place} has an unknown format: give a file that ends in {known}, or the folder of a bag."
+        )
+
+
+def is_table(place: Path) -> bool:
+    """Whether a recording is a table, not a bag."""
+    return not place.is_dir() and place.suffix.lower() in (*TABLES, PARQUET)
 
 
 def _model(place: Path, source: Source, choice: Choice) -> RobotModel:
     arm = source.arm if choice.arm == "auto" else choice.arm
-    model = RobotModel(fr3() if arm == "fr3" else panda())
+    model = RobotModel(robot_named("panda" if arm == "auto" else arm))
     if source.joints is None:
         raise RecordingError(f"{place} has no joint positions: add q1_rad to q{model.n}_rad, or leave out --frame ee.")
     given = source.joints.values
@@ -134,7 +146,7 @@ def _in_base(model: RobotModel, joints: Series, force: Series) -> FloatArray:
 
 
 def _said(source: Source, choice: Choice, model: RobotModel | None) -> str:
-    sign, other = ("on the robot", "by-robot") if choice.sign == "on-robot" else ("by the robot", "on-robot")
+    sign, other = ("by the robot", "on-robot") if choice.sign == "by-robot" else ("on the robot", "by-robot")
     frame, another = ("base", "ee") if choice.frame == "base" else ("end-effector's", "base")
     arm = f" The arm is assumed to be {model.description.name} (--arm)." if model else ""
     return (

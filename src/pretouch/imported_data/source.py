@@ -11,10 +11,9 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
-Sign = Literal["on-robot", "by-robot"]
+Sign = Literal["auto", "on-robot", "by-robot"]
 Frame = Literal["base", "ee"]
 Zeros = Literal["auto", "missing", "kept"]
-Arm = Literal["auto", "panda", "fr3"]
 _OUT_OF_RANGE_RAD = 0.5
 """Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
 
@@ -27,16 +26,25 @@ class Choice:
     """Topic of the force; needed if there are several."""
     joints: str = ""
     """Topic of the joint positions; needed if there are several."""
-    sign: Sign = "on-robot"
-    """Whether the force is on the robot by the environment, as ours, or by the robot, as the vendor's O_F_ext_hat_K."""
+    sign: Sign = "auto"
+    """Whether forces and external torques are on the robot by the environment, as ours, or by the robot, as the
+    vendor's O_F_ext_hat_K; auto: on the robot, but for torques by the name that Franka gives them."""
     frame: Frame = "base"
     """Frame the force is given in: the arm's base or its end-effector."""
     zeros: Zeros = "auto"
     """Whether a wrench of zeros only means that there is no estimate; auto: where the force is by the robot."""
-    arm: Arm = "auto"
-    """The arm; auto: by the names of its joints, otherwise a Panda."""
+    arm: str = "auto"
+    """The arm, by its name or the folder it was imported to; auto: by the names of its joints, otherwise a Panda."""
     ranges: bool = False
     """Whether the range finders are wanted."""
+    torques: str = ""
+    """Topic of the joint torques; needed if it is not clear."""
+    columns: tuple[tuple[str, str], ...] = ()
+    """Columns of other names: theirs and ours. `*` stands for the number of a joint."""
+    gains: tuple[float, ...] = ()
+    """Torque of each joint by its motor's current [Nm/A]."""
+    payload_kg: float = 0.0
+    """Load at the end-effector that measured torques carry and the model does not [kg]."""
 
     @property
     def posture(self) -> bool:
@@ -85,8 +93,8 @@ class Source:
     """Frame the recording names for the force, or ''."""
     joints: Series | None
     """(M, n) joint positions [rad]."""
-    arm: Arm
-    """The arm that its joints' names tell of, if they do."""
+    arm: str
+    """The arm that its joints' names tell of, or auto."""
     ranges: tuple[RangeTopic, ...]
     notes: tuple[str, ...]
     """What was found on the way and a person should know, a sentence each."""

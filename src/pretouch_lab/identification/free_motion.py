@@ -8,7 +8,8 @@ import numpy as np
 
 from pretouch.contact.observer import observe, observer_init
 from pretouch.errors import RecordingError
-from pretouch.imported_data.csv import listed, read_header, read_table
+from pretouch.imported_data.csv import read_header, read_table
+from pretouch.imported_data.renaming import listed
 from pretouch.imported_data.samples import TABLES
 from pretouch.imported_data.source import check_reach
 from pretouch.recording.reader import open_recording

@@ -1,0 +1,183 @@
+"""`pretouch detect` on joint torques: what the profiles find, as tables, figure or page, and numbers."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+
+from pretouch.cli.detect_drawing import write_drawing
+from pretouch.cli.tables import show
+from pretouch.errors import RecordingError
+from pretouch.imported_data.events import ContactEvent
+from pretouch.imported_data.torque_results import ProfileResult, result_of
+from pretouch.imported_data.torque_summary import PUSH_S
+from pretouch.imported_data.torques import TorqueRecording
+from pretouch.profiles import Profile
+from pretouch.text_table import TextTable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NO = "–"
+_LONGEST = 24
+"""Characters of a profile's name that a table has room for."""
+
+
+def show_torques(
+    recording: TorqueRecording, profiles: Sequence[Profile], out: Path | None, write: Callable[[Any], None]
+) -> None:
+    """Run profiles over a recording of torques, show what they found, and write figure or page and numbers."""
+    results = [result_of(recording, profile) for profile in profiles]
+    if not any(r.by_torques or r.by_force for r in results):
+        raise RecordingError(results[0].notes[0])
+    notes = list(dict.fromkeys([*recording.notes, *(note for r in results for note in r.notes)]))
+    labels = _labels(results)
+    pairs = list(zip(labels, results, strict=True))
+    notes += [f"{label} is {r.profile.name}." for label, r in pairs if label != r.profile.name]
+    said = [*(_guidance(label, r) for label, r in pairs), recording.said, *notes]
+    tables = [_contacts(labels, results), _profiles(labels, results), *_joints(recording, labels, results)]
+    if out:
+        figures = _figures(recording, labels, results)
+        write_drawing(recording.place.name, said, tables, figures, out)
+    write(_numbers(recording, results, notes))
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(
+        f"{recording.place}: {len(recording.time)} samples in {recording.time[-1]:.1f} s, {recording.rate:.4g} Hz, the"
+        f" first at {recording.first_s:.3f} s: times below count from it.",
+        markup=False,
+    )
+    for sentence in [recording.said, *notes]:
+        console.print(sentence, markup=False)
+    show(console, tables)
+    for label, r in pairs:
+        console.print(_guidance(label, r), markup=False)
+    if out:
+        print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
+
+
+def _labels(results: Sequence[ProfileResult]) -> list[str]:
+    """Names of profiles for tables: those of long changes are numbered."""
+    names = [r.profile.name for r in results]
+    return [name if len(name) <= _LONGEST else f"{name.partition(':')[0]} ({k})" for k, name in enumerate(names, 1)]
+
+
+def _guidance(name: str, r: ProfileResult) -> str:
+    count = len(r.contacts)
+    contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.duration / 60:.1f} min"
+    if not r.motion:
+        return f"{name}: {contacts}; the arm does not move."
+    return (
+        f"{name}: {contacts}, {r.in_motion} of them in {r.motion / 60:.1f} min of motion; if nobody touched the"
+        f" arm, these are {r.per_hour:.3g} false alarms an hour."
+    )
+
+
+def _contacts(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTable:
+    pairs = zip(labels, results, strict=True)
+    found = sorted(((name, c) for name, r in pairs for c in r.contacts), key=lambda pair: pair[1].time)
+    rows = [_contact_row(name, c) for name, c in found] or [("none", *[""] * 9)]
+    header = ("profile", "link", "time [s]", *(f"{axis} [m]" for axis in "xyz"), "force x [N]", "y", "z", "norm")
+    note = (
+        "Link, place and force on the robot are those where the contact stands out most, base frame; without a link the"
+        " force is that at the end-effector."
+    )
+    return TextTable("Contacts", header, tuple(rows), note)
+
+
+def _contact_row(name: str, c: ContactEvent) -> tuple[str, ...]:
+    place = [_shown(value, 3) for value in c.point]
+    return name, c.link or _NO, f"{c.time:.3f}", *place, *(_shown(v, 1) for v in (*c.force, np.linalg.norm(c.force)))
+
+
+def _profiles(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTable:
+    rows = []
+    for name, r in zip(labels, results, strict=True):
+        one = r.by_torques[1].one_sample if r.by_torques else r.width
+        parts = [_shown(r.by_torques[1].push_quantile(q), 1) if r.by_torques else _NO for q in (0.5, 0.9)]
+        largest = _shown(r.by_torques[1].evidence, 2) if r.by_torques else _NO
+        rows.append((
+            name, str(len(r.contacts)), f"{r.duration:.1f}", f"{r.motion:.1f}", _shown(r.per_hour, 1), largest,
+            _shown(one, 1), *parts,
+        ))  # fmt: skip
+    header = (
+        "profile", "contacts", "armed [s]", "in motion [s]", "contacts an hour of motion", "evidence without contact",
+        "force in one sample [N]", f"in {1000 * PUSH_S:.0f} ms [N]", "in 90 % [N]",
+    )  # fmt: skip
+    note = (
+        "A contact is evidence from 1 on. The last three are forces at the end-effector that are found: by one sample"
+        f" alone along the worst axis (median), and pushes of {1000 * PUSH_S:.0f} ms laid on the recorded torques in"
+        " free motion along all axes: half of these are found, and 90 %."
+    )
+    return TextTable("Detection", header, tuple(rows), note, 1)
+
+
+def _joints(recording: TorqueRecording, labels: Sequence[str], results: Sequence[ProfileResult]) -> list[TextTable]:
+    made = []
+    for label, r in zip(labels, results, strict=True):
+        if r.by_torques:
+            s = r.by_torques[1]
+            columns = zip(recording.model.joints, s.before, s.mean, s.sigma, strict=True)
+            rows = tuple((name, *(_shown(value, 3) for value in values)) for name, *values in columns)
+            header = ("joint", "external torque, sigma", "residual, mean", "residual, sigma")
+            note = "Outside contacts; the residual is what learnt free motion does not explain."
+            made.append(TextTable(f"Torques in free motion [Nm], {label}", header, rows, note, 1))
+    return made
+
+
+def _shown(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else "inf" if value > 0 else _NO
+
+
+def _figures(
+    recording: TorqueRecording, labels: Sequence[str], results: Sequence[ProfileResult]
+) -> list[tuple["Figure", str]]:
+    from pretouch.imported_data.figure import decisions_figure
+    from pretouch.imported_data.torque_figure import torque_figure
+
+    title = recording.place.name
+    shown = "joint torques, what free motion does not explain of them, and the evidence. Red: contacts."
+    figures = [
+        (torque_figure(r.by_torques[0], recording.model.joints, f"{title}: {name}"), f"{name}: {shown}")
+        for name, r in zip(labels, results, strict=True) if r.by_torques
+    ]  # fmt: skip
+    if forces := [r.by_force for r in results if r.by_force]:
+        shown = "Force at the end-effector by the torques, and thresholds."
+        figures.append((decisions_figure(forces, title), shown))
+    return figures
+
+
+def _numbers(recording: TorqueRecording, results: Sequence[ProfileResult], notes: list[str]) -> dict[str, Any]:
+    found = [_of_profile(r) for r in results]
+    return {
+        "recording": str(recording.place), "assumed": recording.said, "notes": notes, "samples": len(recording.time),
+        "first_sample_s": recording.first_s, "duration_s": recording.time[-1], "rate_hz": recording.rate,
+        "arm": recording.model.description.name, "joints": recording.model.joints,
+        "contacts": found[0]["contacts"], "profiles": found,
+    }  # fmt: skip
+
+
+def _of_profile(r: ProfileResult) -> dict[str, Any]:
+    numbers = {
+        "profile": r.profile.name, "control_rate_hz": 1 / r.profile.task.control_period_s,
+        "contacts": [_contact_numbers(c) for c in r.contacts],
+        "armed_s": r.duration, "motion_s": r.motion, "contacts_in_motion": r.in_motion,
+        "contacts_per_hour_of_motion": r.per_hour,
+    }  # fmt: skip
+    if r.by_torques is None:
+        return numbers | {"threshold_width_n": r.width}
+    s = r.by_torques[1]
+    return numbers | {
+        "residual_mean_nm": s.mean, "residual_sigma_nm": s.sigma, "external_torque_sigma_nm": s.before,
+        "largest_evidence_without_contact": s.evidence, "one_sample_force_n": s.one_sample,
+        "push_s": PUSH_S, "push_force_median_n": s.push_quantile(0.5), "push_force_90_percent_n": s.push_quantile(0.9),
+    }  # fmt: skip
+
+
+def _contact_numbers(c: ContactEvent) -> dict[str, Any]:
+    known = bool(c.link)
+    return {
+        "time_s": c.time, "link": c.link if known else None, "point_m": c.point if known else None, "force_n": c.force,
+        "norm_n": np.linalg.norm(c.force), "end_s": c.end, "probability": c.probability, "evidence": c.evidence,
+    }  # fmt: skip

@@ -1,0 +1,282 @@
+"""Recordings of joint torques: what is read, found, refused and named."""
+
+import csv
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pretouch.errors import ParameterError, RecordingError
+from pretouch.imported_data.observed import observed
+from pretouch.imported_data.renaming import mapping_of, renamed
+from pretouch.imported_data.source import Choice
+from pretouch.imported_data.torque_results import result_of
+from pretouch.imported_data.torques import read_torques
+from pretouch.profiles import profile
+from tests.imported_data.files import write_csv
+from tests.imported_data.joint_files import Moving
+
+PUSHES = ((22.0, 0.4, "panda_link5", (0.0, 25.0, 0.0)), (27.0, 0.4, "panda_hand", (20.0, 0.0, 0.0)))
+
+
+@pytest.fixture(scope="module")
+def pushed(panda_model):
+    return Moving(panda_model, 30.0, PUSHES)
+
+
+@pytest.fixture(scope="module")
+def short(panda_model):
+    return Moving(panda_model, 6.0)
+
+
+def found_in(recording):
+    return result_of(recording, profile("pretouch"))
+
+
+@pytest.mark.parametrize("kind", ["external", "raw"])
+def test_pushes_are_found_with_their_link_and_force_and_nothing_else(tmp_path, pushed, kind):
+    file = getattr(pushed, f"{kind}_csv")(tmp_path / "a.csv")
+    recording = read_torques(file, Choice())
+    result = found_in(recording)
+    assert [c.link for c in result.contacts] == ["panda_link5", "panda_hand"]
+    for contact, (start, _, _, force) in zip(result.contacts, PUSHES, strict=True):
+        assert start < contact.time < start + 0.1
+        np.testing.assert_allclose(contact.force, force, atol=4.0)
+    assert result.in_motion == 2
+    assert result.per_hour == pytest.approx(2 * 3600 / result.motion)
+    _, summary = result.by_torques
+    assert 1.0 < np.median(summary.push) < 10.0
+    assert (summary.sigma < summary.before).all()
+    assert any("no skin watches" in note for note in result.notes)
+
+
+def test_our_observer_follows_the_external_torques_as_an_observer_of_the_vendors_would(panda_model, pushed):
+    n = round(24.0 * 500)
+    found = observed(panda_model, pushed.time[:n], pushed.q[:n], pushed.qd_d[:n], pushed.driving[:n], 60.0, 0.0)
+    known = np.isfinite(found[:, 0])
+    assert 0.08 < pushed.time[:n][known][0] < 0.1
+    assert np.abs((found - pushed.tau_ext[:n])[known].mean(axis=0)).max() < 0.02
+    assert (found - pushed.tau_ext[:n])[known].std() < 0.1
+
+
+def test_after_a_gap_what_was_learnt_is_kept_and_nothing_is_found_in_it(tmp_path, panda_model, pushed):
+    kept = (pushed.time < 12.0) | (pushed.time > 15.0)
+    columns = {
+        name: values[kept]
+        for name, values in pushed.columns(
+            ("q*_rad", pushed.q), ("dq*_rad_s", pushed.qd), ("tau*_Nm", pushed.driving)
+        ).items()
+    }
+    recording = read_torques(write_csv(tmp_path / "gap.csv", columns), Choice())
+    assert any("A gap of more than 0.1 s, 3.00 s in all" in note for note in recording.notes)
+    result = found_in(recording)
+    assert [c.link for c in result.contacts] == ["panda_link5", "panda_hand"]
+
+
+def test_a_load_that_the_model_lacks_is_noticed_and_can_be_told(tmp_path, panda_model):
+    file = Moving(panda_model, 8.0, payload=2.5).raw_csv(tmp_path / "tool.csv")
+    (said,) = [note for note in read_torques(file, Choice()).notes if "load" in note]
+    assert "A load of 2.5 kg at the end-effector" in said
+    assert "--payload 2.5" in said
+    told = read_torques(file, Choice(payload_kg=2.5))
+    assert not any("load" in note for note in told.notes)
+    # of 25 Nm for the arm stretched out, friction is left, and what accelerates the load
+    assert np.nanstd(told.tau_ext, axis=0).max() < 2.0
+
+
+SWAPPED = [0, 1, 3, 2, 4, 5, 6]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"tau": -1.0}, "minus those that hold the arm: they have the other sign, so give --sign by-robot"),
+        ({"tau": 1000.0}, "in mNm, name the columns tau1_mNm"),
+        ({"tau": 0.001}, "in kNm, name the columns tau1_kNm"),
+        ({"q": 180 / np.pi}, "in the range of panda as degrees: name the columns q1_deg"),
+        ({"dq": 180 / np.pi}, "so they are in degrees: name the columns dq1_deg_s"),
+        ({"dq": -1.0}, "with the other sign: reverse them"),
+        ({"order": [6, 5, 4, 3, 2, 1, 0]}, "in it in another order, as joints"),
+    ],
+)
+def test_a_wrong_sign_unit_or_order_is_refused_and_named(tmp_path, short, change, words):
+    file = short.raw_csv(tmp_path / "wrong.csv", **change)
+    with pytest.raises(RecordingError) as caught:
+        read_torques(file, Choice())
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["driving", "qd"])
+def test_one_kind_of_columns_in_another_order_is_named(tmp_path, short, kind):
+    given = {"q": short.q, "qd": short.qd, "driving": short.driving}
+    given[kind] = given[kind][:, [0, 3, 2, 1, 4, 5, 6]]
+    columns = short.columns(("q*_rad", given["q"]), ("dq*_rad_s", given["qd"]), ("tau*_Nm", given["driving"]))
+    words = "far better as those of joints 1, 4, 3, 2" if kind == "driving" else "is that of the position of joint"
+    with pytest.raises(RecordingError, match=words):
+        read_torques(write_csv(tmp_path / "a.csv", columns), Choice())
+
+
+def test_all_columns_in_another_order_within_the_ranges_are_named_by_their_torques(tmp_path, short):
+    order = [2, 1, 0, 3, 4, 5, 6]
+    file = short.raw_csv(tmp_path / "a.csv", order=order)
+    with pytest.raises(RecordingError, match="far better with all columns in the order of joints 3, 2, 1, 4"):
+        read_torques(file, Choice())
+    q, qd = short.q[:, order], short.qd[:, order]
+    columns = short.columns(("q*_rad", q), ("dq*_rad_s", qd), ("tau*_Nm", short.driving))
+    with pytest.raises(RecordingError, match="far better with positions and velocities in the order"):
+        read_torques(write_csv(tmp_path / "b.csv", columns), Choice())
+
+
+def test_one_joint_of_the_other_sign_is_named(tmp_path, short):
+    short_driving = short.driving * np.where(np.arange(7) == 3, -1.0, 1.0)
+    columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau*_Nm", short_driving))
+    with pytest.raises(RecordingError, match=r"The torques of joints 4 in .* are minus those"):
+        read_torques(write_csv(tmp_path / "a.csv", columns), Choice())
+
+
+def external(short, file, tau):
+    return write_csv(file, short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau_ext*_Nm", tau)))
+
+
+def test_what_friction_tells_of_external_torques_is_mentioned(tmp_path, short):
+    right = external(short, tmp_path / "a.csv", short.tau_ext)
+    assert not any("sign" in note or "order" in note for note in read_torques(right, Choice()).notes)
+    turned = external(short, tmp_path / "b.csv", -short.tau_ext)
+    assert any("they seem to have the other sign" in note for note in read_torques(turned, Choice()).notes)
+    assert not any("seem" in note for note in read_torques(turned, Choice(sign="by-robot")).notes)
+    order = [0, 2, 1, 3, 4, 6, 5]
+    mixed = external(short, tmp_path / "c.csv", short.tau_ext[:, order])
+    assert any("as those of joints 1, 3, 2, 4, 5, 7, 6" in note for note in read_torques(mixed, Choice()).notes)
+
+
+def test_external_torques_with_gravity_or_in_millinewtons_are_refused(tmp_path, short):
+    with pytest.raises(RecordingError, match="gravity is still in them, so name the columns tau1_Nm"):
+        read_torques(external(short, tmp_path / "a.csv", short.driving), Choice())
+    heavy = external(short, tmp_path / "b.csv", 1000.0 * short.tau_ext)
+    with pytest.raises(RecordingError, match="in mNm, name the columns"):
+        read_torques(heavy, Choice())
+
+
+def test_currents_need_gains_and_are_then_torques(tmp_path, short):
+    gains = np.array([10.0, 11.0, 9.0, 8.0, 5.0, 4.0, 3.0])
+    columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("current*_A", short.driving / gains))
+    file = write_csv(tmp_path / "a.csv", columns)
+    with pytest.raises(RecordingError, match="currents of 7 motors and 0 gains: give --gains"):
+        read_torques(file, Choice())
+    recording = read_torques(file, Choice(gains=tuple(gains)))
+    same = read_torques(short.raw_csv(tmp_path / "b.csv"), Choice())
+    np.testing.assert_allclose(recording.tau_ext, same.tau_ext, atol=1e-9)
+    assert any("currents have gear friction in them" in note for note in found_in(recording).notes)
+
+
+def renamed_csv(file, columns, names):
+    write_csv(file, {new: columns[old] for old, new in names.items()})
+    return file
+
+
+def test_a_log_of_libfranka_is_read_as_it_is(tmp_path, short):
+    """Its header, spaces included: milliseconds, joints from 0 on, torques by the robot, commands of the same name."""
+    columns = {"duration": 1000.0 * short.time, " success rate": np.ones(len(short.time))}
+    for name, values in (("q", short.q), ("q_d", short.q), ("dq", short.qd), ("dq_d", short.qd_d),
+                         ("tau_J", short.driving), ("tau_ext_hat_filtered", -short.tau_ext)):  # fmt: skip
+        columns |= {f"{name}[{j}]" if j == 0 else f" {name}[{j}]": values[:, j] for j in range(7)}
+    rows = ["\ufeff".lstrip("\ufeff") + ",".join([*columns, *[f"dq_d[{j}]" for j in range(7)]])]
+    table = np.hstack([np.column_stack(list(columns.values())), np.full((len(short.time), 7), 9.0)])
+    rows += [",".join(repr(float(v)) for v in row) for row in table]
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join(rows))
+    recording = read_torques(file, Choice())
+    np.testing.assert_allclose(recording.tau_ext, short.tau_ext)
+    np.testing.assert_allclose(recording.qd_commanded, short.qd_d)
+    np.testing.assert_allclose(recording.time, short.time, atol=1e-8)
+    assert "by the robot (otherwise --sign on-robot)" in recording.said
+    assert not any("seem" in note for note in recording.notes)
+
+
+def test_columns_of_other_names_are_mapped_one_by_one_or_by_a_pattern_or_by_a_file(tmp_path, short):
+    columns = short.columns(("pos_*", short.q), ("vel.*", short.qd), ("effort[*]", short.tau_ext))
+    columns["t"] = columns.pop("time_s")
+    columns = {name.replace("effort[", "effort["): values for name, values in columns.items()}
+    file = write_csv(tmp_path / "a.csv", columns)
+    text = "t=time_s, pos_*=q*_rad, vel.*=dq*_rad_s, effort[*]=tau_ext*_Nm"
+    by_text = read_torques(file, Choice(columns=mapping_of(text)))
+    np.testing.assert_allclose(by_text.tau_ext, short.tau_ext)
+    toml = tmp_path / "columns.toml"
+    toml.write_text("\n".join(f'"{a}" = "{b}"' for a, b in mapping_of(text)))
+    by_file = read_torques(file, Choice(columns=mapping_of(str(toml))))
+    np.testing.assert_allclose(by_file.q, by_text.q)
+
+
+def test_numbers_of_joints_in_a_pattern_begin_at_one_or_zero():
+    assert renamed(Path("a"), ["x_0", "x_1", "y"], (("x_*", "q*_rad"),)) == ["q1_rad", "q2_rad", "y"]
+    assert renamed(Path("a"), ["x_1", "x_2"], (("x_*", "q*_rad"),)) == ["q1_rad", "q2_rad"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "error", "words"),
+    [
+        ("tau_J_0", ParameterError, "--columns has 'tau_J_0': write THEIRS=OURS"),
+        ("gone.toml", ParameterError, "gone.toml cannot be read"),
+        ("nothing=q1_rad", RecordingError, "has no column 'nothing'"),
+        ("no_*=q*_rad", RecordingError, r"has no column 'no_\*'"),
+    ],
+)
+def test_a_mapping_that_is_wrong_is_one_sentence(tmp_path, short, columns, error, words):
+    file = short.external_csv(tmp_path / "a.csv")
+    with pytest.raises(error, match=words) as caught:
+        read_torques(file, Choice(columns=mapping_of(columns)))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "choice", "words"),
+    [
+        (lambda c: c.pop("tau_ext3_Nm"), {}, "joints 1, 2, 4, 5, 6, 7, and positions of 7 joints"),
+        (lambda c: [c.pop(name) for name in list(c) if "7_" in name], {}, "has 6 joints, and panda has 7: choose"),
+        (lambda c: c.update(tau_ext1=c.pop("tau_ext1_Nm")), {}, "'tau_ext1' .* has no unit: write tau_ext1_nm"),
+        (lambda c: c.pop("time_s"), {}, "has 0 columns of time"),
+        (lambda c: c.update(time_s=50 * c["time_s"]), {}, "come at 10 Hz: record at 40 Hz or more"),
+        (lambda c: c.update(time_s=np.zeros_like(c["time_s"])), {}, "has 1 samples of all joints"),
+        (lambda c: None, {"payload_kg": 1.0}, "which --payload does not change"),
+        (lambda c: None, {"gains": (1.0,) * 7}, "--gains is for motor currents"),
+        (lambda c: None, {"torques": "/x"}, "has no topics: leave out --torques"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_used_is_one_sentence_with_the_way_out(tmp_path, short, change, choice, words):
+    columns = short.columns(
+        ("q*_rad", short.q), ("dq*_rad_s", short.qd), ("dq_d*_rad_s", short.qd_d), ("tau_ext*_Nm", short.tau_ext)
+    )
+    change(columns)
+    with pytest.raises(RecordingError, match=words) as caught:
+        read_torques(write_csv(tmp_path / "a.csv", columns), Choice(**choice))
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) - len(os.fspath(tmp_path)) < 330
+
+
+def test_a_parquet_file_is_read_with_lists_or_without(tmp_path, short):
+    pa = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    flat = pa.table(dict(short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau_ext*_Nm", short.tau_ext))))
+    parquet.write_table(flat, tmp_path / "flat.parquet")
+    found = read_torques(tmp_path / "flat.parquet", Choice())
+    np.testing.assert_allclose(found.tau_ext, short.tau_ext)
+    lists = pa.table({
+        "time_s": short.time, "q": list(short.q), "dq": list(short.qd), "tau_ext_hat_filtered": list(-short.tau_ext),
+    })  # fmt: skip
+    parquet.write_table(lists, tmp_path / "lists.parquet")
+    np.testing.assert_allclose(read_torques(tmp_path / "lists.parquet", Choice()).tau_ext, short.tau_ext)
+    (tmp_path / "broken.parquet").write_bytes(b"PAR1 no")
+    with pytest.raises(RecordingError, match="cannot be read as a Parquet file"):
+        read_torques(tmp_path / "broken.parquet", Choice())
+
+
+def test_without_velocities_those_of_the_positions_stand_in(tmp_path, short):
+    file = write_csv(tmp_path / "a.csv", short.columns(("q*_rad", short.q), ("tau_ext*_Nm", short.tau_ext)))
+    with file.open() as text:
+        assert "dq1_rad_s" not in next(csv.reader(text))
+    recording = read_torques(file, Choice())
+    assert np.abs(recording.qd - short.qd_d)[50:-50].max() < 0.01
+    assert any("Velocities are those of positions" in note for note in recording.notes)
