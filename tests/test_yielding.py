@@ -7,6 +7,7 @@ import pytest
 
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.reach import axis_ends
 from pretouch.errors import ParameterError
 from pretouch.modes import ModeState
 from pretouch.params import ClampParams, GiveUpParams
@@ -105,6 +106,30 @@ def test_a_hand_that_keeps_pushing_keeps_it_away(arm: Pushed):
     steps = arm.push((0.0, -8.0, 0.0), cycles=500)
     assert modes(steps) == {Mode.REACT}
     assert arm.ee()[1] <= aside
+
+
+@pytest.mark.parametrize("force", [(0.0, -20.0, 0.0), (-20.0, 0.0, 0.0), (0.0, 0.0, 30.0)])
+def test_a_push_that_is_held_moves_it_no_farther_than_its_reach_and_back_it_still_yields(arm: Pushed, force):
+    start, reach = axis_ends(arm.model.body, arm.model.kinematics(arm.q)), OURS.react.reach_m
+    steps = arm.push(force, cycles=800)
+    assert modes(steps[10:]) == {Mode.REACT}
+    there = axis_ends(arm.model.body, arm.model.kinematics(arm.q))
+    assert 0.97 * reach < np.linalg.norm(there - start, axis=-1).max() < 1.03 * reach
+    assert np.linalg.norm(steps[-1].command) < 0.02, "it stands there"
+    assert "goes no farther" in steps[-1].reason
+    begun = [step for step in steps if step.reaction_velocity.any()]
+    assert all(step.reaction_velocity @ np.array(force) > 0 for step in begun[10:]), "never towards who pushes"
+    hand = arm.ee()
+    arm.push(tuple(-2 * f for f in force), cycles=60)
+    assert (arm.ee() - hand) @ np.array(force) / np.linalg.norm(force) < -0.02
+
+
+def test_another_contact_may_move_it_as_far_again(arm: Pushed):
+    arm.push((0.0, -20.0, 0.0), cycles=500)
+    arm.wait()
+    first = arm.ee()[1]
+    arm.push((0.0, -20.0, 0.0), cycles=500)
+    assert arm.ee()[1] < first - 0.2
 
 
 @pytest.mark.parametrize("link", ["panda_link4", "panda_link6", "panda_hand"])
