@@ -10,11 +10,12 @@ from pretouch.contact.detector import Body
 from pretouch.contact.reach import axis_ends, within_reach
 from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
 from pretouch.contact.repeated_contact import (
+    Met,
     RepeatedContactState,
-    count_contact,
     discount_push,
     forget_passed,
     given_up,
+    meet,
     repeated_contact_init,
     wait_to_retry,
 )
@@ -22,7 +23,7 @@ from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
 from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
 from pretouch.modes import Event, ModeState
 from pretouch.params.reaction import AdmittanceParams, ClampParams
-from pretouch.robot.model import Kinematics
+from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import FloatArray, Mode
 from pretouch.values import value
 
@@ -161,7 +162,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             return discount_push(place, energy)
         if given_up(place, self.give_up):
             return wait_to_retry(place, near, dt, self.give_up)
-        return forget_passed(place, inputs.path_phase) if doing == "task" else place
+        return forget_passed(place, inputs.path_phase, inputs.robot.q) if doing == "task" else place
 
     def _begun(self, state: AdmittanceState, body: Body, inputs: ReactionInputs) -> AdmittanceState:
         """Begin to move with the contact that was found; one the arm brought about in its task counts for its place."""
@@ -173,13 +174,10 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         # none, and the sample stands for itself.
         before = {"soft": state.mass.steady[0], "still": torque}.get(doing, state.mass.torque)
         mass = begun(state.mass, model, kin, torque, before, band, self)
-        # what the arm ran into pushes against its motion; what pushes it on has come by itself
-        mine = doing == "task" and float(torque @ command) < 0
         place = replace(state.place, counted=False)
-        if mine and self.give_up is not None:
-            kinetic = 0.5 * float(command @ model.mass_matrix(inputs.robot.q) @ command)
-            point, near = kin.position[model.ee], self._near(inputs)
-            place = count_contact(state.place, inputs.path_phase, point, near, kinetic, self.give_up)
+        met = _met(model, inputs, torque) if doing == "task" else None
+        if met is not None and self.give_up is not None:
+            place = meet(state.place, met, self._near(inputs), self.give_up)
         # only the arm's own task closes a gap on something: without a motion there is no self-clamping to be found
         came = command if doing == "task" else np.zeros(len(torque))
         clamp = self._pinched(clamp_begun(state.clamp, inputs.robot.q_commanded, came), body, inputs)
@@ -244,6 +242,16 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     def _presses(self, mass: VirtualMass) -> bool:
         """Whether an arm that static friction holds has detected a contact of late."""
         return self.static_friction_nm > 0 and mass.no_contact < self.quiet_s
+
+
+def _met(model: RobotModel, inputs: ReactionInputs, torque: FloatArray) -> Met | None:
+    """Return the contact that is detected, with its external torques (n,) [Nm]; None without one."""
+    q, command, found = inputs.robot.q, inputs.command, inputs.detection.contact
+    if found is None:
+        return None
+    kinetic = 0.5 * float(command @ model.mass_matrix(q) @ command)
+    point, size = inputs.kin.position[model.ee], float(np.linalg.norm(found.force))
+    return Met(inputs.path_phase, point, q, torque, size, command, kinetic)
 
 
 def _residual(mass: VirtualMass, inputs: ReactionInputs) -> FloatArray:
