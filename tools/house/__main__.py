@@ -22,6 +22,8 @@ class Measure:
 
     Lines and files were raised once, by 1110 and 4, for what a first hour needs: the opening, hand and three arms of
     the live page, the sentence that explains a step, a first start that says what it does, hints for each installation.
+    Then by 215 and 1, and words by 1200, for a bound on how far a contact moves the arm, for light touches that are no
+    object, and for saying beside each claim what it does not hold for.
     """
 
     name: str
@@ -49,16 +51,16 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 51_150, 35_000),
-        Measure("files of the product", len(product.files), 424, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 71_205, 50_000),
+        Measure("lines of the product, comments aside", product.lines, 51_365, 35_000),
+        Measure("files of the product", len(product.files), 425, 300),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 71_430, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
         Measure("lines of functions, 95th percentile", quantiles([f.lines for f in functions], n=20)[-1], 27),
         Measure("lines of the longest function", longest.lines, 60, 60, longest.place),
         *(_comments(package) for package in ("control", "contact", "perception")),
-        Measure("words of documents by hand", sum(words_by_hand(ROOT).values()), 42_000, 42_000),
+        Measure("words of documents by hand", sum(words_by_hand(ROOT).values()), 43_200, 42_000),
         Measure("lines of README", len((ROOT / "README.md").read_text().splitlines()), 150, 150),
         Measure("parameters of a profile", len(values), 125, 140),
         Measure("booleans among them", sum(isinstance(value, bool) for value in values), 8, 6),
