@@ -7,6 +7,7 @@ import pytest
 
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.reach import axis_ends
 from pretouch.errors import ParameterError
 from pretouch.modes import ModeState
 from pretouch.params import ClampParams, GiveUpParams
@@ -36,6 +37,10 @@ class Pushed(Arm):
             torque = self.model.jacobian(kin, k, kin.position[k])[:3].T @ np.array(force)
             steps.append(self.step(force=force, change=with_torque(torque), **more))
         return steps
+
+    def meet(self, face: float, cycles: int) -> list[ControlStep]:
+        """Move where something at rest, of 5 N/mm, keeps the hand from going beyond y = face [m]."""
+        return [step for _ in range(cycles) for step in self.push((0.0, min(0.0, 5e3 * (face - self.ee()[1])), 0.0))]
 
     def wait(self, most: int = 1000) -> None:
         """Until it goes on with its task."""
@@ -107,6 +112,30 @@ def test_a_hand_that_keeps_pushing_keeps_it_away(arm: Pushed):
     assert arm.ee()[1] <= aside
 
 
+@pytest.mark.parametrize("force", [(0.0, -20.0, 0.0), (-20.0, 0.0, 0.0), (0.0, 0.0, 30.0)])
+def test_a_push_that_is_held_moves_it_no_farther_than_its_reach_and_back_it_still_yields(arm: Pushed, force):
+    start, reach = axis_ends(arm.model.body, arm.model.kinematics(arm.q)), OURS.react.reach_m
+    steps = arm.push(force, cycles=800)
+    assert modes(steps[10:]) == {Mode.REACT}
+    there = axis_ends(arm.model.body, arm.model.kinematics(arm.q))
+    assert 0.97 * reach < np.linalg.norm(there - start, axis=-1).max() < 1.03 * reach
+    assert np.linalg.norm(steps[-1].command) < 0.02, "it stands there"
+    assert "goes no farther" in steps[-1].reason
+    begun = [step for step in steps if step.reaction_velocity.any()]
+    assert all(step.reaction_velocity @ np.array(force) > 0 for step in begun[10:]), "never towards who pushes"
+    hand = arm.ee()
+    arm.push(tuple(-2 * f for f in force), cycles=60)
+    assert (arm.ee() - hand) @ np.array(force) / np.linalg.norm(force) < -0.02
+
+
+def test_another_contact_may_move_it_as_far_again(arm: Pushed):
+    arm.push((0.0, -20.0, 0.0), cycles=500)
+    arm.wait()
+    first = arm.ee()[1]
+    arm.push((0.0, -20.0, 0.0), cycles=500)
+    assert arm.ee()[1] < first - 0.2
+
+
 @pytest.mark.parametrize("link", ["panda_link4", "panda_link6", "panda_hand"])
 @pytest.mark.parametrize("force", [(0.0, -30.0, 0.0), (0.0, 30.0, 0.0), (0.0, 0.0, 30.0)])
 def test_the_link_that_is_pushed_goes_with_the_push(arm: Pushed, link: str, force):
@@ -157,20 +186,47 @@ def test_a_person_who_pushes_thrice_at_one_place_does_not_make_it_give_up(arm: P
     assert Mode.TRACK in modes(arm.run(150))
 
 
+@pytest.mark.parametrize("side", [(0.0, -1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, -1.0)])
+def test_light_touches_of_an_arm_that_stands_are_no_obstacle(arm: Pushed, side):
+    arm.run(300)
+    before = arm.ee()
+    arm.run(10)
+    np.testing.assert_allclose(arm.ee(), before, atol=1e-4, err_msg="it is at the end of its path")
+    touches = 0
+    for force, pause in zip((16, 14, 18, 15, 17, 16), (20, 30, 25, 60, 15, 40), strict=True):
+        touches += any(s.contact is not None for s in arm.push(tuple(force * f for f in side), cycles=12))
+        arm.wait()
+        arm.run(pause)
+    assert touches >= 4
+    assert arm.state.mode.mode is Mode.TRACK
+
+
+@pytest.mark.parametrize("pauses", [(15, 45, 80, 20, 60, 100), (60, 20, 90, 30, 75, 15)])
+def test_light_touches_of_an_arm_that_passes_are_no_obstacle(panda_model, paper_skin, pauses):
+    slow = replace(NO_LAG, task=replace(NO_LAG.task, speed_m_s=0.1))
+    arm = arm_of(panda_model, paper_skin, slow)
+    for pause in pauses:
+        arm.push((0.0, -15.0, 0.0), cycles=12)
+        arm.wait()
+        arm.run(pause)
+    assert arm.state.mode.mode is Mode.TRACK
+
+
 def test_after_three_contacts_at_one_place_it_gives_up_says_so_and_tries_again(panda_model, paper_skin):
     quick = replace(NO_LAG.react, quiet_s=0.3, give_up=GiveUpParams(push_j=100.0, retry_s=1.0))
     arm = arm_of(panda_model, paper_skin, replace(NO_LAG, react=quick))
-    for _ in range(3):
-        arm.wait()
-        arm.run(5)
-        arm.push((0.0, -20.0, 0.0), cycles=10)
-    steps = arm.run(60)
+    face = arm.ee()[1] + 0.05
+    steps = arm.meet(face, 500)
     assert steps[-1].mode is Mode.HOLD
     assert "3 contacts at one place" in steps[-1].reason
     assert not arm.state.mode.latched
-    assert Mode.TRACK in modes(arm.run(100)), "no unit saw anything: it tries again after a while"
-    arm.push((0.0, -20.0, 0.0), cycles=10)
-    assert arm.run(60)[-1].mode is Mode.HOLD, "one contact more, and it gives up again"
+    again = arm.meet(face, 300)
+    assert Mode.TRACK in modes(again), "no unit saw anything: it tries again after a while"
+    held = np.array([s.mode is Mode.HOLD for s in again])
+    assert np.count_nonzero(np.diff(held.astype(int)) == 1) >= 1, "one contact more, and it gives up again"
+    assert sum(s.contact is not None for s in again) == np.count_nonzero(np.diff(held.astype(int)) == 1)
+    while arm.state.mode.mode is not Mode.HOLD:
+        arm.meet(face, 1)
     assert arm.step(resume=True).mode is Mode.TRACK
 
 

@@ -7,13 +7,15 @@ import numpy as np
 
 from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
 from pretouch.contact.detector import Body
+from pretouch.contact.reach import axis_ends, within_reach
 from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
 from pretouch.contact.repeated_contact import (
+    Met,
     RepeatedContactState,
-    count_contact,
     discount_push,
     forget_passed,
     given_up,
+    meet,
     repeated_contact_init,
     wait_to_retry,
 )
@@ -21,6 +23,7 @@ from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
 from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
 from pretouch.modes import Event, ModeState
 from pretouch.params.reaction import AdmittanceParams, ClampParams
+from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import FloatArray, Mode
 from pretouch.values import value
 
@@ -35,6 +38,10 @@ class AdmittanceState:
     mass: VirtualMass
     clamp: ClampState
     place: RepeatedContactState
+    origin: FloatArray | None = None
+    """(C, 2, 3) where the ends of the body's axes were when the reaction began [m], None before any."""
+    moved: float = 0.0
+    """How far the farthest of them has come since [m]."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         """Let the virtual mass move, look for clamps, count places; name what the reaction is at."""
         doing, near = self._doing(inputs.mode, inputs.detection.armed), self._near(inputs)
         mass, clamp = self._moved(state, doing, body, inputs), state.clamp
+        mass, moved = self._kept_near(mass, state.origin, doing, body, inputs.kin)
         q, dt = inputs.robot.q_commanded, body.period
         # a clamp that is found stands: the arm opens out of it, and no other is looked for
         if doing == "react" and not clamp.torque:
@@ -64,7 +72,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             clamp = gone(clamp, q, dt)
         # what the tank holds beyond its start is the least energy that the contact has given
         place = self._placed(state.place, doing, mass.tank - self.start_energy_j, near, dt, inputs)
-        state = AdmittanceState(mass, clamp_init(q) if inputs.resume else clamp, place)
+        state = AdmittanceState(mass, clamp_init(q) if inputs.resume else clamp, place, state.origin, moved)
         return self._events(state, doing, near, inputs), state
 
     def move(
@@ -93,8 +101,8 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     def announced(self, period: float) -> str:
         """Say how fast the arm goes with a push, and when it goes on."""
         return (
-            f"When pushed, it yields at up to {self.speed_max_m_s:g} m/s as long as the push lasts, and continues"
-            f" {self.quiet_s:g} s later: keep everything it could hit away from it."
+            f"When pushed, it yields at up to {self.speed_max_m_s:g} m/s as long as the push lasts, by up to"
+            f" {self.reach_m:g} m, and continues {self.quiet_s:g} s later: keep everything it could hit away from it."
         )
 
     @property
@@ -129,6 +137,19 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             mass = replace(mass, velocity=np.where(mass.velocity * clamp.course > 0, 0.0, mass.velocity))
         return mass
 
+    def _kept_near(
+        self, mass: VirtualMass, origin: FloatArray | None, doing: Doing, body: Body, kin: Kinematics
+    ) -> tuple[VirtualMass, float]:
+        """Let no contact move the arm farther than its reach; return the mass, and how far it has come [m].
+
+        A soft hold has no such bound: whoever frees somebody, or guides the arm out, may have to move it farther.
+        """
+        if doing != "react" or origin is None:
+            return mass, 0.0
+        moved_by, capsules = body.model.moved_by, body.model.body.arrays
+        velocity, moved = within_reach(mass.velocity, kin, moved_by, capsules, origin, self.reach_m)
+        return replace(mass, velocity=velocity), moved
+
     def _placed(
         self, place: RepeatedContactState, doing: Doing, energy: float, near: bool, dt: float, inputs: ReactionInputs
     ) -> RepeatedContactState:
@@ -141,7 +162,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             return discount_push(place, energy)
         if given_up(place, self.give_up):
             return wait_to_retry(place, near, dt, self.give_up)
-        return forget_passed(place, inputs.path_phase) if doing == "task" else place
+        return forget_passed(place, inputs.path_phase, inputs.robot.q) if doing == "task" else place
 
     def _begun(self, state: AdmittanceState, body: Body, inputs: ReactionInputs) -> AdmittanceState:
         """Begin to move with the contact that was found; one the arm brought about in its task counts for its place."""
@@ -153,17 +174,14 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         # none, and the sample stands for itself.
         before = {"soft": state.mass.steady[0], "still": torque}.get(doing, state.mass.torque)
         mass = begun(state.mass, model, kin, torque, before, band, self)
-        # what the arm ran into pushes against its motion; what pushes it on has come by itself
-        mine = doing == "task" and float(torque @ command) < 0
         place = replace(state.place, counted=False)
-        if mine and self.give_up is not None:
-            kinetic = 0.5 * float(command @ model.mass_matrix(inputs.robot.q) @ command)
-            point, near = kin.position[model.ee], self._near(inputs)
-            place = count_contact(state.place, inputs.path_phase, point, near, kinetic, self.give_up)
+        met = _met(model, inputs, torque) if doing == "task" else None
+        if met is not None and self.give_up is not None:
+            place = meet(state.place, met, self._near(inputs), self.give_up)
         # only the arm's own task closes a gap on something: without a motion there is no self-clamping to be found
         came = command if doing == "task" else np.zeros(len(torque))
         clamp = self._pinched(clamp_begun(state.clamp, inputs.robot.q_commanded, came), body, inputs)
-        return AdmittanceState(mass, clamp, place)
+        return AdmittanceState(mass, clamp, place, axis_ends(model.body, kin), 0.0)
 
     def _pinched(self, clamp: ClampState, body: Body, inputs: ReactionInputs) -> ClampState:
         """Look for something caught between two links, or one and a fixture, as long as a contact is detected."""
@@ -192,7 +210,8 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             events[Event.CLAMPED if clamp.open else Event.OPENING] = _caught(clamp)
         elif doing == "react" and self._waits(state, near, inputs.detection.lasting):
             until = ", once nothing is seen near it" if near and not given_up(place, self.give_up) else ""
-            events[Event.YIELDING] = f"{self.quiet_s:g} s after the last push{until}"
+            far = f"; it is {state.moved:.2f} m away, and goes no farther" if self._at_reach(state) else ""
+            events[Event.YIELDING] = f"{self.quiet_s:g} s after the last push{until}{far}"
         elif doing in ("react", "soft") and self._presses(mass) and mass.quiet >= max(self.quiet_s, self.patience_s):
             torque = np.abs(mass.steady[1])
             events[Event.PRESSED] = f"{self.patience_s:g} s, about {torque.max():.0f} Nm at joint {torque.argmax() + 1}"
@@ -216,9 +235,23 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         waits_for = (near and not given_up(state.place, self.give_up)) or self._presses(state.mass)
         return lasting or quiet < self.quiet_s or (waits_for and quiet < self.patience_s)
 
+    def _at_reach(self, state: AdmittanceState) -> bool:
+        """Whether the arm has all but come as far as a contact may move it."""
+        return state.moved > _FAR * self.reach_m
+
     def _presses(self, mass: VirtualMass) -> bool:
         """Whether an arm that static friction holds has detected a contact of late."""
         return self.static_friction_nm > 0 and mass.no_contact < self.quiet_s
+
+
+def _met(model: RobotModel, inputs: ReactionInputs, torque: FloatArray) -> Met | None:
+    """Return the contact that is detected, with its external torques (n,) [Nm]; None without one."""
+    q, command, found = inputs.robot.q, inputs.command, inputs.detection.contact
+    if found is None:
+        return None
+    kinetic = 0.5 * float(command @ model.mass_matrix(q) @ command)
+    point, size = inputs.kin.position[model.ee], float(np.linalg.norm(found.force))
+    return Met(inputs.path_phase, point, q, torque, size, command, kinetic)
 
 
 def _residual(mass: VirtualMass, inputs: ReactionInputs) -> FloatArray:
@@ -232,3 +265,7 @@ def _caught(clamp: ClampState) -> str:
     if clamp.between:
         return f"{clamp.between}, pushed apart with {clamp.force:.0f} N"
     return f"{clamp.torque:.1f} Nm against the direction it yielded in"
+
+
+_FAR = 0.95
+"""Share of its reach from which the arm says that it goes no farther."""

@@ -29,6 +29,52 @@ class RepeatedContactState:
     """Whether the contact of the reaction under way is among them."""
     bound: float
     """Energy that contact may give the arm and still be one of an object at rest [J]."""
+    q: FloatArray | None = None
+    """(n,) joint positions at the last contact there [rad], None for no such location."""
+    lever: FloatArray | None = None
+    """(n,) external torques of that contact for each newton of its force [m]."""
+    touched: float = -np.inf
+    """Arc length of the last contact of all, counted or not [m]."""
+
+
+@value
+class Met:
+    """A contact in the arm's task."""
+
+    phase: float
+    """Arc length along the path [m]."""
+    point: FloatArray
+    """(3,) where the end-effector is [m]."""
+    q: FloatArray
+    """(n,) joint positions [rad]."""
+    torque: FloatArray
+    """(n,) external torques [Nm]."""
+    force: float
+    """Size of its force [N]."""
+    command: FloatArray
+    """(n,) joint velocities commanded last [rad/s]."""
+    kinetic: float
+    """Energy with which the arm met it [J]."""
+
+    @property
+    def lever(self) -> FloatArray:
+        """(n,) torques for each newton [m]: their product with joint velocities is a speed along the force [m/s]."""
+        return self.torque / max(self.force, _LEAST_N)
+
+
+def meet(state: RepeatedContactState, met: Met, near: bool, params: GiveUpParams) -> RepeatedContactState:
+    """Take in a contact that begins, and count it if the arm ran into something.
+
+    It did if it moved against the force, fast enough to be what brought that about, and had come on along its path
+    since the contact before. What touches an arm that stands, or settles again after such a touch, has come by itself;
+    what pushes it on has too.
+    """
+    against = float(met.lever @ met.command) < -_CLOSING_M_S
+    if against and met.phase > state.touched + _ADVANCED_M:
+        state = count_contact(state, met, near, params)
+    else:
+        state = replace(state, counted=False)
+    return replace(state, touched=met.phase)
 
 
 def repeated_contact_init() -> RepeatedContactState:
@@ -41,21 +87,39 @@ def given_up(state: RepeatedContactState, params: GiveUpParams | None) -> bool:
     return params is not None and state.contacts >= params.contacts
 
 
-def count_contact(
-    state: RepeatedContactState, phase: float, point: FloatArray, near: bool, kinetic: float, params: GiveUpParams
-) -> RepeatedContactState:
-    """Count a contact made on the path at an arc length [m] with the end-effector at a point (3,) [m].
+def count_contact(state: RepeatedContactState, met: Met, near: bool, params: GiveUpParams) -> RepeatedContactState:
+    """Count a contact that the arm ran into on its path.
 
-    `near` says whether something is seen near the body. `kinetic` is the energy with which the arm met it [J]: an
-    object at rest gives back no more, and as much again allows for the drives, which go on until it is detected.
+    An object at rest is met where it was met before, and from the same side. A hand that touches the arm lightly, now
+    here and now there, is met at another location each time.
+
+    `near` says whether something is seen near the body. An object at rest gives back no more energy than the arm
+    brought, and as much again allows for the drives, which go on until it is detected.
     """
-    bound = params.push_j + 2.0 * kinetic
-    if state.contacts and abs(phase - state.phase) <= _LOCATION_M:
+    bound = params.push_j + 2.0 * met.kinetic
+    if state.contacts and abs(met.phase - state.phase) <= _LOCATION_M and _same_object(state, met):
         # the location stays that of the first contact: one that crept along would never be passed
         return RepeatedContactState(
-            state.phase, state.point, state.contacts + 1, state.seen or near, 0.0, 0.0, True, bound
+            state.phase, state.point, state.contacts + 1, state.seen or near, 0.0, 0.0, True, bound, met.q, met.lever
         )  # fmt: skip
-    return RepeatedContactState(phase, point, 1, near, 0.0, 0.0, True, bound)
+    return RepeatedContactState(met.phase, met.point, 1, near, 0.0, 0.0, True, bound, met.q, met.lever)
+
+
+def _same_object(state: RepeatedContactState, met: Met) -> bool:
+    """Whether a contact can be with the object at rest that the arm met last at a location."""
+    if state.q is None or state.lever is None:  # as in recordings of before
+        return True
+    sizes = float(np.linalg.norm(state.lever) * np.linalg.norm(met.lever))
+    alike = float(state.lever @ met.lever) >= _ALIKE * sizes
+    return alike and -_SHORT_M <= _farther(state.q, state.lever, met.q) <= _FARTHER_M
+
+
+def _farther(q: FloatArray, lever: FloatArray, now: FloatArray) -> float:
+    """How much farther against a force the arm has come from joint positions q (n,) [rad] to those of `now` [m].
+
+    That is the work against the force, for each newton: to first order the way of the touched point, wherever it is.
+    """
+    return -float(lever @ (now - q))
 
 
 def discount_push(state: RepeatedContactState, energy: float) -> RepeatedContactState:
@@ -65,12 +129,20 @@ def discount_push(state: RepeatedContactState, energy: float) -> RepeatedContact
     # somebody pushes: that says nothing of the location
     if state.contacts > 1:
         return replace(state, contacts=state.contacts - 1, counted=False)
-    return repeated_contact_init()
+    return _nowhere(state)
 
 
-def forget_passed(state: RepeatedContactState, phase: float) -> RepeatedContactState:
-    """Forget the location once the arm is past it on its path."""
-    return repeated_contact_init() if state.contacts and phase > state.phase + _LOCATION_M else state
+def _nowhere(state: RepeatedContactState) -> RepeatedContactState:
+    """Forget the location, and keep where the last contact was."""
+    return replace(repeated_contact_init(), touched=state.touched)
+
+
+def forget_passed(state: RepeatedContactState, phase: float, q: FloatArray) -> RepeatedContactState:
+    """Forget the location once the arm is past it: on its path, or where an object at rest would be in its way."""
+    if not state.contacts:
+        return state
+    there = state.q is not None and state.lever is not None and _farther(state.q, state.lever, q) > _FARTHER_M
+    return _nowhere(state) if there or phase > state.phase + _LOCATION_M else state
 
 
 def wait_to_retry(state: RepeatedContactState, near: bool, dt: float, params: GiveUpParams) -> RepeatedContactState:
@@ -83,11 +155,28 @@ def wait_to_retry(state: RepeatedContactState, near: bool, dt: float, params: Gi
     time = state.waited + dt
     if nothing_seen >= _CLEAR_S if seen else time >= p.retry_s:
         # one contact less than it takes to give up: the next one ends it again
-        return RepeatedContactState(state.phase, state.point, p.contacts - 1, False, 0.0, 0.0, False, 0.0)
-    return RepeatedContactState(state.phase, state.point, state.contacts, seen, nothing_seen, time, False, 0.0)
+        return replace(
+            state, contacts=p.contacts - 1, seen=False, nothing_seen=0.0, waited=0.0, counted=False, bound=0.0
+        )
+    return replace(state, seen=seen, nothing_seen=nothing_seen, waited=time, counted=False, bound=0.0)
 
 
 _LOCATION_M = 0.1
 """Contacts less than this apart along the path are at one location [m]."""
 _CLEAR_S = 1.0
 """Time for which nothing is seen near before the arm that gave up tries again [s]: several readings of each unit."""
+_CLOSING_M_S = 0.02
+"""Least speed against the force with which the arm runs into something [m/s]: boards were met at 0.04 m/s and more. An
+arm that stands, and is touched lightly again and again, settles at up to 0.018 m/s."""
+_ADVANCED_M = 1e-4
+"""How far along its path the arm has come from one contact with an object at rest to the next [m]: at boards 0.5 mm and
+more; at the end of its path nothing."""
+_SHORT_M = 0.01
+"""How much short of its last location an object at rest may be met [m]: boards were met 3 mm short of it at most."""
+_FARTHER_M = 0.02
+"""How much farther, against the force, it may be met, or the arm may come without meeting it [m]: along a board of 2
+N/mm beside the circle the arm slides on by 0.014 m from one contact to the next."""
+_ALIKE = 0.5
+"""Least cosine between the torques of two contacts with an object at rest: with boards at least 0.77."""
+_LEAST_N = 5.0
+"""Least force by which torques are divided [N]: the estimate of a smaller one is mostly noise."""

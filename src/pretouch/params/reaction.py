@@ -52,6 +52,9 @@ class AdmittanceParams(Checked):
 
     speed_max_m_s: Positive = 0.3
     """Bound on the speed of every point of the body's axes [m/s] (authors' code family, there of the hand)."""
+    reach_m: Positive = 0.3
+    """How far a contact may move any point of the body's axes from where it was when the contact began [m]: as far as
+    the paper's reaction goes at most, so that the same room has to be free about the arm."""
     inertia_kg_m2: Positive = 1.5
     """Virtual inertia of each joint [kg m^2]: with the damping, 0.1 s to come to rest."""
     damping_nm_s: Positive = 15.0

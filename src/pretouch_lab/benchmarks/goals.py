@@ -19,10 +19,11 @@ _DEFINED = (
     " 100 ms and more on the links 3 to 7 and the hand, whose torques exceed three standard deviations of free"
     " motion's, on the usual arm and skin; delay from the true force passing 1 N, of what was detected; bounds of the"
     " median from its ranks (of fewer than six values their range), of shares Clopper and Pearson's. Towards the"
-    " person: of all contacts and of all reactions in the closed loop. Boards: 25 N/mm, circle and line from both"
-    " sides; median over the trials of the part of the reference's value in the same trial, where without contact the"
-    " force is 0 N and the time endless. First contact: from the board being within 0.8 m of the end-effector. A turn:"
-    " the second one. Forces beside the person: true 20 ms peak, 90 % of the trials below it."
+    " person: of all contacts, by the first motion of the touched point (redefined after the first published run), and"
+    " of all reactions in the closed loop; an answer that moves nothing is none. Boards: 25 N/mm, seen by units, circle"
+    " and line from both sides; median over the trials of the part of the reference's value in the same trial, where"
+    " without contact the force is 0 N and the time endless. First contact: from the board being within 0.8 m of the"
+    " end-effector. A turn: the second one. Forces beside the person: true 20 ms peak, 90 % of the trials below it."
 )
 
 

@@ -121,7 +121,8 @@ def test_what_was_not_measured_is_not_reached():
 def test_the_table_of_the_first_page_has_who_it_is_about():
     table = front_table(*measured())
     assert [row[0] for row in table.rows] == ["blind", "paper", "pretouch"]
-    assert table.rows[2][1:] == ("5.0 N", "30 ms / 30 ms", "0 of 180", "5.0 s", "0.4")
+    assert table.rows[2][1:] == ("5.0 N", "30 ms / 30 ms", "0 of 180", "0 of 180", "5.0 s", "0.4", "0.4")
+    assert "all links" in table.note
     detection, avoidance = measured()
     for cell in avoidance["families"]:
         if cell["contender"] == "paper":
