@@ -95,7 +95,7 @@ def test_both_variances_are_found_from_samples(panda_model):
         block = np.zeros(block_size(n))
         for _ in range(250):
             e = M @ (np.sqrt(true[0]) * rng.standard_normal(n)) + np.sqrt(true[1]) * rng.standard_normal(n)
-            add_sample(block, False, CalmSample(e, x, e, M, np.zeros(n), 1), spread, 1000.0, 0.0)
+            add_sample(block, False, CalmSample(e, x, e, M, np.zeros(n), 1, np.zeros(0)), spread, 1000.0, 0.0)
         start = n + n * features_of(n)
         spread = block[start : start + 2 * n].reshape(2, n) / block[-2]
     found, expected = np.empty((n, n)), np.empty((n, n))

@@ -7,16 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, multivariate_t
 
-from pretouch.contact.sequential import (
-    LENGTHS,
-    LONGEST,
-    Hypotheses,
-    alarm_level,
-    explained_by_force,
-    judge,
-    log_ratio,
-    window_means,
-)
+from pretouch.contact.residual_windows import LENGTHS, LONGEST, window_means
+from pretouch.contact.sequential import Hypotheses, alarm_bound, explained_by_force, judge, log_ratio
+from pretouch.contact.window_scatter import white_means
 from pretouch.params import SequentialParams
 from pretouch.types import FloatArray
 
@@ -53,10 +46,8 @@ def test_windows_are_means_of_the_newest_samples():
 
 def test_the_level_is_that_of_the_rate_of_false_alarms():
     # 360000 samples an hour at 100 Hz
-    assert alarm_level(SequentialParams(slack_nats=0.0), 0.01) == pytest.approx(math.log(360_000))
-    assert alarm_level(SequentialParams(slack_nats=0.0, false_alarms_per_hour=0.1), 0.01) == pytest.approx(
-        math.log(3_600_000)
-    )
+    assert alarm_bound(SequentialParams(), 0.01) == pytest.approx(math.log(360_000))
+    assert alarm_bound(SequentialParams(false_alarms_per_hour=0.1), 0.01) == pytest.approx(math.log(3_600_000))
 
 
 @pytest.mark.parametrize("tails", [8.0, 1e9])
@@ -102,20 +93,20 @@ def test_the_expectation_of_the_statistic_in_free_motion_is_the_sum_of_the_weigh
     for _ in range(20_000):
         means = np.zeros((len(LENGTHS), N))
         means[0] = np.linalg.cholesky(S) @ rng.standard_normal(N) / math.sqrt(rng.chisquare(tails) / tails)
-        log_r, _, _ = judge(means, 1, S, np.zeros(N), no_point(weight), 0.5, tails)
+        log_r, _, _ = judge(means, 1, white_means(S, np.zeros(N)), no_point(weight), 0.5, tails)
         total.append(math.exp(log_r) * len(LENGTHS))
     assert np.mean(total) == pytest.approx(1.0, abs=0.03)
 
 
 def test_false_alarms_on_noise_stay_within_the_bound():
-    rng, S, p = np.random.default_rng(6), spread(), SequentialParams(slack_nats=0.0, false_alarms_per_hour=3600.0)
+    rng, S, p = np.random.default_rng(6), spread(), SequentialParams(false_alarms_per_hour=3600.0)
     L, ring, weight = np.linalg.cholesky(S), np.zeros((LONGEST, N)), np.full(N, 1.0 / N)
-    passed, samples, level = 0, 20_000, alarm_level(p, 0.01)
+    passed, samples, level = 0, 20_000, alarm_bound(p, 0.01)
     for i in range(samples):
         ring[i % LONGEST] = L @ rng.standard_normal(N)
         means = np.zeros((len(LENGTHS), N))
         whole = window_means(ring, (i + 1) % LONGEST, min(i + 1, LONGEST), means)
-        log_r, _, _ = judge(means, whole, S, np.zeros(N), no_point(weight), 15.0, 30.0)
+        log_r, _, _ = judge(means, whole, white_means(S, np.zeros(N)), no_point(weight), 15.0, 30.0)
         passed += log_r >= level
     assert passed <= samples * 0.01 * 1.0  # one a second is the bound
 
@@ -124,14 +115,17 @@ def test_a_push_is_found_and_its_window_is_that_of_its_length():
     means = np.zeros((len(LENGTHS), N))
     means[:] = 0.1
     means[3] = [6.0, 0.0, 0.0]
-    log_r, window, _ = judge(means, 6, np.eye(N), np.full(N, 1e-3), no_point(np.full(N, 1.0 / N)), 15.0, 30.0)
+    log_r, window, _ = judge(
+        means, 6, white_means(np.eye(N), np.full(N, 1e-3)), no_point(np.full(N, 1.0 / N)), 15.0, 30.0
+    )
     assert window == 3
-    assert log_r > alarm_level(SequentialParams(slack_nats=0.0), 0.01)
+    assert log_r > alarm_bound(SequentialParams(), 0.01)
 
 
 def test_an_outlier_of_one_sample_is_less_to_a_test_with_heavy_tails():
     means = np.full((len(LENGTHS), N), 7.0)
     heavy, light = (
-        judge(means, 1, np.eye(N), np.zeros(N), no_point(np.full(N, 1 / N)), 15.0, tails)[0] for tails in (5.0, 1e3)
+        judge(means, 1, white_means(np.eye(N), np.zeros(N)), no_point(np.full(N, 1 / N)), 15.0, tails)[0]
+        for tails in (5.0, 1e3)
     )
     assert heavy < 0.3 * light

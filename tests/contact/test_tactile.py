@@ -11,7 +11,7 @@ from tests.contact.alone import feel, sample, standing
 
 from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.detector import Body
-from pretouch.contact.sequential import alarm_level
+from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.tactile import TouchSensors, gain_of, surface_area
 from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import profile
@@ -170,5 +170,5 @@ def test_a_touch_counts_for_an_object_that_is_seen_at_its_link_as_well(panda_mod
             felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, cues)
         evidence.append(felt.evidence)
     # fifty times the prior of what says most: ln 50 in units of ln A, but for what the other hypotheses add
-    gained = np.log(50.0) / alarm_level(ours.detect, ours.task.control_period_s)
+    gained = np.log(50.0) / (alarm_bound(ours.detect, ours.task.control_period_s) - ours.detect.slack_nats)
     assert 0.8 * gained < evidence[1] - evidence[0] <= gained * (1 + 1e-9)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pretouch.contact.sequential import LENGTHS
+from pretouch.contact.residual_windows import LENGTHS
 from pretouch.contact.turning import add_reversal_variance, learn_turning, turning_init
 
 M, S = np.diag([2.0, 1.0]), 0.04 * np.eye(2)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, inlined
+from pretouch.contact.alarm_level import learn_level
 from pretouch.contact.lasting_load import (
     WeightPart,
     find_lasting,
@@ -14,8 +15,9 @@ from pretouch.contact.lasting_load import (
     weight_part,
 )
 from pretouch.contact.residual_model import BLOCK, QUEUE, CalmSample, Learnt, Pace, add_sample, learn_block
-from pretouch.contact.sequential import LENGTHS, LONGEST
+from pretouch.contact.residual_windows import LENGTHS, LONGEST
 from pretouch.contact.turning import learn_turning
+from pretouch.contact.window_scatter import FreeMeans, learn_scatter
 from pretouch.types import FloatArray
 
 CALM = BLOCK * QUEUE
@@ -43,6 +45,9 @@ class Recent(NamedTuple):
     lasting: FloatArray
     steady: int
     turning: FloatArray
+    scatter: FloatArray
+    level: FloatArray
+    settled: int
     speed: FloatArray
     """(n,) commanded joint velocities as late as the torques, of the sample before [rad/s]."""
 
@@ -64,8 +69,8 @@ class Situation(NamedTuple):
     """Of control [s]."""
     settle: int
     """Samples after which what lasts is learnt, 0 for never."""
-    alarm: float
-    """ln A of the test."""
+    bound: float
+    """ln A of the test, see `alarm_bound`."""
     may_learn: bool
     """Whether free motion may be learnt."""
     reacting: bool
@@ -92,11 +97,15 @@ class DetectionNumbers(NamedTuple):
     near_horizon_s: float
     clear_m: float
     suspect: float
+    slack_nats: float
     noise_floor_nm: float
     bias_floor_nm: float
     still_rad_s: float
     memory_s: float
     spread_memory_s: float
+    learn_misfit: bool
+    misfit_memory_s: float
+    settled_s: float
 
 
 class Tested(NamedTuple):
@@ -107,26 +116,35 @@ class Tested(NamedTuple):
     """(6, n) means of the newest residuals, of each of `LENGTHS` [Nm]."""
     whole: int
     """How many of them are of as many samples as they should be."""
-    noise: FloatArray
-    """(n, n) covariance of the noise of a sample [Nm^2]."""
+    expected: FreeMeans
+    """What the means are in free motion, and how they compare with it."""
     J: FloatArray
     """(6, n) Jacobian of the end-effector."""
     alone: bool
     """Whether nothing that is seen can touch the arm."""
     suspected: bool
     """Whether a contact is."""
+    log_r: float
+    """ln R of the test."""
+    level: FloatArray
+    """(5,) what the level follows in the present regime, see `level_init`; changed."""
 
 
 @inlined
 def update_model(memory: Memory, now: Situation, p: DetectionNumbers, tested: Tested) -> tuple[int, int, int, int]:
     """Learn from a sample; return calm samples, samples of the block, blocks that wait, and `steady` of the state."""
     learnt, blocks, recent = memory
-    sample, whole, noise, alone, suspected = tested.sample, tested.whole, tested.noise, tested.alone, tested.suspected
-    # what was gathered before a contact is suspected may be its beginning: it is thrown away, not learnt
-    calm = 0 if suspected or now.reacting or not alone else min(recent.calm + 1, CALM)
+    sample, whole, free, alone, suspected = tested.sample, tested.whole, tested.expected, tested.alone, tested.suspected
+    # What was gathered before a contact is suspected may be its beginning: it is thrown away, not learnt. Where misfit is
+    # learnt it only counts less: a spread without what it does not expect shrinks, and expects less and less.
+    calm = 0 if (suspected and not p.learn_misfit) or now.reacting or not alone else min(recent.calm + 1, CALM)
     # learnt also where a contact is suspected: an alarm at a reversal would otherwise come at each of them
     if p.widen_at_turns and alone and not now.reacting and whole == len(LENGTHS):
-        learn_turning(recent.at, tested.means, noise, sample.model_variance, now.period / p.memory_s, recent.turning)
+        learn_turning(recent.at, tested.means, free.S, sample.model_variance, now.period / p.memory_s, recent.turning)
+    if p.learn_misfit and alone and not now.reacting:
+        learn_scatter(recent.at, whole, free, p.tails, now.period / p.misfit_memory_s)
+        if whole == len(LENGTHS):
+            learn_level(tested.log_r, tested.level)
     filled, waiting = 0, 0
     if calm >= CALM:
         add_sample(
@@ -139,7 +157,7 @@ def update_model(memory: Memory, now: Situation, p: DetectionNumbers, tested: Te
         filled, waiting = _queue_block(blocks, blocks.filled + 1, learnt, pace)
     # something that lasts is worth finding only if it troubles the arm; calm samples learn it anyway
     steady, unclear = 0, recent.steady > 0 or suspected or now.reacting
-    if now.settle > 0 and alone and whole == len(LENGTHS) and calm < CALM and unclear:
+    if now.settle > 0 and alone and whole == len(LENGTHS) and (calm < CALM or suspected) and unclear:
         steady = _lasting_samples(recent, now, tested, learnt, p.offset_prior_nm)
     return calm, filled, waiting, steady
 
@@ -167,7 +185,7 @@ def _lasting_samples(recent: Recent, now: Situation, tested: Tested, known: Lear
     Samples count in which a contact is suspected or the arm reacts, but only what stands out is something to find out.
     """
     lasting, steady, settle = recent.lasting, recent.steady, now.settle
-    residual, x, J, noise, moving = tested.means[-1], tested.sample.x, tested.J, tested.noise, tested.sample.moving
+    residual, x, J, noise, moving = tested.means[-1], tested.sample.x, tested.J, tested.expected.S, tested.sample.moving
     n = len(residual)
     # what may be weight and what one joint's offset depend on the posture: both are found anew in each step
     weight = WeightPart(np.empty(n), np.empty(n), np.empty(n))

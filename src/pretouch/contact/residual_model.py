@@ -215,6 +215,8 @@ class CalmSample(NamedTuple):
     """(n,) variance of the error of the mean [Nm^2]."""
     moving: int
     """1 if the arm moves, or 0."""
+    ratio: FloatArray
+    """(n,) how many samples in a row say as much of the mean as one would of white noise; (0,): noise is white."""
 
 
 @compiled
@@ -227,7 +229,7 @@ def add_sample(
     A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. The variance of the mean's error is in the
     sample but not in D. `spread` (2, n) is A and D of samples of its kind.
     """
-    torque, x, residual, M, model_variance, moving = sample
+    torque, x, residual, M, model_variance, moving, ratio = sample
     n, f = x.shape
     S, L, y, z = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n)
     if first:
@@ -252,7 +254,10 @@ def add_sample(
         jitter = trust * (D * z[i]) ** 2 + D - D * D * forward(L, unit, y)
         unit[i] = 0.0
         block[start + n + i] += max(jitter - model_variance[i] - floor**2, 0.0)
-        block[start + 2 * n + i] += S[i, i]
+        if len(ratio):  # an outlier counts less, and what stays the same for many samples is one piece of news
+            block[start + 2 * n + i] += S[i, i] / trust * max(1.0, ratio[i])
+        else:
+            block[start + 2 * n + i] += S[i, i]
     block[-2] += 1.0
     block[-1] = moving  # a block is of the kind of its last sample
 

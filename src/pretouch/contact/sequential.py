@@ -15,12 +15,11 @@ import numpy as np
 
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
+from pretouch.contact.residual_windows import LENGTHS
+from pretouch.contact.window_scatter import FreeMeans, spread_out
 from pretouch.params import SequentialParams
 from pretouch.types import FloatArray, IntArray
 
-LENGTHS = (1, 2, 4, 8, 16, 32)
-"""Lengths of the windows [samples]."""
-LONGEST = LENGTHS[-1]
 _LENGTHS = np.array(LENGTHS)
 _LARGEST = 300.0
 """Logarithm of a likelihood ratio from which on it is all the same."""
@@ -29,33 +28,10 @@ _SINGULAR = 1e-6
 """Part of its trace by which a force's information is made regular: a force along a joint's axis has none."""
 
 
-def alarm_level(p: SequentialParams, period: float) -> float:
+def alarm_bound(p: SequentialParams, period: float) -> float:
     """Return ln A for the chosen rate of false alarms, at one sample a period [s]."""
     # A is the number of samples in which one false alarm is allowed
-    return max(1.0, math.log(3600.0 / period / p.false_alarms_per_hour) - p.slack_nats)
-
-
-@compiled
-def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> int:
-    """Write the means (6, n) of the newest 1, 2, ... 32 samples of a ring, and return how many of them are whole.
-
-    `at` is where the next sample goes, `count` how many there are.
-    """
-    size, n = ring.shape
-    total = np.zeros(n)
-    taken = whole = 0
-    for k in range(len(_LENGTHS)):
-        if _LENGTHS[k] > count:
-            break
-        # a longer window goes on with the sum of the shorter one
-        while taken < _LENGTHS[k]:
-            taken += 1
-            for j in range(n):
-                total[j] += ring[(at - taken) % size, j]
-        for j in range(n):
-            means[k, j] = total[j] / taken
-        whole += 1
-    return whole
+    return max(1.0, math.log(3600.0 / period / p.false_alarms_per_hour))
 
 
 class Hypotheses(NamedTuple):
@@ -76,23 +52,23 @@ class Hypotheses(NamedTuple):
 
 @compiled
 def judge(
-    means: FloatArray, whole: int, S: FloatArray, model_variance: FloatArray, contacts: Hypotheses, gain: float,
-    tails: float,
-) -> tuple[float, int, int]:  # fmt: skip
+    means: FloatArray, whole: int, free: FreeMeans, contacts: Hypotheses, gain: float, tails: float
+) -> tuple[float, int, int]:
     """Return ln R, and the window and the hypothesis that have the largest part in it.
 
     Args:
         means: (6, n) means of the windows' samples [Nm].
         whole: how many of them there are.
-        S: (n, n) spread of a sample [Nm^2].
-        model_variance: (n,) variance of the error of their mean [Nm^2]: it does not average out.
+        free: what they are in free motion.
         contacts: hypotheses.
         gain: g, how much larger a contact's spread is than that of free motion.
         tails: degrees of freedom of the Student distribution.
     """
     J, joints, weight, away = contacts
+    S, model_variance, scatter, whitened, squares, ratios = free
     n, total, best, window, which = S.shape[0], 0.0, -1.0, 0, 0
     S0, L, z, y, pivot = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n)
+    K = np.empty((n, n))
     scratch, widened = np.empty((n, 3)), np.log1p(gain)
     for k in range(whole):
         # the last joint comes first, so that what the joints behind a link say is the beginning of y
@@ -104,9 +80,16 @@ def judge(
             S0[i, i] += model_variance[n - 1 - i]
         if not factor(S0, L):
             continue
+        if len(scatter):
+            for i in range(n):
+                ratios[k, n - 1 - i] = z[i] ** 2 / S0[i, i]
+            forward(L, z, whitened[k])
+            spread_out(scatter[k], L, K)
         for i in range(n):
             pivot[i] = 1.0 / L[i, i]
         square, behind = forward(L, z, y), 0.0
+        if len(scatter):
+            squares[k] = square
         alone = np.log1p(square / tails)
         for h in range(n + len(J)):
             link, size, explained, one_sided = h, 3, 0.0, 1.0

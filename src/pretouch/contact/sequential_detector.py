@@ -5,14 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pretouch.contact.alarm_level import level_init
 from pretouch.contact.cues import Cues
 from pretouch.contact.model_update import CALM
 from pretouch.contact.residual_model import BLOCK, QUEUE, ResidualModel, prior_of, residual_init
-from pretouch.contact.sequential import LENGTHS, LONGEST, alarm_level
+from pretouch.contact.residual_windows import LENGTHS, LONGEST
+from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.sequential_step import detect_contact
 from pretouch.contact.turning import turning_init
+from pretouch.contact.window_scatter import scatter_init
 from pretouch.groups import ObstacleArrays
-from pretouch.params import ProximityPriorParams, SequentialParams
+from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import FloatArray, Obstacles, RobotState
 from pretouch.values import value
@@ -21,6 +24,7 @@ _CEILING = 4.0
 """Times the prior that the noise's standard deviations may grow to."""
 _NONE = np.zeros(0)
 _NO_PROXIMITY = ProximityPriorParams(gain=1.0)
+_NO_MISFIT = MisfitParams()
 
 
 @value
@@ -44,6 +48,12 @@ class SequentialState:
     """Samples that it has explained with nothing near, the arm reacting or a contact suspected."""
     turning: FloatArray
     """(3, n) how much worse free motion is known where the arm accelerates hard, see `turning_init`."""
+    scatter: FloatArray
+    """How much more the windows' means vary than white noise would, see `scatter_init`."""
+    level: FloatArray
+    """What the level of an alarm follows, see `level_init`."""
+    settled: int
+    """Samples of free motion at rest, see `MisfitParams.settled_s`."""
 
 
 class Observation(NamedTuple):
@@ -98,7 +108,18 @@ def sequential_init(model: RobotModel, p: SequentialParams, learnt: ResidualMode
     """Return the state before the first sample; `learnt` is what an earlier session knew of the arm."""
     known = residual_init(model.n, p) if learnt is None else learnt
     return SequentialState(
-        known, np.zeros((LONGEST, model.n)), 0, 0, 0, 0, np.zeros(3 + model.n), 0, turning_init(model.n)
+        known,
+        np.zeros((LONGEST, model.n)),
+        0,
+        0,
+        0,
+        0,
+        np.zeros(3 + model.n),
+        0,
+        turning_init(model.n),
+        scatter_init(model.n),
+        level_init(),
+        0,
     )
 
 
@@ -131,22 +152,26 @@ def sequential_step(
             prior = prior_of(n, p)
             weights, weights_covariance = weights.copy(), weights_covariance.copy()
             noise, learnt = noise.copy(), learnt.copy()
+    misfit, scatter, level = p.misfit or _NO_MISFIT, state.scatter, state.level
+    if p.misfit is not None:
+        scatter, level = scatter.copy(), level.copy()
     lasting, turning, nearness = state.lasting.copy(), state.turning.copy(), p.proximity or _NO_PROXIMITY
     count = min(state.count + 1, LONGEST)
     # The fields of Joints, ObstacleArrays, Memory, Situation, DetectionNumbers, Results, Kinematics and Mechanism in
     # their order, which nothing checks: numbers of one type can change places in silence.
-    ratio, calm, filled, waiting, steady = detect_contact.flat(
+    ratio, calm, filled, waiting, steady, settled = detect_contact.flat(
         robot.qd, robot.qd_commanded, robot.tau_ext,
         o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
         weights, weights_covariance, noise, learnt, prior,
         block, m.filled, queue, m.waiting,
-        ring, state.at, count, state.calm, lasting, state.steady, turning, m.speed,
-        math.exp(-p.observer_gain_1_s * period), period, settle, alarm_level(p, period),
+        ring, state.at, count, state.calm, lasting, state.steady, turning, scatter, level, state.settled, m.speed,
+        math.exp(-p.observer_gain_1_s * period), period, settle, alarm_bound(p, period),
         p.learn == "always" or (watched and p.learn == "watched"), reacting,
         (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2, seen.cues.gain,
         p.inertia, p.widen_at_turns, p.offset_prior_nm, p.proximity is not None, p.contact_gain, p.tails, nearness.gain,
-        nearness.distance_m, nearness.horizon_s, p.clear_m, p.suspect, p.noise_floor_nm, p.bias_floor_nm,
-        p.still_rad_s, p.memory_s, p.spread_memory_s,
+        nearness.distance_m, nearness.horizon_s, p.clear_m, p.suspect, p.slack_nats, p.noise_floor_nm, p.bias_floor_nm,
+        p.still_rad_s, p.memory_s, p.spread_memory_s, p.misfit is not None, misfit.memory_s,
+        misfit.settled_s,
         residual, speed, force, bands, means, covariance, model_variance, *seen.kin, *model.mechanism_fields,
     )  # fmt: skip
     relearnt = steady < 0  # the load that lasted is free motion now, and no contact
@@ -159,4 +184,6 @@ def sequential_step(
     )  # fmt: skip
     after = ResidualModel(weights, weights_covariance, noise, learnt, speed, queue, block, filled, waiting)
     at = (state.at + 1) % LONGEST
-    return found, SequentialState(after, ring, at, count, calm, confirmed, lasting, steady, turning)
+    return found, SequentialState(
+        after, ring, at, count, calm, confirmed, lasting, steady, turning, scatter, level, settled
+    )

@@ -11,13 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, entry, inlined
+from pretouch.contact.alarm_level import earned_level
 from pretouch.contact.force_map import force_map_into
 from pretouch.contact.hypotheses import NearPrior, write_hypotheses
 from pretouch.contact.model_update import DetectionNumbers, Memory, Situation, Tested, update_model
 from pretouch.contact.proximity_prior import MOST
 from pretouch.contact.residual_model import CalmSample, features_into, mean_and_variance, spread_of_sample
-from pretouch.contact.sequential import LONGEST, Hypotheses, judge, window_means
+from pretouch.contact.residual_windows import LONGEST, window_means
+from pretouch.contact.sequential import Hypotheses, judge
 from pretouch.contact.turning import add_reversal_variance
+from pretouch.contact.window_scatter import scattered_means, white_means
 from pretouch.groups import Mechanism, ObstacleArrays
 from pretouch.robot.mass_matrix import mass_matrix_into
 from pretouch.robot.model import Kinematics, jacobian_into
@@ -48,7 +51,7 @@ class Results(NamedTuple):
 def detect_contact(
     robot: Joints, obstacles: ObstacleArrays, memory: Memory, now: Situation, p: DetectionNumbers, results: Results,
     kin: Kinematics, mechanism: Mechanism,
-) -> tuple[float, int, int, int, int]:  # fmt: skip
+) -> tuple[float, int, int, int, int, int]:  # fmt: skip
     """Write what a sample says and what is learnt; return the log-likelihood ratio and what `update_model` does."""
     arm, recent, n = mechanism.arm, memory.recent, len(robot.qd)
     covariance, means, distance = results.covariance, results.means, obstacles.body_distance
@@ -66,15 +69,26 @@ def detect_contact(
     contacts = Hypotheses(np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most), np.zeros((most, 3)))
     near = NearPrior(p.near_gain, p.near_m, p.near_horizon_s)
     write_hypotheses(kin, mechanism, robot.qd, obstacles, now.touch_gain, near, contacts)
-    log_r, window, which = judge(means, whole, covariance, results.model_variance, contacts, p.contact_gain, p.tails)
-    log_likelihood_ratio = max(0.0, log_r / now.alarm)
+    settled = 0 if moving else recent.settled
+    regime = 0 if settled * now.period >= p.settled_s else 1
+    expected, ratio = white_means(covariance, results.model_variance), np.zeros(0)
+    if p.learn_misfit:
+        expected = scattered_means(covariance, results.model_variance, recent.scatter[regime])
+        ratio = expected.scatter[-1, n + 1]
+    log_r, window, which = judge(means, whole, expected, contacts, p.contact_gain, p.tails)
+    level = max(1.0, now.bound - p.slack_nats)
+    if p.learn_misfit:
+        level = earned_level(recent.level[regime], now.bound, p.slack_nats, math.exp(-now.bound))
+    log_likelihood_ratio = max(0.0, log_r / level)
 
     J_ee = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
     # nothing is learnt while anything that is seen could be what is measured
     alone = now.may_learn and distance.min() >= p.clear_m if len(distance) else now.may_learn
-    sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving)
-    tested = Tested(sample, means, whole, covariance, J_ee, alone, log_likelihood_ratio >= p.suspect)
+    sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving, ratio)
+    tested = Tested(
+        sample, means, whole, expected, J_ee, alone, log_likelihood_ratio >= p.suspect, log_r, recent.level[regime]
+    )  # fmt: skip
     calm, filled, waiting, steady = update_model(memory, now, p, tested)
 
     for j in range(n):  # only now: what is learnt is learnt of the noise alone
@@ -82,9 +96,11 @@ def detect_contact(
     # the first n hypotheses, wrenches beyond a joint, have no direction
     away = contacts.away[max(which - n, 0)] if which >= n else np.zeros(3)
     _force_and_bands(
-        J_ee, means[window], free.mean, covariance, away, math.sqrt(2.0 * now.alarm), results.force, results.bands
+        J_ee, means[window], free.mean, covariance, away, math.sqrt(2.0 * level), results.force, results.bands
     )  # fmt: skip
-    return log_likelihood_ratio, calm, filled, waiting, steady
+    if alone and not now.reacting:
+        settled += 1
+    return log_likelihood_ratio, calm, filled, waiting, steady, settled
 
 
 class _FreeMotion(NamedTuple):

@@ -20,6 +20,7 @@ from pretouch.params.reaction import AdmittanceParams as AdmittanceParams
 from pretouch.params.reaction import ClampParams as ClampParams
 from pretouch.params.reaction import GiveUpParams as GiveUpParams
 from pretouch.params.reaction import PinchParams as PinchParams
+from pretouch.params.sequential import MisfitParams as MisfitParams
 from pretouch.params.sequential import ProximityPriorParams as ProximityPriorParams
 from pretouch.params.sequential import SequentialParams as SequentialParams
 from pretouch.params.sequential import TouchSensorParams as TouchSensorParams

@@ -42,6 +42,19 @@ class TouchSensorParams(Checked):
 
 
 @dataclass(frozen=True)
+class MisfitParams(Checked):
+    """How the test covers what the model of free motion cannot express, and earns its level from what it measures.
+
+    Measured on simulated arms as unkind as real ones (world `hard`, development seeds): docs/explanation/detection.md.
+    """
+
+    memory_s: Positive = 30.0
+    """Time over which the scatter of the windows' means is averaged [s]."""
+    settled_s: Positive = 10.0
+    """Time at rest, as far as free motion is learnt in it, after which a posture's offsets count as learnt [s]."""
+
+
+@dataclass(frozen=True)
 class SequentialParams(Checked):
     """A test on the torques less their learnt mean in free motion."""
 
@@ -100,5 +113,7 @@ class SequentialParams(Checked):
     """Smallest standard deviation of the error of the learnt mean [Nm]."""
     still_rad_s: Positive = 0.02
     """Joint speed below which the arm counts as standing, with a spread of its own [rad/s]."""
+    misfit: MisfitParams | None = None
+    """How what the model cannot express is covered; none: not at all, and suspicious samples are not learnt."""
     confirm_samples: PositiveCount = 1
     """Samples in a row with the evidence of a contact that make one."""

@@ -5,7 +5,7 @@ import numpy as np
 from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
 from pretouch.contact.localisation.prior import candidate_poses, hidden_candidates
-from pretouch.contact.sequential import LENGTHS
+from pretouch.contact.residual_windows import LENGTHS
 from pretouch.contact.sequential_detector import Observation, ResidualWindows
 from pretouch.params import LocalisationParams
 from pretouch.perception.closest import no_obstacles

@@ -8,9 +8,11 @@ import numpy as np
 from pretouch.contact.detector import Sample
 from pretouch.contact.hypotheses import NearPrior, write_hypotheses
 from pretouch.contact.residual_model import spread_of_sample
-from pretouch.contact.sequential import LENGTHS, Hypotheses, judge, window_means
+from pretouch.contact.residual_windows import LENGTHS, window_means
+from pretouch.contact.sequential import Hypotheses, judge
 from pretouch.contact.sequential_detector import SequentialState
 from pretouch.contact.sequential_test import SequentialTest
+from pretouch.contact.window_scatter import white_means
 from pretouch.errors import ExperimentError
 from pretouch.groups import NOTHING_NEAR
 from pretouch.params import ProximityPriorParams
@@ -148,9 +150,9 @@ def link_evidence(known: SequentialState, kin: Kinematics, robot: RobotState, p:
     contacts = Hypotheses(np.empty((parts, 3, n)), np.empty(parts, np.int64), np.empty(n + parts), np.zeros((parts, 3)))
     prior = NearPrior(near.gain, near.distance_m, near.horizon_s)
     write_hypotheses(kin, arm.mechanism, robot.qd, NOTHING_NEAR, np.ones(len(arm.links)), prior, contacts)
-    model_variance, found = np.full(n, p.bias_floor_nm**2), np.empty(parts)
+    free, found = white_means(S, np.full(n, p.bias_floor_nm**2)), np.empty(parts)
     for h in range(parts):
         one = np.zeros(n + parts)
         one[n + h] = 1.0
-        found[h] = judge(means, whole, S, model_variance, contacts._replace(weight=one), p.contact_gain, p.tails)[0]
+        found[h] = judge(means, whole, free, contacts._replace(weight=one), p.contact_gain, p.tails)[0]
     return found
