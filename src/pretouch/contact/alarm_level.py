@@ -44,6 +44,7 @@ def level_init() -> FloatArray:
 @compiled
 def earned_level(seen: FloatArray, bound: float, slack: float, rate: float) -> float:
     """Return the level for one alarm in 1 / `rate` samples, from `bound` - `slack` to `bound` (both at least 1)."""
+    # both quantiles of Gumbel's distribution give its scale and its location
     scale = max(seen[1] - seen[0], _LEAST) / (_GUMBEL_HIGH - _GUMBEL_MIDDLE)
     location = seen[0] - scale * _GUMBEL_MIDDLE
     # P(maximum > x) is about exp(-(x - location) / scale) far out

@@ -135,8 +135,8 @@ def update_model(memory: Memory, now: Situation, p: DetectionNumbers, tested: Te
     """Learn from a sample; return calm samples, samples of the block, blocks that wait, and `steady` of the state."""
     learnt, blocks, recent = memory
     sample, whole, free, alone, suspected = tested.sample, tested.whole, tested.expected, tested.alone, tested.suspected
-    # What was gathered before a contact is suspected may be its beginning: it is thrown away, not learnt. Where misfit is
-    # learnt it only counts less: a spread without what it does not expect shrinks, and expects less and less.
+    # What was gathered before a contact is suspected may be its beginning: it is thrown away, not learnt. Where misfit
+    # is learnt it only counts less: a spread without what it does not expect shrinks, and expects less and less.
     calm = 0 if (suspected and not p.learn_misfit) or now.reacting or not alone else min(recent.calm + 1, CALM)
     # learnt also where a contact is suspected: an alarm at a reversal would otherwise come at each of them
     if p.widen_at_turns and alone and not now.reacting and whole == len(LENGTHS):

@@ -254,10 +254,8 @@ def add_sample(
         jitter = trust * (D * z[i]) ** 2 + D - D * D * forward(L, unit, y)
         unit[i] = 0.0
         block[start + n + i] += max(jitter - model_variance[i] - floor**2, 0.0)
-        if len(ratio):  # an outlier counts less, and what stays the same for many samples is one piece of news
-            block[start + 2 * n + i] += S[i, i] / trust * max(1.0, ratio[i])
-        else:
-            block[start + 2 * n + i] += S[i, i]
+        # an outlier counts less, and what stays the same for many samples is one piece of news
+        block[start + 2 * n + i] += S[i, i] / trust * max(1.0, ratio[i]) if len(ratio) else S[i, i]
     block[-2] += 1.0
     block[-1] = moving  # a block is of the kind of its last sample
 

@@ -108,19 +108,9 @@ def sequential_init(model: RobotModel, p: SequentialParams, learnt: ResidualMode
     """Return the state before the first sample; `learnt` is what an earlier session knew of the arm."""
     known = residual_init(model.n, p) if learnt is None else learnt
     return SequentialState(
-        known,
-        np.zeros((LONGEST, model.n)),
-        0,
-        0,
-        0,
-        0,
-        np.zeros(3 + model.n),
-        0,
-        turning_init(model.n),
-        scatter_init(model.n),
-        level_init(),
-        0,
-    )
+        known, np.zeros((LONGEST, model.n)), 0, 0, 0, 0, np.zeros(3 + model.n), 0, turning_init(model.n),
+        scatter_init(model.n), level_init(), 0,
+    )  # fmt: skip
 
 
 def sequential_step(
@@ -152,10 +142,9 @@ def sequential_step(
             prior = prior_of(n, p)
             weights, weights_covariance = weights.copy(), weights_covariance.copy()
             noise, learnt = noise.copy(), learnt.copy()
-    misfit, scatter, level = p.misfit or _NO_MISFIT, state.scatter, state.level
-    if p.misfit is not None:
-        scatter, level = scatter.copy(), level.copy()
-    lasting, turning, nearness = state.lasting.copy(), state.turning.copy(), p.proximity or _NO_PROXIMITY
+    scatter, level = (state.scatter.copy(), state.level.copy()) if p.misfit else (state.scatter, state.level)
+    lasting, turning = state.lasting.copy(), state.turning.copy()
+    misfit, nearness = p.misfit or _NO_MISFIT, p.proximity or _NO_PROXIMITY
     count = min(state.count + 1, LONGEST)
     # The fields of Joints, ObstacleArrays, Memory, Situation, DetectionNumbers, Results, Kinematics and Mechanism in
     # their order, which nothing checks: numbers of one type can change places in silence.
@@ -170,8 +159,7 @@ def sequential_step(
         (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2, seen.cues.gain,
         p.inertia, p.widen_at_turns, p.offset_prior_nm, p.proximity is not None, p.contact_gain, p.tails, nearness.gain,
         nearness.distance_m, nearness.horizon_s, p.clear_m, p.suspect, p.slack_nats, p.noise_floor_nm, p.bias_floor_nm,
-        p.still_rad_s, p.memory_s, p.spread_memory_s, p.misfit is not None, misfit.memory_s,
-        misfit.settled_s,
+        p.still_rad_s, p.memory_s, p.spread_memory_s, p.misfit is not None, misfit.memory_s, misfit.settled_s,
         residual, speed, force, bands, means, covariance, model_variance, *seen.kin, *model.mechanism_fields,
     )  # fmt: skip
     relearnt = steady < 0  # the load that lasted is free motion now, and no contact
@@ -183,7 +171,5 @@ def sequential_step(
         confirmed >= p.confirm_samples, relearnt or calm == CALM, steady > 0,
     )  # fmt: skip
     after = ResidualModel(weights, weights_covariance, noise, learnt, speed, queue, block, filled, waiting)
-    at = (state.at + 1) % LONGEST
-    return found, SequentialState(
-        after, ring, at, count, calm, confirmed, lasting, steady, turning, scatter, level, settled
-    )
+    remembered = (calm, confirmed, lasting, steady, turning, scatter, level, settled)
+    return found, SequentialState(after, ring, (state.at + 1) % LONGEST, count, *remembered)

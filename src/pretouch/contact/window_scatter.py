@@ -82,9 +82,11 @@ def learn_scatter(at: int, whole: int, free: FreeMeans, tails: float, forget: fl
     n = whitened.shape[1]
     for k in range(whole):
         stride = max(_LENGTHS[k], _LEAST_STRIDE)
+        # no sample is in two means of a long window: those that overlap would say the same twice
         if at % stride:
             continue
         trust = (tails + n) / (tails + square[k])
+        # a mean with the prior at first, then one that fades
         gain = max(1.0 / (_PRIOR + scatter[k, n, 0]), stride * forget)
         scatter[k, n, 0] += 1.0
         for i in range(n):
@@ -104,10 +106,12 @@ def spread_out(scatter: FloatArray, L: FloatArray, K: FloatArray) -> None:
     C = scatter[:n].copy()
     for i in range(n):
         C[i, i] = max(C[i, i], _LEAST)
+    # A larger diagonal leaves the matrix positive definite. Rounding alone could fail; then nothing is added.
     K[:] = 0.0
     if not factor(C, K):
         for i in range(n):
             K[i, i] = 1.0
+    # the product of two lower triangles in place: from the left, for L[i, m] is read for m from j on only
     for i in range(n):
         for j in range(i + 1):
             total = 0.0
