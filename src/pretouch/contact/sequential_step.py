@@ -70,8 +70,8 @@ def detect_contact(
     near = NearPrior(p.near_gain, p.near_m, p.near_horizon_s)
     write_hypotheses(kin, mechanism, robot.qd, obstacles, now.touch_gain, near, contacts)
     settled = 0 if moving else recent.settled
-    # At rest the offsets of a posture are learnt in seconds; until then the arm errs as in motion. Time in which nothing
-    # may be learnt, with somebody near, does not count.
+    # At rest the offsets of a posture are learnt in seconds; until then the arm errs as in motion. Time in which
+    # nothing may be learnt, with somebody near, does not count.
     regime = 0 if settled * now.period >= p.settled_s else 1
     expected, ratio = white_means(covariance, results.model_variance), np.zeros(0)
     if p.learn_misfit:
