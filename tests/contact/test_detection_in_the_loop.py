@@ -96,10 +96,10 @@ def biased(joint: int, torque: float, since: float):
     """Have a joint's torque sensor err by a constant more."""
 
     def prepare(plant, _) -> None:
-        right = plant._offset.copy()
+        right = plant._err.copy()
 
         def before_step(time: float) -> None:
-            plant._offset[joint] = right[joint] + (torque if time >= since else 0.0)
+            plant._err[joint] = right[joint] + (torque if time >= since else 0.0)
 
         plant.before_each_step(before_step)
 
