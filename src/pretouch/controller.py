@@ -211,6 +211,7 @@ class Controller:
             reaction_velocity=desired if mode.mode is Mode.REACT else _STILL, restricted=motion.restricted,
             approach_limit=motion.approach_limit, qp=motion.qp, command=motion.qp.qd,
             residual=detection.residual, evidence=detection.evidence, touched=detection.touched,
+            detectable_n=detection.detectable_n,
         )  # fmt: skip
         after = ControllerState(
             watch=given.watch, tracks=near.tracks, window=window, detector=detector, reduction=reduction,

@@ -6,6 +6,7 @@ from enum import Enum
 
 import numpy as np
 
+from pretouch.contact.detectable import LOUD_N
 from pretouch.types import BoolArray, ControlStep, Mode
 
 OFF_PATH_M = 0.01
@@ -57,7 +58,22 @@ def explain(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> Ex
     if step.mode is Mode.HOLD:
         return Explanation(Doing.STOPPED if resumable(step) else Doing.WAITING, step.reason)
     names = _Names(units, links)
-    return _in_contact(step, names) if step.mode is Mode.REACT else _on_the_way(step, names)
+    if step.mode is Mode.REACT:
+        return _in_contact(step, names)
+    found = _on_the_way(step, names)
+    return found if not step.detectable_n > LOUD_N else Explanation(found.doing, f"{found.sentence} {_loud(step)}")
+
+
+def _loud(step: ControlStep) -> str:
+    """Say that a light push would not be found."""
+    if step.detectable_n == np.inf:
+        return "Here, at this speed, no push is found."
+    return f"Here, at this speed, a push is found from {step.detectable_n:.0f} N on."
+
+
+def finds(step: ControlStep) -> str:
+    """Say in two words what force is found; '' where the detector does not say."""
+    return f"finds {step.detectable_n:.0f} N" if np.isfinite(step.detectable_n) else ""
 
 
 def resumable(step: ControlStep) -> bool:

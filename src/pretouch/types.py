@@ -347,3 +347,5 @@ class ControlStep:
     """How far the detector is on the way to a contact: one from 1 on, while armed."""
     touched: Touched = field(default_factory=lambda: NOT_TOUCHED)
     """Where the arm is touched; empty where no contact is detected or the profile does not localise."""
+    detectable_n: float = np.nan
+    """Force at the end-effector that the detector finds here and now, see `Detection.detectable_n` [N]."""

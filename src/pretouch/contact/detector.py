@@ -90,6 +90,9 @@ class Detection:
     significant: tuple[FloatArray, FloatArray] | None = None
     """Residual (n,), averaged over the time in which it stands out most [Nm], and the covariance (n, n) that it has in
     free motion [Nm^2]; None where the detector has none, or no contact is detected."""
+    detectable_n: float = math.nan
+    """Force at the end-effector, in the direction the torques tell least of, that is found in 95 of 100 cases if it is
+    held for 0.1 s [N]; NaN of a detector that does not say."""
 
 
 class Detector(Part, group="pretouch.detectors"):

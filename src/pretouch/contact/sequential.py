@@ -16,7 +16,7 @@ import numpy as np
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
 from pretouch.contact.residual_windows import LENGTHS
-from pretouch.contact.window_scatter import FreeMeans, spread_out
+from pretouch.contact.window_scatter import FreeMeans, covariance_of_mean, spread_out
 from pretouch.params import SequentialParams
 from pretouch.types import FloatArray, IntArray
 
@@ -65,19 +65,15 @@ def judge(
         tails: degrees of freedom of the Student distribution.
     """
     J, joints, weight, away = contacts
-    S, model_variance, scatter, whitened, squares, ratios = free
-    n, total, best, window, which = S.shape[0], 0.0, -1.0, 0, 0
+    scatter, whitened, squares, ratios = free.scatter, free.whitened, free.square, free.ratio
+    n, total, best, window, which = len(free.S), 0.0, -1.0, 0, 0
     S0, L, z, y, pivot = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n)
     K = np.empty((n, n))
     scratch, widened = np.empty((n, 3)), np.log1p(gain)
     for k in range(whole):
-        # the last joint comes first, so that what the joints behind a link say is the beginning of y
         for i in range(n):
             z[i] = means[k, n - 1 - i]
-            for j in range(i + 1):
-                S0[i, j] = S[n - 1 - i, n - 1 - j] / _LENGTHS[k]
-            # unlike the noise, not divided by the length of the window
-            S0[i, i] += model_variance[n - 1 - i]
+        covariance_of_mean(free, k, S0)
         if not factor(S0, L):
             continue
         if len(scatter):

@@ -102,6 +102,8 @@ class SequentialDetection:
     """Whether the sample is to be learnt as free motion."""
     lasting: bool
     """Whether it is being found out if the residual is a load or a step of an estimate."""
+    detectable_n: float
+    """Force at the end-effector that is found, see `detectable_force` [N]."""
 
 
 def sequential_init(model: RobotModel, p: SequentialParams, learnt: ResidualModel | None = None) -> SequentialState:
@@ -148,7 +150,7 @@ def sequential_step(
     count = min(state.count + 1, LONGEST)
     # The fields of Joints, ObstacleArrays, Memory, Situation, DetectionNumbers, Results, Kinematics and Mechanism in
     # their order, which nothing checks: numbers of one type can change places in silence.
-    ratio, calm, filled, waiting, steady, settled = detect_contact.flat(
+    ratio, detectable, calm, filled, waiting, steady, settled = detect_contact.flat(
         robot.qd, robot.qd_commanded, robot.tau_ext,
         o.unit, o.link, o.body_point, o.direction, o.body_distance, o.closing_speed,
         weights, weights_covariance, noise, learnt, prior,
@@ -168,7 +170,7 @@ def sequential_step(
     confirmed = state.confirmed + 1 if ratio >= 1.0 else 0
     found = SequentialDetection(
         residual, ResidualWindows(means, count, covariance, model_variance), ratio, force, bands,
-        confirmed >= p.confirm_samples, relearnt or calm == CALM, steady > 0,
+        confirmed >= p.confirm_samples, relearnt or calm == CALM, steady > 0, detectable,
     )  # fmt: skip
     after = ResidualModel(weights, weights_covariance, noise, learnt, speed, queue, block, filled, waiting)
     remembered = (calm, confirmed, lasting, steady, turning, scatter, level, settled)

@@ -12,6 +12,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, entry, inlined
 from pretouch.contact.alarm_level import earned_level
+from pretouch.contact.detectable import detectable_force
 from pretouch.contact.force_map import force_map_into
 from pretouch.contact.hypotheses import NearPrior, write_hypotheses
 from pretouch.contact.model_update import DetectionNumbers, Memory, Situation, Tested, update_model
@@ -51,8 +52,11 @@ class Results(NamedTuple):
 def detect_contact(
     robot: Joints, obstacles: ObstacleArrays, memory: Memory, now: Situation, p: DetectionNumbers, results: Results,
     kin: Kinematics, mechanism: Mechanism,
-) -> tuple[float, int, int, int, int, int]:  # fmt: skip
-    """Write what a sample says and what is learnt; return the log-likelihood ratio and what `update_model` does."""
+) -> tuple[float, float, int, int, int, int, int]:  # fmt: skip
+    """Write what a sample says and what is learnt.
+
+    Returns the log-likelihood ratio, the force that is found [N], what `update_model` does, and samples at rest.
+    """
     arm, recent, n = mechanism.arm, memory.recent, len(robot.qd)
     covariance, means, distance = results.covariance, results.means, obstacles.body_distance
     x, M = np.empty((n, memory.learnt.weights.shape[1])), np.empty((n, n))
@@ -85,6 +89,9 @@ def detect_contact(
 
     J_ee = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
+    # one hypothesis alone, of a force on a link that neither a touch nor an object makes likelier, in one window
+    needed = level + math.log(2.0 * len(mechanism.links.parts) * len(means))
+    found = detectable_force(J_ee, now.period, expected, needed, p.contact_gain, p.tails)
     # nothing is learnt while anything that is seen could be what is measured
     alone = now.may_learn and distance.min() >= p.clear_m if len(distance) else now.may_learn
     sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving, ratio)
@@ -102,7 +109,7 @@ def detect_contact(
     )  # fmt: skip
     if alone and not now.reacting:
         settled += 1
-    return log_likelihood_ratio, calm, filled, waiting, steady, settled
+    return log_likelihood_ratio, found, calm, filled, waiting, steady, settled
 
 
 class _FreeMotion(NamedTuple):

@@ -80,7 +80,7 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
             significant = most_significant_mean(tested.windows, period, self.localise or _USUAL)
         made = Detection(
             bands, contact, sample.armed, tested.residual, tested.log_likelihood_ratio, tested.learning, tested.lasting,
-            touched, significant,
+            touched, significant, tested.detectable_n,
         )  # fmt: skip
         return made, SequentialTestState(test, location if self.localise else None, remembered)
 

@@ -73,6 +73,20 @@ def scattered_means(S: FloatArray, model_variance: FloatArray, scatter: FloatArr
 
 
 @compiled
+def covariance_of_mean(free: FreeMeans, k: int, S0: FloatArray) -> None:
+    """Write the lower triangle of the covariance (n, n) of window k's mean, the last joint first, but for its scatter.
+
+    What the joints behind a link say is so the beginning of a whitened mean.
+    """
+    n = len(S0)
+    for i in range(n):
+        for j in range(i + 1):
+            S0[i, j] = free.S[n - 1 - i, n - 1 - j] / _LENGTHS[k]
+        # unlike the noise, not divided by the length of the window
+        S0[i, i] += free.model_variance[n - 1 - i]
+
+
+@compiled
 def learn_scatter(at: int, whole: int, free: FreeMeans, tails: float, forget: float) -> None:
     """Learn from the means of the first `whole` windows; `at` counts samples.
 

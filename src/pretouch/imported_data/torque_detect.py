@@ -48,8 +48,8 @@ class TorqueDecisions:
     """(S, n) what free motion does not explain of them [Nm], NaN without torques."""
     evidence: FloatArray
     """(S,) a contact from 1 on, while armed."""
-    one_sample: FloatArray
-    """(S,) force at the end-effector from which one sample is a contact, along the worst axis [N]."""
+    detectable_n: FloatArray
+    """(S,) force at the end-effector that the detector says it finds, see `Detection.detectable_n` [N]."""
     armed: BoolArray
     moving: BoolArray
     """(S,) whether a joint turns."""
@@ -130,7 +130,7 @@ def detect_torques(recording: TorqueRecording, profile: Profile) -> TorqueDecisi
     return TorqueDecisions(
         name=profile.name, time=stream.time, tau_ext=recording.tau_ext[stream.newest],
         residual=np.array([d.residual for d in found]), evidence=np.array([d.evidence for d in found]),
-        one_sample=np.array([(d.thresholds.upper - d.thresholds.mean).max() for d in found]),
+        detectable_n=np.array([d.detectable_n for d in found]),
         armed=np.array([d.armed for d in found]), moving=np.abs(qd).max(axis=1) > MOVING_RAD_S,
         contacts=events.all(), kept=tuple(kept),
     )  # fmt: skip

@@ -37,9 +37,9 @@ class TorqueSummary:
     """(n,) that of the external torques [Nm]."""
     evidence: float
     """Largest outside contacts."""
-    one_sample: float
-    """Force at the end-effector from which one sample is a contact, along the worst axis: median outside contacts [N],
-    of the detector's own covariance."""
+    detectable_n: float
+    """Force at the end-effector that the detector itself says it finds: median outside contacts [N]; NaN if it does not
+    say."""
     push: FloatArray
     """(M,) smallest forces at the end-effector that are found if they last `PUSH_S`, tried at some instants along all
     axes [N]; infinite beyond `_MOST_N`."""
@@ -65,7 +65,7 @@ def torque_summary(stream: Stream, d: TorqueDecisions) -> TorqueSummary:
         sigma=d.residual[free].std(axis=0) if some else nothing,
         before=d.tau_ext[free].std(axis=0) if some else nothing,
         evidence=float(d.evidence[free].max()) if some else np.nan,
-        one_sample=float(np.median(d.one_sample[free])) if some else np.nan,
+        detectable_n=float(np.median(d.detectable_n[free])) if some else np.nan,
         push=_pushes(stream, d),
     )  # fmt: skip
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pretouch.contact.detectable import HELD_S, LOUD_N
 from pretouch.reporting.html import Html, Text, bad, element, joined, note, number, percent, table
 from pretouch.reporting.measures import Measures
 from pretouch.reporting.sections.setting import started
@@ -14,7 +15,7 @@ def summary(m: Measures) -> Html:
     """Say the most important of a recording."""
     if not len(m.course):
         return element("p", "The recording holds no control step.", "summary")
-    sentences: list[Text] = [_what(m), _contacts(m), _forces(m), _nearest(m), _modes(m)]
+    sentences: list[Text] = [_what(m), _contacts(m), _found(m), _forces(m), _nearest(m), _modes(m)]
     if m.violations:
         sentences.append(bad(f"Limits of the arm were exceeded: {', '.join(m.violations)}."))
     else:
@@ -45,6 +46,19 @@ def _contacts(m: Measures) -> Text:
     after = f", {1000 * float(np.median(delays)):.0f} ms (median) after the true touch" if delays else ""
     wrong = f"; {len(m.missed)} of {len(m.touches)} true touches missed, {len(m.without_touch)} detections without one."
     return joined([said + after, bad(wrong) if m.missed or m.without_touch else Html(wrong)], "")
+
+
+def _found(m: Measures) -> Text:
+    """Say what force the detector finds, as `Detection.detectable_n`."""
+    said = m.course.detectable_n[m.course.armed & ~np.isnan(m.course.detectable_n)]
+    if not len(said):
+        return ""
+    half, most = (float(np.quantile(said, share, method="inverted_cdf")) for share in (0.5, 0.95))
+    sentence = (
+        f"A force that is held on the end-effector for {HELD_S:g} s is found from {half:.0f} N on half of the time, and"
+        f" from {most:.0f} N on 95 % of the time."
+    )
+    return sentence if most <= LOUD_N else bad(sentence)
 
 
 def _forces(m: Measures) -> str:

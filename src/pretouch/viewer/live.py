@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pretouch.errors import PretouchError
-from pretouch.explanation import explain, resumable
+from pretouch.explanation import explain, finds, resumable
 from pretouch.loop import MonotonicClock
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.action_queue import Action, ActionQueue
@@ -156,14 +156,15 @@ class LivePage:
                 self._companions.draw(now)
             self._plots.draw(now)
             recording = self._simulation.recording
-            recorded = f" · recording {recording.place.name}" if recording else ""
+            recorded = f"recording {recording.place.name}" if recording else ""
             rates = (
                 "paused" if self.controls.running.paused
                 else f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
             )  # fmt: skip
             step, skin, links = frame.step, self._simulation.skin, self._simulation.model.links
             self._status.draw(
-                step.mode, explain(step, skin.ids, links), f"{step.stamp:.1f} s · {rates}{recorded}",
+                step.mode, explain(step, skin.ids, links),
+                " · ".join(filter(None, (f"{step.stamp:.1f} s", rates, finds(step), recorded))),
                 pace.sentence(), now,
             )  # fmt: skip
             self.controls.offer_resume(resumable(step))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.explanation import explain
+from pretouch.explanation import explain, finds
 from pretouch.loop import MonotonicClock
 from pretouch.recording.codec import decode_step
 from pretouch.recording.compare import Comparison, Found
@@ -179,6 +179,7 @@ class ReplayPage:
             put(self._slider, round(player.time, 2))
         self._play.label = "Pause" if player.playing else "Play"
         rates = f"{player.time:.2f} of {player.duration:.2f} s · stamp {step.stamp:.2f} s · {self.run_name(kept.run)}"
+        rates = " · ".join(filter(None, (rates, finds(step))))
         run = self._recorded.runs[kept.run]
         self._status.draw(step.mode, explain(step, run.skin.ids, run.model.links), rates, "", now)
 
