@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.explanation import Doing, Explanation, explain, resumable, still
+from pretouch.explanation import Doing, Explanation, explain, finds, resumable, still
 from pretouch.modes import TABLE
 from pretouch.types import Contact, ControlStep, Mode, Obstacles, QpOutcome, QpSolution, Thresholds, Touched
 
@@ -49,6 +49,16 @@ def test_an_arm_that_nothing_limits_follows_its_path(step: ControlStep) -> None:
     assert said(step) == Explanation(Doing.MOVING, "Following its path at 0.30 m/s: nothing near is seen.")
     far = said(step, obstacles=seen((0, 0.9, 0.75, 2), (1, 0.6, 0.45, 2)))
     assert far == Explanation(Doing.MOVING, "Following its path at 0.30 m/s: hand_left sees something at 0.45 m.")
+
+
+def test_an_arm_too_loud_for_a_light_push_says_what_it_finds(step: ControlStep) -> None:
+    assert said(step, detectable_n=14.9) == said(step)
+    loud = said(step, detectable_n=28.4)
+    assert loud.doing is Doing.MOVING
+    assert loud.sentence.endswith("nothing near is seen. Here, at this speed, a push is found from 28 N on.")
+    assert said(step, detectable_n=np.inf).sentence.endswith("Here, at this speed, no push is found.")
+    assert finds(replace(step, detectable_n=28.4)) == "finds 28 N"
+    assert finds(step) == finds(replace(step, detectable_n=np.inf)) == ""
 
 
 def test_an_arm_without_a_way_to_go_is_in_its_place(step: ControlStep) -> None:

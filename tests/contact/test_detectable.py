@@ -76,10 +76,10 @@ class Arm:
         robot = RobotState(0.0, self.q, np.zeros(n), self.q, np.zeros(n), tau, None)
         return Sample(0.0, self.kin, robot, self.window, True, no_obstacles(), False, True)
 
-    def learnt(self) -> tuple[SequentialTestState, float]:
+    def learnt(self, steps: int = 4000) -> tuple[SequentialTestState, float]:
         """Return the state after 40 s, and the force that it says it finds."""
         state, says = self.test.init(self.body), math.nan
-        for _ in range(4000):
+        for _ in range(steps):
             said, state = self.test.step(state, self.body, self.sample(np.zeros(3)))
             says = said.detectable_n
         return state, says

@@ -1,5 +1,6 @@
 """Control steps and their inputs to messages and back."""
 
+import math
 from dataclasses import fields, replace
 from types import SimpleNamespace
 
@@ -88,6 +89,7 @@ def steps(draw: st.DrawFn) -> ControlStep:
         thresholds=Thresholds(draw(rows(6, 3))), armed=draw(st.booleans()), contact=draw(st.none() | contact),
         reaction_velocity=draw(row), restricted=draw(wholes(m)), approach_limit=draw(rows(m)), qp=qp,
         command=draw(rows(n)), residual=draw(rows(n)), evidence=draw(NAN_TOO), touched=draw(places()),
+        detectable_n=draw(NAN_TOO),
     )  # fmt: skip
 
 
@@ -107,20 +109,26 @@ def test_inputs_come_back_to_the_bit_whatever_their_lengths(inputs, number):
     assert same(back, inputs)
 
 
+ADDED = {"touched": NOT_TOUCHED, "detectable_n": math.nan}
+"""What versions added to a step at its end, in order, and what is read of a step without it."""
+
+
 @pytest.fixture(scope="module")
-def before_touched() -> tuple[Typestore, str]:
-    """Our types with one of a step as it was before it told where the arm is touched, and that one's name."""
-    kind = f"{PACKAGE}/msg/StepBefore"
-    text = "\n".join(line for line in own_definition("Step").splitlines() if not line.startswith("Touched "))
+def older() -> tuple[Typestore, list[str]]:
+    """Our types with those of a step as it was before each addition, and their names."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for name in OWN:
         store.register(get_types_from_msg(own_definition(name), f"{PACKAGE}/msg/{name}"))
-    store.register(get_types_from_msg(text, kind))
-    return store, kind
+    lines, kinds = own_definition("Step").splitlines(), []
+    for name in ADDED:
+        first = next(i for i, line in enumerate(lines) if line.split()[1:2] == [name])
+        kinds.append(f"{PACKAGE}/msg/StepBefore{name.title().replace('_', '')}")
+        store.register(get_types_from_msg("\n".join(lines[:first]), kinds[-1]))
+    return store, kinds
 
 
 @given(step=steps())
-def test_a_step_comes_back_to_the_bit_in_arrays_as_fresh_ones(step, before_touched):
+def test_a_step_comes_back_to_the_bit_in_arrays_as_fresh_ones(step, older):
     data = encode_step(7, step)
     number, back, tangent = decode_step(data)
     assert number == 7
@@ -130,15 +138,16 @@ def test_a_step_comes_back_to_the_bit_in_arrays_as_fresh_ones(step, before_touch
         assert array.flags.aligned
         assert array.flags.writeable
         assert array.flags.c_contiguous
-    # one of a version that knew no touched places comes back without any
-    store, kind = before_touched
+    # one of an older version comes back without what was added
+    store, kinds = older
     message = decoded(STEP, data)
-    names = [name for name in type(message).__dataclass_fields__ if name != "__msgtype__"]
-    known = [getattr(message, name) for name in names if name != "touched"]
-    before = bytes(store.serialize_cdr(store.types[kind](*known), kind, little_endian=True))
-    number, back, _ = decode_step(before)
-    assert number == 7
-    assert same(back, replace(step, touched=NOT_TOUCHED))
+    for k, kind in enumerate(kinds):
+        missing = dict(list(ADDED.items())[k:])
+        known = [getattr(message, name) for name in store.types[kind].__dataclass_fields__ if name != "__msgtype__"]
+        before = bytes(store.serialize_cdr(store.types[kind](*known), kind, little_endian=True))
+        number, back, _ = decode_step(before)
+        assert number == 7
+        assert same(back, replace(step, **missing))
 
 
 @given(rows(4), rows(4, 3), rows(3), st.lists(st.tuples(NAN_TOO, st.integers(-5, 99), rows(3)), max_size=3))

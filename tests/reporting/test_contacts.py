@@ -114,6 +114,14 @@ def test_a_contact_that_held_the_arm_still_is_told_as_that(pushed):
     assert contact_section(pushed).count("<td>held still</td>") == 1
 
 
+def test_the_force_that_is_found_is_told_where_the_detector_says_it(panda_model, paper_skin, pushed):
+    assert "is found from" not in str(summary(pushed))
+    said = [8.0] * 90 + [12.4] * 6 + [30.0] * 4
+    steps = [made.step(panda_model, stamp=0.01 * i, detectable_n=force) for i, force in enumerate(said)]
+    told = str(summary(measure(made.recorded(panda_model, paper_skin, steps), "loud")))
+    assert "for 0.1 s is found from 8 N on half of the time, and from 12 N on 95 % of the time." in told
+
+
 def test_the_largest_true_force_counts_felt_or_not(pushed):
     assert pushed.peak == 50.0
     assert pushed.held is None
