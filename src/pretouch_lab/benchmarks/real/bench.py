@@ -22,8 +22,8 @@ TABLES = {
 _NOTES = {
     "free": "False alarms an hour of free motion, with exact 95 % bounds (Poisson).",
     "contacts": (
-        "Found of the labelled contacts; busy: began during an earlier alarm, so that they count in neither. Link: right"
-        " of those that set and detector name."
+        "Found of the labelled contacts; busy: began during an earlier alarm, and count in neither. Link: right of"
+        " those that set and detector name."
     ),
     "added": (
         "15 N for 100 ms at the end-effector, laid on the measured torques before the observer; the arm does not give"
@@ -76,18 +76,21 @@ def play(work: Work) -> list[Row]:
 def _prepared(folder: Path, name: str) -> tuple[list[Run], dict[str, Stream]]:
     real = next(each for each in SETS if each.name == name)
     runs, model = parted(real.read(real.files(folder))), model_of(real, folder)
-    return runs, {"stream": stream_of(real, runs, model), "pushed": stream_of(real, pushed(runs, model), model)}
+    streams = {"stream": stream_of(real, runs, model)}
+    if not all(run.touched for run in runs):
+        streams["pushed"] = stream_of(real, pushed(runs, model), model)
+    return runs, streams
 
 
 def parted(runs: list[Run]) -> list[Run]:
     """Cut a single recording in the middle, so that there are two: nothing else could be judged apart."""
     if len(runs) > 1:
         return runs
-    (run,), middle = runs, len(runs[0].time) // 2
+    (r,), middle = runs, len(runs[0].time) // 2
     return [
-        Run(f"{run.name}, {half} half", *(values[part] for values in (run.time, run.q, run.qd, run.torque, run.label)), run.joints)
+        Run(f"{r.name}, {half} half", r.time[part], r.q[part], r.qd[part], r.torque[part], r.label[part], r.joints)
         for half, part in (("first", slice(middle)), ("second", slice(middle, None)))
-    ]  # fmt: skip
+    ]
 
 
 def tables_of(rows: Sequence[Row]) -> list[TextTable]:

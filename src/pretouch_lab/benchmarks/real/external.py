@@ -1,4 +1,4 @@
-"""External torques of a set's runs: the product's observer, less what one half of the runs says of load and friction."""
+"""External torques of a set's runs: the product's observer, less what half of the runs says of load and friction."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from pretouch.imported_data.torques import TorqueRecording, torque_recording
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value
 from pretouch_lab.benchmarks.real.sets import RealSet, Run
 
@@ -52,9 +52,9 @@ class Stream:
         return Stream(kept, self.label[at], self.run[at], self.load[at])
 
     @property
-    def free(self) -> FloatArray:
+    def free(self) -> BoolArray:
         """(M,) whether nobody touches the arm and its torques are known."""
-        return (self.label == 0) & np.isfinite(self.recording.tau_ext).all(axis=1)
+        return np.asarray((self.label == 0) & np.isfinite(self.recording.tau_ext).all(axis=1))
 
 
 def model_of(real: RealSet, folder: Path) -> RobotModel:

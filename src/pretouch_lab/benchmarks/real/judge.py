@@ -34,8 +34,9 @@ def said_of(stream: Stream, profile: Profile) -> Said:
     """Let a detector run over a stream, as `pretouch detect` does."""
     r = stream.recording
     if profile.detect.by_torques:
-        d = detect_torques(r, for_currents(r, profile)[0])
-        return Said(d.contacts, d.time, d.armed & np.isfinite(d.residual).all(axis=1))
+        by_torques = detect_torques(r, for_currents(r, profile)[0])
+        known = np.isfinite(by_torques.residual).all(axis=1)
+        return Said(by_torques.contacts, by_torques.time, by_torques.armed & known)
     result = result_of(r, profile)
     if result.by_force is None:
         return Said((), np.zeros(0), np.zeros(0, np.bool_))

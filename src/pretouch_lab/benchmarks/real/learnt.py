@@ -24,6 +24,8 @@ _SHARES = 4
 """Parts of what is learnt from, each of which is judged by the others for the bounds."""
 _ROWS = 8192
 """Samples at a time, for memory."""
+_NO_FORCE_N = 1000.0
+"""Bound on the force, out of reach: torques alone decide, as in the profile `observer`."""
 
 
 def learnt(stream: Stream, runs: Sequence[int]) -> tuple[Stream, Profile]:
@@ -43,8 +45,8 @@ def learnt(stream: Stream, runs: Sequence[int]) -> tuple[Stream, Profile]:
         left = y[part] - _answer(x[part], _fit(x, y, others))
         bounds = np.maximum(bounds, np.abs(left).max(axis=0))
     tau = y - _answer(x, _fit(x, y, seen))
-    detect = FixedBounds(tuple(bounds), OBSERVER.detect.largest_missed_n(None, 0.0))
-    return replace(stream, recording=replace(r, tau_ext=tau)), replace(OBSERVER, name=LEARNT, detect=detect)
+    profile = replace(OBSERVER, name=LEARNT, detect=FixedBounds(tuple(bounds), _NO_FORCE_N))
+    return replace(stream, recording=replace(r, tau_ext=tau)), profile
 
 
 def _inputs(stream: Stream) -> FloatArray:
@@ -65,13 +67,14 @@ def _hidden(x: FloatArray) -> FloatArray:
 
 def _fit(x: FloatArray, y: FloatArray, rows: BoolArray) -> FloatArray:
     """Weights (H, n) of the output."""
-    gram: FloatArray | float = 0.0
-    right: FloatArray | float = 0.0
     at = np.flatnonzero(rows)
+    size = 1 + x.shape[1] + _HIDDEN
+    gram, right = _RIDGE * len(at) * np.eye(size), np.zeros((size, y.shape[1]))
     for some in np.array_split(at, max(1, len(at) // _ROWS)):
         h = _hidden(x[some])
-        gram, right = gram + h.T @ h, right + h.T @ y[some]
-    return np.linalg.solve(gram + _RIDGE * len(at) * np.eye(len(gram)), right)
+        gram += h.T @ h
+        right += h.T @ y[some]
+    return np.asarray(np.linalg.solve(gram, right), np.float64)
 
 
 def _answer(x: FloatArray, weights: FloatArray) -> FloatArray:

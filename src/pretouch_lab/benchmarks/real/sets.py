@@ -105,9 +105,9 @@ def _glove_run(file: Path) -> Run:
 def _run(name: str, parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) -> Run:
     """Leave out what is not finite, and samples that are not later than those before."""
     time, q, qd, torque = (np.asarray(part, np.float64) for part in parts)
-    usable = np.isfinite(np.column_stack([time, q, qd, torque])).all(axis=1)
-    latest = np.maximum.accumulate(np.where(usable, time, -np.inf))
-    usable[1:] &= time[1:] > latest[:-1]
+    finite = np.isfinite(np.column_stack([time, q, qd, torque])).all(axis=1)
+    latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
+    usable = finite & np.append(np.True_, time[1:] > latest[:-1])
     return Run(name, time[usable], q[usable], qd[usable], torque[usable], label[usable].astype(np.int64), joints)
 
 
