@@ -174,7 +174,7 @@ def test_pushes_reach_the_external_torques_as_the_observer_delays_them(motions, 
     J = panda_model.ee_jacobian(panda_model.kinematics(motions[0].q[at]))[:3]
     # implicit Euler of 60 1/s over 25 samples of 4 ms: 1 - 1.24^-25
     expected = J.T @ np.array([15.0, 0.0, 0.0]) * (1.0 - 1.24**-25)
-    np.testing.assert_allclose((pair[1] - pair[0])[at - 1], expected, atol=0.02)
+    np.testing.assert_allclose((pair[1] - pair[0])[at - 1], expected, atol=0.05)  # the arm turned in its 16 ms
     assert (made[0].label == 1).sum() == 75  # three pushes of 25 samples: at 1.5, 3 and 4.5 s
     assert made[0].joints == (7,)
 
@@ -212,7 +212,7 @@ def test_alarms_are_counted_by_hand(stream):
     for begin, end, kind in ((1.9, 2.0, -1), (2.0, 2.2, 1), (2.4, 2.5, 1), (4.0, 4.3, 1), (5.0, 5.2, -1)):
         label[np.searchsorted(time, begin) : np.searchsorted(time, end)] = kind
     labelled = replace(one, label=label)
-    cycles = np.arange(0.005, time[-1], 0.01)
+    cycles = np.concatenate([np.arange(0.005, 6.0, 0.01), np.arange(7.005, time[-1], 0.01)])
     armed = cycles > 1.0
 
     def counted(*alarms):
@@ -254,7 +254,8 @@ def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, 
     assert (row["found"], row["contacts"], row["link_right"], row["false_alarms"]) == (3, 3, 3, 0)
     assert 0.0 < row["median_delay_ms"] < 100.0
     assert rows["franka_fast", "free", "pretouch"]["contacts"] == 0
-    assert rows["franka_fast", "added", "learnt"]["contacts"] == 12
+    added = rows["franka_fast", "added", "learnt"]
+    assert added["contacts"] + added["busy"] == 12
 
 
 def test_a_folder_without_a_set_says_what_was_looked_for_and_where_it_comes_from(tmp_path, capsys):
