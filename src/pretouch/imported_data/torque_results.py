@@ -56,7 +56,7 @@ def result_of(recording: TorqueRecording, profile: Profile) -> ProfileResult:
 
 
 def _by_torques(recording: TorqueRecording, profile: Profile) -> ProfileResult:
-    profile, notes = _for_currents(recording, profile)
+    profile, notes = for_currents(recording, profile)
     d = detect_torques(recording, profile)
     found = torque_summary(Stream(recording, profile), d)
     if getattr(profile.detect, "learn", "") == "watched":
@@ -85,7 +85,7 @@ def _by_torques(recording: TorqueRecording, profile: Profile) -> ProfileResult:
     )
 
 
-def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile, list[str]]:
+def for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile, list[str]]:
     """Allow for what currents do not tell, as the friction of gears, where the profile leaves that as usual."""
     p, usual = profile.detect, SequentialParams()
     if not (recording.of_currents and isinstance(p, SequentialParams)):

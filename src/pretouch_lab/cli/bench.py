@@ -9,6 +9,7 @@ import tyro
 from pretouch.cli.words import words
 from pretouch.errors import ParameterError
 from pretouch_lab.cli.bench_calibration import Calibration
+from pretouch_lab.cli.bench_real import Real
 from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization
 
 
@@ -74,6 +75,7 @@ class Bench:
         | Annotated[FreeMotion, tyro.conf.subcommand("free-motion")]
         | Annotated[Cycle, tyro.conf.subcommand("cycle")]
         | Annotated[Calibration, tyro.conf.subcommand("calibration")]
+        | Annotated[Real, tyro.conf.subcommand("real")]
     )
 
     def run(self) -> int | None:

@@ -1,0 +1,1 @@
+"""Contact detectors on public recordings of real arms."""

@@ -1,0 +1,118 @@
+"""`pretouch bench real`: each detector on each set, halves crosswise: one half learns, the other is judged."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from pretouch.profiles import profile
+from pretouch.text_table import TextTable, tabulated
+from pretouch_lab.benchmarks.real.external import Stream, corrected, model_of, pushed, stream_of
+from pretouch_lab.benchmarks.real.judge import Tally, said_of, tally
+from pretouch_lab.benchmarks.real.learnt import LEARNT, learnt
+from pretouch_lab.benchmarks.real.sets import SETS, Run
+from pretouch_lab.rows import Row
+
+DETECTORS = ("fixed", "observer", LEARNT, "paper", "pretouch")
+TABLES = {
+    "free": "Real free motion",
+    "contacts": "Real contacts",
+    "added": "NOT real contacts: pushes added to real free motion",
+}
+_NOTES = {
+    "free": "False alarms an hour of free motion, with exact 95 % bounds (Poisson).",
+    "contacts": (
+        "Found of the labelled contacts; busy: began during an earlier alarm, and count in neither. Link: right of"
+        " those that set and detector name."
+    ),
+    "added": (
+        "15 N for 100 ms at the end-effector, laid on the measured torques before the observer; the arm does not give"
+        " way. No person made these contacts."
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Work:
+    """A detector on a set."""
+
+    folder: Path
+    set_name: str
+    detector: str
+
+
+def halves(count: int) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
+    """Return pairs of runs to learn from and runs to be judged, no run in both; each of them is judged once."""
+    even, odd = tuple(range(0, count, 2)), tuple(range(1, count, 2))
+    return (even, odd), (odd, even)
+
+
+def play(work: Work) -> list[Row]:
+    """Return a row for each table that a set has something for."""
+    runs, streams = _prepared(work.folder, work.set_name)
+    counts: dict[str, Tally] = {}
+    for learn, judge in halves(len(runs)):
+        touched = tuple(number for number in judge if runs[number].touched)
+        free = tuple(number for number in judge if not runs[number].touched)
+        tables = {"stream": {"free": free, "contacts": touched}, "pushed": {"added": free}}
+        for name, some in tables.items():
+            if any(some.values()):
+                joints = [run.joints if name == "stream" else (len(run.q[0]),) for run in runs]
+                stream, detector = corrected(streams[name], learn), work.detector
+                stream, chosen = learnt(stream, learn) if detector == LEARNT else (stream, profile(detector))
+                # what is learnt in the first half by a detector that does so is kept, as from one session to the next
+                stream = stream.only((*learn, *judge))
+                said = said_of(stream, chosen)
+                for table, judged in some.items():
+                    if judged:
+                        counts[table] = counts.get(table, Tally()) + tally(stream, said, judged, joints)
+    return [
+        {"set": work.set_name, "table": table, "detector": work.detector, **counts[table].row()}
+        for table in TABLES if table in counts
+    ]  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def _prepared(folder: Path, name: str) -> tuple[list[Run], dict[str, Stream]]:
+    real = next(each for each in SETS if each.name == name)
+    runs, model = parted(real.read(real.files(folder))), model_of(real, folder)
+    streams = {"stream": stream_of(real, runs, model)}
+    if not all(run.touched for run in runs):
+        streams["pushed"] = stream_of(real, pushed(runs, model), model)
+    return runs, streams
+
+
+def parted(runs: list[Run]) -> list[Run]:
+    """Cut a single recording in the middle, so that there are two: nothing else could be judged apart."""
+    if len(runs) > 1:
+        return runs
+    (r,), middle = runs, len(runs[0].time) // 2
+    return [
+        Run(f"{r.name}, {half} half", r.time[part], r.q[part], r.qd[part], r.torque[part], r.label[part], r.joints)
+        for half, part in (("first", slice(middle)), ("second", slice(middle, None)))
+    ]
+
+
+def tables_of(rows: Sequence[Row]) -> list[TextTable]:
+    """Write the rows, a table for each kind."""
+    return [
+        tabulated(title, [*_COMMON, *([] if table == "free" else _FOUND)], some, _NOTES[table])
+        for table, title in TABLES.items() if (some := [row for row in rows if row["table"] == table])
+    ]  # fmt: skip
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.0f}"
+
+
+_COMMON = (
+    ("set", lambda row: row["set"]), ("detector", lambda row: row["detector"]),
+    ("free motion [s]", lambda row: _number(row["motion_s"])), ("false alarms", lambda row: str(row["false_alarms"])),
+    ("an hour", lambda row: _number(row["per_hour"])),
+    ("95 %", lambda row: f"{_number(row['per_hour_low'])} to {_number(row['per_hour_high'])}"),
+)  # fmt: skip
+_FOUND = (
+    ("found", lambda row: f"{row['found']} of {row['contacts']}"), ("busy", lambda row: str(row["busy"])),
+    ("delay, median [ms]", lambda row: _number(row["median_delay_ms"])),
+    ("link right", lambda row: f"{row['link_right']} of {row['link_said']}" if row["link_said"] else "–"),
+)  # fmt: skip

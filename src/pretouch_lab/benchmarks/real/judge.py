@@ -1,0 +1,130 @@
+"""What a detector said of a stream, held against its labels: false alarms, contacts found, delays, links."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pretouch.imported_data.events import ContactEvent
+from pretouch.imported_data.torque_detect import MOVING_RAD_S, detect_torques
+from pretouch.imported_data.torque_results import for_currents, result_of
+from pretouch.profiles import Profile
+from pretouch.types import BoolArray, FloatArray
+from pretouch_lab.benchmarks.real.external import Stream
+from pretouch_lab.rows import Row
+
+_AFTER_S = 0.1
+"""Time after a contact in which an alarm still counts as found, and none as false [s]."""
+_NEAR_S = 0.5
+"""Contacts that part for less are one: so long nothing is a new alarm either [s]."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a detector said in S cycles."""
+
+    alarms: tuple[ContactEvent, ...]
+    time: FloatArray
+    """(S,) [s]."""
+    armed: BoolArray
+    """(S,)."""
+
+
+def said_of(stream: Stream, profile: Profile) -> Said:
+    """Let a detector run over a stream, as `pretouch detect` does."""
+    r = stream.recording
+    if profile.detect.by_torques:
+        by_torques = detect_torques(r, for_currents(r, profile)[0])
+        known = np.isfinite(by_torques.residual).all(axis=1)
+        return Said(by_torques.contacts, by_torques.time, by_torques.armed & known)
+    result = result_of(r, profile)
+    if result.by_force is None:
+        return Said((), np.zeros(0), np.zeros(0, np.bool_))
+    d = result.by_force
+    return Said(result.contacts, d.time + r.time[0], d.armed & np.isfinite(d.compared).all(axis=1))
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Counts that add up over runs."""
+
+    motion_s: float = 0.0
+    """Free motion in which a contact could be detected [s]."""
+    false_alarms: int = 0
+    found: int = 0
+    busy: int = 0
+    """Contacts that began during an alarm of before: neither found nor missed."""
+    contacts: int = 0
+    delays_s: tuple[float, ...] = ()
+    links_right: int = 0
+    links_said: int = 0
+    """Contacts found on a link that the set names, by a detector that names one."""
+
+    def __add__(self, other: "Tally") -> "Tally":
+        return Tally(*(getattr(self, name) + getattr(other, name) for name in self.__dataclass_fields__))
+
+    def row(self) -> Row:
+        """Return what a table shows."""
+        hours = self.motion_s / 3600.0
+        low, high = poisson_bounds(self.false_alarms)
+        return {
+            "motion_s": self.motion_s, "false_alarms": self.false_alarms,
+            "per_hour": self.false_alarms / hours if hours else None,
+            "per_hour_low": low / hours if hours else None, "per_hour_high": high / hours if hours else None,
+            "found": self.found, "busy": self.busy, "contacts": self.contacts,
+            "median_delay_ms": 1000.0 * float(np.median(self.delays_s)) if self.delays_s else None,
+            "link_right": self.links_right, "link_said": self.links_said,
+        }  # fmt: skip
+
+
+def poisson_bounds(count: int) -> tuple[float, float]:
+    """95 % bounds on the mean of which so many were counted, exact (Garwood)."""
+    from scipy.stats import chi2
+
+    return float(chi2.ppf(0.025, 2 * count)) / 2 if count else 0.0, float(chi2.ppf(0.975, 2 * count + 2)) / 2
+
+
+def tally(stream: Stream, said: Said, judged: Sequence[int], joints: Sequence[tuple[int, ...]]) -> Tally:
+    """Count over some runs of a stream; `joints` names the touched link of each run of the set, as `Run` does."""
+    r, own = stream.recording, np.isin(stream.run, judged)
+    spans = [span for span in _spans(stream) if own[span[0]]]
+    from_to = [(r.time[first], r.time[last] + _AFTER_S) for first, _, last in spans]
+    at = np.searchsorted(r.time, said.time, side="right") - 1
+    free = own[at] & said.armed & (np.abs(r.qd_commanded[at]).max(axis=1) > MOVING_RAD_S)
+    for begin, end in from_to:
+        free &= (said.time < begin) | (said.time > end)
+    count = Tally(
+        motion_s=float(free.sum() * np.median(np.diff(said.time))) if free.any() else 0.0,
+        false_alarms=int(free[np.searchsorted(said.time, [alarm.time for alarm in said.alarms])].sum()),
+    )
+    for (first, touch, _), (begin, end) in zip(spans, from_to, strict=True):
+        if touch >= 0:
+            count += _contact(said, (begin, r.time[touch], end), stream, joints[stream.run[first]])
+    return count
+
+
+def _contact(said: Said, times: tuple[float, float, float], stream: Stream, joints: tuple[int, ...]) -> Tally:
+    begin, touch, end = times
+    alarm = next((alarm for alarm in said.alarms if begin <= alarm.time <= end), None)
+    if alarm is None:
+        busy = any(alarm.time < begin <= alarm.end for alarm in said.alarms)
+        return Tally(busy=int(busy), contacts=int(not busy))
+    model, named = stream.recording.model, bool(joints and alarm.link)
+    right = named and int(model.moved_by[model.link_index(alarm.link)].sum()) in joints
+    return Tally(
+        found=1, contacts=1, delays_s=(alarm.time - touch,), links_right=int(right), links_said=int(named)
+    )  # fmt: skip
+
+
+def _spans(stream: Stream) -> list[tuple[int, int, int]]:
+    """Stretches that are not sure to be free: first sample, first in a contact (-1: none), last sample."""
+    label, time, run = stream.label, stream.recording.time, stream.run
+    found: list[tuple[int, int, int]] = []
+    some = np.flatnonzero(label)
+    if not len(some):
+        return found
+    apart = (np.diff(time[some]) > _NEAR_S) | (np.diff(run[some]) != 0)
+    for part in np.split(some, np.flatnonzero(apart) + 1):
+        touch = part[label[part] == 1]
+        found.append((int(part[0]), int(touch[0]) if len(touch) else -1, int(part[-1])))
+    return found

@@ -1,0 +1,66 @@
+"""`pretouch bench real`: the detectors on public recordings of real arms."""
+
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Real:
+    """Contact detectors on public recordings of real arms, which you download: false alarms, contacts, delays, links.
+
+    One half of each set's recordings says what load, offsets and friction the arm has, the other is judged; then the
+    other way round. docs/explanation/benchmarks.md tells how the folder is laid out.
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """Of the sets, each by its name, with `arms` as `pretouch robot import` wrote them."""
+    detectors: str = ""
+    """Profiles, separated by commas, and learnt, a baseline that is trained on the half that is not judged; by default
+    fixed, observer, learnt, paper and pretouch."""
+    json: str = ""
+    """File for the rows, or - for standard output: text then goes to standard error."""
+
+    def run(self) -> None:
+        """Play what is there, with tables and rows."""
+        bench_real(self)
+
+
+def bench_real(command: Real) -> None:
+    """Play each detector on each set in processes, show tables, and write the rows."""
+    from rich.console import Console
+
+    from pretouch.cli.tables import show
+    from pretouch.cli.words import words
+    from pretouch.cli.writing import numbers_to
+    from pretouch.profiles import profile
+    from pretouch_lab.benchmarks.real.bench import DETECTORS, Work, play, tables_of
+    from pretouch_lab.benchmarks.real.learnt import LEARNT
+    from pretouch_lab.benchmarks.real.sets import sets_in
+    from pretouch_lab.cli.progress import bar
+    from pretouch_lab.engine import run_jobs
+
+    detectors = words(command.detectors) or DETECTORS
+    for name in detectors:
+        if name != LEARNT:
+            profile(name)  # an hour later would be late
+    sets, missing = sets_in(command.folder)
+    works = [Work(command.folder, each.name, name) for each in sets for name in detectors]
+    rows: dict[Work, Any] = {}
+    with numbers_to(command.json) as write:
+        for sentence in missing:
+            print(sentence, file=sys.stderr)
+        with bar(Console(stderr=True), "recordings", len(works)) as advance:
+
+            def done(work: Work, found: Any) -> None:
+                rows[work] = found
+                advance(1, "recordings")
+
+            run_jobs(works, lambda work: (play, work), os.cpu_count() or 1, done)
+        found = [row for work in works for row in rows[work]]
+        show(Console(highlight=False), tables_of(found))
+        write({"sets": {each.name: each.source for each in sets}, "left_out": missing, "rows": found})
