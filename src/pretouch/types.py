@@ -1,7 +1,6 @@
 """The values that travel along the line from a reading to a joint velocity.
 
-Everything here is a value, set once when it is made; its arrays are to be read and not written to. See
-`docs/reference/conventions.md`.
+All are set once, when they are made; arrays are read and not written to (`docs/reference/conventions.md`).
 """
 
 from dataclasses import field
@@ -348,4 +347,4 @@ class ControlStep:
     touched: Touched = field(default_factory=lambda: NOT_TOUCHED)
     """Where the arm is touched; empty where no contact is detected or the profile does not localise."""
     detectable_n: float = np.nan
-    """Force at the end-effector that the detector finds here and now, see `Detection.detectable_n` [N]."""
+    """Force at the end-effector that is found, see `Detection.detectable_n` [N]."""

@@ -43,6 +43,7 @@ def detectable_force(J: FloatArray, period: float, free: FreeMeans, needed: floa
     while k + 1 < len(_LENGTHS) and _LENGTHS[k + 1] * period <= HELD_S:
         k += 1
     S, L, A = np.empty((n, n)), np.zeros((n, n)), np.empty((3, n))
+    # a mean over less time has more noise, and one over more is not whole while the force lasts
     covariance_of_mean(free, k, S)
     if not factor(S, L):
         return np.inf
@@ -62,6 +63,7 @@ def _squares(needed: float, n: int, gain: float, tails: float) -> float:
     E = exp(2 (needed + 3/2 ln(1 + g)) / (nu + n)) = (nu + n + T) / (nu + n - 3 c + (1 - c) T), which is linear in T.
     """
     E, c = math.exp(2.0 * (needed + 1.5 * math.log1p(gain)) / (tails + n)), gain / (1.0 + gain)
+    # with few degrees of freedom no residual is so large that it could not be an outlier
     slope = 1.0 - E * (1.0 - c)
     return max(0.0, (E * (tails + n - 3.0 * c) - tails - n) / slope) if slope > 0.0 else np.inf
 
@@ -74,5 +76,6 @@ def _least_eigenvalue(G: FloatArray) -> float:
     size = math.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
     if size == 0.0:
         return mean
+    # of G less its mean, over `size`, half the determinant is the cosine of three times the angle of each root
     half = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / size**3
     return mean + 2.0 * size * math.cos((math.acos(max(-1.0, min(half, 1.0))) + 2.0 * math.pi) / 3.0)

@@ -1,11 +1,13 @@
 """The hypotheses of the sequential test in one posture, which `sequential.judge` weighs: contacts and their priors."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.contact.proximity_prior import nearest_of, nearness
+from pretouch.contact.residual_windows import LENGTHS
 from pretouch.contact.sequential import Hypotheses
 from pretouch.groups import Mechanism, ObstacleArrays
 from pretouch.robot.model import Kinematics, jacobian_into
@@ -18,6 +20,12 @@ class NearPrior(NamedTuple):
     near_gain: float
     near_m: float
     near_horizon_s: float
+
+
+@compiled
+def link_prior(mechanism: Mechanism) -> float:
+    """Return ln of the prior weight of a force on one link in one window, of which nothing near or touched is known."""
+    return -math.log(2.0 * len(mechanism.links.parts) * len(LENGTHS))
 
 
 @compiled

@@ -14,7 +14,7 @@ from pretouch.compiled import compiled, entry, inlined
 from pretouch.contact.alarm_level import earned_level
 from pretouch.contact.detectable import detectable_force
 from pretouch.contact.force_map import force_map_into
-from pretouch.contact.hypotheses import NearPrior, write_hypotheses
+from pretouch.contact.hypotheses import NearPrior, link_prior, write_hypotheses
 from pretouch.contact.model_update import DetectionNumbers, Memory, Situation, Tested, update_model
 from pretouch.contact.proximity_prior import MOST
 from pretouch.contact.residual_model import CalmSample, features_into, mean_and_variance, spread_of_sample
@@ -89,9 +89,7 @@ def detect_contact(
 
     J_ee = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
-    # one hypothesis alone, of a force on a link that neither a touch nor an object makes likelier, in one window
-    needed = level + math.log(2.0 * len(mechanism.links.parts) * len(means))
-    found = detectable_force(J_ee, now.period, expected, needed, p.contact_gain, p.tails)
+    found = detectable_force(J_ee, now.period, expected, level - link_prior(mechanism), p.contact_gain, p.tails)
     # nothing is learnt while anything that is seen could be what is measured
     alone = now.may_learn and distance.min() >= p.clear_m if len(distance) else now.may_learn
     sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving, ratio)
