@@ -25,8 +25,8 @@ class Measure:
     Once more, by 1900 and 17, for `pretouch detect` on the joint torques of anybody's arm: tables, bags, an
     observer, checks of sign, unit and order, pushes that are tried, figure and page.
     Then by 215 and 1 for a bound on how far a contact moves the arm and for light touches that are no object, and by
-    350 and 3 for what the model of free motion cannot express, by 165 and 1 for the force that is found. Those of product and lab by 535, for the detectors on
-    recordings of real arms.
+    350 and 3 for what the model of free motion cannot express, by 165 and 1 for the force that is found. Those of
+    product and lab by 535, for the detectors on recordings of real arms.
     """
 
     name: str
