@@ -270,7 +270,7 @@ def test_what_is_wrong_with_a_unit_is_said_with_unit_and_file(panda_model, tmp_p
         ("[unit]\nid = 'a'", "has no unit"),
         ("unit = [3]", r"A unit is 3: write it as a \[\[unit\]\] table"),
         ("[[unit]\n", "is not valid TOML"),
-        ("unit = " + "[" * 100_000, "is not valid TOML: maximum recursion depth exceeded"),
+        ("unit = " + "[" * 100_000, "is not valid TOML: its brackets are nested too deeply"),
         ("unit = " + "9" * 5000, "is not valid TOML: Exceeds the limit"),
         (_entry() + _entry(), "unit id left is used more than once: give each unit its own id"),
     ],
