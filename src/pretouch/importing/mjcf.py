@@ -47,7 +47,8 @@ def _compiled(file: Path) -> mujoco.MjModel:
         place = Path(folder) / "arm.mjb"
         command = [sys.executable, "-P", compile_apart.__file__, file.resolve(), place, _MEMORY, _MOST]
         try:
-            done = run([str(word) for word in command], cwd=folder, capture_output=True, timeout=_PATIENCE_S)
+            words = [str(word) for word in command]
+            done = run(words, cwd=folder, capture_output=True, timeout=_PATIENCE_S)  # noqa: S603  our own program
             reason = "" if done.returncode == 0 else done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
             if done.returncode < 0:
                 reason = f"MuJoCo broke off, most likely because it may take {_MEMORY >> 30} GiB at most"

@@ -13,36 +13,11 @@ LARGEST_MJCF = 1_000_000
 _MOST_ELEMENTS = 2000
 """An arm of 60 links with six capsules each has some 500; RobotModel takes memory by the square: 0.3 GB for so many."""
 _MOST_JOINTS = 64
-_ELEMENTS = frozenset(
-    [
-        "mujoco",
-        "compiler",
-        "option",
-        "flag",
-        "statistic",
-        "default",
-        "worldbody",
-        "frame",
-        "body",
-        "inertial",
-        "joint",
-        "geom",
-        "site",
-        "camera",
-        "light",
-        "asset",
-        "material",
-        "contact",
-        "exclude",
-        "actuator",
-        "general",
-        "motor",
-        "position",
-        "velocity",
-        "keyframe",
-        "key",
-    ]
-)
+_ELEMENTS = frozenset({
+    "mujoco", "compiler", "option", "flag", "statistic", "default", "worldbody", "frame", "body", "inertial", "joint",
+    "geom", "site", "camera", "light", "asset", "material", "contact", "exclude", "actuator", "general", "motor",
+    "position", "velocity", "keyframe", "key",
+})  # fmt: skip
 """What describes an arm by bodies, joints and simple shapes; `pretouch robot import` writes a part of it."""
 _ATTRIBUTES = frozenset({"user", "nsample", "actdim"})
 """Each makes arrays as wide as one element asks for, for all elements."""
@@ -77,7 +52,7 @@ class _Tree(ET.TreeBuilder):
         super().__init__()
         self._given = self._left = most
 
-    def start(self, tag: str, attrs: dict[str, str]) -> ET.Element:  # type: ignore[override]
+    def start(self, tag: str, attrs: dict[str, str]) -> ET.Element:
         """Take the begin of an element."""
         self._left -= 1
         if self._left < 0:
