@@ -30,7 +30,7 @@ def run_on_cluster(
 ) -> None:
     """Play jobs on a cluster, in their order. Raises ExperimentError where it is not there, or goes away.
 
-    A job whose worker is killed is played again by the scheduler itself. Answers are text, and others, pickled ones too,
+    A job whose worker is killed is played again by the scheduler. Answers are text, and others, pickled ones too,
     are not read; but dask unpickles the errors of workers here, so that the cluster must be trusted.
     """
     with _client(address) as client:
