@@ -275,3 +275,9 @@ def test_the_order_of_changes_does_not_matter():
 def test_a_variation_that_cannot_be_is_refused(name, words):
     with pytest.raises(ParameterError, match=words):
         profile(name)
+
+
+def test_commands_are_remembered_for_a_second_at_most():
+    assert FailureParams(state_timeout_s=1.0).state_timeout_s == 1.0
+    with pytest.raises(ParameterError, match=r"state_timeout_s is 1000000\.0: it must be at most 1"):
+        FailureParams(state_timeout_s=1e6)

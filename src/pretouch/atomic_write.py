@@ -2,10 +2,10 @@
 
 import json
 import os
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,12 @@ def atomic_write(path: Path, text: str) -> None:
 
 @contextmanager
 def atomic_replacement(place: Path) -> Iterator[Path]:
-    """Give a path beside a file's place; what is written there replaces the file, or is gone after an exception."""
-    name = sha256(os.fsencode(place.name)).hexdigest()[:16]  # as short for a long name
-    unfinished = place.with_name(f".{name}.{os.getpid()}.tmp")
+    """Give a new file beside a file's place; what is written there replaces the file, or is gone after an exception.
+
+    Its name cannot be foreseen, and it is there alone: nobody else can make it a link to a file of theirs or yours.
+    """
+    unfinished = place.with_name(f".{secrets.token_hex(8)}.tmp")
+    os.close(os.open(unfinished, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o666))
     try:
         yield unfinished
         if place.is_file():

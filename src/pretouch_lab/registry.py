@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from pretouch.errors import ExperimentError
 from pretouch.text_table import TextTable
 from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import avoidance, dynamic, static
@@ -61,12 +62,19 @@ EXPERIMENTS: dict[str, Experiment] = {e.name: e for group in GROUPS.values() for
 
 
 def summarise(trials: list[Row]) -> dict[str, Any]:
-    """Summaries of the experiments in a list of trials, by name."""
-    return {
-        name: experiment.summarise(rows)
-        for name, experiment in EXPERIMENTS.items()
-        if (rows := [t for t in trials if t["experiment"] == name])
-    }
+    """Summaries of the experiments in a list of trials, by name. Trials of another form are an ExperimentError."""
+    found = {}
+    for name, experiment in EXPERIMENTS.items():
+        rows = [trial for trial in trials if trial.get("experiment") == name]
+        try:
+            if rows:
+                found[name] = experiment.summarise(rows)
+        except (LookupError, TypeError, ValueError, AttributeError) as error:
+            raise ExperimentError(
+                f"A file of a trial of {name} was changed ({type(error).__name__}: {error}): delete trials/{name}-* in"
+                " the folder of the run, and give the same command again."
+            ) from error
+    return found
 
 
 def conclusions(summary: dict[str, Any]) -> list[str]:

@@ -69,6 +69,15 @@ def test_the_page_shows_each_table_and_picture(request_and_folder):
             assert np.asarray(picture.convert("L")).std() > 10
 
 
+@pytest.mark.parametrize("change", [lambda row: row.pop("where"), lambda row: row.update(where=3)])
+def test_a_trial_of_another_form_is_one_sentence(request_and_folder, change):
+    _, out = request_and_folder
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("static*/*.json")]
+    change(rows[0])
+    with pytest.raises(ExperimentError, match=r"of static was changed .*: delete trials/static-\* in"):
+        summarise(rows)
+
+
 def test_a_run_without_trials_still_has_a_page(tmp_path):
     request = Request(("static",), seeds=1)
     request.open(tmp_path)

@@ -270,7 +270,7 @@ def test_what_is_wrong_with_a_unit_is_said_with_unit_and_file(panda_model, tmp_p
         ("[unit]\nid = 'a'", "has no unit"),
         ("unit = [3]", r"A unit is 3: write it as a \[\[unit\]\] table"),
         ("[[unit]\n", "is not valid TOML"),
-        ("unit = " + "[" * 100_000, "is not valid TOML: maximum recursion depth exceeded"),
+        ("unit = " + "[" * 100_000, "is not valid TOML: its brackets are nested too deeply"),
         ("unit = " + "9" * 5000, "is not valid TOML: Exceeds the limit"),
         (_entry() + _entry(), "unit id left is used more than once: give each unit its own id"),
     ],
@@ -303,3 +303,8 @@ def test_another_arm_has_no_skin_yet():
     other = RobotModel(replace(panda(), name="other"))
     with pytest.raises(SkinError, match="The arm other comes without a skin: write a file like panda"):
         sensing_skin.paper_skin(other)
+
+
+def test_a_skin_of_far_too_many_units_is_refused_before_they_are_looked_at(panda_model, paper_skin):
+    with pytest.raises(SkinError, match="has 40000 units: give at most 1000"):
+        Skin([paper_skin.units[0]] * 40_000, panda_model)

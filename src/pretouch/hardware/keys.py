@@ -4,7 +4,6 @@ import os
 import secrets
 import stat
 import tempfile
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import tomli_w
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.wire import KEY_SIZE
+from pretouch.toml_files import parsed_toml
 
 _LAST_NUMBER = 0xFFFF
 _SHOWN_BITS = 64
@@ -104,8 +104,8 @@ def load_keys(path: Path) -> Keys:
     except ValueError as error:
         raise HardwareError(f"{str(path)!r} cannot be a file name: {error}.") from None
     try:
-        tables = tomllib.loads(text.decode())
-    except (ValueError, RecursionError) as error:
+        tables = parsed_toml(text)
+    except ValueError as error:
         raise HardwareError(f"{path} is not a TOML file of keys: {error}.") from None
     try:
         return Keys(_unit(id, table) for id, table in tables.items())

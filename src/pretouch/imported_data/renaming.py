@@ -1,10 +1,10 @@
 """Columns of other programs by our names: `tau_J_0=tau1_Nm`, or all joints at once, `tau_J_*=tau*_Nm`."""
 
 import re
-import tomllib
 from pathlib import Path
 
 from pretouch.errors import ParameterError, RecordingError
+from pretouch.toml_files import read_toml
 
 Mapping = tuple[tuple[str, str], ...]
 
@@ -26,10 +26,10 @@ def mapping_of(text: str) -> Mapping:
 
 def _of_file(file: Path) -> Mapping:
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
+        data = read_toml(file)
     except OSError as error:
         raise ParameterError(f"The columns {file} cannot be read ({error.strerror}): check the file's name.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ParameterError(f'The columns {file} are no TOML ({error}): write lines "THEIRS" = "OURS".') from error
     for theirs, ours in data.items():
         if not isinstance(ours, str):

@@ -7,10 +7,13 @@ from pretouch.errors import RobotModelError
 from pretouch.importing.mjcf import read_mjcf
 from pretouch.importing.source import Source
 from pretouch.importing.urdf import read_urdf
+from pretouch.robot.mjcf_check import xml_tree
 
 _LARGEST_FILE = 50_000_000
 """[bytes]"""
 _MOST_LINKS = 1000
+_MOST_ELEMENTS = 100_000
+"""Of one file: real robots have some 1000; each takes about 0.5 kB."""
 
 
 def read_source(file: Path, folders: tuple[Path, ...] = ()) -> Source:
@@ -21,20 +24,35 @@ def read_source(file: Path, folders: tuple[Path, ...] = ()) -> Source:
         folders: that hold the ROS packages a URDF names.
     """
     root = _root(file)
+    count = len(root.findall("link"))
+    if root.tag == "robot" and count > _MOST_LINKS:
+        raise RobotModelError(f"The file {file} has {count} links: give at most {_MOST_LINKS}.")
     if root.tag == "mujoco":
-        source = read_mjcf(file)
-    elif root.tag == "robot":
+        _check_included(root, file)
+        return read_mjcf(file)
+    if root.tag == "robot":
         try:
-            source = read_urdf(root, file, folders)
+            return read_urdf(root, file, folders)
         except RobotModelError as error:
             raise RobotModelError(f"{error} (in {file})") from error
-    else:
-        raise RobotModelError(
-            f"The file {file} starts with <{root.tag}>: give a URDF (<robot>) or an MJCF (<mujoco>) file."
-        )
-    if len(source.links) > _MOST_LINKS:
-        raise RobotModelError(f"The file {file} has {len(source.links)} links: give at most {_MOST_LINKS}.")
-    return source
+    raise RobotModelError(
+        f"The file {file} starts with <{root.tag}>: give a URDF (<robot>) or an MJCF (<mujoco>) file."
+    )
+
+
+def _check_included(root: ET.Element, file: Path) -> None:
+    """Refuse an MJCF file that includes one from outside its folder: the author would choose what is read here."""
+    folder = file.parent.resolve()
+    waiting, seen = [root], set[Path]()
+    while waiting:
+        for element in waiting.pop().iter():
+            given = element.get("file") if element.tag in ("include", "model") else None
+            other = folder / (given or file.name)
+            if given and (Path(given).is_absolute() or not other.resolve().is_relative_to(folder)):
+                raise RobotModelError(f"The file {file} includes {given}, outside its folder: put a copy beside it.")
+            if given and other not in seen and other.is_file():
+                seen.add(other)
+                waiting.append(_root(other))
 
 
 def _root(file: Path) -> ET.Element:
@@ -48,18 +66,9 @@ def _root(file: Path) -> ET.Element:
     except OSError as error:
         raise RobotModelError(f"The file {file} cannot be read: {error.strerror}: give a URDF or MJCF file.") from error
     try:
-        root = ET.fromstring(data, ET.XMLParser(target=_NoEntities()))  # noqa: S314  its entities are refused
+        root = xml_tree(data, _MOST_ELEMENTS)
     except RobotModelError as error:
         raise RobotModelError(f"{error} (in {file})") from error
-    except (ET.ParseError, ValueError, LookupError) as error:
-        raise RobotModelError(f"The file {file} is not valid XML: {error}.") from error
     if "xacro" in str(root.tag) or any("xacro" in str(child.tag) for child in root):
         raise RobotModelError(f"The file {file} is a xacro template: make a URDF of it by `xacro {file.name}` first.")
     return root
-
-
-class _NoEntities(ET.TreeBuilder):
-    """Refuses a document type: a robot needs none, and entities in it could grow without bounds or read files."""
-
-    def doctype(self, _name: str, _public: str | None, _system: str | None) -> None:
-        raise RobotModelError("The file has a document type (<!DOCTYPE>): leave it out.")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
+from pretouch.recording.container import Contents, begins_as_mcap, messages_of
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.skin_reader import holds_units, read_skin
 from pretouch.recording.standard import IMU
@@ -97,11 +97,8 @@ def _imus(place: Path) -> dict[str, ImuTrace]:
     contents, imus = Contents(), ImuRows()
     with place.open("rb") as file:
         begins_as_mcap(file)
-        for chunk in scan(file, contents):
-            channels = {i for i, (_, kind) in contents.topics().items() if kind == IMU}
-            for message in messages(chunk) if channels else ():
-                if message.channel in channels:
-                    imus.add(message.data)
+        for *_, data in messages_of(file, contents, lambda _topic, kind: kind == IMU):
+            imus.add(data)
     return imus.traces()
 
 

@@ -4,14 +4,17 @@ The official reader needs the index at the end of a file. Here a file is read fr
 or that is damaged in the middle, gives all the rest. The format is at https://mcap.dev/spec.
 """
 
+import os
 import re
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from mcap.opcode import Opcode
+
+from pretouch.errors import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -21,8 +24,15 @@ _CHUNK = struct.Struct("<QQQI")
 _COMPRESSION = re.compile(rb"\x04\0\0\0zstd|\x03\0\0\0lz4", re.DOTALL)
 """What stands in the head of a chunk."""
 _BLOCK, _OVERLAP = 1 << 20, 128
-_LARGEST = 1 << 30
-"""A record of this many bytes is damage: nobody writes one."""
+_LARGEST = 1 << 26
+"""A chunk, message, schema or channel of more bytes is damage: ours have 0.3 MB, those of other tools some 10 MB."""
+_MOST_DEFINED = 1 << 26
+"""Bytes of schemas and channels that are kept: ours have 40 kB."""
+_NEEDED = {Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK}
+_MOST_HELD = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
+"""Bytes of messages that are read from one file: half of this machine's memory."""
+_EACH = 500
+"""Bytes that a message takes beside its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,15 +78,24 @@ class Contents:
     """Whether the file has its end: index, footer and magic."""
     damaged: int = 0
     """Records that were left out because what they hold is damaged."""
+    _defined: int = 0
 
     def definitions(self) -> Iterator[bytes]:
         """Yield the record of each schema, then of each channel."""
         yield from (record for _, record in self.schemas.values())
         yield from (record for _, _, record in self.channels.values())
 
-    def topics(self) -> dict[int, tuple[str, str]]:
-        """Return topic and schema name of each channel."""
-        return {i: (topic, self.schemas.get(schema, ("", b""))[0]) for i, (topic, schema, _) in self.channels.items()}
+    def define(self, known: dict[int, Any], number: int, entry: tuple[Any, ...]) -> None:
+        """Keep a schema or channel in the place of one with its number; ValueError for more than anybody needs."""
+        self._defined += len(entry[-1]) - len(known.get(number, (b"",))[-1])
+        if self._defined > _MOST_DEFINED:
+            raise ValueError("it defines too much")
+        known[number] = entry
+
+    def of(self, channel: int) -> tuple[str, str, bytes]:
+        """Return topic, type and schema record of a channel, empty where it is not known."""
+        topic, schema, _ = self.channels.get(channel, ("", -1, b""))
+        return topic, *self.schemas.get(schema, ("", b""))
 
 
 def begins_as_mcap(file: BinaryIO) -> bool:
@@ -90,16 +109,21 @@ def scan(file: BinaryIO, contents: Contents) -> Iterator[Chunk]:
     A message outside a chunk comes as a chunk of its own. A chunk comes once its message indexes have been passed.
     """
     last: Chunk | None = None
+    begin, size = file.tell(), file.seek(0, os.SEEK_END)
+    file.seek(begin)
     while True:
         start = file.tell()
         head = file.read(_HEAD.size)
         opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
-        body = file.read(length) if 0 < opcode < 0x80 and length < _LARGEST else b""
-        if not opcode or len(body) < length:
-            if not _to_next_chunk(file, start + 1):
+        needed = opcode in _NEEDED
+        if not 0 < opcode < 0x80 or length > size - file.tell() or (needed and length > _LARGEST):
+            if not _to_next_chunk(file, start + 1, size):
                 break
             contents.damaged += 1
             continue
+        body = file.read(length) if needed else b""
+        if not needed:
+            file.seek(length, os.SEEK_CUR)
         if opcode == Opcode.MESSAGE_INDEX and last is not None:
             last.end = file.tell()
             continue
@@ -121,19 +145,25 @@ def scan(file: BinaryIO, contents: Contents) -> Iterator[Chunk]:
         yield last
 
 
-def _to_next_chunk(file: BinaryIO, start: int) -> bool:
-    """Go to the next chunk from an offset on whose head makes sense, past what is no record; say if there is one."""
-    kept, at = b"", start
+def _to_next_chunk(file: BinaryIO, start: int, end: int) -> bool:
+    """Go to the next chunk from an offset on whose head makes sense, past what is no record; say if there is one.
+
+    A chunk that does not end in the file, whose length is `end`, is none. What is read grows with the way: many short
+    ways take no longer than a long one.
+    """
+    kept, at, size = b"", start, 32 * _OVERLAP
     file.seek(start)
-    while block := file.read(_BLOCK):
+    while block := file.read(size):
+        size = min(2 * size, _BLOCK)
         text, at = kept + block, at - len(kept)
         for found in _COMPRESSION.finditer(text):
             begin = found.start() - _HEAD.size - _CHUNK.size
             if begin < 0 or found.end() + 8 > len(text):
                 continue
             opcode, length = _HEAD.unpack_from(text, begin)
-            (size,) = struct.unpack_from("<Q", text, found.end())
-            if opcode == Opcode.CHUNK and length == found.end() + 8 - begin - _HEAD.size + size:
+            (packed,) = struct.unpack_from("<Q", text, found.end())
+            whole = length == found.end() + 8 - begin - _HEAD.size + packed and at + begin + _HEAD.size + length <= end
+            if opcode == Opcode.CHUNK and whole:
                 file.seek(at + begin)
                 return True
         kept, at = text[-_OVERLAP:], at + len(text)
@@ -161,16 +191,16 @@ def _chunk(start: int, record: bytes, contents: Contents) -> Chunk | None:
 
 
 def _unpacked(compression: str, packed: bytes, size: int) -> bytes:
-    if size >= _LARGEST:
+    if size > _LARGEST:
         raise ValueError("it is too large to be a chunk")
     if compression == "zstd":
         import zstandard
 
-        return zstandard.ZstdDecompressor().stream_reader(packed).read(size + 1)
+        return zstandard.ZstdDecompressor(max_window_size=_LARGEST).stream_reader(packed).read(size + 1)
     if compression == "lz4":
         import lz4.frame  # type: ignore[import-untyped]
 
-        return bytes(lz4.frame.decompress(packed))
+        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1))
     if compression:
         raise ValueError(f"the compression {compression} is unknown")
     return packed
@@ -196,6 +226,27 @@ def messages(chunk: Chunk) -> Iterator[Message]:
             yield Message(channel, sequence, log_time, record[_HEAD.size + _MESSAGE.size :], offset)
 
 
+def messages_of(
+    file: BinaryIO, contents: Contents, wanted: Callable[[str, str], bool]
+) -> Iterator[tuple[str, str, bytes, bytes]]:
+    """Go on from behind a file's first magic, and yield topic, type, schema record and CDR of the messages wanted.
+
+    RecordingError where they would take more than half of this machine's memory.
+    """
+    held = 0
+    for chunk in scan(file, contents):
+        for message in messages(chunk):
+            topic, kind, schema = contents.of(message.channel)
+            if wanted(topic, kind):
+                held += _EACH + len(message.data)
+                if held > _MOST_HELD:
+                    raise RecordingError(
+                        f"The recording holds more than {_MOST_HELD / 1e9:.3g} GB, half of this machine's memory: cut"
+                        " it by `mcap filter`, or open it on a larger machine."
+                    )
+                yield topic, kind, schema, message.data
+
+
 def _note(opcode: int, record: bytes, contents: Contents) -> None:
     """Keep a header, schema or channel; of others nothing is needed."""
     at = _HEAD.size
@@ -205,10 +256,10 @@ def _note(opcode: int, record: bytes, contents: Contents) -> None:
             contents.library, _ = _text(record, at)
         elif opcode == Opcode.SCHEMA:
             (number,) = struct.unpack_from("<H", record, at)
-            contents.schemas[number] = _text(record, at + 2)[0], record
+            contents.define(contents.schemas, number, (_text(record, at + 2)[0], record))
         elif opcode == Opcode.CHANNEL:
             number, schema = struct.unpack_from("<HH", record, at)
-            contents.channels[number] = _text(record, at + 4)[0], schema, record
+            contents.define(contents.channels, number, (_text(record, at + 4)[0], schema, record))
     except (struct.error, ValueError):
         contents.damaged += 1
 

@@ -33,7 +33,7 @@ def entry(chunk: Chunk, start: int) -> Entry:
     for message in messages(chunk):
         places.setdefault(message.channel, []).append((message.log_time, message.offset))
     times = [time for rows in places.values() for time, _ in rows] or [0]
-    index, offsets = b"", {}
+    index, offsets = bytearray(), {}
     for channel, rows in places.items():
         offsets[channel] = start + len(chunk.record) + len(index)
         index += _written(records.MessageIndex(channel, rows))
@@ -42,7 +42,7 @@ def entry(chunk: Chunk, start: int) -> Entry:
         message_index_length=len(index), message_index_offsets=offsets, message_start_time=min(times),
         uncompressed_size=len(chunk.content),
     )  # fmt: skip
-    return Entry(index, _written(record), {c: len(rows) for c, rows in places.items()}, min(times), max(times))
+    return Entry(bytes(index), _written(record), {c: len(rows) for c, rows in places.items()}, min(times), max(times))
 
 
 def in_chunk(chunk: Chunk) -> Chunk:

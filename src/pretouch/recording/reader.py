@@ -18,7 +18,7 @@ from pretouch.recording.codec import (
     decode_touch,
     decode_truth,
 )
-from pretouch.recording.container import Chunk, Contents, begins_as_mcap, messages, scan
+from pretouch.recording.container import Contents, begins_as_mcap, messages_of
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.setting import Run, Tangents, decode_run
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
@@ -172,23 +172,14 @@ def open_recording(place: Path) -> Recorded:
         with place.open("rb") as file:
             if not begins_as_mcap(file):
                 raise RecordingError(_no_mcap(place))
-            for chunk in scan(file, contents):
-                _take(chunk, contents, raw)
+            for topic, _, _, data in messages_of(file, contents, lambda topic, kind: TOPICS.get(topic) == kind):
+                if len(data) >= _HEAD + _NUMBER.size + _STAMP.size:
+                    raw[topic].setdefault(_NUMBER.unpack_from(data, _HEAD)[0], data)
     except OSError as error:
         reason = "it does not exist" if isinstance(error, FileNotFoundError) else error.strerror
         raise RecordingError(f"The recording {place} cannot be read: {reason}.") from error
     _check(place, contents, raw)
     return Recorded(place, raw, _missing(place, contents))
-
-
-def _take(chunk: Chunk, contents: Contents, raw: Raw) -> None:
-    """Keep our messages of a chunk."""
-    ours = {i: topic for i, (topic, kind) in contents.topics().items() if TOPICS.get(topic) == kind}
-    for message in messages(chunk):
-        topic = ours.get(message.channel)
-        if topic is not None and len(message.data) >= _HEAD + _NUMBER.size + _STAMP.size:
-            (number,) = _NUMBER.unpack_from(message.data, _HEAD)
-            raw[topic].setdefault(number, message.data)
 
 
 def _check(place: Path, contents: Contents, raw: Raw) -> None:
@@ -202,7 +193,7 @@ def _check(place: Path, contents: Contents, raw: Raw) -> None:
             )
     if raw["/pretouch/step"] and raw["/pretouch/run"]:
         return
-    if any(kind == UNIT_SAMPLE for _, kind in contents.topics().values()):
+    if any(contents.of(channel)[1] == UNIT_SAMPLE for channel in contents.channels):
         raise RecordingError(f"{place} holds samples of sensor units, but no control step: {READ_WITH}.")
     if contents.library.startswith(LIBRARY.split()[0]) or any(t in TOPICS for t, _, _ in contents.channels.values()):
         raise RecordingError(f"{place} holds no control step, because the run ended before the first was written.")

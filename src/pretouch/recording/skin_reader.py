@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
+from pretouch.recording.container import Contents, begins_as_mcap, messages, messages_of, scan
 from pretouch.recording.messages import TOPICS, decoded
 from pretouch.recording.reader import is_ours
 from pretouch.recording.skin_recording import UNIT_SAMPLE
@@ -19,6 +19,7 @@ from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
+_READ = (UNIT_SAMPLE, IMU, JOINT_STATE)
 _RANGE_NEW = 1
 """Flag of a sample with a range that no sample before had (docs/reference/wire.md)."""
 
@@ -107,8 +108,8 @@ def holds_units(place: Path) -> bool:
     """Whether a file is a recording of sensor units: what its first chunks hold tells."""
     contents = Contents()
     with suppress(OSError), Path(place).open("rb") as file:  # whoever opens it next says what is wrong
-        for _ in scan(file, contents) if begins_as_mcap(file) else ():
-            kinds = {kind for _, kind in contents.topics().values()}
+        for chunk in scan(file, contents) if begins_as_mcap(file) else ():
+            kinds = {contents.of(message.channel)[1] for message in messages(chunk)}
             if UNIT_SAMPLE in kinds or not kinds.isdisjoint(TOPICS.values()):
                 return UNIT_SAMPLE in kinds
     return False
@@ -121,22 +122,13 @@ def _messages(place: Path, contents: Contents) -> Iterator[tuple[str, bytes]]:
             raise RecordingError(
                 f"{place} is not an MCAP file: give a recording made by `pretouch skin monitor --record`."
             )
-        for chunk in scan(file, contents):
-            kinds = {i: kind for i, (_, kind) in contents.topics().items() if kind in (UNIT_SAMPLE, IMU, JOINT_STATE)}
-            _check(place, contents)
-            for message in messages(chunk):
-                kind = kinds.get(message.channel)
-                if kind is not None:
-                    yield kind, message.data
-
-
-def _check(place: Path, contents: Contents) -> None:
-    """Refuse samples of another definition than ours."""
-    if any(kind == UNIT_SAMPLE and not is_ours(schema, kind) for kind, schema in contents.schemas.values()):
-        raise RecordingError(
-            f"{place} was recorded by another version of pretouch, with different samples of units: open it with that"
-            " version."
-        )
+        for _, kind, schema, data in messages_of(file, contents, lambda _topic, kind: kind in _READ):
+            if kind == UNIT_SAMPLE and not is_ours(schema, kind):
+                raise RecordingError(
+                    f"{place} was recorded by another version of pretouch, with different samples of units: open it"
+                    " with that version."
+                )
+            yield kind, data
 
 
 def _ranges(samples: list[Any]) -> RangeTrace:

@@ -1,11 +1,11 @@
 """Force limits of body regions, to hold the recorded forces against: for orientation, not conformity."""
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pretouch.errors import ParameterError
+from pretouch.toml_files import read_toml
 
 
 @dataclass(frozen=True)
@@ -50,10 +50,10 @@ _KEYS = {"name", "transient_n", "quasi_static_n"}
 def load_limits(place: Path) -> BodyLimits:
     """Read a TOML file of `source` and `[[region]]` tables; what is wrong with it is a ParameterError."""
     try:
-        data = tomllib.loads(place.read_text(encoding="utf-8"))
+        data = read_toml(place)
     except OSError as error:
         raise ParameterError(f"The body limits {place} cannot be read: {error.strerror}: give another file.") from error
-    except (ValueError, RecursionError) as error:  # not of UTF-8 or of TOML, an integer too long, brackets too deep
+    except ValueError as error:  # not of UTF-8 or of TOML, an integer too long, brackets too deep
         raise ParameterError(f"The body limits {place} are not valid TOML: {error}.") from error
     entries, source = data.get("region"), data.get("source")
     if not isinstance(source, str) or not source.strip():

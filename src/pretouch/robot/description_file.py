@@ -1,7 +1,6 @@
 """Description of an arm in a file: robot.toml, beside the MJCF that it names."""
 
 import os
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,8 @@ import tomli_w
 
 from pretouch.errors import RobotModelError
 from pretouch.robot.description import RobotDescription
+from pretouch.robot.mjcf_check import LARGEST_MJCF, check_mjcf
+from pretouch.toml_files import read_toml
 from pretouch.types import FloatArray
 
 FILE = "robot.toml"
@@ -37,7 +38,7 @@ def load_description(path: Path | str) -> RobotDescription:
     n = len(_numbers(path, data, "q_ready", None))
     lists = {key: _numbers(path, data, key, n) for key in _LISTS}
     try:
-        return RobotDescription(
+        arm = RobotDescription(
             name=words["name"],
             mjcf=path.parent / words["mjcf"],
             ee_body=words["ee_body"],
@@ -47,8 +48,11 @@ def load_description(path: Path | str) -> RobotDescription:
             q_ready=lists["q_ready"],
             source=words["source"],
         )
+        with arm.mjcf.open("rb") as file:
+            check_mjcf(file.read(LARGEST_MJCF + 1))
     except (RobotModelError, OSError) as error:  # a file's name may be too long to look for
         raise RobotModelError(f"{error} (in {path})") from error
+    return arm
 
 
 def description_text(arm: RobotDescription) -> str:
@@ -60,7 +64,7 @@ def description_text(arm: RobotDescription) -> str:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return read_toml(path)
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise RobotModelError(
@@ -69,7 +73,7 @@ def _read(path: Path) -> dict[str, Any]:
         ) from error
     except UnicodeDecodeError as error:
         raise RobotModelError(f"The robot file {path} is not UTF-8 text: {error.reason} at {error.start}.") from error
-    except (ValueError, RecursionError) as error:  # not TOML, an integer too long, brackets too deep
+    except ValueError as error:  # not TOML, an integer too long, brackets too deep
         raise RobotModelError(f"The robot file {path} is not valid TOML: {error}.") from error
 
 

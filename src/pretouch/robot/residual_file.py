@@ -3,7 +3,6 @@
 The numbers are plain tables here: this layer knows no detector. `pretouch.session` brings them together.
 """
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import tomli_w
 from pretouch.atomic_write import atomic_write
 from pretouch.errors import RobotModelError
 from pretouch.robot.model import RobotModel
+from pretouch.toml_files import read_toml
 from pretouch.types import FloatArray
 
 FORMAT = 1
@@ -54,10 +54,10 @@ def save_residual(path: Path, model: RobotModel, residual: Residual) -> None:
 def load_residual(path: Path, model: RobotModel, shapes: dict[str, tuple[int, ...]]) -> Residual:
     """Read a file with arrays of these names and shapes. One for another arm or version is a RobotModelError."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = read_toml(path)
     except OSError as error:
         raise RobotModelError(f"The file {path} cannot be read: {error.strerror}: give one that was saved.") from error
-    except (ValueError, RecursionError) as error:  # not of TOML, or not UTF-8
+    except ValueError as error:  # not of TOML, or not UTF-8
         raise RobotModelError(f"The file {path} is not valid TOML: {error}: {_ANEW}.") from error
     for key, ours in (("format", FORMAT), ("arm", model.description.name), ("joints", list(model.joints))):
         if data.get(key) != ours:

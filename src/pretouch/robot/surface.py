@@ -5,12 +5,15 @@ from functools import cached_property
 
 import numpy as np
 
+from pretouch.errors import RobotModelError
 from pretouch.groups import SurfaceArrays
 from pretouch.robot.body import Capsules
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 SPACING_M = 0.025
 """About the distance between neighbouring places [m]: places are interpolated between them."""
+_MOST_CAPSULES, _MOST_AREA = 200, 50.0
+"""Capsules that joints move, and their area [m^2]: a Panda has 18 and 0.9 m^2. Time grows with the product of both."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,15 @@ def surface_of(
         position: (L, 3) of the links in any one posture [m].
         rotation: (L, 3, 3) of the links in it.
         spacing: about the distance of neighbours [m].
+
+    Raises RobotModelError for a body far larger than any arm's.
     """
+    size = 2 * np.pi * float((body.radius * (np.linalg.norm(body.b - body.a, axis=1) + 2 * body.radius)).sum())
+    if len(body) > _MOST_CAPSULES or not size <= _MOST_AREA:
+        raise RobotModelError(
+            f"The joints move {len(body)} capsules of {size:.3g} m^2: describe the body by at most {_MOST_CAPSULES} of"
+            f" {_MOST_AREA:g} m^2 in metres."
+        )
     rigid = bodies_of(moved_by)
     a = position[body.link] + np.einsum("cij,cj->ci", rotation[body.link], body.a)
     b = position[body.link] + np.einsum("cij,cj->ci", rotation[body.link], body.b)

@@ -1,6 +1,5 @@
 """A set of sensor units on one arm, and the TOML file that describes it."""
 
-import tomllib
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -23,11 +22,14 @@ from pretouch.sensing.unit import (
     SensorUnit,
     TouchPatch,
 )
+from pretouch.toml_files import read_toml
 from pretouch.types import FloatArray, IntArray
 
 _FAR = 0.5
 """Distance from its link beyond which a unit cannot be mounted on it [m]: millimetres taken for metres, most likely."""
 
+_MOST_UNITS = 1000
+"""Units on one arm: what a step and a model's check take grows with their number, and each is a board of its own."""
 _LARGEST_COMPONENT = 10.0
 """Largest component of a quaternion that is looked at any further."""
 
@@ -40,11 +42,14 @@ LIVE_SKIN = PAPER_SKIN.with_name("panda_live.toml")
 class Skin:
     """K sensor units on an arm, checked against its model. The order of the units is the order of all readings.
 
-    Raises SkinError for duplicate ids, a link the arm does not have, and a unit inside its own link or far off it.
+    Raises SkinError for too many units, duplicate ids, a link the arm does not have, and a unit inside its own link or
+    far off it.
     """
 
     def __init__(self, units: Sequence[SensorUnit], model: RobotModel) -> None:
         self.units = tuple(units)
+        if len(self.units) > _MOST_UNITS:
+            raise SkinError(f"The skin has {len(self.units)} units: give at most {_MOST_UNITS}.")
         ids = [unit.id for unit in self.units]
         twice = sorted({i for i in ids if ids.count(i) > 1})
         if twice:
@@ -95,12 +100,12 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
     """Read a skin file. What is wrong with it is a SkinError that names the file, the unit and the way out."""
     path = Path(path)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = read_toml(path)
     except OSError as error:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
         raise SkinError(f"The skin file {path} is not UTF-8 text: {error.reason} at byte {error.start}.") from error
-    except (ValueError, RecursionError) as error:  # not of TOML, an integer too long, brackets too deep
+    except ValueError as error:  # not of TOML, an integer too long, brackets too deep
         raise SkinError(f"The skin file {path} is not valid TOML: {error}.") from error
     entries = data.get("unit")
     if not isinstance(entries, list) or not entries:

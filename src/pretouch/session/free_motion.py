@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.contact.learnt_bounds import check_learnt
 from pretouch.contact.residual_model import ResidualModel, kept, residual_init, resumed
 from pretouch.contact.rested import rested
 from pretouch.contact.sequential_test import SequentialTest
@@ -108,6 +109,7 @@ class FreeMotion:
                     f"The file {file.path} belongs to {residual.robot}, but this robot is {file.robot}."
                 )
             known = resumed(residual.numbers, self._params)
+            check_learnt(known, self._model)
         except (RobotModelError, ParameterError) as error:
             if file.given:
                 raise RobotModelError(f"{file.path} cannot be used as --learnt: {error}") from error

@@ -1,7 +1,6 @@
 """Worlds: named sets of simulated arms, sensors and delays, of which a seed draws one."""
 
 import math
-import tomllib
 from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from pretouch.errors import ParameterError
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
+from pretouch.toml_files import parsed_toml
 
 FOLDER = Path(__file__).parent / "worlds"
 SETS = ("nominal", "realistic", "stress", "hard")
@@ -108,7 +108,7 @@ def world_set(name: str) -> WorldSet:
     place = FOLDER / f"{name}.toml" if name in SETS else Path(name)
     try:
         data = place.read_bytes()
-        table = tomllib.loads(data.decode("utf-8"))
+        table = parsed_toml(data)
     except OSError as error:
         raise ParameterError(
             f"The world {name!r} is not one of {', '.join(SETS)}, and no file of that name can be read"

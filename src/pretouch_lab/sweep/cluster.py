@@ -30,7 +30,8 @@ def run_on_cluster(
 ) -> None:
     """Play jobs on a cluster, in their order. Raises ExperimentError where it is not there, or goes away.
 
-    A job whose worker is killed is played again by the scheduler itself. Answers are text; nothing of them is run.
+    A job whose worker is killed is played again by the scheduler. Answers are text, and others, pickled ones too,
+    are not read; but dask unpickles the errors of workers here, so that the cluster must be trusted.
     """
     with _client(address) as client:
         watch = _Watch(client, address)
@@ -60,11 +61,13 @@ def run_on_cluster(
 
 
 def _answer(future: "Future", watch: "_Watch") -> object:
-    """Fetch an answer; a worker or scheduler that went away with it is found out in bounded time."""
+    """Fetch an answer, None for one that is no text; what went away with it is found out in bounded time."""
     from distributed import CancelledError
 
     try:
         return future.result(timeout=GONE_S)
+    except TypeError:  # not of msgpack
+        return None
     except (TimeoutError, OSError, CancelledError):
         watch.gone()
         raise  # never: `gone` raises
@@ -118,7 +121,7 @@ def _client(address: str) -> "Iterator[Client]":
 
     client: Any = None
     try:
-        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+        client = Client(address, timeout=CONNECT_S, set_as_default=False, deserializers=["msgpack"])
     except (OSError, ValueError, TimeoutError) as error:
         raise ExperimentError(
             f"No scheduler answers at {address}: start one with `dask scheduler`, give its address as tcp://HOST:PORT,"

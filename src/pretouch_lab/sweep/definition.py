@@ -2,7 +2,6 @@
 
 import json
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.resources import files
@@ -11,6 +10,7 @@ from typing import Any, Literal, cast, get_args
 
 from pretouch.errors import ExperimentError, PretouchError
 from pretouch.profiles import profile
+from pretouch.toml_files import read_toml
 from pretouch_lab.benchmarks.scenario_files import SeedRange
 from pretouch_lab.sweep.measures import Measure
 from pretouch_lab.sweep.registry import MEASURES, measure
@@ -150,14 +150,14 @@ def _check_ends(sweep: Sweep) -> None:
 def load_sweeps(path: Path, seeds: SeedRange = "development") -> list[Sweep]:
     """Read a file of sweeps: one [[sweep]] each. Raises an error of this package that names the file and the sweep."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = read_toml(path)
     except OSError as error:
         known = ", ".join([*MEASURES, SENSITIVITY])
         raise ExperimentError(
             f"The sweep {path} is neither an experiment nor a file that can be read ({error.strerror}): choose from"
             f" {known}, or give a TOML file."
         ) from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ExperimentError(f"The sweep file {path} is not valid TOML: {error}.") from error
     entries = data.get("sweep")
     if set(data) != {"sweep"} or not isinstance(entries, list) or not entries:
