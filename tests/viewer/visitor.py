@@ -29,7 +29,7 @@ def until(true: Callable[[], bool]) -> None:
     deadline = time.monotonic() + PATIENCE_S
     while not true():
         assert time.monotonic() < deadline, "it has not come to pass"
-        time.sleep(0.002)
+        time.sleep(0.01)
 
 
 def fetched(options: ServeOptions, path: str = "", **headers: str) -> tuple[int, str, str]:
@@ -73,8 +73,12 @@ class Visitor:
     def settle(self) -> None:
         """Wait until all that was said has been heard: what is said last is where somebody looks from."""
         near = 0.1 + 0.001 * next(self._marks)
-        self.say({**CAMERA, "near": near})
-        until(lambda: math.isclose(self._server.get_clients()[self.number].camera.near, near))
+
+        def heard() -> bool:  # who says too much is not heard at first
+            self.say({**CAMERA, "near": near})
+            return math.isclose(self._server.get_clients()[self.number].camera.near, near)
+
+        until(heard)
 
     def heard(self, kind: str) -> dict[str, Any]:
         """The next message of a kind that this visitor is sent."""

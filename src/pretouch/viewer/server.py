@@ -3,8 +3,10 @@
 import errno
 import ipaddress
 import logging
+import os
 import secrets
 import socket
+import sys
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -48,6 +50,16 @@ def announce(options: ServeOptions, what: str, exposed: str, say: Callable[[str]
         say(f"Mind: other machines reach this page, unencrypted. Whoever has the address can {exposed}.")
     if options.opened:
         webbrowser.open(url_of(options))
+
+
+def browser_here() -> bool:
+    """Whether somebody sits at this machine's terminal and has a screen to open a page on."""
+    return sys.stdout.isatty() and not os.environ.keys().isdisjoint({"DISPLAY", "WAYLAND_DISPLAY"})
+
+
+def failure(error: Exception) -> str:
+    """Say that a page came upon an error that nobody foresaw."""
+    return f"The page failed, and holds: {type(error).__name__}: {error}. Please report this."
 
 
 def _stays_here(host: str) -> bool:
