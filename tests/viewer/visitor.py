@@ -50,7 +50,9 @@ class Visitor:
         before = set(server.get_clients())
         address = url_of(options).replace("http", "ws", 1).rstrip("/")
         protocol = f"viser-v{viser.__version__}"
-        self._socket = self._stack.enter_context(connect(address, subprotocols=[protocol], max_size=None))
+        self._socket = self._stack.enter_context(
+            connect(address, subprotocols=[protocol], max_size=None, max_queue=None)
+        )
         self.say(CAMERA)
         until(lambda: set(server.get_clients()) > before)
         (self.number,) = set(server.get_clients()) - before

@@ -21,13 +21,9 @@ class Commander:
         server.on_client_connect(self._welcome)
         server.on_client_disconnect(self._dismiss)
 
-        @self.take.on_click
-        async def _(event: Any) -> None:
-            self._give(event.client_id)
-
-    def refusal(self, visitor: int) -> str:
-        """Say why a visitor may not command, or ''; who asks while nobody commands does from now on."""
-        if self._who is None:
+    def refusal(self, visitor: int, control: Any = None) -> str:
+        """Say why a visitor may not use a control, or ''; who does while nobody commands, commands from now on."""
+        if self._who is None or control is self.take:
             self._give(visitor)
         return "" if self._who == visitor else f"{_name(self._who)} commands: press Take command first."
 

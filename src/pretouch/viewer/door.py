@@ -85,7 +85,8 @@ class Door:
 
     def __init__(self, options: "ServeOptions") -> None:
         self._token = options.token.encode()
-        self._names = {options.host, "localhost", socket.gethostname(), f"{socket.gethostname()}.local"}
+        here = socket.gethostname().lower()
+        self._names = {options.host.lower(), "localhost", here, f"{here}.local"}
         self._server: ViserServer | None = None
         self._built = False
 
@@ -107,7 +108,7 @@ class Door:
                 setattr(websockets_server, "serve", theirs)  # noqa: B010
 
     def keep(self, server: "ViserServer") -> None:
-        """Let people in to a server, and take out of it what shares the page; one without this door is a ViewerError."""
+        """Let people in to a server, which no longer shares its page; one without this door is a ViewerError."""
         if not self._built:
             raise ViewerError("This version of viser goes round the checks of the page: install viser 1.1.1.")
         for kind in (viser_messages.ShareUrlRequest, viser_messages.ShareUrlDisconnect):
@@ -134,7 +135,7 @@ class Door:
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         if len(hosts) != 1 or not self._is_own(hosts[0]):
             return f"This page is not at {' and '.join(hosts)}. {_ADDRESS}"
-        if any(urlsplit(origin).netloc != hosts[0] for origin in origins):
+        if any(origin.partition("//")[2] != hosts[0] for origin in origins):
             return f"Pages of {' and '.join(origins)} may not use this one. {_ADDRESS}"
         token = request.path.partition("?")[0].lstrip("/").partition("/")[0]
         return "" if secrets.compare_digest(token.encode(), self._token) else _ADDRESS
@@ -151,42 +152,42 @@ class Door:
 
     def admitted(self, visit: _Visit, raw: Any) -> bytes | None:
         """Return what viser is to hear of a message; None: nothing, and the visitor is told why."""
-        if self._server is None:
+        server = self._server
+        if server is None:
             return None
-        connections = self._server._websock_server._live_connections
+        connections = server._websock_server._live_connections
         number = next((number for number, known in connections.items() if known is visit), -1)
         try:
             visit.spend()
             heard = _understood(raw)
             if isinstance(heard, GuiUpdateMessage):
-                heard = self._change(number, heard)
+                heard = self._change(server, number, heard)
             elif not isinstance(heard, ViewerCameraMessage):
                 self._check_command(number)
             said = {field.name: getattr(heard, field.name) for field in fields(heard)}
             return msgspec.msgpack.encode(said | {"type": type(heard).__name__})
         except Refused as refused:
-            client = self._server.get_clients().get(number)
+            client = server.get_clients().get(number)
             if client and visit.to_be_told():
                 client.add_notification("Not done", str(refused), auto_close_seconds=6.0)
             return None
 
-    def _check_command(self, number: int) -> None:
-        refusal = self._commander.refusal(number)
+    def _check_command(self, number: int, control: Any = None) -> None:
+        refusal = self._commander.refusal(number, control)
         if refusal:
             raise Refused(refusal)
 
-    def _change(self, number: int, heard: GuiUpdateMessage) -> GuiUpdateMessage:
+    def _change(self, server: "ViserServer", number: int, heard: GuiUpdateMessage) -> GuiUpdateMessage:
         """Check a change of a control; a visitor whose change is refused is shown again what holds."""
-        assert self._server
-        handle = self._server.gui._gui_input_handle_from_uuid.get(heard.uuid)
+        handle = server.gui._gui_input_handle_from_uuid.get(heard.uuid)
         if handle is None:
             raise Refused("This control is gone: load the page again.")
         try:
-            if handle is not self._commander.take:
-                self._check_command(number)
-            return replace(heard, updates={"value": _checked(handle, heard.updates)})
+            value = _checked(handle, heard.updates)
+            self._check_command(number, handle)
+            return replace(heard, updates={"value": value})
         except Refused:
-            client = self._server.get_clients().get(number)
+            client = server.get_clients().get(number)
             if client and not handle._impl.is_button:
                 shown = GuiUpdateMessage(heard.uuid, {"value": handle.value})
                 client._websock_connection.queue_message(shown)
