@@ -25,7 +25,7 @@ class Measure:
     Once more, by 1900 and 17, for `pretouch detect` on the joint torques of anybody's arm: tables, bags, an
     observer, checks of sign, unit and order, pushes that are tried, figure and page.
     Then by 215 and 1 for a bound on how far a contact moves the arm and for light touches that are no object, and by
-    350 and 3 for what the model of free motion cannot express. By 222 and 2 for the door of the pages, and who commands.
+    350 and 3 for what the model of free motion cannot express. By 222 and 2 for the door of the pages.
     """
 
     name: str
