@@ -55,7 +55,7 @@ def test_interrupted_it_closes_its_recording_and_says_where_it_is(
     command = [sys.executable, "-m", "pretouch.cli", "live", "--port", str(port), "--record", str(place)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1) as process:
         assert process.stdout is not None
-        assert process.stdout.readline() == f"The arm is at http://127.0.0.1:{port} (Ctrl-C ends it).\n"
+        assert process.stdout.readline().startswith(f"The arm is at http://127.0.0.1:{port}/")
         deadline = time.monotonic() + 60
         while place.stat().st_size < 100_000:
             assert time.monotonic() < deadline, "nothing is being recorded"

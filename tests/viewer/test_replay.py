@@ -12,7 +12,7 @@ from pretouch.recording.compare import Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.types import Mode
 from pretouch.viewer.replay import ReplayPage, comparison_html, frame_of, serve_replay, world_of
-from pretouch.viewer.server import ServeOptions, served
+from pretouch.viewer.server import ServeOptions, served, url_of
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -109,4 +109,16 @@ def test_of_several_runs_each_is_named_with_its_path(recorded: Recorded) -> None
 def test_the_address_is_said_and_the_page_ends_when_told(recorded: Recorded, capfd: pytest.CaptureFixture[str]) -> None:
     options, turns = ServeOptions(port=free_port()), iter([False, True])
     serve_replay(recorded, options, until=lambda: next(turns))
-    assert capfd.readouterr().out == f"The recording is at http://127.0.0.1:{options.port} (Ctrl-C ends it).\n"
+    assert capfd.readouterr().out == f"The recording is at {url_of(options)} (Ctrl-C ends it).\n"
+
+
+def test_whatever_fails_in_the_page_it_plays_no_further_and_it_is_said_once(
+    recorded: Recorded, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise KeyError("nosuch")
+
+    monkeypatch.setattr(ReplayPage, "turn", fail)
+    turns, said = iter([False, False, True]), []
+    serve_replay(recorded, ServeOptions(port=free_port()), until=lambda: next(turns), say=said.append)
+    assert said[1:] == ["The page failed, and holds: KeyError: 'nosuch'. Please report this."]

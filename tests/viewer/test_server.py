@@ -39,10 +39,16 @@ def test_a_second_page_on_the_same_port_is_refused_and_the_first_goes_on(capfd: 
 
 def test_a_page_is_for_this_machine_alone_unless_asked() -> None:
     assert ServeOptions().host == "127.0.0.1"
-    assert url_of(ServeOptions(port=1234)) == "http://127.0.0.1:1234"
-    assert url_of(ServeOptions("0.0.0.0", 1234)) == "http://localhost:1234"  # noqa: S104
-    assert url_of(ServeOptions("::", 1234)) == "http://localhost:1234"
-    assert url_of(ServeOptions("::1", 1234)) == "http://[::1]:1234"
+    for host, shown in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "localhost"), ("::", "localhost"), ("::1", "[::1]")):  # noqa: S104
+        options = ServeOptions(host, 1234)
+        assert url_of(options) == f"http://{shown}:1234/{options.token}/"
+
+
+def test_each_start_has_an_address_that_nobody_can_guess_or_read_in_an_error() -> None:
+    one, other = ServeOptions(), ServeOptions()
+    assert one.token != other.token
+    assert len(one.token) >= 43  # 256 bits, six to a character
+    assert one.token not in repr(one)
 
 
 @pytest.mark.parametrize("port", [0, -1, 65536])

@@ -26,7 +26,7 @@ class Live:
     record: str = ""
     """Recording to write from the start; the page can also start and stop recordings."""
     host: str = "127.0.0.1"
-    """Address to serve the page at. Anyone who can reach it can move the simulated arm."""
+    """Address to serve the page at. Beyond this machine, whoever has the printed address can move the simulated arm."""
     port: int = 8080
     """Port to serve the page at."""
     keys: str = ""
@@ -63,7 +63,7 @@ class Replay:
     json: str = ""
     """File for the numbers, or - for standard output: text then goes to standard error."""
     host: str = "127.0.0.1"
-    """Address to serve the page at."""
+    """Address to serve the page at. Beyond this machine, whoever has the printed address sees the recording."""
     port: int = 8080
     """Port to serve the page at."""
 

@@ -13,7 +13,7 @@ from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.profiles import profile as find_profile
 from pretouch.signals import ended
 from pretouch.viewer.room import LiveSettings, PathName, Room, live_path
-from pretouch.viewer.server import ServeOptions, check_port
+from pretouch.viewer.server import ServeOptions, browser_here, check_port
 
 if TYPE_CHECKING:
     from pretouch.cli.commands import Live
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def live(command: "Live") -> None:
     """Serve the page until interrupted."""
-    options = ServeOptions(command.host, command.port)
+    options = ServeOptions(command.host, command.port, browser_here())
     LIVE.need("The page")
     check_port(options)  # before the seconds that the simulation takes to begin
     if command.path not in ("circle", "line"):

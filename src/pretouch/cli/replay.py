@@ -42,10 +42,11 @@ def replay(
     console = Console(highlight=False, soft_wrap=True)
     other = find_profile(profile) if profile else None
     if page and not verify:  # what keeps it from being shown is said before the work for it
-        from pretouch.viewer.server import ServeOptions, check_port
+        from pretouch.viewer.server import ServeOptions, browser_here, check_port
 
         LIVE.need("The page")
-        check_port(ServeOptions(host, port))
+        options = ServeOptions(host, port, browser_here())
+        check_port(options)
     with numbers_to(json) as write:
         recorded, found = open_recording(place), None
         if recorded.said:
@@ -70,7 +71,7 @@ def replay(
         if page and not verify:
             from pretouch.viewer.replay import serve_replay
 
-            serve_replay(recorded, ServeOptions(host, port), comparison, ended)
+            serve_replay(recorded, options, comparison, ended)
     return int(verdict is not None and not verdict.agrees)
 
 

@@ -29,6 +29,8 @@ RECORDINGS = Path("runs")
 PUSH_N, PUSH_S = 20.0, 1.0
 """Force [N] and duration [s] of a push unless a person chooses others."""
 _NO_RESUME = "Resume: nothing waits for it"
+_RECORD_SETTLE_S = 0.3
+"""Time without another click from which on one on Record counts [s]: each begins a file."""
 _CLOCK = 0.1, 1.0
 """Range of the clock's speed, simulated over real time."""
 
@@ -82,7 +84,8 @@ class Controls:
             _NO_RESUME, simulation.resume, hint="Leave a hold that waits for you.", disabled=True
         )
         self._button("Reset", simulation.reset, color="gray", hint="Restart at time 0 with the current settings.")
-        self._record = self._button("Record", partial(toggle_recording, simulation), color="gray")
+        record = partial(toggle_recording, simulation)
+        self._record = self._button("Record", record, settle=_RECORD_SETTLE_S, color="gray")
 
     def fold_rest(self) -> None:
         """Add all other controls, each group folded."""
@@ -227,6 +230,10 @@ class Controls:
 
     def _toggle_pause(self) -> None:
         self.running.paused = not self.running.paused
+
+    def hold(self) -> None:
+        """Let no time pass until somebody goes on."""
+        self.running.paused, self._pause.label = True, "Go on"
 
     def _single_step(self) -> None:
         self.running.paused = True

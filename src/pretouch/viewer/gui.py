@@ -45,8 +45,13 @@ def when_changed(
             commands.put(lambda: act(value), kind, settle, quiet)
 
 
-def add_button(gui: "GuiApi", commands: ActionQueue, label: str, act: Callable[[], object], **more: Any) -> Any:
-    """Add a button that queues an action; `more` goes to viser's `add_button`, but `icon` is a name."""
+def add_button(
+    gui: "GuiApi", commands: ActionQueue, label: str, act: Callable[[], object], settle: float = 0.0, **more: Any
+) -> Any:
+    """Add a button that queues an action, once between two ticks at most, and may have it settle.
+
+    `more` goes to viser's `add_button`, but `icon` is a name.
+    """
     from viser import Icon
 
     icon = more.pop("icon", None)
@@ -54,7 +59,7 @@ def add_button(gui: "GuiApi", commands: ActionQueue, label: str, act: Callable[[
 
     @button.on_click
     async def _(_: Any) -> None:
-        commands.put(act)
+        commands.put(act, f"press {label}", settle)
 
     return button
 

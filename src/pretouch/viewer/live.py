@@ -16,7 +16,7 @@ from pretouch.viewer.gui import PERIOD_S, style_page, when_changed
 from pretouch.viewer.pacing import Pace
 from pretouch.viewer.plots import History, Plots
 from pretouch.viewer.scene import Scene
-from pretouch.viewer.server import ServeOptions, served, url_of
+from pretouch.viewer.server import ServeOptions, announce, failure, served
 from pretouch.viewer.simulation import LiveSimulation
 from pretouch.viewer.status import Status
 
@@ -84,6 +84,14 @@ class LivePage:
         self._companions = Companions(self._server, self._simulation) if arms == _ARMS[1] else None
         if self._companions:
             self._simulation.play_opening()
+
+    def hold(self, error: Exception) -> None:
+        """Have the arm hold after an error that nobody foresaw, and say it once."""
+        sentence = failure(error)
+        self.controls.hold()
+        if self.notice != sentence:
+            self._status.notice = sentence
+            self._say(sentence)
 
     def turn(self, now: float) -> None:
         """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
@@ -192,10 +200,14 @@ def serve_live(
     with served(options, "Pretouch") as server:
         try:
             page = LivePage(server, simulation, say)
-            say(f"The arm is at {url_of(options)} (Ctrl-C ends it).")
+            announce(options, "The arm", "move the simulated arm, and record to the disk of this one", say)
             clock, slow = MonotonicClock(PERIOD_S), False
             while not until():
-                page.turn(clock.tick())
+                now = clock.tick()
+                try:
+                    page.turn(now)
+                except Exception as error:  # whatever fails in the page
+                    page.hold(error)
                 if page.pace.slow is not slow:
                     slow = page.pace.slow
                     say(page.pace.sentence() or "The machine keeps up with real time again.")

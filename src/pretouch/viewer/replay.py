@@ -21,7 +21,7 @@ from pretouch.viewer.gui import PERIOD_S, add_button, add_view_boxes, put, style
 from pretouch.viewer.player import Player, Timeline, TimelineEvent
 from pretouch.viewer.plots import SPAN_S, History, Plots
 from pretouch.viewer.scene import Scene
-from pretouch.viewer.server import ServeOptions, served, url_of
+from pretouch.viewer.server import ServeOptions, announce, failure, served
 from pretouch.viewer.status import Status, legend
 
 if TYPE_CHECKING:
@@ -119,6 +119,14 @@ class ReplayPage:
         self.player.seek_index(event.index)
         self._status.notice = f"{event.what} at {self.player.time:.2f} s."
 
+    def hold(self, error: Exception, say: Callable[[str], None]) -> None:
+        """Play no further after an error that nobody foresaw, and say it once."""
+        sentence = failure(error)
+        self.player.playing = False
+        if self._status.notice != sentence:
+            self._status.notice = sentence
+            say(sentence)
+
     def turn(self, now: float, elapsed: float) -> None:
         """Run queued actions, play on by some real time [s], and draw; `now` is the time of the machine [s]."""
         for action in self._actions.take():
@@ -203,12 +211,15 @@ def serve_replay(
     """
     with served(options, recorded.place.name) as server:
         page = ReplayPage(server, recorded, comparison)
-        say(f"The recording is at {url_of(options)} (Ctrl-C ends it).")
+        announce(options, "The recording", "see the recording, and play it", say)
         clock = MonotonicClock(PERIOD_S)
         before = clock.tick()
         while not until():
             now = clock.tick()
-            page.turn(now, now - before)
+            try:
+                page.turn(now, now - before)
+            except Exception as error:  # whatever fails in the page
+                page.hold(error, say)
             before = now
 
 

@@ -1,11 +1,16 @@
 """The web server of a page: on this machine alone unless asked, on the port that was asked for, and quiet."""
 
 import errno
+import ipaddress
 import logging
+import os
+import secrets
 import socket
-from collections.abc import Iterator
+import sys
+import webbrowser
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from pretouch.errors import ViewerError
@@ -26,12 +31,42 @@ class ServeOptions:
     """Address to listen on: by default this machine alone can open the page, 0.0.0.0 lets everybody."""
     port: int = 8080
     """Port to listen on."""
+    opened: bool = False
+    """Whether to open the page in this machine's browser."""
+    token: str = field(default_factory=secrets.token_urlsafe, repr=False)
+    """What an address needs to be answered; another for each start."""
 
 
 def url_of(options: ServeOptions) -> str:
-    """What to type into a browser."""
+    """What to type into a browser; whoever has it may use the page."""
     host = _EVERYWHERE.get(options.host, options.host)
-    return f"http://[{host}]:{options.port}" if ":" in host else f"http://{host}:{options.port}"
+    return f"http://{f'[{host}]' if ':' in host else host}:{options.port}/{options.token}/"
+
+
+def announce(options: ServeOptions, what: str, exposed: str, say: Callable[[str], None]) -> None:
+    """Say where a page is, and beyond this machine what is `exposed` there; open it if that is asked for."""
+    say(f"{what} is at {url_of(options)} (Ctrl-C ends it).")
+    if not _stays_here(options.host):
+        say(f"Mind: other machines reach this page, unencrypted. Whoever has the address can {exposed}.")
+    if options.opened:
+        webbrowser.open(url_of(options))
+
+
+def browser_here() -> bool:
+    """Whether somebody sits at this machine's terminal and has a screen to open a page on."""
+    return sys.stdout.isatty() and not os.environ.keys().isdisjoint({"DISPLAY", "WAYLAND_DISPLAY"})
+
+
+def failure(error: Exception) -> str:
+    """Say that a page came upon an error that nobody foresaw."""
+    return f"The page failed, and holds: {type(error).__name__}: {error}. Please report this."
+
+
+def _stays_here(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 _GREYED = "div[style*='opacity: 0.5'][style*='pointer-events: none']"
@@ -52,11 +87,16 @@ def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
     check_port(options)
     import viser
 
+    from pretouch.viewer.door import Door
+
+    door = Door(options)
     with _quiet():
-        server = viser.ViserServer(options.host, options.port, label=title, verbose=False)
+        with door.built():
+            server = viser.ViserServer(options.host, options.port, label=title, verbose=False)
         try:
             if server.get_port() != options.port:
                 raise _busy(options, server.get_port())
+            door.keep(server)
             server.gui.add_html(_LOST)
             yield server
         finally:

@@ -1,0 +1,83 @@
+"""Serving the live page: what is said, how it ends, and what no error ends."""
+
+from pathlib import Path
+
+import pytest
+from tests.ports import free_port
+
+from pretouch.recording.writer import Recording
+from pretouch.viewer.live import LivePage, serve_live
+from pretouch.viewer.server import ServeOptions, url_of
+from pretouch.viewer.simulation import LiveSimulation
+
+
+@pytest.fixture
+def simulation() -> LiveSimulation:
+    return LiveSimulation()
+
+
+def test_the_address_is_the_one_line_that_is_said(
+    simulation: LiveSimulation, capfd: pytest.CaptureFixture[str]
+) -> None:
+    options, turns = ServeOptions(port=free_port()), iter([False, False, True])
+    serve_live(simulation, options, until=lambda: next(turns))
+    assert capfd.readouterr().out == f"The arm is at {url_of(options)} (Ctrl-C ends it).\n"
+
+
+def test_however_it_ends_a_recording_is_closed_and_named(simulation: LiveSimulation, tmp_path: Path) -> None:
+    def interrupted() -> bool:
+        raise KeyboardInterrupt
+
+    simulation.start_recording(tmp_path / "session.mcap")
+    said: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        serve_live(simulation, ServeOptions(port=free_port()), interrupted, said.append)
+    assert simulation.recording is None
+    assert str(tmp_path / "session.mcap") in said[-1]
+
+
+def test_a_recording_in_trouble_is_said_once_on_the_page_and_in_the_terminal(
+    simulation: LiveSimulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulation.start_recording(tmp_path / "session.mcap")
+    monkeypatch.setattr(Recording, "trouble", property(lambda self: "The recording ended early (disk full)."))
+    turns, said = iter([False] * 5 + [True]), []
+    serve_live(simulation, ServeOptions(port=free_port()), lambda: next(turns), said.append)
+    assert said[1:] == ["The recording ended early (disk full)."]
+
+
+def test_beyond_this_machine_it_is_said_what_is_exposed_and_the_page_is_opened_where_asked(
+    simulation: LiveSimulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    options, said = ServeOptions("0.0.0.0", free_port(), opened=True), []  # noqa: S104
+    serve_live(simulation, options, lambda: True, said.append)
+    assert said == [
+        f"The arm is at {url_of(options)} (Ctrl-C ends it).",
+        "Mind: other machines reach this page, unencrypted. Whoever has the address can move the simulated arm, and"
+        " record to the disk of this one.",
+    ]
+    assert opened == [f"http://localhost:{options.port}/{options.token}/"]
+
+
+@pytest.mark.parametrize("part", ["_run_actions", "_draw"])
+def test_whatever_fails_in_the_page_the_arm_holds_and_it_is_said_once(
+    simulation: LiveSimulation, monkeypatch: pytest.MonkeyPatch, part: str
+) -> None:
+    def fail(*_: object) -> None:
+        raise KeyError("nosuch")
+
+    monkeypatch.setattr("viser.ViserServer.get_clients", lambda self: {0: None})
+    turns, said, times = iter([False] * 5 + [True]), [], []
+
+    def until() -> bool:
+        times.append(simulation.time)
+        if len(times) == 3:
+            monkeypatch.setattr(LivePage, part, fail)
+        return next(turns)
+
+    serve_live(simulation, ServeOptions(port=free_port()), until, said.append)
+    assert said[1:] == ["The page failed, and holds: KeyError: 'nosuch'. Please report this."]
+    assert times[1] < times[2]
+    assert times[-1] == times[-2] == times[-3]

@@ -1,0 +1,113 @@
+"""Somebody at a page without a browser: speaks viser's messages, and may lie."""
+
+import http.client
+import itertools
+import math
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+
+import msgspec
+import viser
+import zstandard
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from pretouch.viewer.server import ServeOptions, url_of
+
+PATIENCE_S = 20.0
+"""Time a page on a busy machine is given [s]."""
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": [2.0, 1.0, 1.0], "fov": 0.9, "near": 0.1,
+    "far": 100.0, "image_height": 600, "image_width": 800, "look_at": [0.0, 0.0, 0.5], "up_direction": [0.0, 0.0, 1.0],
+}  # fmt: skip
+
+
+def until(true: Callable[[], bool]) -> None:
+    """Wait until something holds that another thread does."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not true():
+        assert time.monotonic() < deadline, "it has not come to pass"
+        time.sleep(0.01)
+
+
+def fetched(options: ServeOptions, path: str = "", **headers: str) -> tuple[int, str, str]:
+    """Status, text and kind of what is answered at a path, by default that of the page's own address."""
+    connection = http.client.HTTPConnection(options.host, options.port, timeout=PATIENCE_S)
+    connection.request("GET", path or f"/{options.token}/", headers=headers)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer.status, text, answer.headers["Content-Type"]
+
+
+class Visitor:
+    """One connection to a page that is served, open while the context lasts."""
+
+    def __init__(self, server: viser.ViserServer, options: ServeOptions) -> None:
+        self._server, self._stack = server, ExitStack()
+        before = set(server.get_clients())
+        address = url_of(options).replace("http", "ws", 1).rstrip("/")
+        protocol = f"viser-v{viser.__version__}"
+        self._socket = self._stack.enter_context(
+            connect(address, subprotocols=[protocol], max_size=None, max_queue=None)
+        )
+        self.say(CAMERA)
+        until(lambda: set(server.get_clients()) > before)
+        (self.number,) = set(server.get_clients()) - before
+        self._marks = itertools.count(1)
+
+    def __enter__(self) -> "Visitor":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+        until(lambda: self.number not in self._server.get_clients())
+
+    def say(self, message: dict[str, Any]) -> None:
+        self._socket.send(msgspec.msgpack.encode(message))
+
+    def set(self, handle: Any, value: object) -> None:
+        """Give a control a value, as the page does."""
+        self.say(update(handle, value=value))
+
+    def settle(self) -> None:
+        """Wait until all that was said has been heard: what is said last is where somebody looks from."""
+        near = 0.1 + 0.001 * next(self._marks)
+
+        def heard() -> bool:  # who says too much is not heard at first
+            self.say({**CAMERA, "near": near})
+            return math.isclose(self._server.get_clients()[self.number].camera.near, near)
+
+        until(heard)
+
+    def heard(self, kind: str) -> dict[str, Any]:
+        """The next message of a kind that this visitor is sent."""
+        deadline = time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline:
+            for message in _messages(self._socket.recv(timeout=PATIENCE_S)):
+                if message["type"] == kind:
+                    return message
+        raise AssertionError(f"no {kind} has come")
+
+
+def update(handle: Any, **updates: object) -> dict[str, Any]:
+    """What viser's client sends of a control."""
+    return {"type": "GuiUpdateMessage", "uuid": handle._impl.uuid, "updates": updates}
+
+
+def refusal(options: ServeOptions, path: str = "", origin: str | None = None, **headers: str) -> tuple[int, str]:
+    """Status and sentence with which a connection is refused."""
+    address = f"ws://{options.host}:{options.port}{path or '/' + options.token}"
+    try:
+        with connect(address, origin=origin, additional_headers=headers, subprotocols=[f"viser-v{viser.__version__}"]):  # type: ignore[arg-type]
+            return 101, ""
+    except InvalidStatus as error:
+        return error.response.status_code, error.response.body.decode()
+
+
+def _messages(frame: Any) -> list[dict[str, Any]]:
+    """Messages of a frame, without what is behind them."""
+    size = int.from_bytes(frame[8:16], "little")
+    return list(msgspec.msgpack.decode(zstandard.decompress(frame[16 : 16 + size]))["messages"])
