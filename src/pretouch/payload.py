@@ -27,16 +27,15 @@ class Payload:
     """Longest time from the announcement until the arm carries it, or no longer carries it [s]: a gripper's way."""
 
     def __post_init__(self) -> None:
-        bounds = {"mass_kg": (0.0, _MOST_KG), "within_s": (0.0, _LONGEST_S)}
         try:
             x, y, z = map(float, self.com_m)
-            given = {"mass_kg": self.mass_kg, "within_s": self.within_s, "com_m": math.hypot(x, y, z)}
-            for name, number in given.items():
-                low, high = bounds.get(name, (0.0, _FARTHEST_M))
-                if not low <= number <= high:
-                    raise ParameterError(
-                        f"Payload.{name} is {getattr(self, name)}: give {low:g} to {high:g}, SI units."
-                    )
+            given = {
+                "mass_kg": (float(self.mass_kg), _MOST_KG), "com_m": (math.hypot(x, y, z), _FARTHEST_M),
+                "within_s": (float(self.within_s), _LONGEST_S),
+            }  # fmt: skip
         except (TypeError, ValueError) as error:
             raise ParameterError(f"{self!r} is no payload: give numbers, com_m three of them.") from error
+        for name, (number, most) in given.items():
+            if not 0.0 <= number <= most:
+                raise ParameterError(f"Payload.{name} is {getattr(self, name)}: give 0 to {most:g}, in SI units.")
         object.__setattr__(self, "com_m", (x, y, z))  # an array could not be compared
