@@ -176,9 +176,7 @@ class Controller:
         mark("state")
         kin = model.kinematics(given.robot.q)
         mark("kinematics")
-        if given.load is not None:
-            robot, load = without_load(given.load, model, kin, given.robot, self.limits.period)
-            given = given._replace(robot=robot, load=load)
+        given = self._unloaded(given, kin)
         robot, now = given.robot, given.watch.stamp
         near = self._perceived(state, given, kin)
         mark("perception")
@@ -244,6 +242,13 @@ class Controller:
             events[Event.LOAD_UNFIT] = heavy
         load = announced(state.load, payload, robot)
         return _Given(robot, events, watch, readings, touches, points, load, unfit or wrong, lost)
+
+    def _unloaded(self, given: "_Given", kin: Kinematics) -> "_Given":
+        """Take an announced load out of torques and force."""
+        if given.load is None:
+            return given
+        robot, load = without_load(given.load, self.model, kin, given.robot, self.limits.period)
+        return given._replace(robot=robot, load=load)
 
     def _perceived(self, state: ControllerState, given: "_Given", kin: Kinematics) -> "_Near":
         """Return what is near: eq. 1 and the closest points of the body."""

@@ -24,7 +24,7 @@ GRIPPED, PUT_DOWN = 25.0, 28.0
 def steps_of(
     model: RobotModel, seed: int, kg: float, early: float | None, end: float = 30.5, push: float = 0.0
 ) -> list[ControlStep]:
-    """An arm on the circle grips so much, announced so much earlier and 5 % wrong, is pushed 1 s later, and puts it down."""
+    """An arm grips so much, announced so much earlier and 5 % wrong, is pushed 1 s later, and puts it down."""
     arm = Plant(
         model, SceneSpec(), replace(PlantParams(), payload_kg=0.05), brought_to(model, Circle().point(0.0)), seed
     )
