@@ -34,8 +34,8 @@ class LoadState:
     """What was carried before it."""
     waited: float
     """Time since it was announced [s]."""
-    speed: FloatArray
-    """(n,) commanded joint velocities as late as the torques [rad/s]."""
+    twist: FloatArray | None
+    """(6,) commanded velocity of the end-effector, as late as the torques [m/s, rad/s]; None before the first step."""
     free: FloatArray
     """(n,) torques of free motion without a load, by the detector in the step before [Nm]."""
     doubted_kg: float = 0.0
@@ -47,7 +47,7 @@ def announced(state: LoadState | None, said: Payload | None, robot: RobotState) 
     if said is None or (state is not None and said == state.payload):
         return state
     if state is None:
-        return LoadState(said, _NOTHING, 0.0, robot.qd_commanded, np.zeros(len(robot.q)))
+        return LoadState(said, _NOTHING, 0.0, None, np.zeros(len(robot.q)))
     return replace(state, payload=said, before=state.payload, waited=0.0)
 
 
@@ -56,17 +56,20 @@ def without_load(
 ) -> tuple[RobotState, LoadState]:
     """Return a robot's state with the load taken out of its torques and force, and what to remember."""
     keep, J, R = np.exp(-_OBSERVER_1_S * period), model.ee_jacobian(kin), kin.rotation[model.ee]
-    speed = keep * state.speed + (1.0 - keep) * robot.qd_commanded
-    # J qdd only, as in the model of free motion
-    acceleration = J @ (speed - state.speed) / period
+    twist = J @ robot.qd_commanded
+    before = twist if state.twist is None else state.twist
+    twist = keep * before + (1.0 - keep) * twist
+    # by differences, so that a path's bend is in it: at 1 m/s it throws a load outwards by a fifth of its weight
+    acceleration = (twist - before) / period
     load, within = wrench_of(state.payload, R, acceleration), state.payload.within_s
     if state.waited < within:
-        before = wrench_of(state.before, R, acceleration)
-        load = before + _share(J, robot, state.free + J.T @ before, load - before) * (load - before)
+        earlier = wrench_of(state.before, R, acceleration)
+        load = earlier + _share(J, robot, state.free + J.T @ earlier, load - earlier) * (load - earlier)
     waited = state.waited + period
+    # doubted only now: while any part of it passed, the torques taught nothing of the mass
     changed = abs(state.payload.mass_kg - state.before.mass_kg) if state.waited < within <= waited else 0.0
     wrench = None if robot.wrench is None else robot.wrench - load
-    after = replace(state, waited=waited, speed=speed, doubted_kg=changed)
+    after = replace(state, waited=waited, twist=twist, doubted_kg=changed)
     return replace(robot, tau_ext=robot.tau_ext - J.T @ load, wrench=wrench), after
 
 
@@ -85,6 +88,7 @@ def _share(J: FloatArray, robot: RobotState, torque: FloatArray, change: FloatAr
     measured, expected = robot.tau_ext, J.T @ change
     if np.isnan(measured).any():  # a detector by the force needs no torques
         measured = torque if robot.wrench is None else J.T @ robot.wrench
+    # least squares; nothing of the change where it is none
     size = float(expected @ expected)
     part = float(expected @ (measured - torque)) / size if size > 0.0 else 0.0
     return min(max(part, -_BEYOND), 1.0 + _BEYOND)
