@@ -77,6 +77,21 @@ def test_the_torques_are_those_of_a_point_mass_by_its_own_jacobian(panda_model):
     np.testing.assert_allclose(after.tau_ext, -J.T @ [0.0, 0.0, -9.81 * 1.5], atol=1e-12)
 
 
+def test_a_load_that_is_swung_about_the_base_pulls_outwards(panda_model):
+    """Joint 1 at 2 rad/s: m w^2 r, a little behind, as the observer is."""
+    q, qd, state = panda_model.description.q_ready.copy(), np.array([2.0, 0, 0, 0, 0, 0, 0]), None
+    for k in range(100):
+        q[0] = 2.0 * DT * k
+        now, kin = RobotState(DT * k, q, qd, q, qd, STILL, np.zeros(6)), panda_model.kinematics(q)
+        after, state = without_load(
+            announced(state, Payload(1.5, within_s=0.0), now), panda_model, kin, now, DT
+        )  # fmt: skip
+    out = kin.position[panda_model.ee] * [1.0, 1.0, 0.0]
+    load, r = -after.wrench[:3], float(np.linalg.norm(out))
+    assert load @ out / r == pytest.approx(1.5 * 2.0**2 * r, rel=0.01)
+    assert load[2] == pytest.approx(-9.81 * 1.5)
+
+
 @pytest.mark.parametrize("part", [0.0, 0.4, 1.0])
 def test_any_part_of_the_change_passes_while_it_is_awaited_and_all_of_it_is_expected_after(panda_model, part):
     said, there = Payload(2.0, within_s=0.2), robot(panda_model, 2.0 * part)
