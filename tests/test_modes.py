@@ -10,13 +10,16 @@ from pretouch.types import Mode
 
 LATCHING = [Event.UNUSABLE, Event.TIME_BACKWARDS, Event.STATE_STALE, Event.SOLVER_FAILED]
 PASSING = [
-    Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.POINTS_LOST, Event.NO_FORCE, Event.OVERRUN, Event.GIVEN_UP,
-    Event.WINDOW_FILLING,
+    Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.POINTS_LOST, Event.LOAD_UNFIT, Event.NO_FORCE, Event.OVERRUN,
+    Event.GIVEN_UP, Event.WINDOW_FILLING,
 ]  # fmt: skip
 GOING = [Event.REACTING, Event.OPENING, Event.YIELDING]
 FAULTS = [Event.UNUSABLE, Event.SOLVER_FAILED]  # the other two stand beside them
 REPORTED = [*FAULTS, Event.BLOCKED, *GOING, Event.CLAMPED, Event.CONTACT, *PASSING]
-SOFT = {Event.CLAMPED, Event.GIVEN_UP, Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.POINTS_LOST, Event.NO_FORCE}
+SOFT = {
+    Event.CLAMPED, Event.GIVEN_UP, Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.POINTS_LOST, Event.LOAD_UNFIT,
+    Event.NO_FORCE,
+}  # fmt: skip
 STATES = [
     ModeState(Mode.TRACK, "before"), ModeState(Mode.REACT, "before"), ModeState(Mode.HOLD, "before"),
     ModeState(Mode.HOLD, "before", latched=True),

@@ -167,11 +167,11 @@ def test_inputs_with_points_that_fit_no_message_are_said_to_be_unreadable(panda_
     assert verify(recorded).agrees
 
 
-def test_a_state_recorded_before_there_were_outside_points_still_opens(panda_model, paper_skin):
+def test_a_state_recorded_before_there_were_outside_points_and_loads_still_opens(panda_model, paper_skin):
     state = controller_of(panda_model, paper_skin).init(Run(controller_of(panda_model, paper_skin)).inputs().robot)
     message = decoded(STATE, encode_state(3, state, True))
-    assert message.name[-1] == "outside"
-    message.name, message.kind, message.shape = message.name[:-1], message.kind[:-1], message.shape[:-1]
+    assert message.name[-2:] == ["outside", "load"]
+    message.name, message.kind, message.shape = message.name[:-2], message.kind[:-2], message.shape[:-2]
     assert same(decode_state(encoded(STATE, message))[1], state)
 
 

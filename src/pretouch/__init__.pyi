@@ -36,6 +36,7 @@ from pretouch.loop import Cycle as Cycle
 from pretouch.loop import MonotonicClock as MonotonicClock
 from pretouch.loop import Recorder as Recorder
 from pretouch.params import WindowParams as WindowParams
+from pretouch.payload import Payload as Payload
 from pretouch.perception.closest import closest_points as closest_points
 from pretouch.perception.closest import no_obstacles as no_obstacles
 from pretouch.perception.scene_filter import Fixtures as Fixtures

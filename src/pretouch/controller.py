@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pretouch.contact.announced_load import LoadState, announced, kept_free, most_kg, without_load
 from pretouch.contact.detector import Body, Detection, Sample
 from pretouch.contact.reaction import ReactionInputs, ReactionMotion
 from pretouch.contact.residual_model import ResidualModel
@@ -25,6 +26,7 @@ from pretouch.faults import (
     Watch,
     examine,
     sound_imu,
+    sound_payload,
     sound_points,
     sound_readings,
     sound_robot,
@@ -76,6 +78,8 @@ class ControllerState:
     """(3, 3) R_O_ee at the start, held if the task asks for it."""
     outside: OutsideState | None = None
     """What outside sources showed; None before there is one."""
+    load: LoadState | None = None
+    """What was announced of a load; None before anything was."""
 
 
 STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motion", "record")
@@ -104,7 +108,7 @@ class Controller:
         self._setup = motion_setup(self._motion_body, profile.null_space, profile.failure.solver_iterations)
         self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
         self._detector = profile.detect.on(self.body)
-        self._units = len(skin)
+        self._units, self._most_kg = len(skin), most_kg(model)
         self._touching = "touch" in profile.detect.reads and len(skin.touching) > 0
         self._shaken = "imu" in self._detector.reads
         self._mark = mark
@@ -169,10 +173,11 @@ class Controller:
         if len(state.command) != model.n or len(state.tracks.point) != self._units:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         given = self._checked(state, inputs)
-        robot, now = given.robot, given.watch.stamp
         mark("state")
-        kin = model.kinematics(robot.q)
+        kin = model.kinematics(given.robot.q)
         mark("kinematics")
+        given = self._unloaded(given, kin)
+        robot, now = given.robot, given.watch.stamp
         near = self._perceived(state, given, kin)
         mark("perception")
         detection, window, detector = self._detected(state, inputs, given, near, kin)
@@ -219,6 +224,7 @@ class Controller:
             if mode.mode is Mode.TRACK else paths.pause(state.path),
             approach=approach, motion=moving, mode=mode, command=motion.qp.qd.copy(),
             rotation_goal=state.rotation_goal, outside=near.outside,
+            load=given.load and kept_free(given.load, robot.tau_ext, detection.residual),
         )  # fmt: skip
         mark("record")
         return step, after
@@ -230,7 +236,18 @@ class Controller:
         readings, unfit = sound_readings(inputs.readings, units)
         touches, wrong = sound_touch(inputs.touch, units) if self._touching else (None, "")
         points, lost = sound_points(inputs.points)
-        return _Given(robot, events, watch, readings, touches, points, unfit or wrong, lost)
+        payload, heavy = sound_payload(inputs.payload, self._most_kg)
+        if heavy:
+            events[Event.LOAD_UNFIT] = heavy
+        load = announced(state.load, payload, robot)
+        return _Given(robot, events, watch, readings, touches, points, load, unfit or wrong, lost)
+
+    def _unloaded(self, given: "_Given", kin: Kinematics) -> "_Given":
+        """Take an announced load out of torques and force."""
+        if given.load is None:
+            return given
+        robot, load = without_load(given.load, self.model, kin, given.robot, self.limits.period)
+        return given._replace(robot=robot, load=load)
 
     def _perceived(self, state: ControllerState, given: "_Given", kin: Kinematics) -> "_Near":
         """Return what is near: eq. 1 and the closest points of the body."""
@@ -256,7 +273,7 @@ class Controller:
         imu = sound_imu(inputs.imu, self._units) if self._shaken else None
         sample = Sample(
             given.watch.stamp, kin, robot, window, before.full, near.seen.obstacles, reacting, near.watched,
-            given.touches, imu,
+            given.touches, imu, given.load.doubted_kg if given.load else 0.0,
         )  # fmt: skip
         detection, detector = self._detector.step(state.detector, self.body, sample)
         return detection, before if reacting and p.freeze_while_reacting else window, detector
@@ -292,6 +309,7 @@ class _Given(NamedTuple):
     readings: RangeReadings
     touches: TouchReadings | None
     points: SeenPoints | None
+    load: LoadState | None
     unfit: str
     """What is wrong with readings; '' for nothing."""
     lost: str

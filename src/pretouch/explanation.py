@@ -6,7 +6,6 @@ from enum import Enum
 
 import numpy as np
 
-from pretouch.contact.detectable import LOUD_N
 from pretouch.types import BoolArray, ControlStep, Mode
 
 OFF_PATH_M = 0.01
@@ -21,6 +20,8 @@ _ANSWER_M_S = 1e-3
 """Speed of the end-effector from which on a reaction moves the arm [m/s]."""
 _ASKED_M_S = 0.005
 """Speed from which on a motion is asked for [m/s]."""
+LOUD_N = 15.0
+"""Force that should be found; where it takes more, the arm is too loud [N]: a hand that touches lightly has less."""
 
 
 class Doing(Enum):

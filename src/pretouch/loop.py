@@ -14,6 +14,7 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ParameterError
+from pretouch.payload import Payload
 from pretouch.ports import Clock, Points, Robot, Skin, imu_of, touch_of
 from pretouch.signals import noted
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, TouchReadings
@@ -186,6 +187,8 @@ class Options:
     points: Points | None = None
     """An outside source of points, read in the loop, so it must not wait; once there is one, its silence stops the
     arm."""
+    payload: Callable[[], Payload | None] = lambda: None
+    """What the arm carries, asked in the loop; None: nothing is said, and what was said last stays."""
 
 
 NO_OPTIONS = Options()
@@ -201,7 +204,7 @@ def run(
     try:
         while True:
             tick = clock.tick()
-            cycle = turn(controller, state, robot, skin, tick, options.resume(), options.points)
+            cycle = turn(controller, state, robot, skin, tick, options.resume(), options.points, options.payload())
             state, sent = cycle.after, cycle.step.command
             recorder.record(cycle)
             if done(cycle.step):
@@ -213,14 +216,14 @@ def run(
 
 def turn(
     controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float, resume: bool = False,
-    points: Points | None = None,
+    points: Points | None = None, payload: Payload | None = None,
 ) -> Cycle:  # fmt: skip
     """Turn the controller once, at a tick [s]: read, step, command."""
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
     imu = imu_of(skin) if "imu" in controller.profile.detect.reads else None
     seen = None if points is None else points.read()
     stamp = _instant(tick, controller.limits.period, report, readings, touch)
-    inputs = Inputs(stamp, report, readings, resume, touch, imu, seen)
+    inputs = Inputs(stamp, report, readings, resume, touch, imu, seen, payload)
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)

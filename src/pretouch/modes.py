@@ -25,6 +25,7 @@ class Event(Enum):
     SKIN_UNFIT = auto()
     SKIN_SILENT = auto()
     POINTS_LOST = auto()
+    LOAD_UNFIT = auto()
     NO_FORCE = auto()
     GIVEN_UP = auto()
     PRESSED = auto()
@@ -107,6 +108,9 @@ TABLE: tuple[Transition, ...] = (
         Event.POINTS_LOST, _ANY, Mode.HOLD,
         "The outside source of points {}: check it and its clock; the arm goes on when it is heard again.",
         soft=True,
+    ),
+    Transition(
+        Event.LOAD_UNFIT, _ANY, Mode.HOLD, "The announced payload is {}: announce what the arm carries.", soft=True,
     ),
     Transition(
         Event.NO_FORCE, _ANY, Mode.HOLD,

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pretouch.payload import Payload
 from pretouch.values import value
 
 FloatArray = NDArray[np.float64]
@@ -160,6 +161,8 @@ class Inputs:
     """None where units have no IMU, or nobody asks them."""
     points: SeenPoints | None = None
     """What outside sources see; None without one. Once given, silence of theirs stops the arm."""
+    payload: Payload | None = None
+    """What the arm carries; None: nothing is said, and what was said last stays."""
 
 
 class Mode(Enum):
@@ -294,10 +297,7 @@ class QpSolution:
 
 @value
 class ControlStep:
-    """All that one step of the controller saw and decided.
-
-    The one record that figures, metrics and reports read, whether it comes from a simulation or from a real arm.
-    """
+    """All that one step of the controller saw and decided: what figures and reports read, of any arm."""
 
     stamp: float
     mode: Mode
@@ -323,7 +323,7 @@ class ControlStep:
     """(K,) distances of the readings used [m], NaN where the unit reported no target."""
     obstacles: Obstacles
     force: FloatArray
-    """(3,) the robot's estimate of the external force on it [N], NaN where it has none."""
+    """(3,) the robot's estimate of the external force less an announced load's [N], NaN where it has none."""
     filtered_force: FloatArray
     """(3,) newest value added to the window, eq. 8 [N]."""
     thresholds: Thresholds

@@ -17,8 +17,6 @@ from pretouch.types import FloatArray
 
 HELD_S = 0.1
 """For how long the force is there [s]."""
-LOUD_N = 15.0
-"""Force that should be found; where it takes more, the arm is too loud [N]: a hand that touches lightly has less."""
 _SURE = 1.645
 """Deviations of the noise above what would do in half of all cases: so that it does in 95 % of them."""
 _LENGTHS = np.array(LENGTHS)

@@ -67,6 +67,8 @@ class Sample:
     """Of the units' touch sensors; None without."""
     imu: ImuReadings | None = None
     """New samples of the units' accelerometers; None without."""
+    doubted_kg: float = 0.0
+    """How much of an announced load is taken out of torques and force anew, and may be a little off [kg]."""
 
 
 @value

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.contact.announced_load import doubted
 from pretouch.contact.cues import Cue, Cues, no_cues, together
 from pretouch.contact.detector import Body, Detection, Detector, Readings, Sample, no_torques, strongest
 from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
@@ -68,7 +69,10 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         # while a unit is touched free motion is not learnt, whatever the test says
         alone = sample.watched and not len(said.link)
         seen = Observation(sample.kin, sample.robot, sample.obstacles, said)
-        tested, test = sequential_step(state.test, model, seen, sample.reacting, alone, period, self)
+        before = state.test
+        if sample.doubted_kg:
+            before = replace(before, model=doubted(before.model, sample.doubted_kg))
+        tested, test = sequential_step(before, model, seen, sample.reacting, alone, period, self)
         bands, touched, significant = Thresholds(tested.bands), NOT_TOUCHED, None
         contact = strongest(tested.force, bands) if tested.detected and sample.armed else None
         if self.localise:

@@ -17,6 +17,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from pretouch.errors import RecordingError
+from pretouch.payload import Payload
 from pretouch.recording.messages import PACKAGE, decoded, encoded, fields_of
 from pretouch.recording.truth import Truth
 from pretouch.types import (
@@ -37,6 +38,7 @@ INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE
 TOUCH = f"{PACKAGE}/msg/Touch"
 IMU = f"{PACKAGE}/msg/ImuReadings"
 POINTS = f"{PACKAGE}/msg/SeenPoints"
+PAYLOAD = f"{PACKAGE}/msg/Payload"
 
 _NAMED: dict[type, str] = {ControlStep: "Step", TouchReadings: "Touch"}
 """Messages that are not named as the classes of which they hold the fields."""
@@ -178,6 +180,8 @@ def encode_inputs(sequence: int, inputs: Inputs) -> tuple[bytes, bool]:
         for kind, own in ((TouchReadings, inputs.touch), (SeenPoints, inputs.points)):
             if own is not None:
                 _taken(kind, own)  # has a message of its own
+        if not isinstance(inputs.payload, Payload | None):
+            raise UnreadableError("the payload is none")
         given = {"stamp": stamp, "robot": robot, "readings": readings, "resume": resume, "unreadable": ""}
         return encoded(INPUTS, None, sequence=sequence, **given), True
     except Exception as error:  # inputs may be anything, with any behaviour
@@ -212,6 +216,20 @@ def encode_touch(sequence: int, inputs: Inputs) -> bytes | None:
 def decode_touch(data: bytes) -> TouchReadings:
     """Return what units said of a touch."""
     return _made(TouchReadings, decoded(TOUCH, data))
+
+
+def encode_payload(sequence: int, inputs: Inputs) -> bytes | None:
+    """Return an announced load as CDR, of inputs that `encode_inputs` found to be whole; None for nothing."""
+    if inputs.payload is None:
+        return None
+    com_m = np.array(inputs.payload.com_m)
+    return encoded(PAYLOAD, inputs.payload, sequence=sequence, step_stamp=_number(inputs.stamp), com_m=com_m)
+
+
+def decode_payload(data: bytes) -> Payload:
+    """Return an announced load."""
+    m = decoded(PAYLOAD, data)
+    return Payload(m.mass_kg, tuple(m.com_m), m.within_s)
 
 
 def encode_points(sequence: int, points: SeenPoints, same_as: int) -> bytes:

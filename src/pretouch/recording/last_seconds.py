@@ -58,6 +58,7 @@ class _Passed(NamedTuple):
             touch=None if self.touch is None else decode_touch(self.touch),
             imu=None if self.imu is None else decode_imu(self.imu),
             points=None if self.points is None else decode_points(self.points)[1],
+            payload=self.cycle.inputs.payload,  # nobody can change it
         )
         return replace(self.cycle, inputs=whole)
 

@@ -13,6 +13,7 @@ from pretouch.errors import RecordingError
 from pretouch.recording.codec import (
     decode_imu,
     decode_inputs,
+    decode_payload,
     decode_points,
     decode_step,
     decode_touch,
@@ -100,6 +101,9 @@ class Recorded:
             inputs = replace(inputs, touch=decode_touch(touch))
         if inputs is not None and imu is not None:
             inputs = replace(inputs, imu=decode_imu(imu))
+        payload = raw["/pretouch/payload"].get(number)
+        if inputs is not None and payload is not None:
+            inputs = replace(inputs, payload=decode_payload(payload))
         return self._with_points(number, inputs)
 
     def _with_points(self, number: int, inputs: Inputs | None) -> Inputs | None:

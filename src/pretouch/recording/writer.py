@@ -18,12 +18,14 @@ from pretouch.loop import Cycle
 from pretouch.recording.codec import (
     IMU,
     INPUTS,
+    PAYLOAD,
     POINTS,
     STEP,
     TOUCH,
     TRUTH,
     encode_imu,
     encode_inputs,
+    encode_payload,
     encode_points,
     encode_step,
     encode_touch,
@@ -125,6 +127,9 @@ class Recording:
         touch = encode_touch(number, cycle.inputs) if whole else None
         if touch is not None:
             items.append(Item("/pretouch/touch", TOUCH, number, time, touch))
+        payload = encode_payload(number, cycle.inputs) if whole else None
+        if payload is not None:
+            items.append(Item("/pretouch/payload", PAYLOAD, number, time, payload))
         self._command = step.command if whole else None
         items.append(Item("/pretouch/inputs", INPUTS, number, time, data))
         imu = getattr(cycle.inputs, "imu", None)

@@ -60,7 +60,8 @@ def execute(
         folder = Path(command.holds)
         kept = stack.enter_context(open_run_files(controller, session.arm.name, place, folder, tell, learnt, further))
         reporter = ProgressReporter(kept.recorder, tell, latched, controller)
-        options = Options(enter, learnt.begin if learnt else None, None, command.priority, command.cpu, tell)
+        known, priority, cpu = learnt.begin if learnt else None, command.priority, command.cpu
+        options = Options(enter, known, priority=priority, cpu=cpu, tell=tell)
         try:
             if _go_to_start(session, way.approach, tell, ending):
                 _follow(session, way, reporter, clock, options, ending)
