@@ -26,7 +26,6 @@ from pretouch.faults import (
     Watch,
     examine,
     sound_imu,
-    sound_payload,
     sound_points,
     sound_readings,
     sound_robot,
@@ -34,6 +33,7 @@ from pretouch.faults import (
     watch_init,
 )
 from pretouch.modes import Event, ModeState, mode_init, next_mode
+from pretouch.payload import sound_payload
 from pretouch.perception.obstacles import TrackState, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
 from pretouch.perception.perceive import Perception, nothing_seen, perceive, perception_setup, silent_units
@@ -189,8 +189,7 @@ class Controller:
             state.path.phase, inputs.resume,
         )  # fmt: skip
         answers, react = p.react.sense(state.reaction, self.body, noticed)
-        blocked = state.motion.blocked
-        noted = events_of(given.unfit, near.silent, near.lost, detection, window.count, blocked, p)
+        noted = events_of(given.unfit, near.silent, near.lost, detection, window.count, state.motion.blocked, p)
         events = given.events | answers | noted
         mode = next_mode(state.mode, events, inputs.resume)
         contact = detection.contact if mode.mode is Mode.REACT is not state.mode.mode else None

@@ -8,7 +8,6 @@ from pretouch.compiled import compiled
 from pretouch.control.joint_box import JointLimits
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.payload import Payload
 from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
 from pretouch.types import (
     WHOLE,
@@ -332,15 +331,6 @@ def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
             f" outside 0 to {LARGEST_SIGMA:g} m"
         )
     return SeenPoints(heard, stamp, point, sigma), ""
-
-
-def sound_payload(payload: Payload | None, most_kg: float) -> tuple[Payload | None, str]:
-    """Return an announced payload, or None and what is wrong with it for an arm that can hold so much [kg]."""
-    if payload is None or (isinstance(payload, Payload) and payload.mass_kg <= most_kg):
-        return payload, ""
-    if not isinstance(payload, Payload):
-        return None, f"a {type(payload).__name__}, no Payload"
-    return None, f"{payload.mass_kg:g} kg, more than the {most_kg:.3g} kg that this arm's joints can hold"
 
 
 @compiled

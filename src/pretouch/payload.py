@@ -39,3 +39,12 @@ class Payload:
             if not 0.0 <= number <= most:
                 raise ParameterError(f"Payload.{name} is {getattr(self, name)}: give 0 to {most:g}, in SI units.")
         object.__setattr__(self, "com_m", (x, y, z))  # an array could not be compared
+
+
+def sound_payload(payload: Payload | None, most_kg: float) -> tuple[Payload | None, str]:
+    """Return an announced payload, or None and what is wrong with it for an arm that can hold so much [kg]."""
+    if payload is None or (isinstance(payload, Payload) and payload.mass_kg <= most_kg):
+        return payload, ""
+    if not isinstance(payload, Payload):
+        return None, f"a {type(payload).__name__}, no Payload"
+    return None, f"{payload.mass_kg:g} kg, more than the {most_kg:.3g} kg that this arm's joints can hold"
