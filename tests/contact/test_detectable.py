@@ -4,21 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from tests.contact.standing_arm import PERIOD, StandingArm
 
 from pretouch.contact.detectable import detectable_force
-from pretouch.contact.detector import Body, Sample
 from pretouch.contact.sequential import log_ratio
-from pretouch.contact.sequential_test import SequentialTest, SequentialTestState
-from pretouch.contact.window import window_init
 from pretouch.contact.window_scatter import scatter_init, scattered_means, white_means
 from pretouch.params import MisfitParams
-from pretouch.perception.closest import no_obstacles
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
-from pretouch.types import RobotState
 
 GAIN, TAILS, NEEDED = 15.0, 30.0, 10.0
-PERIOD = 0.01
 
 
 def test_by_hand_for_a_cartesian_arm():
@@ -59,46 +52,12 @@ def test_what_no_joint_shows_and_what_tails_forbid_is_never_found():
     assert detectable_force(all_axes, PERIOD, free, 60.0, GAIN, 3.0) == math.inf
 
 
-class Arm:
-    """A Panda at rest in one posture, with noise that no unit can have caused."""
-
-    def __init__(self, model: RobotModel, misfit: MisfitParams | None, seed: int) -> None:
-        self.test = SequentialTest(learn="always", misfit=misfit)
-        self.body, self.rng = Body(model, Skin((), model), PERIOD), np.random.default_rng(seed)
-        self.q = model.description.q_ready + self.rng.uniform(-0.4, 0.4, model.n)
-        self.kin = model.kinematics(self.q)
-        self.J = model.ee_jacobian(self.kin)[:3]
-        self.sigma, self.window = self.rng.uniform(0.05, 0.4, model.n), window_init(500)
-
-    def sample(self, force: np.ndarray) -> Sample:
-        n = self.body.model.n
-        tau = self.sigma * self.rng.standard_normal(n) + self.J.T @ force
-        robot = RobotState(0.0, self.q, np.zeros(n), self.q, np.zeros(n), tau, None)
-        return Sample(0.0, self.kin, robot, self.window, True, no_obstacles(), False, True)
-
-    def learnt(self, steps: int = 4000) -> tuple[SequentialTestState, float]:
-        """Return the state after 40 s, and the force that it says it finds."""
-        state, says = self.test.init(self.body), math.nan
-        for _ in range(steps):
-            said, state = self.test.step(state, self.body, self.sample(np.zeros(3)))
-            says = said.detectable_n
-        return state, says
-
-    def finds(self, state: SequentialTestState, force: np.ndarray) -> bool:
-        """Whether a force that is held for 0.1 s is a contact."""
-        for _ in range(10):
-            said, state = self.test.step(state, self.body, self.sample(force))
-            if said.contact is not None:
-                return True
-        return False
-
-
 @pytest.mark.parametrize("misfit", [None, MisfitParams()], ids=["without misfit", "with"])
 def test_what_it_says_is_found_in_95_of_100_cases_and_less_is_not(panda_model, misfit):
     found, less = [], []
     for seed in range(8):
-        arm = Arm(panda_model, misfit, seed)
-        state, says = arm.learnt()
+        arm = StandingArm(panda_model, misfit, seed)
+        state, says = arm.learnt(40.0)
         # the direction that the torques tell least of
         worst = np.linalg.eigh(arm.J @ np.diag(1.0 / arm.sigma**2) @ arm.J.T)[1][:, 0]
         sign = arm.rng.choice([-1.0, 1.0], 40)
@@ -109,7 +68,7 @@ def test_what_it_says_is_found_in_95_of_100_cases_and_less_is_not(panda_model, m
 
 
 def test_a_louder_arm_says_a_larger_force(panda_model):
-    quiet, loud = Arm(panda_model, MisfitParams(), 3), Arm(panda_model, MisfitParams(), 3)
+    quiet, loud = StandingArm(panda_model, MisfitParams(), 3), StandingArm(panda_model, MisfitParams(), 3)
     loud.sigma = 3.0 * loud.sigma
     # not three times: floors of the noise are in both, and an arm that is as learnt earns a lower level
-    assert 1.5 < loud.learnt()[1] / quiet.learnt()[1] <= 3.0
+    assert 1.5 < loud.learnt(40.0)[1] / quiet.learnt(40.0)[1] <= 3.0

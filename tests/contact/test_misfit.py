@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.contact.standing_arm import PERIOD, StandingArm
 
 from pretouch.contact.alarm_level import BLOCK, earned_level, learn_level, level_init
 from pretouch.contact.detector import Body, Sample
@@ -122,3 +123,18 @@ def alarms(model: RobotModel, misfit: MisfitParams | None) -> list[float]:
         if said.contact is not None and (not found or t > found[-1] + 2.0):
             found.append(t)
     return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_what_grows_slowly_where_no_unit_sees_it_is_felt_and_not_learnt_away(panda_model: RobotModel, seed: int):
+    arm = StandingArm(panda_model, MisfitParams(), seed)
+    state, _ = arm.learnt(180.0)
+    push = arm.rng.standard_normal(3)
+    push /= np.linalg.norm(push)
+    for i in range(2000):
+        # by 1 N/s
+        said, state = arm.test.step(state, arm.body, arm.sample(PERIOD * i * push))
+        if said.contact is not None:
+            break
+    assert PERIOD * i < 4.0

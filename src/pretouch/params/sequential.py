@@ -48,8 +48,9 @@ class MisfitParams(Checked):
     Measured on simulated arms as unkind as real ones (world `hard`, development seeds): docs/explanation/detection.md.
     """
 
-    memory_s: Positive = 30.0
-    """Time over which the scatter of the windows' means is averaged [s]."""
+    memory_s: Positive = 300.0
+    """Time over which the scatter of the windows' means is averaged [s]. Shorter, a push that grows slowly where no
+    unit sees it is learnt away: with 30 s one of six that grew by 1 N/s, with 300 s none."""
     settled_s: Positive = 10.0
     """Time at rest, as far as free motion is learnt in it, after which a posture's offsets count as learnt [s]."""
 
