@@ -2,7 +2,6 @@
 
 import json
 import os
-import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,7 +30,7 @@ def atomic_replacement(place: Path) -> Iterator[Path]:
 
     Its name cannot be foreseen, and it is there alone: nobody else can make it a link to a file of theirs or yours.
     """
-    unfinished = place.with_name(f".{secrets.token_hex(8)}.tmp")
+    unfinished = place.with_name(f".{os.urandom(8).hex()}.tmp")
     os.close(os.open(unfinished, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o666))
     try:
         yield unfinished
