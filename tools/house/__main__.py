@@ -25,7 +25,7 @@ class Measure:
     Once more, by 1900 and 17, for `pretouch detect` on the joint torques of anybody's arm: tables, bags, an
     observer, checks of sign, unit and order, pushes that are tried, figure and page.
     Then by 215 and 1 for a bound on how far a contact moves the arm and for light touches that are no object, and by
-    350 and 3 for what the model of free motion cannot express.
+    350 and 3 for what the model of free motion cannot express. By 143 and 4 for bounds on files from elsewhere.
     """
 
     name: str
@@ -53,9 +53,9 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 53_615, 35_000),
-        Measure("files of the product", len(product.files), 445, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 73_670, 50_000),
+        Measure("lines of the product, comments aside", product.lines, 53_758, 35_000),
+        Measure("files of the product", len(product.files), 449, 300),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 73_838, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
