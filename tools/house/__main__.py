@@ -25,9 +25,9 @@ class Measure:
     Once more, by 1900 and 17, for `pretouch detect` on the joint torques of anybody's arm: tables, bags, an
     observer, checks of sign, unit and order, pushes that are tried, figure and page.
     Then by 215 and 1 for a bound on how far a contact moves the arm and for light touches that are no object, and by
-    350 and 3 for what the model of free motion cannot express, by 165 and 1 for the force that is found, by 77 and 2
-    for loads that a program announces, by 222 and 2 for the door of the pages, by 577 and 4 for bounds on files of
-    others. Those of product and lab by 535, for the detectors on recordings of real arms.
+    350 and 3 for what the model of free motion cannot express, 162 and 1 for the force that is found, 223 and 2 for
+    loads that a program announces, 368 and 2 for the door of the pages, 289 and 4 for bounds on files from elsewhere.
+    Those of product and lab by 667, for the detectors on recordings of real arms.
     """
 
     name: str
