@@ -231,7 +231,9 @@ class Controller:
     def _checked(self, state: ControllerState, inputs: Inputs) -> "_Given":
         """Return what of the inputs can be used, and what is wrong with the rest."""
         p, units = self.profile, self._units
-        robot, events, watch = examine(state.watch, inputs, state.command, self.limits, p.failure, p.detect.by_torques)
+        robot, events, watch = examine(
+            state.watch, inputs, state.command, self.limits.period, self.limits.qd_max, p.failure, p.detect.by_torques
+        )
         readings, unfit = sound_readings(inputs.readings, units)
         touches, wrong = sound_touch(inputs.touch, units) if self._touching else (None, "")
         points, lost = sound_points(inputs.points)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.control.joint_box import JointLimits
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
@@ -65,7 +64,8 @@ def examine(
     watch: Watch,
     inputs: Inputs,
     command: FloatArray,
-    limits: JointLimits,
+    period: float,
+    qd_max: FloatArray,
     params: FailureParams,
     torques: bool = False,
 ) -> tuple[RobotState, dict[Event, str], Watch]:
@@ -79,42 +79,39 @@ def examine(
         watch: memory.
         inputs: of this step.
         command: (n,) last joint velocity command [rad/s].
-        limits: of the joints, and the time that command was held.
+        period: time that command was held [s].
+        qd_max: (n,) joint velocity limits [rad/s].
         params: time limits.
         torques: whether the torques of the external force are needed, rather than the force.
     """
     faults: dict[Event, str] = {}
-    robot, wrong = sound_robot(inputs.robot, limits.qd_max)
+    robot, wrong = sound_robot(inputs.robot, qd_max)
     stamp = _time(inputs.stamp)
     now = watch.stamp if stamp is None else stamp
-    sent = (*watch.sent[-int(params.state_timeout_s / limits.period) - 1 :], (watch.stamp, command))
-    late = now - watch.stamp > params.overrun_s
-    old = robot is not None and robot.stamp <= watch.stamp < now
     if robot is None:
         faults[Event.UNUSABLE] = wrong
     elif stamp is None:
         faults[Event.UNUSABLE] = f"the step's time stamp is {inputs.stamp}"
     elif abs(now - robot.stamp) > params.state_timeout_s:
         faults[Event.STATE_STALE] = _stale(now - robot.stamp)
-    elif watch.stamp <= now and not old and (wrong := _unexplained(robot.qd_commanded, sent, limits, late)):
-        faults[Event.UNUSABLE] = wrong
+    sent = (*watch.sent[-int(params.state_timeout_s / period) - 1 :], (watch.stamp, command))
     if now < watch.stamp:
         faults[Event.TIME_BACKWARDS] = f"from {watch.stamp:.3f} s to {now:.3f} s"
         sent = ()
     if robot is None or faults:
         last = watch.robot
         believed = replace(
-            last, q_commanded=last.q_commanded + command * limits.period, qd_commanded=command,
+            last, q_commanded=last.q_commanded + command * period, qd_commanded=command,
             tau_ext=np.full(len(last.q), np.nan), wrench=None,
         )  # fmt: skip
         return believed, faults, Watch(now, believed, min(watch.force_stamp, now), sent)
-    if old:
+    if robot.stamp <= watch.stamp < now:
         robot = replace(robot, q_commanded=_moved_on(robot, now, sent), qd_commanded=command)
     if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
         robot = replace(robot, wrench=None)
     missing = np.isnan(robot.tau_ext).any() if torques else robot.wrench is None
     force_stamp = min(watch.force_stamp, now) if missing else now
-    if late:
+    if now - watch.stamp > params.overrun_s:
         faults[Event.OVERRUN] = f"{now - watch.stamp:.3f} s"
     if now - force_stamp > params.force_timeout_s:
         faults[Event.NO_FORCE] = f"{now - force_stamp:.2f} s"
@@ -129,26 +126,6 @@ def _stale(age: float) -> str:
         f"{age:.3f} s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow:"
         " close other programs and check the connection to the arm"
     )
-
-
-def _unexplained(
-    reported: FloatArray, sent: tuple[tuple[float, FloatArray], ...], limits: JointLimits, late: bool
-) -> str:
-    """Say which commanded velocity no command of late explains, or ''.
-
-    The next command may differ by little from this one: believed, a wrong one would be a jump of the arm. An arm may be
-    behind what it was sent, by its bus or a filter, and between two of these commands; a change that its acceleration
-    limit allows in a period is none; and it stops by itself where the next command is late.
-    """
-    reach = limits.qdd_max * limits.period
-    if below((reported - sent[-1][1]) / reach, 1.0):
-        return ""
-    commands = np.array([command for _, command in sent] + [0.0 * reach] * late)
-    beyond = np.maximum(commands.min(axis=0) - reported, reported - commands.max(axis=0)) / reach
-    joint = int(np.argmax(beyond))
-    if beyond[joint] < 1.0:
-        return ""
-    return f"it reports a commanded velocity of {reported[joint]:.3g} rad/s of joint {joint + 1}, which was never sent"
 
 
 def _moved_on(robot: RobotState, now: float, sent: tuple[tuple[float, FloatArray], ...]) -> FloatArray:

@@ -61,7 +61,7 @@ class Course:
         self.read_only = self.rng.random() < 0.3
         robot = self.robot()
         self.state = self.controller.init(robot)
-        self.oracle = Oracle(world.profile, world.skin.ids, robot, world.model.description)
+        self.oracle = Oracle(world.profile, world.skin.ids, robot, world.model.description.qd_max)
         p = world.profile
         self.setting = (
             "step", f"arm {world.model.description.name}", f"restriction {restriction_mode(p)}",

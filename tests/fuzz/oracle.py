@@ -7,7 +7,6 @@ import numpy as np
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.profiles import Profile
-from pretouch.robot.description import RobotDescription
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RobotState
 
 SHOWN, NEAR, NO_TARGET = {0, 6, 11}, {3, 13}, {1, 2, 4, 7}
@@ -72,9 +71,8 @@ class Expected:
 class Oracle:
     """Remembers what has to be remembered, apart from the controller's own state."""
 
-    def __init__(self, profile: Profile, ids: tuple[str, ...], robot: RobotState, arm: RobotDescription) -> None:
-        self.p, self.ids, self.qd_max = profile, ids, arm.qd_max
-        self.reach = arm.qdd_max * profile.task.control_period_s
+    def __init__(self, profile: Profile, ids: tuple[str, ...], robot: RobotState, qd_max: np.ndarray) -> None:
+        self.p, self.ids, self.qd_max = profile, ids, qd_max
         self.sent: list[tuple[float, np.ndarray]] = []
         self.stamp = self.force_stamp = robot.stamp
         self.used = np.full(len(ids), -np.inf)
@@ -93,8 +91,6 @@ class Oracle:
         now = self.stamp = inputs.stamp if abs(inputs.stamp) < LATEST else self.stamp
         kept = int(p.failure.state_timeout_s / p.task.control_period_s) + 1
         self.sent = [] if now < last else [*self.sent[-kept:], (last, self.qd)]
-        if not fault and (robot.stamp > last or now == last) and self._never_sent(robot.qd_commanded, now - last):
-            fault = "unusable"
         if not fault:
             self._believe(robot, last, now)
         w = None if fault else robot.wrench
@@ -112,14 +108,6 @@ class Oracle:
             silent=[name for name, a in zip(self.ids, age, strict=False) if a >= stop],
             scale=min(max(float(stop - age.max(initial=0.0)) / (stop - slow), 0.0), 1.0),
         )  # fmt: skip
-
-    def _never_sent(self, reported: np.ndarray, pause: float) -> bool:
-        """Whether a joint's commanded velocity is neither near what was sent of late nor between two of that."""
-        sent = [command for _, command in self.sent]
-        if pause > self.p.failure.overrun_s and (np.abs(reported - self.qd) >= self.reach).any():
-            sent.append(np.zeros_like(reported))
-        lowest, highest = np.min(sent, axis=0) - self.reach, np.max(sent, axis=0) + self.reach
-        return not ((lowest < reported) & (reported < highest)).all()
 
     def _believe(self, robot: RobotState, last: float, now: float) -> None:
         """Go by a report, and by the commands it cannot know of."""

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.params import FailureParams
-from pretouch.robot.description import RobotDescription
 from pretouch.types import Inputs, Mode, RobotState
 
 UNUSABLE = "The robot's state cannot be used ({}): check the connection to the arm, then resume."
@@ -81,9 +80,9 @@ class Behaviour:
 class Trust:
     """What is remembered to judge the next inputs."""
 
-    def __init__(self, robot: RobotState, params: FailureParams, arm: RobotDescription) -> None:
+    def __init__(self, robot: RobotState, params: FailureParams, qd_max: np.ndarray) -> None:
         self.params, self.robot, self.now, self.felt = params, robot, robot.stamp, robot.stamp
-        self.qd_max, self.qdd_max = arm.qd_max, arm.qdd_max
+        self.qd_max = qd_max
         self.sent: list[tuple[float, np.ndarray]] = []
 
     def judge(self, inputs: Inputs, command: np.ndarray, period: float) -> tuple[RobotState, dict[str, str]]:
@@ -99,10 +98,6 @@ class Trust:
                 wrong[STALE] = OLD.format(age) if age > 0 else AHEAD.format(-age)
         kept = int(self.params.state_timeout_s / period) + 1
         self.sent = [*self.sent[-kept:], (before, command)]
-        if not wrong and before <= self.now and not robot.stamp <= before < self.now:
-            never = self._never_sent(robot.qd_commanded, self.now - before, self.qdd_max * period)
-            if never:
-                wrong[UNUSABLE] = never
         if self.now < before:
             wrong[BACKWARDS] = f"from {before:.3f} s to {self.now:.3f} s"
             self.sent = []
@@ -131,18 +126,6 @@ class Trust:
             wrong[NO_FORCE] = f"{self.now - self.felt:.2f} s"
         self.robot = robot
         return robot, wrong
-
-    def _never_sent(self, reported: np.ndarray, pause: float, reach: np.ndarray) -> str:
-        """Say which joint's commanded velocity lies outside all commands of late by its acceleration in a period."""
-        sent = np.array([command for _, command in self.sent])
-        if (np.abs(reported - sent[-1]) < reach).all():
-            return ""
-        if pause > self.params.overrun_s:  # the arm may have stopped by itself
-            sent = np.vstack([sent, np.zeros(len(reach))])
-        beyond = np.max([sent.min(axis=0) - reported, reported - sent.max(axis=0)], axis=0) / reach
-        j = beyond.argmax()
-        text = "it reports a commanded velocity of {:.3g} rad/s of joint {}, which was never sent"
-        return text.format(reported[j], j + 1) if beyond[j] >= 1 else ""
 
 
 def unusable(inputs: Inputs, qd_max: np.ndarray) -> str:

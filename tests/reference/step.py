@@ -36,7 +36,7 @@ class ReferenceController:
         self, model: RobotModel, skin: Skin, fixtures: Fixtures, path: Path, profile: Profile, robot: RobotState
     ) -> None:
         self.model, self.path, self.profile, self.tree = model, path, profile, tree_of(model)
-        self.trust = modes.Trust(robot, profile.failure, model.description)
+        self.trust = modes.Trust(robot, profile.failure, model.description.qd_max)
         self.eyes = Eyes(model, skin, fixtures, profile)
         self.touch = Touch(profile.detect, profile.window)
         self.fading = Fading(profile.slow, profile.task.restore_cycles)

@@ -11,7 +11,7 @@ class FailureParams(Checked):
     """When to stop trusting the inputs."""
 
     state_timeout_s: Annotated[float, Check(low=0.0, high=1.0, open_low=True)] = 0.05
-    """Age of the robot state at which the arm holds [s]. As long are commands remembered, and each takes time."""
+    """Age of the robot state at which the arm holds [s]. As long are commands remembered."""
     overrun_s: Positive = 0.05
     """Time between two steps from which the later one brakes [s]: a command is meant to be held for one period."""
     force_max_n: Positive = 1e5
