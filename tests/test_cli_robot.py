@@ -75,7 +75,7 @@ def test_misuse_is_one_sentence(tmp_path, capsys, more, sentence):
 @pytest.mark.parametrize(
     ("name", "old", "new", "sentence"),
     [
-        ("arm.xml", 'name="base_0" type="capsule" size="', 'name="base_0" type="capsule" size="0.7 0.1" user="',
+        ("arm.xml", 'name="base_0" type="capsule" size="', 'name="base_0" type="capsule" size="0.7 0.1" friction="',
          "overlap by"),
         ("robot.toml", '"tool0"', '"hand"', "ee_body: The link 'hand' is unknown: choose from base"),
         ("robot.toml", "1.2", "9.2", "q_ready is [0.0, 0.3, 9.2, 0.0, 1.6, 0.0]: give 6 joint positions"),

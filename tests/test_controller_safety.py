@@ -328,35 +328,3 @@ def test_a_path_out_of_reach_ends_within_the_limits(
         step = arm.step(arm.inputs())
         arm.check_position_and_velocity()
     assert step.qp.outcome is QpOutcome.SOLVED
-
-
-PARTS = ("stamp", "q", "qd", "q_commanded", "qd_commanded", "tau_ext", "wrench")
-
-
-@pytest.mark.parametrize("lie", [-1.9, -1.0, -0.05, 0.02, 0.3, 1.0])
-@pytest.mark.parametrize("part", PARTS)
-@pytest.mark.parametrize("cycles", [2, 40], ids=["standing", "moving"])
-def test_a_finite_lie_is_no_jump_of_the_arm(panda_model, paper_skin, cycles, part, lie):
-    """What is believed of a commanded velocity is within a period's acceleration of what was sent."""
-    arm = Arm(panda_model, paper_skin, path=circle_at_the_hand(panda_model))
-    for _ in range(cycles):
-        arm.step(arm.inputs(0.0, RangeStatus.NO_TARGET))
-    for k in range(12):
-        given, sent = arm.inputs(0.0, RangeStatus.NO_TARGET), arm.state.command
-        if k % 2:
-            told = np.array(getattr(given.robot, part), dtype=np.float64)
-            told[... if part == "stamp" else k % len(told)] += lie
-            given = replace(given, robot=replace(given.robot, **{part: told}))
-        step, arm.state = arm.controller.step(arm.state, given)
-        assert (np.abs(step.command - sent) <= 2.0 * arm.limits.qdd_max * DT + 1e-9).all()
-        arm.q, arm.qd, arm.time = arm.q + step.command * DT, step.command, arm.time + DT
-
-
-def test_a_standing_arm_stays_where_it_is_told_of_a_velocity_that_was_never_sent(panda_model, paper_skin):
-    arm = Arm(panda_model, paper_skin)
-    for reported in (1.0, 0.0, -0.5):
-        given = arm.inputs()
-        step = arm.step(replace(given, robot=replace(given.robot, qd_commanded=np.full(7, reported))))
-        assert not step.command.any()
-    assert step.mode is Mode.HOLD
-    assert "a commanded velocity of -0.5 rad/s of joint 6, which was never sent" in step.reason

@@ -57,6 +57,7 @@ FIELDS = {
     "command": "command",
     "residual": "residual",
     "detector.evidence": "evidence",
+    "detector.detectable": "detectable_n",
     "localisation.link": "touched.link",
     "localisation.point": "touched.point",
     "localisation.force": "touched.force",

@@ -79,8 +79,6 @@ class RunRecord(DetectorRecord):
     """(S, 3) value of eq. 8 [N]."""
     evidence: FloatArray
     """(S,) how far the detector was on the way to a contact, one from 1 on."""
-    detectable_n: FloatArray
-    """(S,) force at the end-effector that is found if it is held for 0.1 s [N]."""
     contacts: tuple[tuple[int, Contact, float], ...]
     """Detections: index of the step, contact, speed of the reaction [m/s]."""
     truth: TrueForces | None
@@ -116,7 +114,7 @@ class RunRecord(DetectorRecord):
 
 _AS_THEY_ARE = (
     "ee_position", "ee_velocity", "path_position", "speed_scale", "range_distance", "force", "filtered_force",
-    "evidence", "detectable_n", "armed",
+    "evidence", "armed",
 )  # fmt: skip
 
 

@@ -42,6 +42,8 @@ class Course(RunRecord):
     """(S, 3) that point [m]."""
     answering: BoolArray
     """(S,) whether the arm moves with a contact."""
+    detectable_n: FloatArray
+    """(S,) force at the end-effector that is found if it is held for 0.1 s [N]."""
     restricted: IntArray
     """(S,) how many obstacles restrict the arm."""
     q_margin: FloatArray

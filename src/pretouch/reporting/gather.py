@@ -83,6 +83,7 @@ def _block(batch: list["Kept"], run: "Run", layout: _Layout) -> Columns:
         **spread,
         "run": np.full(len(batch), batch[0].run),
         "answering": np.array([answers(s) for s in steps]),
+        "detectable_n": np.array([s.detectable_n for s in steps]),
         "restricted": np.array([len(s.restricted) for s in steps]),
         "outcome": np.array([OUTCOMES.index(s.qp.outcome) for s in steps]),
         "slack": np.array([np.max(s.qp.slack, initial=0.0) for s in steps]),
