@@ -59,22 +59,17 @@ def explain(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> Ex
     if step.mode is Mode.HOLD:
         return Explanation(Doing.STOPPED if resumable(step) else Doing.WAITING, step.reason)
     names = _Names(units, links)
-    if step.mode is Mode.REACT:
-        return _in_contact(step, names)
-    found = _on_the_way(step, names)
-    return found if not step.detectable_n > LOUD_N else Explanation(found.doing, f"{found.sentence} {_loud(step)}")
-
-
-def _loud(step: ControlStep) -> str:
-    """Say that a light push would not be found."""
-    if step.detectable_n == np.inf:
-        return "Here, at this speed, no push is found."
-    return f"Here, at this speed, a push is found from {step.detectable_n:.0f} N on."
+    return _in_contact(step, names) if step.mode is Mode.REACT else _on_the_way(step, names)
 
 
 def finds(step: ControlStep) -> str:
-    """Say in two words what force is found; '' where the detector does not say."""
-    return f"finds {step.detectable_n:.0f} N" if np.isfinite(step.detectable_n) else ""
+    """Say which push is found; '' where the detector does not say."""
+    if np.isnan(step.detectable_n):
+        return ""
+    if step.detectable_n <= LOUD_N:
+        return f"finds {step.detectable_n:.0f} N"
+    loud = "no push is found" if np.isinf(step.detectable_n) else f"a push is found from {step.detectable_n:.0f} N on"
+    return f"here, at this speed, {loud}"
 
 
 def resumable(step: ControlStep) -> bool:
