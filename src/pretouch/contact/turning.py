@@ -16,8 +16,9 @@ _PRIOR = 0.3
 """Deviation of the factor before anything is learnt; its mean is 0."""
 _MOST = 1.0
 """Largest factor: nothing is known of what accelerates."""
-_MOST_NM2 = 1.0
-"""Largest variance: a force of 15 N half a metre from an axis makes 7 Nm [Nm^2]."""
+_MOST_NM2 = 25.0
+"""Largest variance: joints that ring after 15 rad/s^2, the limit of the Panda's first, were wrong by up to 13 Nm,
+and with 1 Nm^2 gave an alarm a minute [Nm^2]."""
 _WINDOW = 2
 _SAMPLES = LENGTHS[_WINDOW]
 """The window whose means say how large the factor is [samples]."""

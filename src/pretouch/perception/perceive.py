@@ -74,6 +74,8 @@ class SightNumbers(NamedTuple):
     persistence_s: float
     margin_m: float
     """Distance before what is known to be there from which on a reading is explained by it."""
+    aside_m: float
+    """By how much it may lie beside what a unit is believed to see."""
     filters: bool
     """Whether readings are explained at all."""
     estimates: bool
@@ -111,7 +113,7 @@ def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: 
     )  # fmt: skip
     estimates, memory = p.closing is not None, math.inf if p.closing is None else p.closing.memory_s
     numbers = SightNumbers(
-        p.persistence_s, p.self_margin_m or 0.0, p.self_margin_m is not None, estimates, memory,
+        p.persistence_s, p.self_margin_m or 0.0, p.self_aside_m, p.self_margin_m is not None, estimates, memory,
         p.reckon_below_minimum, p.silent_after_s if p.keep_while_silent else 0.0,
         0.0 if skin.exact else p.spread_sigmas,
     )  # fmt: skip
@@ -296,14 +298,14 @@ def _take_readings(
     if p.filters:
         if p.sigmas > 0:
             widen(ends, p.sigmas, skin.position_sigma, skin.orientation_sigma, distance, p.margin_m)
-        leave_out(shows, fresh, Shown(distance, ends), sensors, placed_capsules(scene.arm, kin), scene.rays)
+        leave_out(shows, fresh, Shown(distance, ends, p.aside_m), sensors, placed_capsules(scene.arm, kin), scene.rays)
     if instant.moves:
         # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
         chain = Chain(kin.anchor, kin.axis, scene.moved_by, instant.qd)
         # changes `position` and `rotation`, the arrays of `sensors`, for all that follows
         move_back(sensors, readings.stamp, chain, instant.posed, p.persistence_s)
     if p.filters:
-        leave_out(shows, fresh, Shown(distance, ends), sensors, placed_capsules(scene.others, kin), scene.rays)
+        leave_out(shows, fresh, Shown(distance, ends, p.aside_m), sensors, placed_capsules(scene.others, kin), scene.rays)
         leave_out_planes(shows, fresh, ends, position, rotation, scene.planes, scene.rays)
     points = locate(position, rotation, distance)  # eq. 1
     # both look at what was seen last, before `take_in` overwrites it

@@ -19,9 +19,6 @@ RAYS = cone_rays(2)
 """Unit vectors (19, 3) that stand for all a sensor sees, sensor frame; the first is its axis."""
 
 _COS, _SIN = float(np.cos(CONE_ANGLE / 2)), float(np.sin(CONE_ANGLE / 2))
-_ASIDE = 0.005
-"""By how much the arm may lie beside what a unit is believed to see [m]: what a ruler leaves of a unit's place. A unit
-that is off by it and by 3 degrees saw the arm itself at the edge of its cone in up to 45 % of the time."""
 _ROUNDING = 1e-9
 """Distance within which rounding may put a point on either side of a surface [m]."""
 
@@ -108,6 +105,8 @@ class Shown(NamedTuple):
     """(K,) what each stands for [m]."""
     ends: FloatArray
     """(K,) up to where a return that is expected explains it [m]: nothing is seen through a body."""
+    aside: float
+    """By how much what it shows may lie beside what its unit is believed to see [m]."""
 
 
 @compiled
@@ -124,10 +123,10 @@ def leave_out(
             end = shown.ends[k]
             # nothing farther explains the reading, and the first return within is enough
             shows[k] = capsule_return(sensors, k, capsules, spheres, rays, Wanted(0.0, -np.inf, end, end)) > end
-        if fresh[k] and shows[k]:
+        if fresh[k] and shows[k] and shown.aside > 0:
             # a capsule that is missed hides nothing behind it: only a reading from about there is taken for it
             start = 2 * shown.distance[k] - shown.ends[k]
-            wanted = Wanted(_ASIDE, start, shown.ends[k], start)
+            wanted = Wanted(shown.aside, start, shown.ends[k], start)
             shows[k] = capsule_return(sensors, k, capsules, spheres, rays, wanted) > shown.ends[k]
 
 

@@ -7,6 +7,7 @@ WITHOUT = "without "
 """Begins the names of these baselines."""
 
 OFF = {
+    "perception.self_aside_m": "0",
     "perception.closing": "none",
     "perception.reckon_below_minimum": "no",
     "perception.place_at_stamp": "no",
@@ -25,6 +26,7 @@ OFF = {
     "detect.cues": "none",
     "detect.learn": "never",
     "detect.widen_at_turns": "no",
+    "detect.misfit": "none",
     "detect.localise": "none",
     "react": "decay",
     "react.clamp": "none",
