@@ -29,9 +29,9 @@ _IMU = {
 }  # fmt: skip
 _DETECT = (
     "joint_torques_nm", "force_n", "false_alarms_per_hour", "slack_nats", "contact_gain", "tails", "clear_m", "suspect",
-    "inertia", "relearn_after_s", "widen_at_turns", "memory_s", "spread_memory_s", "observer_gain_1_s",
+    "relearn_after_s", "widen_at_turns", "memory_s", "spread_memory_s", "observer_gain_1_s",
     "offset_prior_nm", "friction_prior_nm", "mass_prior", "payload_prior_kg", "velocity_prior_rad_s2",
-    "torque_prior_nm", "noise_floor_nm", "bias_floor_nm", "still_rad_s", "confirm_samples",
+    "torque_prior_nm", "noise_floor_nm", "bias_floor_nm", "still_rad_s",
 )  # fmt: skip
 _APPROACH = (
     "v_max_m_s", "beta", "d_repulse_m", "d_crit_m", "d_notice_m", "floor_m_s", "slack_weight", "deceleration_m_s2",

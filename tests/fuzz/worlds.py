@@ -93,7 +93,7 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "false_alarms_per_hour": (1.0, 3600.0),
         "proximity": (ProximityPriorParams(), ProximityPriorParams(gain=1e4), None),
         "learn": ("watched", "always", "never"), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0), "suspect": (0.6, 1.0),
-        "confirm_samples": (1, 3), "localise": (LocalisationParams(), None),
+        "localise": (LocalisationParams(), None),
     },
     FixedBounds: {},
     Admittance: {

@@ -86,7 +86,6 @@ class Situation(NamedTuple):
 class DetectionNumbers(NamedTuple):
     """What compiled code takes of `SequentialParams`."""
 
-    inertia: bool
     widen_at_turns: bool
     offset_prior_nm: float
     use_proximity: bool

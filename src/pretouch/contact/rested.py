@@ -10,8 +10,7 @@ from pretouch.params import SequentialParams
 
 _DRIFT = 0.25
 """Part of the prior's standard deviations that offset and friction may drift by while nobody looks: an arm cools."""
-_COOLING_S = 300.0
-"""Time in which it does: an assumption [s]."""
+_COOLING_S = 300.0  # an assumption
 
 
 def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> ResidualModel:

@@ -40,8 +40,6 @@ class SequentialState:
     """How many there are."""
     calm: int
     """Samples since a contact was suspected, something was near, or the arm reacted."""
-    confirmed: int
-    """Samples in a row with a log-likelihood ratio from 1 on."""
     lasting: FloatArray
     """(3 + n,) load or step of a joint's torque that explains a residual that stays, see `find_lasting`."""
     steady: int
@@ -110,7 +108,7 @@ def sequential_init(model: RobotModel, p: SequentialParams, learnt: ResidualMode
     """Return the state before the first sample; `learnt` is what an earlier session knew of the arm."""
     known = residual_init(model.n, p) if learnt is None else learnt
     return SequentialState(
-        known, np.zeros((LONGEST, model.n)), 0, 0, 0, 0, np.zeros(3 + model.n), 0, turning_init(model.n),
+        known, np.zeros((LONGEST, model.n)), 0, 0, 0, np.zeros(3 + model.n), 0, turning_init(model.n),
         scatter_init(model.n), level_init(), 0,
     )  # fmt: skip
 
@@ -159,7 +157,7 @@ def sequential_step(
         math.exp(-p.observer_gain_1_s * period), period, settle, alarm_bound(p, period),
         p.learn == "always" or (watched and p.learn == "watched"), reacting,
         (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2, seen.cues.gain,
-        p.inertia, p.widen_at_turns, p.offset_prior_nm, p.proximity is not None, p.contact_gain, p.tails, nearness.gain,
+        p.widen_at_turns, p.offset_prior_nm, p.proximity is not None, p.contact_gain, p.tails, nearness.gain,
         nearness.distance_m, nearness.horizon_s, p.clear_m, p.suspect, p.slack_nats, p.noise_floor_nm, p.bias_floor_nm,
         p.still_rad_s, p.memory_s, p.spread_memory_s, p.misfit is not None, misfit.memory_s, misfit.settled_s,
         residual, speed, force, bands, means, covariance, model_variance, *seen.kin, *model.mechanism_fields,
@@ -167,11 +165,10 @@ def sequential_step(
     relearnt = steady < 0  # the load that lasted is free motion now, and no contact
     if relearnt:
         ratio, force, count, calm, steady, filled, waiting = 0.0, np.zeros(3), 0, 0, 0, 0, 0
-    confirmed = state.confirmed + 1 if ratio >= 1.0 else 0
     found = SequentialDetection(
         residual, ResidualWindows(means, count, covariance, model_variance), ratio, force, bands,
-        confirmed >= p.confirm_samples, relearnt or calm == CALM, steady > 0, detectable,
+        ratio >= 1.0, relearnt or calm == CALM, steady > 0, detectable,
     )  # fmt: skip
     after = ResidualModel(weights, weights_covariance, noise, learnt, speed, queue, block, filled, waiting)
-    remembered = (calm, confirmed, lasting, steady, turning, scatter, level, settled)
+    remembered = (calm, lasting, steady, turning, scatter, level, settled)
     return found, SequentialState(after, ring, (state.at + 1) % LONGEST, count, *remembered)

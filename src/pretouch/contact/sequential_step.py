@@ -27,9 +27,8 @@ from pretouch.robot.mass_matrix import mass_matrix_into
 from pretouch.robot.model import Kinematics, jacobian_into
 from pretouch.types import FloatArray
 
-
 _STIRS_RAD_S = 0.002
-"""Joint speed from which an arm at rest sets out: friction turns round long before it counts as moving [rad/s]."""
+"""Joint speed from which an arm at rest sets out: friction turns round before it counts as moving [rad/s]."""
 
 
 class Joints(NamedTuple):
@@ -148,7 +147,7 @@ def _free_motion(
         acceleration[j] = (free.speed[j] - before[j]) / now.period
         if abs(free.speed[j]) > p.still_rad_s:
             moving = 1
-    features_into(kin, mechanism, free.speed, acceleration if p.inertia else np.zeros(n), free.x)
+    features_into(kin, mechanism, free.speed, acceleration, free.x)
     mean_and_variance(learnt.weights, learnt.covariance, free.x, free.mean, free.model_variance)
     mass_matrix_into(kin, mechanism, free.M)
     spread_of_sample(free.M, learnt.spread[moving], p.noise_floor_nm, free.covariance)

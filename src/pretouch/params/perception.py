@@ -52,8 +52,7 @@ class PerceptionParams(Checked):
     the VL53L1X ranging error of 25 mm, and 10 mm of pose error. None: all readings count as obstacles."""
     self_aside_m: NonNegative = 0.0
     """By how much the arm or a fixture may lie beside what a unit is believed to see, and be left out where a reading
-    is within that margin of it [m]. `pretouch` has 5 mm, what a ruler leaves of a unit's place: one that was off by it
-    and by 3 degrees saw the arm itself at the edge of its cone, up to 45 % of the time."""
+    is within that margin of it [m]. `pretouch` has 5 mm: one that a ruler placed saw the arm itself half the time."""
     spread_sigmas: NonNegative = 2.0
     """Standard deviations of a unit's place by which what it shows counts as nearer, and as the arm or a fixture
     earlier [1]: ours, about 95 % along one direction. It has no effect where the skin says no uncertainty."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from pretouch.checks import Check, Checked, NonNegative, Positive, PositiveCount
+from pretouch.checks import Check, Checked, NonNegative, Positive
 
 
 @dataclass(frozen=True)
@@ -63,14 +63,13 @@ class SequentialParams(Checked):
     """Bound on the rate of false alarms with nothing near [1/h], if free motion is as learnt."""
     slack_nats: NonNegative = 7.0
     """How far below its bound ln R may be a contact [1], for Markov's inequality is not tight: as far as free motion
-    has earned it, or, without `misfit`, at once. In 1.5 hours of free motion of eighteen simulated arms at up to 0.3
-    m/s ln R came to 4.4 where the bound allows 12.8. With 0 the bound is proven."""
+    has earned it, or, without `misfit`, at once. 18 simulated arms came to 4.4 in 1.5 h, where the bound is 12.8."""
     contact_gain: Positive = 15.0
     """Times the spread of the torques is larger with a contact, in each direction it can push [1]: best for what is
     just large enough to be found."""
     tails: Annotated[float, Check(low=3.0, high=1000.0)] = 20.0
-    """Degrees of freedom of the Student distribution of free motion: one outlier alone is no contact. On arms of the
-    world `hard` 30 gave two and a half times as many false alarms, and 10 missed nine times as many contacts."""
+    """Degrees of freedom of the Student distribution of free motion: one outlier alone is no contact. In the world
+    `hard` 30 gave twice as many false alarms, and 10 missed nine times as many contacts."""
     proximity: ProximityPriorParams | None = field(default_factory=ProximityPriorParams)
     """How something near raises the prior of a contact there; None: not at all."""
     learn: Literal["watched", "always", "never"] = "watched"
@@ -80,9 +79,6 @@ class SequentialParams(Checked):
     """Body distance within which nothing may be, for free motion to be learnt [m]."""
     suspect: Annotated[float, Check(low=0.05, high=1.0)] = 0.6
     """Evidence from which a contact is suspected, so that nothing is learnt from before or after it [1]."""
-    inertia: bool = True
-    """Whether what accelerates is part of the mean, as what weighs is: an unknown load's inertia where a path turns
-    round."""
     relearn_after_s: NonNegative = 5.0
     """Time after which a residual is learnt that looks like a contact and that all the while, with nothing near, the
     same weight gripped or put down explains, or the same small torque on one joint [s]; 0: never. The arm waits so
@@ -91,9 +87,8 @@ class SequentialParams(Checked):
     """Whether it is learnt how much less of free motion is known where the arm accelerates hard, as where it turns
     round."""
     memory_s: Positive = 10_000.0
-    """Time in which what was learnt of the mean fades towards not knowing [s]. A mean that forgets in 300 s follows
-    what sticks and what leans on the arm: on arms of the world `hard` it gave three times as many false alarms, and a
-    push that grew by 1 N/s was felt at 9 N in place of 5."""
+    """Time in which what was learnt of the mean fades towards not knowing [s]. One that forgets in 300 s follows what
+    sticks and who leans on the arm: in the world `hard` it gave three times as many false alarms."""
     spread_memory_s: Positive = 30.0
     """Time over which the spread is averaged [s]."""
     observer_gain_1_s: Positive = 60.0
@@ -114,11 +109,8 @@ class SequentialParams(Checked):
     noise_floor_nm: Positive = 0.03
     """Smallest spread of a sample of a joint's torque [Nm]."""
     bias_floor_nm: Positive = 0.06
-    """Smallest standard deviation of the error of the learnt mean [Nm]: with 0.03 twice as many false alarms on arms of
-    the world `hard`."""
+    """Smallest standard deviation of the error of the learnt mean [Nm]; 0.03 gave twice as many false alarms."""
     still_rad_s: Positive = 0.02
     """Joint speed below which the arm counts as standing, with a spread of its own [rad/s]."""
     misfit: MisfitParams | None = field(default_factory=MisfitParams)
     """How what the model cannot express is covered; none: not at all, and suspicious samples are not learnt."""
-    confirm_samples: PositiveCount = 1
-    """Samples in a row with the evidence of a contact that make one."""

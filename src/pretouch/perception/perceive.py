@@ -25,7 +25,7 @@ from pretouch.perception.obstacles import (
     take_in,
     tells_anything,
 )
-from pretouch.perception.scene_filter import RAYS, Fixtures, Shown, leave_out, leave_out_planes
+from pretouch.perception.scene_filter import RAYS, Fixtures, leave_out, leave_out_planes
 from pretouch.perception.spread import bring_nearer, widen
 from pretouch.perception.stamped import move_back
 from pretouch.robot.model import Kinematics, RobotModel
@@ -298,14 +298,14 @@ def _take_readings(
     if p.filters:
         if p.sigmas > 0:
             widen(ends, p.sigmas, skin.position_sigma, skin.orientation_sigma, distance, p.margin_m)
-        leave_out(shows, fresh, Shown(distance, ends, p.aside_m), sensors, placed_capsules(scene.arm, kin), scene.rays)
+        leave_out(shows, fresh, distance, ends, p.aside_m, sensors, placed_capsules(scene.arm, kin), scene.rays)
     if instant.moves:
         # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
         chain = Chain(kin.anchor, kin.axis, scene.moved_by, instant.qd)
         # changes `position` and `rotation`, the arrays of `sensors`, for all that follows
         move_back(sensors, readings.stamp, chain, instant.posed, p.persistence_s)
     if p.filters:
-        leave_out(shows, fresh, Shown(distance, ends, p.aside_m), sensors, placed_capsules(scene.others, kin), scene.rays)
+        leave_out(shows, fresh, distance, ends, p.aside_m, sensors, placed_capsules(scene.others, kin), scene.rays)
         leave_out_planes(shows, fresh, ends, position, rotation, scene.planes, scene.rays)
     points = locate(position, rotation, distance)  # eq. 1
     # both look at what was seen last, before `take_in` overwrites it

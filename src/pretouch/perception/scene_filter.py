@@ -98,36 +98,25 @@ def expected_range(
     return near
 
 
-class Shown(NamedTuple):
-    """What readings show, and what explains them."""
-
-    distance: FloatArray
-    """(K,) what each stands for [m]."""
-    ends: FloatArray
-    """(K,) up to where a return that is expected explains it [m]: nothing is seen through a body."""
-    aside: float
-    """By how much what it shows may lie beside what its unit is believed to see [m]."""
-
-
 @compiled
 def leave_out(
-    shows: BoolArray, fresh: BoolArray, shown: Shown, sensors: Sensors, capsules: CapsuleArrays, rays: FloatArray
-) -> None:
-    """Take from `shows` (K,) each fresh reading that a placed capsule explains.
+    shows: BoolArray, fresh: BoolArray, distance: FloatArray, ends: FloatArray, aside: float, sensors: Sensors,
+    capsules: CapsuleArrays, rays: FloatArray,
+) -> None:  # fmt: skip
+    """Take from `shows` (K,) each fresh reading that a placed capsule explains: one seen up to its `ends` (K,) [m].
 
-    One that is seen does so up to `ends`, and one that is barely missed if it is about there.
+    One that is missed by no more than `aside` [m] explains a `distance` (K,) [m] as far before as behind it.
     """
     spheres = bounds(capsules.a, capsules.b, capsules.radius)
     for k in range(len(shows)):
+        end = ends[k]
         if fresh[k] and shows[k]:
-            end = shown.ends[k]
             # nothing farther explains the reading, and the first return within is enough
             shows[k] = capsule_return(sensors, k, capsules, spheres, rays, Wanted(0.0, -np.inf, end, end)) > end
-        if fresh[k] and shows[k] and shown.aside > 0:
+        if fresh[k] and shows[k] and aside > 0:
             # a capsule that is missed hides nothing behind it: only a reading from about there is taken for it
-            start = 2 * shown.distance[k] - shown.ends[k]
-            wanted = Wanted(shown.aside, start, shown.ends[k], start)
-            shows[k] = capsule_return(sensors, k, capsules, spheres, rays, wanted) > shown.ends[k]
+            wanted = Wanted(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
+            shows[k] = capsule_return(sensors, k, capsules, spheres, rays, wanted) > end
 
 
 @compiled

@@ -16,8 +16,7 @@ from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState
 
 PROFILE = "paper:detect.f_base_n=1000:slow=none:approach=none:perception.closing=on:perception.self_aside_m=0.005"
 """Of the arms that are recorded: proximity is sensed, but no force is a contact and nothing near changes the motion.
-The arm is left out as `pretouch` does, for all detectors.
-Closing speeds are there for the detectors that use them; nothing else that is sensed depends on them."""
+Closing speeds are there for the detectors that use them, and the arm is left out as `pretouch` does, for all."""
 
 _ROBOT = tuple(f.name for f in fields(RobotState))
 _OBSTACLES = tuple(f.name for f in fields(Obstacles))
