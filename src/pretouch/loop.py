@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from signal import SIGINT, SIGTERM
 from typing import Any, Protocol
 
@@ -22,6 +22,8 @@ from pretouch.values import value
 
 _FINEST = 1e-7
 """Shortest time `Durations` tells apart [s]."""
+_ROUNDING_RAD_S = 1e-6
+"""By how much the report of a command may be rounded [rad/s]."""
 _BINS_PER_E = 1.0 / math.log(1.01)
 _BINS = 2316
 """Bins one per cent wide from a tenth of a microsecond to a thousand seconds."""
@@ -223,10 +225,32 @@ def turn(
     imu = imu_of(skin) if "imu" in controller.profile.detect.reads else None
     seen = None if points is None else points.read()
     stamp = _instant(tick, controller.limits.period, report, readings, touch)
-    inputs = Inputs(stamp, report, readings, resume, touch, imu, seen, payload)
+    believed = explained(controller, state, report, stamp)
+    inputs = Inputs(stamp, believed, readings, resume, touch, imu, seen, payload)
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)
+
+
+def explained(controller: Controller, state: ControllerState, robot: RobotState, now: float) -> RobotState:
+    """Return an arm's report [at a step's instant, s], with NaN for joint velocities that nobody commanded.
+
+    A loop that commands asks before each step: the next command may differ from what is reported by so much only, so a
+    false report would move the arm. A joint's velocity is explained between the least and the largest of the commands
+    that the report may be of, and what the acceleration limit allows since the last one. What is no report of an arm
+    stays as it is, for the step to name.
+    """
+    try:
+        reported = np.asarray(robot.qd_commanded, dtype=np.float64)
+    except (AttributeError, TypeError, ValueError, OverflowError):
+        return robot
+    limits, command = controller.limits, state.command
+    if reported.shape != command.shape:
+        return robot
+    reach = limits.qdd_max * max(limits.period, now - state.watch.stamp) + _ROUNDING_RAD_S
+    recent = np.array([command, *(earlier for _, earlier in state.watch.sent)])
+    known = (reported >= recent.min(axis=0) - reach) & (reported <= recent.max(axis=0) + reach)
+    return robot if known.all() else replace(robot, qd_commanded=np.where(known, reported, np.nan))
 
 
 def _instant(

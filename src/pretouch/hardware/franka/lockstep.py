@@ -17,7 +17,7 @@ from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.state import JOINTS, FrankaState, robot_state
 from pretouch.hardware.keys import Keys
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.loop import Cycle, Recorder
+from pretouch.loop import Cycle, Recorder, explained
 from pretouch.ports import touch_of
 from pretouch.realtime import warm_up
 from pretouch.sensing.skin import Skin
@@ -114,8 +114,9 @@ class _ControllerLoop:
 
     def _turn(self, state: FrankaState, readings: RangeReadings) -> None:
         stamp = state.time
-        robot = robot_state(state, stamp)
-        before = self._controller.init(robot, self._learnt) if self._state is None else self._state
+        report = robot_state(state, stamp)
+        before = self._controller.init(report, self._learnt) if self._state is None else self._state
+        robot = explained(self._controller, before, report, stamp)
         inputs = Inputs(stamp, robot, readings, self._resume(), touch_of(self._skin_at))
         step, self._state = self._controller.step(before, inputs)
         self._recorder.record(Cycle(inputs, before, step, self._state))
