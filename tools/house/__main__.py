@@ -55,9 +55,9 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 54_510, 35_000),
+        Measure("lines of the product, comments aside", product.lines, 54_533, 35_000),
         Measure("files of the product", len(product.files), 454, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 75_257, 50_000),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 75_282, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
@@ -66,7 +66,7 @@ def measures() -> list[Measure]:
         *(_comments(package) for package in ("control", "contact", "perception")),
         Measure("words of documents by hand", sum(words_by_hand(ROOT).values()), 42_000, 42_000),
         Measure("lines of README", len((ROOT / "README.md").read_text().splitlines()), 150, 150),
-        Measure("parameters of a profile", len(values), 125, 140),
+        Measure("parameters of a profile", len(values), 122, 140),
         Measure("booleans among them", sum(isinstance(value, bool) for value in values), 8, 6),
         Measure("import pretouch, processor [s]", _import_s(), 0.05, 0.05),
         Measure("modules in an import cycle", len(cycle), 0, 0, " > ".join(cycle)),

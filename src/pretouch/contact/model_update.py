@@ -104,7 +104,6 @@ class DetectionNumbers(NamedTuple):
     spread_memory_s: float
     learn_misfit: bool
     misfit_memory_s: float
-    settled_s: float
 
 
 class Tested(NamedTuple):

@@ -51,7 +51,7 @@ class SequentialState:
     level: FloatArray
     """What the level of an alarm follows, see `level_init`."""
     settled: int
-    """Samples of free motion at rest, see `MisfitParams.settled_s`."""
+    """Samples of free motion at rest, see `sequential_step`."""
 
 
 class Observation(NamedTuple):
@@ -159,7 +159,7 @@ def sequential_step(
         (_CEILING * p.velocity_prior_rad_s2) ** 2, (_CEILING * p.torque_prior_nm) ** 2, seen.cues.gain,
         p.widen_at_turns, p.offset_prior_nm, p.proximity is not None, p.contact_gain, p.tails, nearness.gain,
         nearness.distance_m, nearness.horizon_s, p.clear_m, p.suspect, p.slack_nats, p.noise_floor_nm, p.bias_floor_nm,
-        p.still_rad_s, p.memory_s, p.spread_memory_s, p.misfit is not None, misfit.memory_s, misfit.settled_s,
+        p.still_rad_s, p.memory_s, p.spread_memory_s, p.misfit is not None, misfit.memory_s,
         residual, speed, force, bands, means, covariance, model_variance, *seen.kin, *model.mechanism_fields,
     )  # fmt: skip
     relearnt = steady < 0  # the load that lasted is free motion now, and no contact

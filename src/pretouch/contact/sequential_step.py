@@ -27,6 +27,8 @@ from pretouch.robot.mass_matrix import mass_matrix_into
 from pretouch.robot.model import Kinematics, jacobian_into
 from pretouch.types import FloatArray
 
+_SETTLED_S = 10.0
+"""Time at rest, as far as free motion is learnt in it, after which a posture's offsets count as learnt [s]."""
 _STIRS_RAD_S = 0.002
 """Joint speed from which an arm at rest sets out: friction turns round before it counts as moving [rad/s]."""
 
@@ -79,7 +81,7 @@ def detect_contact(
     settled = 0 if np.abs(free.speed).max() > _STIRS_RAD_S else recent.settled
     # At rest the offsets of a posture are learnt in seconds; until then the arm errs as in motion. Time in which
     # nothing may be learnt, with somebody near, does not count.
-    regime = 0 if settled * now.period >= p.settled_s else 1
+    regime = 0 if settled * now.period >= _SETTLED_S else 1
     expected, ratio = white_means(covariance, results.model_variance), np.zeros(0)
     if p.learn_misfit:
         expected = scattered_means(covariance, results.model_variance, recent.scatter[regime])

@@ -51,8 +51,6 @@ class MisfitParams(Checked):
     memory_s: Positive = 300.0
     """Time over which the scatter of the windows' means is averaged [s]. Shorter, a push that grows slowly where no
     unit sees it is learnt away: with 30 s one of six that grew by 1 N/s, with 300 s none."""
-    settled_s: Positive = 10.0
-    """Time at rest, as far as free motion is learnt in it, after which a posture's offsets count as learnt [s]."""
 
 
 @dataclass(frozen=True)
