@@ -129,6 +129,12 @@ def test_all_columns_in_another_order_within_the_ranges_are_named_by_their_torqu
         read_torques(write_csv(tmp_path / "b.csv", columns), Choice())
 
 
+def test_all_columns_of_an_arm_with_a_load_in_another_order_are_named(tmp_path, panda_model):
+    file = Moving(panda_model, 6.0, payload=8.0).raw_csv(tmp_path / "a.csv", order=[2, 1, 0, 3, 4, 5, 6])
+    with pytest.raises(RecordingError, match="far better with all columns in the order of joints 3, 2, 1, 4"):
+        read_torques(file, Choice(payload_kg=8.0))
+
+
 def test_one_joint_of_the_other_sign_is_named(tmp_path, short):
     short_driving = short.driving * np.where(np.arange(7) == 3, -1.0, 1.0)
     columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau*_Nm", short_driving))

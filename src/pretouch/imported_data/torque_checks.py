@@ -100,12 +100,12 @@ def check_torques(
     """
     some = np.unique(np.linspace(0, len(q) - 1, _SAMPLES).astype(np.int64))
     q, qd, tau = q[some], qd[some], tau[some]
-    carried = np.array([model.ee_jacobian(model.kinematics(p))[:3].T @ GRAVITY for p in q])
+    carried = _carried(model, q)
     expected = _model_torques(model, q, qd) + payload * carried
     _check_unit(place, tau, expected, model, measured)
     if measured:
         _check_sign(place, tau, expected)
-        _check_order(place, q, qd, tau, expected, model)
+        _check_order(place, q, qd, tau, model, payload)
         _check_signs(place, tau, expected)
         return _load(tau - expected, carried, "measured torques" if not payload else "")
     left = float((tau**2).sum())
@@ -116,6 +116,11 @@ def check_torques(
                 " still in them, so name the columns tau1_Nm and so on for our own observer."
             )
     return (*_friction_sign(qd, tau, carried), *_external_order(qd, tau, carried))
+
+
+def _carried(model: RobotModel, q: FloatArray) -> FloatArray:
+    """Torques (N, n) [Nm] that carry 1 kg at the end-effector."""
+    return np.array([model.ee_jacobian(model.kinematics(p))[:3].T @ GRAVITY for p in q])
 
 
 def _model_torques(model: RobotModel, q: FloatArray, qd: FloatArray) -> FloatArray:
@@ -157,9 +162,10 @@ def _check_signs(place: Path, tau: FloatArray, expected: FloatArray) -> None:
 
 
 def _check_order(
-    place: Path, q: FloatArray, qd: FloatArray, tau: FloatArray, expected: FloatArray, model: RobotModel
+    place: Path, q: FloatArray, qd: FloatArray, tau: FloatArray, model: RobotModel, payload: float
 ) -> None:
     """Refuse torques, or all columns, that another order of the joints explains far better."""
+    expected = _model_torques(model, q, qd) + payload * _carried(model, q)
     errors = ((tau[:, :, None] - expected[:, None, :]) ** 2).sum(axis=0)
     stay = 0.01 * float((tau**2).sum()) * (1.0 - np.eye(model.n))  # what little tells of a joint leaves it in place
     columns, joints = linear_sum_assignment(errors + stay)
@@ -177,7 +183,7 @@ def _check_order(
     for tried in permutations(range(model.n)):
         turned = q[:, tried]
         if ((turned >= model.q_min) & (turned <= model.q_max)).all():
-            expected = _model_torques(model, turned, qd[:, tried])
+            expected = _model_torques(model, turned, qd[:, tried]) + payload * _carried(model, turned)
             for columns_of, torques in (("all columns", tau[:, tried]), ("positions and velocities", tau)):
                 error = float(((torques - expected) ** 2).sum())
                 if error < best:
