@@ -239,6 +239,25 @@ def test_keys_are_made_and_listed_without_being_shown(tmp_path, capsys):
     assert "cannot be read" in capsys.readouterr().err
 
 
+def test_the_key_of_a_lost_unit_is_revoked_or_replaced_and_the_others_stay(tmp_path, capsys):
+    place = tmp_path / "keys.toml"
+    assert cli.main(["skin", "keys", "--keys", str(place), "--new", "a, b, c"]) == 0
+    made = load_keys(place)
+    assert cli.main(["skin", "keys", "--keys", str(place), "--revoke", "a"]) == 0
+    assert "Revoked: a. A receiver that runs" in capsys.readouterr().out
+    left = load_keys(place)
+    assert dict(left) == {name: made[name] for name in "bc"}
+    assert stat.S_IMODE(place.stat().st_mode) == 0o600
+    assert cli.main(["skin", "keys", "--keys", str(place), "--revoke", "b", "--new", "b"]) == 0
+    anew = load_keys(place)
+    assert anew["c"] == made["c"]
+    assert anew["b"].key != made["b"].key
+    capsys.readouterr()
+    assert cli.main(["skin", "keys", "--keys", str(place), "--revoke", "b, z"]) == 2
+    assert "z has no key to revoke: give names of c, b." in capsys.readouterr().err
+    assert load_keys(place) == anew
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [

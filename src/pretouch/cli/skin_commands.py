@@ -142,12 +142,14 @@ class Provision:
 
 @dataclass(frozen=True)
 class Keys:
-    """List the units of a file of keys, or add some with random keys, to try `simulate` and `monitor`."""
+    """List the units of a file of keys, add some with random keys to try `simulate` and `monitor`, or revoke keys."""
 
     keys: str
     """File of the units' keys; created if it is missing, readable only by you."""
     new: str = ""
     """Names of units to add, separated by commas."""
+    revoke: str = ""
+    """Names of units whose keys no longer count, separated by commas: lost or stolen. The others keep theirs."""
     json: str = ""
     """File for the numbers, or - for standard output: text then goes to standard error."""
 
@@ -157,7 +159,7 @@ class Keys:
         from pretouch.cli.writing import numbers_to
 
         with numbers_to(self.json) as write:
-            write(list_keys(keys_file(self.keys), self.new))
+            write(list_keys(keys_file(self.keys), self.new, self.revoke))
         return 0
 
 

@@ -1,4 +1,4 @@
-"""What `pretouch skin keys` does: the units of a file of keys, listed or added to."""
+"""What `pretouch skin keys` does: the units of a file of keys, listed, added to, or without those that were lost."""
 
 from collections.abc import Sequence
 from itertools import count
@@ -11,13 +11,15 @@ from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
 from pretouch.hardware.provision import fingerprint
 
 
-def list_keys(place: Path, new: str = "") -> dict[str, Any]:
-    """Print name, number and fingerprint of each unit in a file, after adding those of new names; return them."""
-    names = words(new)
-    keys = keys_or_none(place) if names else load_keys(place)
-    if names:
-        keys = with_new(keys, names)
+def list_keys(place: Path, new: str = "", revoke: str = "") -> dict[str, Any]:
+    """Print name, number and fingerprint of each unit in a file, after revoking keys and adding names; return them."""
+    names, lost = words(new), words(revoke)
+    keys = keys_or_none(place) if names and not lost else load_keys(place)
+    if names or lost:
+        keys = with_new(without(keys, lost), names)
         save_keys(keys, place)
+    if lost:
+        print(f"Revoked: {', '.join(lost)}. A receiver that runs goes on with the keys it has read: start it anew.")
     listed = [{"unit": u.id, "number": u.number, "fingerprint": fingerprint(u.key)} for u in keys.values()]
     for unit in listed:
         print("{unit}: number {number}, key {fingerprint}...".format(**unit))
@@ -44,6 +46,14 @@ def with_new(keys: Keys, names: Sequence[str]) -> Keys:
     for name in names:
         keys = Keys([*keys.values(), UnitKey(name, free_number(keys), new_key())])
     return keys
+
+
+def without(keys: Keys, names: Sequence[str]) -> Keys:
+    """Return keys without those of some names; a name there is not is a HardwareError."""
+    absent = [name for name in names if name not in keys]
+    if absent:
+        raise HardwareError(f"{', '.join(absent)} has no key to revoke: give names of {', '.join(keys) or 'no unit'}.")
+    return Keys(unit for unit in keys.values() if unit.id not in names)
 
 
 def free_number(keys: Keys) -> int:
