@@ -205,6 +205,7 @@ def test_light_touches_of_an_arm_that_stands_are_no_obstacle(arm: Pushed, side):
 def test_light_touches_of_an_arm_that_passes_are_no_obstacle(panda_model, paper_skin, pauses):
     slow = replace(NO_LAG, task=replace(NO_LAG.task, speed_m_s=0.1))
     arm = arm_of(panda_model, paper_skin, slow)
+    arm.run(500)  # touched in its first seconds, the detector doubts what it feels, and the arm yields less far
     for pause in pauses:
         arm.push((0.0, -15.0, 0.0), cycles=12)
         arm.wait()

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from tests.contact.alone import begun as feel_init
 from tests.contact.alone import feel, sample, standing
 
+from pretouch.contact.alarm_level import earned_level, level_init
 from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.detector import Body
 from pretouch.contact.sequential import alarm_bound
@@ -169,7 +170,7 @@ def test_a_touch_counts_for_an_object_that_is_seen_at_its_link_as_well(panda_mod
             robot = RobotState(0.02 * k, q, still, q, still, torque, np.zeros(6))
             felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, cues)
         evidence.append(felt.evidence)
-    # fifty times the prior of what says most: ln 50 in units of ln A, which is the bound of an arm that has earned
-    # nothing, but for what the other hypotheses add
-    gained = np.log(50.0) / alarm_bound(ours.detect, ours.task.control_period_s)
+    # fifty times the prior of what says most: ln 50 in units of ln A, but for what the other hypotheses add
+    bound = alarm_bound(ours.detect, ours.task.control_period_s)
+    gained = np.log(50.0) / earned_level(level_init()[1], bound, ours.detect.slack_nats, np.exp(-bound))
     assert 0.8 * gained < evidence[1] - evidence[0] <= gained * (1 + 1e-9)

@@ -55,9 +55,9 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 54_551, 35_000),
+        Measure("lines of the product, comments aside", product.lines, 54_554, 35_000),
         Measure("files of the product", len(product.files), 454, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 75_300, 50_000),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 75_303, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),

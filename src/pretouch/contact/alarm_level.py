@@ -1,8 +1,8 @@
-"""The level that ln R must pass to be a contact: the proven bound, less what the arm's own free motion has earned.
+"""The level that ln R must pass to be a contact: the proven bound, less what the arm's own free motion leaves it.
 
 Markov's inequality bounds how often R passes A in free motion that is as learnt (`sequential`). Of an arm whose free
-motion the model describes well, the largest ln R of half a second stay far below that, and of one that rings and
-sticks they do not. Maxima of many samples are Gumbel's (Fisher and Tippett 1928): two quantiles of them, followed
+motion the model describes well, the largest ln R of a quarter of a second stay far below that, and of one that rings
+and sticks they do not. Maxima of many samples are Gumbel's (Fisher and Tippett 1928): two quantiles of them, followed
 online with nothing near, say from which level on one in so many hours lies above. The level is that, between the bound
 and `slack_nats` below it: neither a person's touches nor a year of alarms can raise it further.
 """
@@ -17,14 +17,16 @@ from pretouch.types import FloatArray
 
 BLOCK = 25
 """Samples of which one maximum is taken."""
-_MIDDLE, _HIGH = 0.5, 0.8
-"""Parts of the maxima that lie below both quantiles: touches that no unit sees are too few to move these."""
-_FIRST = (2.0, 5.0)
-"""Both quantiles before anything is known: the level is the bound."""
+_MIDDLE, _HIGH = 0.8, 0.98
+"""Parts of the maxima that lie below both quantiles. Lower ones say nothing of the tail: arms that stick and ring
+differ from others in one maximum of fifty. Touches that no unit sees raise the level too, to the bound at most."""
+_FIRST = (0.5, 2.5)
+"""Both quantiles before anything is known: the level begins 5 nats below the bound. With all of `slack_nats` a real arm
+that shook gave twice as many alarms in its first minute, and at the bound one sample of 60 N could be missed."""
 _PRIOR, _MEMORY = 40.0, 600.0
 """Maxima that the first values count for, and over which the quantiles are averaged at most."""
-_STEP = 4.0
-"""How far one maximum moves a quantile, relative to their distance and the average's weight."""
+_STEP, _STEP_HIGH = 4.0, 20.0
+"""How far one maximum moves each quantile, relative to their distance and the average's weight."""
 _LEAST = 0.5
 """Least distance of the quantiles: with less they would stand still."""
 _HEAVIER = 1.0
@@ -58,8 +60,9 @@ def learn_level(log_r: float, seen: FloatArray) -> None:
     seen[2], seen[3] = max(seen[2], log_r), seen[3] + 1.0
     if seen[3] < BLOCK:
         return
-    step = _STEP * max(seen[1] - seen[0], _LEAST) / min(_PRIOR + seen[4], _MEMORY)
+    step = max(seen[1] - seen[0], _LEAST) / min(_PRIOR + seen[4], _MEMORY)
     # stochastic approximation: at rest where the part above each is as it should be (Robbins and Monro 1951)
-    seen[0] += step * ((seen[2] > seen[0]) - (1.0 - _MIDDLE))
-    seen[1] += step * ((seen[2] > seen[1]) - (1.0 - _HIGH))
+    seen[0] += _STEP * step * ((seen[2] > seen[0]) - (1.0 - _MIDDLE))
+    seen[1] += _STEP_HIGH * step * ((seen[2] > seen[1]) - (1.0 - _HIGH))
+    seen[1] = max(seen[1], seen[0] + _LEAST)
     seen[2], seen[3], seen[4] = -np.inf, 0.0, seen[4] + 1.0

@@ -61,7 +61,7 @@ class SequentialParams(Checked):
     """Bound on the rate of false alarms with nothing near [1/h], if free motion is as learnt."""
     slack_nats: NonNegative = 7.0
     """How far below its bound ln R may be a contact [1], for Markov's inequality is not tight: as far as free motion
-    has earned it, or, without `misfit`, at once. 18 simulated arms came to 4.4 in 1.5 h, where the bound is 12.8."""
+    leaves it, or, without `misfit`, always. 18 simulated arms came to 4.4 in 1.5 h, where the bound is 12.8."""
     contact_gain: Positive = 15.0
     """Times the spread of the torques is larger with a contact, in each direction it can push [1]: best for what is
     just large enough to be found."""
