@@ -55,7 +55,7 @@ def test_a_standing_arm_that_is_told_it_moves_stays_where_it_is_and_says_why(pan
     said = turned(control, arm, 20)
     assert max(np.abs(step.command).max() for step in said) < 1e-6
     assert said[-1].mode is Mode.HOLD
-    assert "no recent command explains" in said[-1].reason
+    assert "commanded joint velocities hold nan" in said[-1].reason
 
 
 @pytest.mark.parametrize("name", ["paper", "pretouch"])

@@ -38,7 +38,6 @@ MOST_IMU = 64
 MOST_POINTS = 20_000
 """Points of outside sources that are taken in one step: what they cost stays bounded."""
 
-_UNEXPLAINED = ", or what no recent command explains"
 _PARTS = ("joint positions", "joint velocities", "commanded joint positions", "commanded joint velocities")
 
 
@@ -172,7 +171,7 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
     if not _plausible(numbers, qd_max):
         bounds = np.vstack([np.full((3, len(qd_max)), _LARGEST), _FASTEST * qd_max])
         i, j = np.argwhere(~(np.abs(numbers) < bounds))[0]
-        return None, f"{_PARTS[i]} hold {numbers[i, j]:g}" + _UNEXPLAINED * bool(i == 3 and np.isnan(numbers[i, j]))
+        return None, f"{_PARTS[i]} hold {numbers[i, j]:g}"
     return RobotState(stamp, numbers[0], numbers[1], numbers[2], numbers[3], tau_ext, wrench), ""
 
 

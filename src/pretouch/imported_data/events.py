@@ -15,7 +15,7 @@ _OVER_S = 0.5
 
 @value
 class ContactEvent:
-    """A contact that a detector found, where it stood out most."""
+    """A contact that a detector found, where its place was surest."""
 
     time: float
     """At which it was detected [s]."""
@@ -50,19 +50,16 @@ class Events:
             self._now = ContactEvent(time, time, "", np.full(3, np.nan), d.contact.force, np.nan, -1.0)
         if self._now is None or not d.armed or not d.evidence >= 1.0:
             return
-        now = self._now
-        if d.evidence > now.evidence:
-            touched = bool(len(d.touched.link))
-            self._now = ContactEvent(
-                now.time, time, self._model.links[d.touched.link[0]] if touched else "",
-                d.touched.point[0] if touched else now.point,
-                d.touched.force[0] if touched else now.force if d.contact is None else d.contact.force,
-                float(d.touched.probability[0]) if touched else np.nan, d.evidence,
-            )  # fmt: skip
-        else:
-            self._now = ContactEvent(
-                now.time, time, now.link, now.point, now.force, now.probability, now.evidence
-            )  # fmt: skip
+        now, found = self._now, d.touched
+        link, point, force, probability = now.link, now.point, now.force, now.probability
+        if len(found.link):
+            # the place gathers what all samples say: it is surest late, when the evidence may have passed its peak
+            if not probability >= found.probability[0]:
+                link, point, force = self._model.links[found.link[0]], found.point[0], found.force[0]
+                probability = float(found.probability[0])
+        elif d.evidence > now.evidence and d.contact is not None and not link:
+            force = d.contact.force
+        self._now = ContactEvent(now.time, time, link, point, force, probability, max(now.evidence, d.evidence))
 
     def all(self) -> tuple[ContactEvent, ...]:
         """Return the contacts of all cycles."""
