@@ -255,6 +255,8 @@ def test_the_order_of_changes_does_not_matter():
         ("papre:task.speed_m_s=0.1", "The profile 'papre' is unknown"),
         ("paper:speed=0.1", "The group 'speed' of 'speed=0.1' is unknown: choose from perception, task, slow,"),
         ("paper:task.sped=0.1", "The parameter 'task.sped' is unknown: choose from speed_m_s,"),
+        ("pretouch:detection.confirm_samples=2", "The parameter 'detection.confirm_samples' is gone: it had one value"),
+        ("pretouch:detect.inertia=no", "The parameter 'detect.inertia' is gone: it had one value"),
         ("pretouch:anticipation.detour=yes", "The parameter 'anticipation.detour' is gone: the arm no longer goes"),
         ("paper:task.speed_m_s", "has no value: write PATH=VALUE"),
         ("paper:", "has no value"),

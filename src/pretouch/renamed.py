@@ -111,13 +111,19 @@ SWITCHES: dict[str, dict[str, dict[str, str]]] = {
 
 _NO_DETOUR = "the arm no longer goes round what blocks its path, which kept it from none of 8 boards. Leave it out."
 _CONSTANT = "it is a constant of pretouch.contact now, with its reason beside it. Leave it out."
+_ONE_VALUE = "it had one value in every profile. Leave it out."
 _CONSTANTS = (
     "reverse_band", "tank_max_j", "mean_s", "clamp_s", "clamp_window_s", "clamp_turns", "turn_s", "pinch_least_m",
     "pinch_closing_m_s", "pinch_thickness_m", "pinch_along", "pinch_rest", "pinch_explained", "place_m", "clear_s",
 )  # fmt: skip
-REMOVED = {
-    f"anticipation.{name}": _NO_DETOUR for name in ("detour", "detour_distance_m", "detour_speed_m_s", "detour_hold_s")
-} | {f"reaction.{name}": _CONSTANT for name in _CONSTANTS}
+REMOVED = (
+    {
+        f"anticipation.{name}": _NO_DETOUR
+        for name in ("detour", "detour_distance_m", "detour_speed_m_s", "detour_hold_s")
+    }
+    | {f"reaction.{name}": _CONSTANT for name in _CONSTANTS}
+    | {f"{group}.{name}": _ONE_VALUE for group in ("detection", "detect") for name in ("inertia", "confirm_samples")}
+)
 """Parameters that earlier versions had, and what to do without each."""
 
 

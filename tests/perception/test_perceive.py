@@ -6,22 +6,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.params import PerceptionParams
-from pretouch.perception.obstacles import sensor_poses, track_init
+from pretouch.perception.obstacles import track_init
 from pretouch.perception.perceive import perceive, perception_setup, silent_units
-from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
+from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.vectors import placed
-from pretouch.sensing.skin import LIVE_SKIN, Skin, load_skin, paper_skin
-from pretouch.sensing.unit import CONE_ANGLE, MIN_DISTANCE, SensorUnit
-from pretouch.sim.misplacement import Misplacement, misplaced
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
 from pretouch.types import RangeReadings, RangeStatus
 
 FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
 TCP = np.array([0.30689, 0.0, 0.48688])
 """End-effector origin in the ready posture, see `test_model.py` [m]."""
 PARAMS = PerceptionParams()
-ASIDE = PerceptionParams(self_aside_m=0.005)
 
 
 def _left_of_hand(distance: float) -> np.ndarray:
@@ -152,37 +150,6 @@ def test_the_floor_is_no_obstacle_but_what_stands_on_it_is(looking_down, distanc
 def test_the_forearm_is_no_obstacle_but_what_is_before_it_is(watcher, distance, shown):
     # the unit on the hand's back sees the arm at 0.354 m, on the edge of its cone
     assert len(watcher.see(1.0, hand_back=distance).unit) == shown
-
-
-def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(panda_model):
-    rng, placed_by_hand = np.random.default_rng(5), Misplacement(5.0, 3.0)
-    shown, readings = 0, 0
-    for seed in range(10):
-        truly = load_skin(LIVE_SKIN, panda_model)
-        believed = _Watcher(panda_model, misplaced(truly, panda_model, placed_by_hand, seed)[0], no_fixtures(), ASIDE)
-        for _ in range(50):
-            believed.state = track_init(len(truly))
-            believed.kin = kin = panda_model.kinematics(rng.uniform(panda_model.q_min, panda_model.q_max))
-            position, rotation = sensor_poses(truly, kin)
-            at = expected_range(kin, position, rotation, truly.link, panda_model.capsules, no_fixtures())
-            near = at < 0.3
-            readings += int(near.sum())
-            seen = dict(zip(np.array(truly.ids)[near], np.maximum(at[near], MIN_DISTANCE), strict=True))
-            shown += len(believed.see(1.0, **seen).unit)
-    assert readings > 1000
-    assert shown < 10  # 46 without the allowance
-
-
-@pytest.mark.parametrize(("distance", "shown"), [(0.05, 1), (0.13, 1), (0.15, 0), (0.25, 0), (0.27, 1), (0.5, 1)])
-def test_what_is_barely_missed_explains_what_is_about_there_and_hides_nothing(panda_model, distance, shown):
-    # a post whose surface lies 3 mm outside of the cone, 0.2 m before the unit of the hand that looks along +y
-    unit = TCP + np.array([0.0, 0.108, 0.1034 - 0.045])
-    edge = 0.2 * np.tan(CONE_ANGLE / 2) + 0.003 / np.cos(CONE_ANGLE / 2)
-    post = unit + np.array([0.0, 0.2, edge + 0.01 / np.cos(CONE_ANGLE / 2)])
-    ends = post[None] - np.array([0.3, 0, 0]), post[None] + np.array([0.3, 0, 0])
-    beside = Fixtures(np.zeros((0, 4)), Capsules(np.zeros(1, np.int64), *ends, np.full(1, 0.01)))
-    watcher = _Watcher(panda_model, paper_skin(panda_model), beside, ASIDE)
-    assert len(watcher.see(1.0, hand_left=distance).unit) == shown
 
 
 def test_unfiltered_the_floor_is_an_obstacle(looking_down, panda_model):

@@ -94,8 +94,6 @@ class SequentialDetection:
     seen object if what says most is that this object touches."""
     bands: FloatArray
     """(6, 3) bands of the force that say the same of one sample, the parts of `Thresholds` [N]."""
-    detected: bool
-    """Whether it is a contact."""
     learning: bool
     """Whether the sample is to be learnt as free motion."""
     lasting: bool
@@ -167,7 +165,7 @@ def sequential_step(
         ratio, force, count, calm, steady, filled, waiting = 0.0, np.zeros(3), 0, 0, 0, 0, 0
     found = SequentialDetection(
         residual, ResidualWindows(means, count, covariance, model_variance), ratio, force, bands,
-        ratio >= 1.0, relearnt or calm == CALM, steady > 0, detectable,
+        relearnt or calm == CALM, steady > 0, detectable,
     )  # fmt: skip
     after = ResidualModel(weights, weights_covariance, noise, learnt, speed, queue, block, filled, waiting)
     remembered = (calm, lasting, steady, turning, scatter, level, settled)

@@ -74,7 +74,7 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
             before = replace(before, model=doubted(before.model, sample.doubted_kg))
         tested, test = sequential_step(before, model, seen, sample.reacting, alone, period, self)
         bands, touched, significant = Thresholds(tested.bands), NOT_TOUCHED, None
-        contact = strongest(tested.force, bands) if tested.detected and sample.armed else None
+        contact = strongest(tested.force, bands) if tested.log_likelihood_ratio >= 1.0 and sample.armed else None
         if self.localise:
             touched, location = localise(
                 location or localisation_init(), model, seen, tested.windows, tested.log_likelihood_ratio, period,

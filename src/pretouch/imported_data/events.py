@@ -52,12 +52,11 @@ class Events:
             return
         now, found = self._now, d.touched
         link, point, force, probability = now.link, now.point, now.force, now.probability
-        if len(found.link):
-            # the place gathers what all samples say: it is surest late, when the evidence may have passed its peak
-            if not probability >= found.probability[0]:
-                link, point, force = self._model.links[found.link[0]], found.point[0], found.force[0]
-                probability = float(found.probability[0])
-        elif d.evidence > now.evidence and d.contact is not None and not link:
+        # the place gathers what all samples say: it is surest late, when the evidence may have passed its peak
+        if len(found.link) and not probability >= found.probability[0]:  # NaN: none is known yet
+            link, point, force = self._model.links[found.link[0]], found.point[0], found.force[0]
+            probability = float(found.probability[0])
+        elif not link and d.contact is not None and d.evidence > now.evidence:
             force = d.contact.force
         self._now = ContactEvent(now.time, time, link, point, force, probability, max(now.evidence, d.evidence))
 

@@ -43,7 +43,7 @@ class TouchSensorParams(Checked):
 
 @dataclass(frozen=True)
 class MisfitParams(Checked):
-    """How the test covers what the model of free motion cannot express, and earns its level from what it measures.
+    """How the test covers what the model of free motion cannot express, and how its level follows what it measures.
 
     Measured on simulated arms as unkind as real ones (world `hard`, development seeds): docs/explanation/detection.md.
     """

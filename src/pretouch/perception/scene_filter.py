@@ -98,6 +98,19 @@ def expected_range(
     return near
 
 
+class Wanted(NamedTuple):
+    """Which return is looked for."""
+
+    aside: float
+    """By how much capsules are taken to be thicker [m]."""
+    beyond: float
+    """Distance before which a capsule does not count [m]."""
+    within: float
+    """Distance up to which one counts [m]."""
+    enough: float
+    """The search ends with the first distance that counts and is no more [m], which then need not be the least."""
+
+
 @compiled
 def leave_out(
     shows: BoolArray, fresh: BoolArray, distance: FloatArray, ends: FloatArray, aside: float, sensors: Sensors,
@@ -114,7 +127,8 @@ def leave_out(
             # nothing farther explains the reading, and the first return within is enough
             shows[k] = capsule_return(sensors, k, capsules, spheres, rays, Wanted(0.0, -np.inf, end, end)) > end
         if fresh[k] and shows[k] and aside > 0:
-            # a capsule that is missed hides nothing behind it: only a reading from about there is taken for it
+            # A capsule that is missed hides nothing behind it: only a reading from about there is taken for it. One
+            # that comes nearer than that is out at its first such ray.
             wanted = Wanted(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
             shows[k] = capsule_return(sensors, k, capsules, spheres, rays, wanted) > end
 
@@ -134,19 +148,6 @@ def leave_out_planes(
 def nearest_capsule(sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, rays: FloatArray) -> float:
     """Least distance [m] at which sensor k sees a placed capsule; `spheres` are those of `bounds`."""
     return capsule_return(sensors, k, capsules, spheres, rays, Wanted(0.0, -np.inf, np.inf, -np.inf))
-
-
-class Wanted(NamedTuple):
-    """Which return is looked for."""
-
-    aside: float
-    """By how much capsules are taken to be thicker [m]."""
-    beyond: float
-    """Distance before which a capsule does not count [m]."""
-    within: float
-    """Distance up to which one counts [m]."""
-    enough: float
-    """The search ends with the first distance that counts and is no more [m], which then need not be the least."""
 
 
 @compiled
