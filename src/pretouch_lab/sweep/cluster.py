@@ -1,5 +1,6 @@
 """Jobs on a dask.distributed cluster that is there already, and a sentence in bounded time when it is gone."""
 
+import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -121,6 +122,7 @@ def _client(address: str) -> "Iterator[Client]":
 
     client: Any = None
     try:
+        asyncio.run(_greet(address))
         client = Client(address, timeout=CONNECT_S, set_as_default=False, deserializers=["msgpack"])
     except (OSError, ValueError, TimeoutError) as error:
         raise ExperimentError(
@@ -132,3 +134,11 @@ def _client(address: str) -> "Iterator[Client]":
     finally:
         with suppress(Exception):  # it may be gone, and what matters is said already
             client.close(timeout=2)
+
+
+async def _greet(address: str) -> None:
+    """Raise what `_client` expects unless a scheduler greets: dask's client waits for a silent one without end."""
+    from distributed.comm import connect
+
+    comm = await asyncio.wait_for(connect(address, timeout=CONNECT_S), CONNECT_S)
+    await comm.close()

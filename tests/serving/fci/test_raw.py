@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pretouch.hardware.franka import client as fci_client
 from pretouch.serving.fci.options import Drop
 from pretouch.serving.fci.wire import ERRORS, HEADER, PROTOCOLS, RobotKind
 
@@ -50,6 +51,44 @@ def test_a_bare_connection_does_no_harm(serve: Any, raw: Any) -> None:
     assert raw(served).connected[0] == 0
     for one in held:
         one.close()
+
+
+def test_who_asks_only_whether_anybody_answers_is_no_client(
+    serve: Any, kind: RobotKind, monkeypatch: pytest.MonkeyPatch, raw: Any
+) -> None:
+    served = serve(kind)
+    host, port = served.server.address
+    monkeypatch.setattr(fci_client, "PORT", port)
+    fci_client.demand_answer(host)
+    assert raw(served).connected[0] == 0
+
+
+def test_what_a_client_sets_does_not_outlive_it(serve: Any, raw: Any) -> None:
+    served = serve("fr3")
+    first = raw(served)
+    delivered = first.state()
+    assert first.request("SetCollisionBehavior", np.zeros(52).tobytes()) == b"\0"
+    load = np.array([1.5, 0.0, 0.0, 0.1, *np.eye(3).ravel()])
+    assert first.request("SetLoad", load.tobytes()) == b"\0"
+    assert first.request("SetNEToEE", np.diag([-1.0, -1.0, 1.0, 1.0]).ravel().tobytes()) == b"\0"
+    changed = first.state_where(lambda state: state["m_load"] == 1.5)
+    assert changed["F_T_EE"].tolist() != delivered["F_T_EE"].tolist()
+    assert _REFLEX in _modes(first)
+    first.close()
+    second = raw(served)
+    found = second.state()
+    assert [found[name].tolist() for name in ("m_load", "F_T_EE")] == [0.0, delivered["F_T_EE"].tolist()]
+    assert second.request("AutomaticErrorRecovery") == b"\0"
+    assert set(_modes(second)) == {_MOVE}
+
+
+def _modes(client: Any) -> list[int]:
+    """Modes of the robot while a client stands still in a motion for twenty states, or until they end."""
+    assert client.begin() == "started"
+    states = [client.first_of_motion()]
+    while len(states) < 20 and states[-1]["robot_mode"] == _MOVE:
+        states.append(client.turn(states[-1], _STILL))
+    return [int(state["robot_mode"]) for state in states]
 
 
 def test_a_second_client_is_turned_away_while_the_first_is_served(serve: Any, raw: Any) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from pretouch.cli.run.setup import RunSetup, free_motion
 from pretouch.cli.skin_keys import keys_file
 from pretouch.errors import RobotError
-from pretouch.hardware.franka.client import connect
+from pretouch.hardware.franka.client import connect, demand_answer
 from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.errors import MotionAborted
 from pretouch.hardware.franka.lockstep import LockstepSkin, run_in_lockstep
@@ -34,6 +34,7 @@ def run_lockstep(command: "Run", setup: RunSetup, write: Callable[[Any], None]) 
     Nobody is asked anything: nothing is real.
     """
     address, seconds = command.robot.ip, command.task.seconds
+    demand_answer(address)
     with connect(address, command.robot.arm) as client, _units(command, setup) as readings_at:
         client.set_collision_behavior(collision_behavior(setup.profile, setup.model))
         q = client.read().q

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.errors import RobotModelError
 from pretouch.robot.model import RobotModel
-from pretouch.serving.fci.collision import Contacts
+from pretouch.serving.fci.collision import Contacts, default_behavior
 from pretouch.serving.fci.frames import frames_of
 from pretouch.serving.fci.limits import PERIOD_S, motion_limits
 from pretouch.serving.fci.motion import Ending, Motion, Setpoint
@@ -113,6 +113,10 @@ class ServedArm:
         """Forget errors."""
         self.errors, self.mode = (), RobotMode.IDLE
         self.contacts.forget()
+
+    def forget_settings(self) -> None:
+        """Undo what a client has set: the next one finds the arm as it was delivered."""
+        self.contacts.behavior, self.frames = default_behavior(), frames_of(self.model)
 
     def step(self, setpoint: Setpoint | None) -> Ending | None:
         """Let a millisecond pass under the command that came for it, None if none did; say how a motion ended."""

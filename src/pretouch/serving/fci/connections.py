@@ -13,6 +13,10 @@ _KEEPALIVE_S = 5
 """A client whose machine is gone is given up after about so long [s]."""
 
 
+CLOSED = "closed by the client"
+"""Why a connection ends that needs no word."""
+
+
 class Disconnected(Exception):
     """A connection is over: closed by its other end, or not to be kept."""
 
@@ -49,7 +53,7 @@ class Connection:
         except OSError as error:
             raise Disconnected(f"connection lost ({error.strerror})") from None
         if not data:
-            raise Disconnected("closed by the client")
+            raise Disconnected(CLOSED)
         self._received += data
         found = []
         while (request := self._next(protocol)) is not None:

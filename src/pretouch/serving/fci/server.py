@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from pretouch.serving.fci.arm import ServedArm
-from pretouch.serving.fci.connections import Connection, Disconnected, Listener
+from pretouch.serving.fci.connections import CLOSED, Connection, Disconnected, Listener
 from pretouch.serving.fci.handler import RequestHandler
 from pretouch.serving.fci.limits import PERIOD_S
 from pretouch.serving.fci.motion import Setpoint
@@ -216,12 +216,14 @@ class FciServer:
             fits = version == self.protocol.version
             answer = bytes([not fits]) + self.protocol.version.to_bytes(2, "little")
             connection.send(self.protocol.reply("Connect", requests[0].identifier, answer))
+            if version == 0:  # asks only whether anybody answers
+                raise Disconnected(CLOSED)
             if not fits:
                 raise Disconnected(f"speaks FCI {version}, this robot {self.protocol.version}")
         except Disconnected as why:
             self._listener.waiting.remove(connection)
             connection.close()
-            if str(why) != "closed by the client":
+            if str(why) != CLOSED:
                 self._say(f"Not served: {connection.peer} {why}.")
             return
         self._serve_client(connection, port)
@@ -272,3 +274,5 @@ class FciServer:
         self._client = self._handler = None
         if self._arm.moving:
             self._arm.stop()
+        self._arm.forget_settings()
+        self._state.frames_changed()

@@ -1,0 +1,85 @@
+"""Peers that take a connection and say nothing: whoever waits for one gives up with a sentence, within a bound.
+
+Of the others that wait, each has its test beside it: `hardware/franka/test_connect` (the arm's process),
+`hardware/test_provision` (a unit's line), `hardware/ros2` (topics), `serving/fci/test_raw` (clients that say nothing).
+"""
+
+import http.client
+import socket
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from pretouch import cli
+from pretouch.errors import ExperimentError, RobotError
+from pretouch.extras import FRANKA
+from pretouch.hardware.franka import client
+from pretouch.hardware.network_skin import NetworkSkin
+from pretouch.viewer.server import ServeOptions, served
+from pretouch_lab.sweep import cluster
+from tests.hardware.fake_unit import IDS, KEYS
+from tests.hardware.franka.served import loopback
+from tests.needs import skip_without
+from tests.ports import free_port
+
+
+@pytest.fixture
+def silent() -> Iterator[str]:
+    """Address of a machine whose port of the arm takes connections and says nothing."""
+    address = loopback()
+    with socket.create_server((address, client.PORT)):
+        yield address
+
+
+@pytest.fixture(autouse=True)
+def bounded() -> Iterator[None]:
+    began = time.monotonic()
+    yield
+    assert time.monotonic() - began < 30.0
+
+
+def test_a_simulated_arm(silent: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client, "ANSWER_S", 0.3)
+    with pytest.raises(
+        RobotError, match=rf"The machine at {silent} takes connections, but does .* within 0\.3 s: check"
+    ):
+        client.demand_answer(silent)
+
+
+def test_a_run_in_lockstep(silent: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    skip_without(FRANKA)
+    monkeypatch.setattr(client, "ANSWER_S", 0.3)
+    given = ("--robot", "franka", "--ip", silent, "--lockstep", "--seconds", "1", "--arm", "panda")
+    assert cli.main(["run", *given, "--no-skin", "--profile", "blind"]) == 2
+    assert "does not answer as an arm" in capsys.readouterr().err
+
+
+def test_a_scheduler(silent: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
+    with pytest.raises(ExperimentError, match="No scheduler answers at"):
+        cluster.run_on_cluster(f"tcp://{silent}:{client.PORT}", [], lambda *_: None, lambda *_: None)
+
+
+def test_units() -> None:
+    with NetworkSkin(IDS, KEYS) as skin:
+        began = time.monotonic()
+        assert not skin.take_samples()
+        assert skin.read().stamp.size == len(IDS)
+        assert time.monotonic() - began < 1.0
+
+
+def test_visitors_of_a_page_keep_nobody_else_out() -> None:
+    options = ServeOptions(port=free_port())
+    place = (options.host, options.port)
+    with served(options, "test"):
+        mute = [socket.create_connection(place) for _ in range(20)]
+        half = [socket.create_connection(place) for _ in range(20)]
+        for one in half:
+            one.sendall(b"GET / HTTP/1.1\r\n")
+        page = http.client.HTTPConnection(*place, timeout=5.0)
+        page.request("GET", f"/{options.token}/")
+        assert page.getresponse().status == 200
+        page.close()
+        for one in (*mute, *half):
+            one.close()
