@@ -199,7 +199,7 @@ def _understood(raw: Any) -> Any:
     try:
         mapping = msgspec.msgpack.decode(raw)
         heard = msgspec.convert(mapping, _KINDS[mapping["type"]])
-    except (msgspec.MsgspecError, TypeError, KeyError) as error:
+    except (msgspec.MsgspecError, ValueError, TypeError, KeyError, RecursionError) as error:
         raise Refused("The page does not know what to do with this message: load it again.") from error
     if not _bounded(list(mapping.values())):
         raise Refused("A number in this message is none, or too large.")

@@ -1,0 +1,257 @@
+"""Everything that reads what somebody else may have written: what it begins with, and what it may raise."""
+
+import json
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from pretouch.errors import PretouchError
+from pretouch.hardware.keys import load_keys, save_keys
+from pretouch.hardware.wire import TAG_SIZE
+from pretouch.imported_data.samples import read_imported
+from pretouch.imported_data.source import Choice
+from pretouch.imported_data.torques import read_torques
+from pretouch.importing.chain import arm_of
+from pretouch.importing.read import read_source
+from pretouch.profiles import profile
+from pretouch.recording.reader import open_recording
+from pretouch.recording.skin_reader import read_skin
+from pretouch.recording.skin_recording import SkinRecording
+from pretouch.robot.description import panda
+from pretouch.robot.description_file import description_text, load_description
+from pretouch.robot.model import RobotModel
+from pretouch.robot.residual_file import Residual, load_residual, save_residual
+from pretouch.sensing.skin import load_skin, paper_skin, skin_file
+from pretouch.serving.fci.arm import ArmSetup, ServedArm
+from pretouch.serving.fci.commands import set_or_get, wanted_motion
+from pretouch.serving.fci.connections import Connection, Disconnected
+from pretouch.serving.fci.wire import PROTOCOLS, Protocol
+from pretouch.sim.randomisation import FOLDER, world_set
+from pretouch.sim.scene import SceneSpec
+from pretouch.types import RangeStatus
+from pretouch.viewer.door import Refused, _understood
+from pretouch_lab.sweep.definition import load_sweeps
+from pretouch_lab.sweep.registry import measure
+from pretouch_lab.sweep.store import Store
+from pretouch_lab.sweep.work import Cell, Job
+from tests.fuzz import crashers
+from tests.hardware.fake_unit import KEYS, Bench
+from tests.imported_data.files import STORE1, pushed, wrenches, write_bag1, write_csv
+from tests.imported_data.joint_files import Moving
+from tests.importing.made import six_axis
+from tests.recording.runs import controller_of, recorded_run
+from tests.recording.test_skin_recording import record
+from tests.viewer.visitor import CAMERA
+
+Read = Callable[[bytes], object]
+
+
+@dataclass(frozen=True)
+class Parser:
+    """One that reads."""
+
+    corpus: list[bytes]
+    """What is changed: something whole first, then what once did harm."""
+    read: Read
+    allowed: tuple[type[Exception], ...] = (PretouchError,)
+    """What it may raise: sentences."""
+    words: tuple[bytes, ...] = (b"\n", b"[[", b"]]", b"=", b"'", b'"""', b"{", b"}", b",", b";", b"inf", b"nan", b"a.b")
+
+
+def _file(folder: Path, name: str, read: Callable[[Path], object]) -> Read:
+    """Return what writes bytes to a file and has it read."""
+
+    def written(data: bytes) -> object:
+        (folder / name).write_bytes(data)
+        return read(folder / name)
+
+    return written
+
+
+@contextmanager
+def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
+    """Have all of them, with their files in a folder."""
+    model = RobotModel(panda())
+    recorded_run(folder / "whole.mcap", controller_of(model, paper_skin(model)), 8)
+    found = {
+        "recording": _of_file(folder, "a.mcap", [(folder / "whole.mcap").read_bytes(), *crashers.MCAP], _read_whole),
+        "recording of units": _of_file(folder, "b.mcap", [_units_recorded(folder / "units.mcap")], read_skin),
+        **_of_tables(folder, model),
+        **_of_robots(folder),
+        **_of_tomls(folder, model),
+        "profile": Parser([b"pretouch:detect.memory_s=100:react.reach_m=0.2"], lambda data: profile(data.decode())),
+        "page": Parser([msgspec.msgpack.encode(CAMERA), *crashers.PAGE], _understood, (Refused,)),
+        "worker": _of_workers(folder),
+    }
+    found["profile"] = replace(found["profile"], allowed=(PretouchError, UnicodeDecodeError))
+    with Bench() as bench, ServedArm(ArmSetup(model, "panda", model.description.q_ready, SceneSpec())) as arm:
+        bench.join()
+        yield found | {"wire": _of_units(bench), "FCI": _of_clients(arm)}
+
+
+def _of_file(folder: Path, name: str, corpus: list[bytes], read: Callable[[Path], object]) -> Parser:
+    return Parser(corpus, _file(folder, name, read))
+
+
+def _units_recorded(place: Path) -> bytes:
+    with SkinRecording(place) as recording:
+        for number in range(10):
+            record(recording, number)
+    return place.read_bytes()
+
+
+def _read_whole(place: Path) -> None:
+    recorded = open_recording(place)
+    for _ in recorded:
+        pass
+    _ = recorded.runs[0].profile, recorded.stamps()
+
+
+# tables and bags
+
+
+def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
+    force = pushed(2.0, ())
+    columns = {"time_s": np.arange(len(force)) / 100.0} | {f"force_{a}_N": force[:, i] for i, a in enumerate("xyz")}
+    torques = Moving(model, 0.3).external_csv(folder / "torques.csv").read_bytes()
+    bag = write_bag1(folder / "whole.bag", wrenches(force[:20], store=STORE1)).read_bytes()
+    return {
+        "CSV of forces": _of_file(
+            folder,
+            "a.csv",
+            [write_csv(folder / "f.csv", columns).read_bytes()],
+            partial(read_imported, choice=Choice()),
+        ),
+        "CSV of torques": _of_file(folder, "b.csv", [torques], partial(read_torques, choice=Choice())),
+        "ROS bag": _of_file(folder, "a.bag", [bag], partial(read_imported, choice=Choice())),
+    }
+
+
+# robots
+
+
+def _of_robots(folder: Path) -> dict[str, Parser]:
+    arm = folder / "arm"
+    arm.mkdir()
+    described = panda()
+    (arm / "arm.xml").write_bytes(described.mjcf.read_bytes())
+    (arm / "robot.toml").write_text(description_text(replace(described, mjcf=arm / "arm.xml")))
+    tags = tuple(f"<{tag}>".encode() for tag in ("link", "joint", "body", "geom", "replicate", "include", "mesh", "/a"))
+
+    def model_of(data: bytes) -> RobotModel:
+        (arm / "arm.xml").write_bytes(data)
+        return RobotModel(load_description(arm))
+
+    return {
+        "URDF": Parser(
+            [six_axis().encode(), *crashers.URDF],
+            _file(folder, "arm.urdf", lambda place: arm_of(read_source(place))), words=tags,
+        ),
+        "MJCF": Parser([described.mjcf.read_bytes(), *crashers.MJCF], model_of, words=tags),
+    }  # fmt: skip
+
+
+# TOML
+
+
+def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
+    save_keys(KEYS, folder / "keys.toml")
+    learnt = Residual({"weights": np.zeros((7, 4))}, "panda", 0.0, 1.0)
+    save_residual(folder / "learnt.toml", model, learnt)
+    sweep = b'[[sweep]]\nexperiment = "static"\nvary = { "window.samples" = "50:200" }\nsamples = 4\n'
+
+    def keys(place: Path) -> object:
+        place.chmod(0o600)
+        return load_keys(place)
+
+    (folder / "described").mkdir()
+    (folder / "described" / panda().mjcf.name).write_bytes(panda().mjcf.read_bytes())
+    described = description_text(panda()).encode()
+    return {
+        "skin": _of_file(
+            folder, "s.toml", [skin_file(panda()).read_bytes(), *crashers.TOML], partial(load_skin, model=model)
+        ),
+        "keys": _of_file(folder, "k.toml", [(folder / "keys.toml").read_bytes(), *crashers.TOML], keys),
+        "world": _of_file(folder, "w.toml", [(FOLDER / "realistic.toml").read_bytes()], lambda p: world_set(str(p))),
+        "sweeps": _of_file(folder, "p.toml", [sweep], load_sweeps),
+        "learnt": _of_file(
+            folder,
+            "l.toml",
+            [(folder / "learnt.toml").read_bytes(), *crashers.TOML],
+            partial(load_residual, model=model, shapes={"weights": (7, 4)}),
+        ),
+        "description": _of_file(folder / "described", "robot.toml", [described], load_description),
+    }
+
+
+# messages
+
+
+def _of_workers(folder: Path) -> Parser:
+    cell = Cell("abc", {}, 0, 1.0)
+    static = measure("static")
+    row = {"key": "abc", "metrics": dict.fromkeys(static.metrics, 1.0), "seconds": 1.0}
+    store, job = Store(folder / "store", static), Job("static", "paper", (cell,))
+
+    def read(data: bytes) -> None:
+        ((_, result),) = store.answered(job, data.decode(errors="replace"))
+        assert (result.metrics is None) == bool(result.reason)
+        assert all(v is None or np.isfinite(v) for v in (result.metrics or {}).values())
+
+    return Parser([json.dumps([row]).encode(), *crashers.ANSWERS], read, ())
+
+
+def _of_units(bench: Bench) -> Parser:
+    """A stolen unit: what it says is signed with its key."""
+    unit = bench.units[0]
+    sample, hello = unit.sample(bench.now), unit.hello(bench.now)
+
+    def read(data: bytes) -> None:
+        bench.now, data = bench.now + 0.001, data[:2000]
+        bench.send(data + unit.mac.tag(data), data + unit.session.tag(data))
+        readings = bench.receiver.readings()
+        valid = readings.status == RangeStatus.OK
+        assert np.all(np.isfinite(readings.distance[valid]))
+        assert np.all(readings.distance[valid] >= 0.0)
+        assert np.all(readings.stamp <= bench.now)
+        bench.answers()
+
+    return Parser([sample[:-TAG_SIZE], hello[:-TAG_SIZE]], read, ())
+
+
+def _of_clients(arm: ServedArm) -> Parser:
+    protocol = PROTOCOLS["panda"]
+    names = [name for name in protocol.requests if name in protocol.sizes]
+    requests = [protocol.reply(name, k, _ones(protocol, name)) for k, name in enumerate(names)]
+
+    def read(data: bytes) -> None:
+        ours, theirs = _connected()
+        with ours, theirs:
+            theirs.sendall(data[:4096])
+            for request in Connection(ours, "a client").requests(protocol):
+                if request.name == "Move":
+                    wanted_motion(request.body)
+                elif request.name.startswith(("Set", "Get")) and request.name != "GetRobotModel":
+                    set_or_get(arm, request.name, request.body)
+        assert np.all(np.isfinite(arm.frames.F_T_EE))
+        assert np.all(np.isfinite(arm.frames.load.inertia))
+        arm.forget_settings()
+
+    return Parser([b"".join(requests), *requests], read, (Disconnected,), words=tuple(requests))
+
+
+def _connected() -> tuple[socket.socket, socket.socket]:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        theirs = socket.create_connection(server.getsockname())
+        return server.accept()[0], theirs
+
+
+def _ones(protocol: Protocol, name: str) -> bytes:
+    size = protocol.sizes[name]
+    return np.ones(size // 8 + 1).tobytes()[:size]

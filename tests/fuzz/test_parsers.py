@@ -1,0 +1,85 @@
+"""No file or message from elsewhere is worse than a sentence, soon: what is whole is changed at random."""
+
+import signal
+import time
+import tracemalloc
+from collections.abc import Iterator
+from types import FrameType
+from typing import NoReturn
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from tests.fuzz.mutations import Change, changed, changes
+from tests.fuzz.parsers import Parser, parsers
+
+SOON_S = 10.0
+"""Longest time for anything that is read [s]."""
+MEMORY = 400_000_000
+"""Largest memory that Python and NumPy may take for it [B]."""
+NAMES = (
+    "recording", "recording of units", "CSV of forces", "CSV of torques", "ROS bag", "URDF", "MJCF", "skin", "keys",
+    "world", "sweeps", "learnt", "description", "profile", "page", "worker", "wire", "FCI",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Parser]]:
+    with parsers(tmp_path_factory.mktemp("parsers")) as found:
+        assert set(found) == set(NAMES)
+        yield found
+
+
+def too_late(_number: int, _frame: FrameType | None) -> NoReturn:
+    raise AssertionError(f"it takes more than {SOON_S:g} s")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _alarm() -> Iterator[None]:
+    before = signal.signal(signal.SIGALRM, too_late)
+    yield
+    signal.signal(signal.SIGALRM, before)
+
+
+def read(parser: Parser, data: bytes) -> bool:
+    """Have it read, within the bounds; return whether it was refused."""
+    signal.setitimer(signal.ITIMER_REAL, SOON_S)
+    try:
+        parser.read(data)
+        sentence = ""
+    except parser.allowed as refused:
+        sentence = str(refused) or type(refused).__name__
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    assert len(sentence) < 2000 + len(data)
+    return bool(sentence)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_whole_is_read_and_what_once_did_harm_does_none(
+    there: dict[str, Parser], name: str
+) -> None:
+    parser = there[name]
+    assert not read(parser, parser.corpus[0])
+    for data in parser.corpus[1:]:
+        tracemalloc.start()
+        began = time.monotonic()
+        read(parser, data)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < MEMORY
+        assert time.monotonic() - began < SOON_S
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_whatever_is_changed_is_no_worse_than_a_sentence(there: dict[str, Parser], name: str) -> None:
+    parser = there[name]
+
+    @settings(max_examples=200, suppress_health_check=list(HealthCheck))
+    @given(changes, changes)
+    def fuzzed(first: list[Change], second: list[Change]) -> None:
+        data = parser.corpus[second[0].number % len(parser.corpus)]
+        read(parser, changed(data, first, (*parser.words, parser.corpus[0][:200])))
+
+    fuzzed()
