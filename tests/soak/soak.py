@@ -92,7 +92,7 @@ class Soak:
                 self._one_run(page, begun + 0.5 * self._seconds, "SIGINT")
                 while time.monotonic() < end:
                     kind = str(self._rng.choice(("SIGINT", "SIGTERM", "program", "arm's process", "receiver", "robot")))
-                    self._one_run(page, time.monotonic() + self._rng.uniform(2.0, 20.0), kind)
+                    self._one_run(page, time.monotonic() + self._rng.uniform(4.0, 20.0), kind)
                     if kind == "robot" or self._server.process.poll() is not None:
                         serving.close()
                         self._serve(serving, relay)

@@ -108,10 +108,11 @@ def read_value(name: str, text: str, now: Value) -> Value:
         return text
     try:
         value = int(text) if isinstance(now, int) else float(text)
-    except ValueError:
+        finite = math.isfinite(value)
+    except (ValueError, OverflowError):
         kind = "a whole number" if isinstance(now, int) else "a number"
         raise ExperimentError(f"{name} is {text!r}: write {kind}.") from None
-    if not math.isfinite(value):
+    if not finite:
         raise ExperimentError(f"{name} is {text}: write a finite number.")
     if name == UNITS and value < 1:
         raise ExperimentError(f"{name} is {text}: give 1 or more; without it the paper's seven are taken.")
