@@ -58,6 +58,16 @@ def test_a_standing_arm_that_is_told_it_moves_stays_where_it_is_and_says_why(pan
     assert "commanded joint velocities hold nan" in said[-1].reason
 
 
+@pytest.mark.parametrize(("step_rad", "held"), [(0.5, True), (-0.08, True), (0.01, False)])
+def test_an_encoder_that_jumps_makes_the_arm_hold_until_a_person_has_looked(panda_model, arm, step_rad, held):
+    arm.told = lambda robot: replace(robot, q=robot.q + step_rad * (np.arange(7) == 3))
+    said = turned(controller(panda_model, "paper"), arm, 150)
+    assert all(step.mode is not Mode.HOLD for step in said[120:150])
+    assert (said[150].mode is Mode.HOLD) is held
+    assert (said[-1].mode is Mode.HOLD) is held
+    assert ("joint positions hold nan" in said[150].reason) is held
+
+
 @pytest.mark.parametrize("name", ["paper", "pretouch"])
 @pytest.mark.parametrize("field", ["stamp", "q", "qd", "q_commanded", "qd_commanded", "tau_ext", "wrench"])
 def test_no_finite_lie_breaks_the_acceleration_limits_by_more_than_once_their_size(panda_model, arm, field, name):

@@ -24,6 +24,8 @@ _FINEST = 1e-7
 """Shortest time `Durations` tells apart [s]."""
 _ROUNDING_RAD_S = 1e-6
 """By how much the report of a command may be rounded [rad/s]."""
+_ENCODER_RAD = 0.02
+"""By how much a measured joint position may jump [rad]: what an encoder and a joint's elasticity can do."""
 _BINS_PER_E = 1.0 / math.log(1.01)
 _BINS = 2316
 """Bins one per cent wide from a tenth of a microsecond to a thousand seconds."""
@@ -233,20 +235,24 @@ def turn(
 
 
 def explained(controller: Controller, state: ControllerState, robot: RobotState, now: float) -> RobotState:
-    """Return an arm's report with NaN for commanded joint velocities that no recent command explains; `now` is in s.
+    """Return an arm's report with NaN for joints that no recent command, or no motion, explains; `now` is in s.
 
-    A loop that commands asks before each step: the next command may differ from what is reported by so much only, so a
+    A loop that commands asks before each step: the next command may differ from the reported one by so much only, so a
     false report would move the arm. A joint's velocity is explained between the least and the largest of the commands
-    that the report may be of, and what the acceleration limit allows since the last one. What is no report of an arm
-    stays as it is, for the step to name.
+    that the report may be of, and what the acceleration limit allows since the last one; its position by speed and
+    acceleration limit since the last report. What is no report of an arm stays as it is, for the step to name.
     """
+    limits, command, last = controller.limits, state.command, state.watch.robot
     try:
-        reported = np.asarray(robot.qd_commanded, dtype=np.float64)
+        q, reported = np.asarray(robot.q, dtype=np.float64), np.asarray(robot.qd_commanded, dtype=np.float64)
+        gap = max(limits.period, float(robot.stamp) - last.stamp)
     except (AttributeError, TypeError, ValueError, OverflowError):
         return robot
-    limits, command = controller.limits, state.command
-    if reported.shape != command.shape:
+    if q.shape != command.shape or reported.shape != command.shape:
         return robot
+    moved = (np.maximum(np.abs(last.qd), np.abs(command)) + limits.qdd_max * gap) * gap + _ENCODER_RAD
+    if (jumped := np.abs(q - last.q) > moved).any():
+        return replace(robot, q=np.where(jumped, np.nan, q))
     reach = limits.qdd_max * max(limits.period, now - state.watch.stamp) + _ROUNDING_RAD_S
     if (np.abs(reported - command) <= reach).all():  # nearly always, and all commands would cost 10 us at 1 kHz
         return robot

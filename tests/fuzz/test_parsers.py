@@ -56,9 +56,7 @@ def read(parser: Parser, data: bytes) -> bool:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_is_whole_is_read_and_what_once_did_harm_does_none(
-    there: dict[str, Parser], name: str
-) -> None:
+def test_what_is_whole_is_read_and_what_once_did_harm_does_none(there: dict[str, Parser], name: str) -> None:
     parser = there[name]
     assert not read(parser, parser.corpus[0])
     for data in parser.corpus[1:]:

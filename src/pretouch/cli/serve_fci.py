@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from pretouch.cli.commands import ServeFci
 
 _say = partial(print, flush=True)
+_STOP = (b"stop", b"release")
+"""What is typed for the user stop."""
 _LAG_S = 0.2
 """How long the arm's estimate of a push that has ended is still looked at [s]."""
 _STIFFEST = 1e6
@@ -57,7 +59,10 @@ def serve_fci(command: "ServeFci") -> None:
         _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}).")
         typed = TypedPushes(arm, sys.stdin)
         if typed.possible:
-            _say("Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force such as 0,15,0 [N].")
+            _say(
+                "Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force such as 0,15,0 [N];"
+                " stop presses the user stop, release releases it."
+            )
         server.serve(lambda: ended() or typed.take())
 
 
@@ -86,6 +91,9 @@ class TypedPushes:
             self._descriptor = -1
         *lines, self._text = (self._text + read).split(b"\n")
         for line in filter(bytes.strip, lines):
+            if line.strip() in _STOP:
+                self._arm.press_stop(line.strip() == b"stop")
+                continue
             try:
                 self._push = typed_push(line.decode(errors="replace"), self._arm.pushes.now)
                 self._arm.pushes.add(self._push)

@@ -31,24 +31,30 @@ def wait_for(happened: Callable[[], bool], what: str, most: float = 20.0) -> Non
 
 
 class Served:
-    """`pretouch serve-fci` in a process of its own."""
+    """`pretouch serve-fci` in a process of its own, with a keyboard."""
 
     def __init__(self, place: Path, kind: str, *more: str) -> None:
         self.kind, self.address = kind, loopback()
         name = self.address.replace(".", "-")
-        self._truth, self._said = place / f"{name}.csv", place / f"{name}.log"
-        at = ["--robot", kind, "--host", self.address, "--truth", str(self._truth)]
+        self.truth, self._said = place / f"{name}.csv", place / f"{name}.log"
+        at = ["--robot", kind, "--host", self.address, "--truth", str(self.truth)]
+        self._keyboard, typed = os.openpty()
         with self._said.open("w") as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "pretouch.cli", "serve-fci", *at, *more],
+                stdin=typed,
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
+        os.close(typed)
         try:
             wait_for(self._listens, f"listening at {self.address}", STARTS_S)
         except BaseException:
             self.close()
             raise
+
+    def type(self, line: str) -> None:
+        os.write(self._keyboard, f"{line}\n".encode())
 
     def _listens(self) -> bool:
         assert self.process.poll() is None, self.said()
@@ -59,8 +65,8 @@ class Served:
 
     def q(self) -> np.ndarray:
         """(T, 7) where the arm truly was in the last milliseconds, as far as it has been written [rad]."""
-        with self._truth.open("rb") as file:
-            file.seek(max(0, self._truth.stat().st_size - _TAIL))
+        with self.truth.open("rb") as file:
+            file.seek(max(0, self.truth.stat().st_size - _TAIL))
             lines = file.read().decode().splitlines()[1:-1]
         return np.array([line.split(",")[4:] for line in lines], dtype=np.float64).reshape(-1, 7)
 
@@ -85,6 +91,7 @@ class Served:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
+        os.close(self._keyboard)
 
 
 def child(script: str, *arguments: str) -> subprocess.Popen[str]:

@@ -14,7 +14,7 @@ from pretouch.hardware.franka.limits import FrankaParams, motion_limits
 from pretouch.hardware.franka.mailboxes import Command, Feedback, Mailboxes, Request
 from pretouch.hardware.franka.process import ProcessSettings, serve
 from pretouch.hardware.franka.report import CommunicationReport
-from pretouch.hardware.franka.state import JOINTS, FrankaState, robot_state
+from pretouch.hardware.franka.state import JOINTS, FrankaState, TorqueWatch, robot_state
 from pretouch.realtime import check_wishes
 from pretouch.robot.model import RobotModel
 from pretouch.signals import OF_TERMINAL, kept_from_children
@@ -52,7 +52,7 @@ class FrankaArm:
         """
         check_wishes(priority, None)
         self._address, self._owner = address, os.getpid()
-        self._mailboxes, self._number = Mailboxes(), 0
+        self._mailboxes, self._number, self._torques = Mailboxes(), 0, TorqueWatch()
         limits = motion_limits(model, kind)
         settings = ProcessSettings(address, kind, limits, behavior, params or FrankaParams(), priority, self._owner)
         context = get_context("spawn")
@@ -82,7 +82,7 @@ class FrankaArm:
     def read(self) -> RobotState:
         """Return the newest state, stamped with `time.monotonic` as it came; a RobotError as of `state`."""
         feedback = self._fresh_feedback()
-        return robot_state(feedback.state, feedback.stamp)
+        return self._torques.believed(robot_state(feedback.state, feedback.stamp))
 
     def begin(self) -> None:
         """Begin a motion at rest. Commands must follow within `FrankaParams.end_after_s`."""

@@ -2,7 +2,7 @@
 
 import re
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ _ARRAYS = struct.Struct(f"<{6 * JOINTS + 6}d")
 _CUTS = *(slice(JOINTS * i, JOINTS * (i + 1)) for i in range(6)), slice(6 * JOINTS, None)
 PACKED_MOST = _PLAIN.size + _ARRAYS.size + 4096
 """Bytes that a packed state has at most."""
+STUCK_S = 0.1
+"""Time for which a joint's external torque may repeat to the last digit [s]: each of the arm's states has new noise."""
 _NAME = re.compile(r"[a-z]\w+")
 
 
@@ -69,6 +71,24 @@ def robot_state(state: FrankaState, stamp: float) -> RobotState:
     """
     wrench = -state.wrench if state.wrench.any() else None
     return RobotState(stamp, state.q, state.qd, state.q_d, state.dq_d, -state.tau_ext, wrench)
+
+
+class TorqueWatch:
+    """Watches for torques that repeat to the last digit: they are noisy, so a sensor sticks, or all is an old state."""
+
+    def __init__(self) -> None:
+        self._last, self._changed = np.full(JOINTS, np.nan), np.full(JOINTS, -np.inf)
+
+    def believed(self, robot: RobotState) -> RobotState:
+        """Return an old state with its old stamp, and one of a sensor that sticks without torques and force."""
+        new = robot.tau_ext != self._last
+        self._changed[new] = robot.stamp
+        self._last = robot.tau_ext
+        if not new.any():
+            robot = replace(robot, stamp=float(self._changed.max()))
+        if robot.stamp - self._changed.min() <= STUCK_S:
+            return robot
+        return replace(robot, tau_ext=np.full(JOINTS, np.nan), wrench=None)
 
 
 def franka_state(raw: Any) -> FrankaState:

@@ -73,7 +73,7 @@ class ServedArm:
         """Fraction of the last commands of the motion that came in time; 0 while none runs."""
         self.qd, self.qdd = np.zeros(JOINTS), np.zeros(JOINTS)
         """Commanded velocities [rad/s] and accelerations [rad/s^2], (7,)."""
-        self._since_motion = _COMES_TO_REST
+        self._since_motion, self._stop_pressed = _COMES_TO_REST, False
         for _ in range(round(SETTLE_S / PERIOD_S)):
             self._pass_time()
 
@@ -109,9 +109,17 @@ class ServedArm:
         if self.mode is RobotMode.MOVE:
             self.mode = RobotMode.IDLE
 
+    def press_stop(self, pressed: bool = True) -> None:
+        """Press the user stop, or release it: a motion ends, and none begins until then."""
+        self._stop_pressed = pressed
+        if pressed and not self.moving:
+            self.mode = RobotMode.USER_STOPPED
+        elif self.mode is RobotMode.USER_STOPPED:
+            self.mode = RobotMode.REFLEX if self.errors else RobotMode.IDLE
+
     def recover(self) -> None:
         """Forget errors."""
-        self.errors, self.mode = (), RobotMode.IDLE
+        self.errors, self.mode = (), RobotMode.USER_STOPPED if self._stop_pressed else RobotMode.IDLE
         self.contacts.forget()
 
     def forget_settings(self) -> None:
@@ -121,6 +129,10 @@ class ServedArm:
     def step(self, setpoint: Setpoint | None) -> Ending | None:
         """Let a millisecond pass under the command that came for it, None if none did; say how a motion ended."""
         ending = None
+        if self.motion is not None and self._stop_pressed:
+            ending = Ending("emergency")
+            self.stop()
+            self.mode = RobotMode.USER_STOPPED
         if self.motion is not None:
             ending = self.motion.follow(self.report.q_commanded, setpoint)
             self.qd, self.qdd, self.success_rate = self.motion.qd, self.motion.qdd, self.motion.success_rate
