@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka ros2 meshes browser docs micropython test test-skipped test-slow golden golden-values lint house bench peers \
+.PHONY: setup demo live franka ros2 meshes browser docs micropython test test-skipped test-slow soak golden golden-values lint house bench peers \
 	format clean
 
 setup: $(STAMP)
@@ -61,6 +61,11 @@ test-skipped: setup
 test-slow: setup
 	$(BIN)/pytest -n 2 --dist worksteal -m "slow and not alone" --none-skipped
 	$(BIN)/pytest -n 0 -m alone --none-skipped
+
+# two hours of everything at once, as long as nothing goes wrong (SECURITY.md); MINUTES=10 for fewer
+MINUTES ?= 120
+soak: franka
+	$(BIN)/python -m tests.soak --minutes $(MINUTES)
 
 # every field of every control step, to the bit, here and in the commit BASE (docs/explanation/design.md, golden steps)
 BASE ?= HEAD

@@ -108,3 +108,9 @@ def test_names_in_the_notation_exist():
             )  # fmt: skip
             owners = [vars(importlib.import_module(m)).get(owner) for m in modules]
             assert any(name in o.__annotations__ or hasattr(o, name) for o in owners if o), f"{owner}.{name}"
+
+
+def test_the_tests_that_hold_the_threats_are_there() -> None:
+    named = re.findall(r"`((?:\w+/)*test_\w+)`", (ROOT / "SECURITY.md").read_text())
+    assert len(named) > 10
+    assert [name for name in named if not list((ROOT / "tests").rglob(f"{name}.py"))] == []
