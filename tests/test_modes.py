@@ -10,7 +10,8 @@ from pretouch.types import Mode
 
 LATCHING = [Event.UNUSABLE, Event.TIME_BACKWARDS, Event.STATE_STALE, Event.SOLVER_FAILED]
 PASSING = [
-    Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.POINTS_LOST, Event.LOAD_UNFIT, Event.NO_FORCE, Event.OVERRUN,
+    Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.POINTS_LOST, Event.LOAD_UNFIT,
+    Event.DESIRED_UNFIT, Event.DESIRED_STALE, Event.NO_FORCE, Event.OVERRUN,
     Event.GIVEN_UP, Event.WINDOW_FILLING,
 ]  # fmt: skip
 GOING = [Event.REACTING, Event.OPENING, Event.YIELDING]
@@ -18,6 +19,7 @@ FAULTS = [Event.UNUSABLE, Event.SOLVER_FAILED]  # the other two stand beside the
 REPORTED = [*FAULTS, Event.BLOCKED, *GOING, Event.CLAMPED, Event.CONTACT, *PASSING]
 SOFT = {
     Event.CLAMPED, Event.GIVEN_UP, Event.SKIN_UNFIT, Event.SKIN_SILENT, Event.POINTS_LOST, Event.LOAD_UNFIT,
+    Event.DESIRED_UNFIT, Event.DESIRED_STALE,
     Event.NO_FORCE,
 }  # fmt: skip
 STATES = [

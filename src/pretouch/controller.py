@@ -15,11 +15,13 @@ from pretouch.contact.reaction import ReactionInputs, ReactionMotion
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.control import path as paths
+from pretouch.control.commander import Asked, asked_by
 from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.motion import Motion, MotionState, joint_motion, restriction_on
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.control.setup import motion_setup
+from pretouch.desired import Desired, sound_desired
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import events_of
 from pretouch.faults import (
@@ -195,19 +197,20 @@ class Controller:
         contact = detection.contact if mode.mode is Mode.REACT is not state.mode.mode else None
         mark("mode")
 
-        # along the path as fast as eqs. 3-4 leave it, or as the reaction says
+        # along the path, or as a commander asks, as fast as eqs. 3-4 leave it, or as the reaction says
         slowed = 1.0 if p.slow is None else speed_scale(near.seen.nearest, p.slow.d_max_m)
         scale, reduction = reduce_speed(state.reduction, min(near.scale, slowed), p.task.restore_cycles)
-        following = paths.follow(self.path, state.path, kin.position[model.ee], p.task)
+        asked = self._asked(state, given, kin)
         answer, react = p.react.move(react, self.body, noticed, mode)
-        desired = following.scaled(scale) if answer is None else answer.velocity
+        desired = asked.scaled(scale) if answer is None else answer.velocity
         mark("path")
-        motion, mode, approach, moving = self._moved(state, noticed, near, mode, desired, answer)
+        request = self._request(state, near, mode, asked, desired, scale if answer is None else answer)
+        motion, mode, approach, moving = self._moved(state, noticed, near, mode, request)
         mark("motion")
 
         step = ControlStep(
             stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
-            ee_position=kin.position[model.ee], ee_velocity=motion.ee_velocity, path_position=following.point,
+            ee_position=kin.position[model.ee], ee_velocity=motion.ee_velocity, path_position=asked.point,
             path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
             speed_scale=scale, range_distance=near.seen.distance, obstacles=near.seen.obstacles,
             force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
@@ -219,10 +222,10 @@ class Controller:
         )  # fmt: skip
         after = ControllerState(
             watch=given.watch, tracks=near.tracks, window=window, detector=detector, reduction=reduction,
-            reaction=react, path=paths.advance(self.path, state.path, following, motion.ee_velocity_commanded, p.task)
-            if mode.mode is Mode.TRACK else paths.pause(state.path),
+            reaction=react, path=paths.advance(self.path, state.path, asked, motion.ee_velocity_commanded, p.task)
+            if mode.mode is Mode.TRACK and isinstance(asked, paths.Following) else paths.pause(state.path),
             approach=approach, motion=moving, mode=mode, command=motion.qp.qd.copy(),
-            rotation_goal=state.rotation_goal, outside=near.outside,
+            rotation_goal=_kept(asked, state), outside=near.outside,
             load=given.load and kept_free(given.load, robot.tau_ext, detection.residual),
         )  # fmt: skip
         mark("record")
@@ -241,7 +244,12 @@ class Controller:
         if heavy:
             events[Event.LOAD_UNFIT] = heavy
         load = announced(state.load, payload, robot)
-        return _Given(robot, events, watch, readings, touches, points, load, unfit or wrong, lost)
+        desired, none = sound_desired(inputs.desired, self.model.n, watch.stamp)
+        if none:
+            events[Event.DESIRED_UNFIT] = none
+        elif desired is not None and watch.stamp - desired.stamp[-1] > p.failure.desired_timeout_s:
+            events[Event.DESIRED_STALE] = f"{watch.stamp - desired.stamp[-1]:.2f} s"
+        return _Given(robot, events, watch, readings, touches, points, load, desired, unfit or wrong, lost)
 
     def _unloaded(self, given: "_Given", kin: Kinematics) -> "_Given":
         """Take an announced load out of torques and force."""
@@ -279,15 +287,33 @@ class Controller:
         detection, detector = self._detector.step(state.detector, self.body, sample)
         return detection, before if reacting and p.freeze_while_reacting else window, detector
 
-    def _moved(
-        self, state: ControllerState, noticed: ReactionInputs, near: "_Near", mode: ModeState, desired: FloatArray,
-        answer: ReactionMotion | None,
-    ) -> tuple[Motion, ModeState, object, MotionState]:  # fmt: skip
-        """Return the joint velocities that come nearest to what is asked: eqs. 5-7 and eq. 2."""
-        qd, touch = (None, None) if answer is None else (answer.qd, answer.touch_speed)
+    def _asked(self, state: ControllerState, given: "_Given", kin: Kinematics) -> paths.Following | Asked:
+        """Return what is asked, before anything limits it: what follows the path, or what a commander wants."""
+        task, model = self.profile.task, self.model
+        if given.desired is None:
+            return paths.follow(self.path, state.path, kin.position[model.ee], task)
+        return asked_by(given.desired, given.watch.stamp, kin, given.robot, model, state.rotation_goal, task)
+
+    def _request(
+        self, state: ControllerState, near: "_Near", mode: ModeState, asked: paths.Following | Asked,
+        desired: FloatArray, answer: ReactionMotion | float,
+    ) -> MotionRequest:  # fmt: skip
+        """Return what is asked of the motion: by the reaction's answer, or by the task times a factor."""
+        goal, touch = state.rotation_goal, None
+        if isinstance(answer, ReactionMotion):
+            qd, touch = answer.qd, answer.touch_speed
+        elif isinstance(asked, Asked) and mode.mode is Mode.TRACK:
+            qd, goal = None if asked.qd is None else answer * asked.qd, asked.rotation_goal
+        else:
+            qd = None
         room = self._units + (0 if near.outside is None else len(near.outside.sigma))
         hold = mode.mode is Mode.HOLD and qd is None
-        request = MotionRequest(desired, state.rotation_goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
+        return MotionRequest(desired, goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
+
+    def _moved(
+        self, state: ControllerState, noticed: ReactionInputs, near: "_Near", mode: ModeState, request: MotionRequest
+    ) -> tuple[Motion, ModeState, object, MotionState]:
+        """Return the joint velocities that come nearest to what is asked: eqs. 5-7 and eq. 2."""
         kin, robot, obstacles = noticed.kin, noticed.robot, near.seen.obstacles
         allowed, approach = self._approach.step(state.approach, self._motion_body, kin, robot, obstacles, request)
         motion, moving = joint_motion(state.motion, self._setup, kin, robot, obstacles, request, allowed)
@@ -295,6 +321,11 @@ class Controller:
         if qp.outcome in _TROUBLE and (qp.outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)
         return motion, mode, approach, moving
+
+
+def _kept(asked: paths.Following | Asked, state: ControllerState) -> FloatArray:
+    """Return the orientation (3, 3) to hold from here on where nobody asks for another."""
+    return asked.rotation_kept if isinstance(asked, Asked) else state.rotation_goal
 
 
 def _points_per_link(profile: Profile) -> int:
@@ -311,6 +342,7 @@ class _Given(NamedTuple):
     touches: TouchReadings | None
     points: SeenPoints | None
     load: LoadState | None
+    desired: Desired | None
     unfit: str
     """What is wrong with readings; '' for nothing."""
     lost: str

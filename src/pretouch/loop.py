@@ -13,6 +13,7 @@ import numpy as np
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
+from pretouch.desired import Desired
 from pretouch.errors import ParameterError
 from pretouch.payload import Payload
 from pretouch.ports import Clock, Points, Robot, Skin, imu_of, touch_of
@@ -193,6 +194,8 @@ class Options:
     arm."""
     payload: Callable[[], Payload | None] = lambda: None
     """What the arm carries, asked in the loop; None: nothing is said, and what was said last stays."""
+    desired: Callable[[], Desired | None] = lambda: None
+    """What a commander asks for, asked in the loop: the newest again while there is no newer; None: the path."""
 
 
 NO_OPTIONS = Options()
@@ -208,7 +211,7 @@ def run(
     try:
         while True:
             tick = clock.tick()
-            cycle = turn(controller, state, robot, skin, tick, options.resume(), options.points, options.payload())
+            cycle = turn(controller, state, robot, skin, tick, options)
             state, sent = cycle.after, cycle.step.command
             recorder.record(cycle)
             if done(cycle.step):
@@ -219,16 +222,17 @@ def run(
 
 
 def turn(
-    controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float, resume: bool = False,
-    points: Points | None = None, payload: Payload | None = None,
+    controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float,
+    options: Options = NO_OPTIONS,
 ) -> Cycle:  # fmt: skip
     """Turn the controller once, at a tick [s]: read, step, command."""
+    resume, payload, desired, points = options.resume(), options.payload(), options.desired(), options.points
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
     imu = imu_of(skin) if "imu" in controller.profile.detect.reads else None
     seen = None if points is None else points.read()
     stamp = _instant(tick, controller.limits.period, report, readings, touch)
     believed = explained(controller, state, report, stamp)
-    inputs = Inputs(stamp, believed, readings, resume, touch, imu, seen, payload)
+    inputs = Inputs(stamp, believed, readings, resume, touch, imu, seen, payload, desired)
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)

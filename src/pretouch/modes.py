@@ -26,6 +26,8 @@ class Event(Enum):
     SKIN_SILENT = auto()
     POINTS_LOST = auto()
     LOAD_UNFIT = auto()
+    DESIRED_UNFIT = auto()
+    DESIRED_STALE = auto()
     NO_FORCE = auto()
     GIVEN_UP = auto()
     PRESSED = auto()
@@ -111,6 +113,14 @@ TABLE: tuple[Transition, ...] = (
     ),
     Transition(
         Event.LOAD_UNFIT, _ANY, Mode.HOLD, "The announced payload is {}: announce what the arm carries.", soft=True,
+    ),
+    Transition(
+        Event.DESIRED_UNFIT, _ANY, Mode.HOLD,
+        "The desired motion cannot be used ({}): the arm goes on when it can.", soft=True,
+    ),
+    Transition(
+        Event.DESIRED_STALE, _ANY, Mode.HOLD,
+        "The desired motion ended {} ago: the arm goes on when a new one comes.", soft=True,
     ),
     Transition(
         Event.NO_FORCE, _ANY, Mode.HOLD,

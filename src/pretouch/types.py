@@ -10,16 +10,15 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pretouch.arrays import WHOLE as WHOLE
+from pretouch.arrays import BoolArray as BoolArray
+from pretouch.arrays import FloatArray as FloatArray
+from pretouch.arrays import IntArray as IntArray
+from pretouch.desired import Desired
 from pretouch.payload import Payload
 from pretouch.values import value
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 Number = TypeVar("Number", float, NDArray[np.float64])
-
-WHOLE = np.dtype(np.int64)
-"""Type of the numbers in an `IntArray`."""
 
 
 class RangeStatus(IntEnum):
@@ -163,6 +162,8 @@ class Inputs:
     """What outside sources see; None without one. Once given, silence of theirs stops the arm."""
     payload: Payload | None = None
     """What the arm carries; None: nothing is said, and what was said last stays."""
+    desired: Desired | None = None
+    """What a commander asks for, in place of the path; None: the path is followed."""
 
 
 class Mode(Enum):

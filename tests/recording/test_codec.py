@@ -233,7 +233,13 @@ def test_inputs_of_other_types_are_kept_as_the_controller_takes_them(spoil, want
 def test_messages_mirror_the_types_field_by_field():
     mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, Touched, ControlStep, Inputs, ImuReadings)
     own = {"sequence", "time", "unreadable", "has_wrench", "has_contact", "path_tangent"}
-    beside = {"touch", "imu", "points", "payload"}  # of Inputs: in messages of their own, so that older recordings open
+    beside = {
+        "touch",
+        "imu",
+        "points",
+        "payload",
+        "desired",
+    }  # of Inputs: in messages of their own, so that older recordings open
     for kind in mirrored:
         name = {"ControlStep": "Step"}.get(kind.__name__, kind.__name__)
         there = {field.name for field in fields_of(f"{PACKAGE}/msg/{name}")}

@@ -19,6 +19,9 @@ class FailureParams(Checked):
     spoil the window's sums."""
     force_timeout_s: Positive = 0.2
     """Time without a force estimate after which the arm holds [s]."""
+    desired_timeout_s: Positive = 0.1
+    """Time after the last instant of a desired motion from which the arm is brought to rest [s]: a few messages of a
+    commander at 50 Hz may be late or lost."""
     solver_iterations: PositiveCount = 500
     """Iterations of the QP solver after which the arm brakes. A bound on its time that is the same in each replay; most
     steps need less than 10."""

@@ -16,6 +16,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import RecordingError
 from pretouch.payload import Payload
 from pretouch.recording.messages import PACKAGE, decoded, encoded, fields_of
@@ -39,6 +40,7 @@ TOUCH = f"{PACKAGE}/msg/Touch"
 IMU = f"{PACKAGE}/msg/ImuReadings"
 POINTS = f"{PACKAGE}/msg/SeenPoints"
 PAYLOAD = f"{PACKAGE}/msg/Payload"
+DESIRED = f"{PACKAGE}/msg/Desired"
 
 _NAMED: dict[type, str] = {ControlStep: "Step", TouchReadings: "Touch"}
 """Messages that are not named as the classes of which they hold the fields."""
@@ -182,6 +184,7 @@ def encode_inputs(sequence: int, inputs: Inputs) -> tuple[bytes, bool]:
                 _taken(kind, own)  # has a message of its own
         if not isinstance(inputs.payload, Payload | None):
             raise UnreadableError("the payload is none")
+        encode_desired(sequence, inputs)
         given = {"stamp": stamp, "robot": robot, "readings": readings, "resume": resume, "unreadable": ""}
         return encoded(INPUTS, None, sequence=sequence, **given), True
     except Exception as error:  # inputs may be anything, with any behaviour
@@ -230,6 +233,27 @@ def decode_payload(data: bytes) -> Payload:
     """Return an announced load."""
     m = decoded(PAYLOAD, data)
     return Payload(m.mass_kg, tuple(m.com_m), m.within_s)
+
+
+def encode_desired(sequence: int, inputs: Inputs) -> bytes | None:
+    """Return a desired motion as CDR; None for nothing. Raises for what no step could use."""
+    if inputs.desired is None:
+        return None
+    kind, stamp = DesiredKind(inputs.desired.kind), _numbers(inputs.desired.stamp)
+    number = _numbers(np.reshape(inputs.desired.number, -1))
+    given = {"quantity": int(kind), "stamp": stamp, "number": number}
+    return encoded(DESIRED, None, sequence=sequence, step_stamp=_number(inputs.stamp), **given)
+
+
+def decode_desired(data: bytes) -> Desired:
+    """Return a desired motion."""
+    m = decoded(DESIRED, data)
+    try:
+        return Desired(DesiredKind(m.quantity), m.stamp, m.number.reshape(len(m.stamp), -1))
+    except ValueError as error:
+        raise RecordingError(
+            f"A desired motion in it cannot be read ({error}): use a recording that is whole."
+        ) from error
 
 
 def encode_points(sequence: int, points: SeenPoints, same_as: int) -> bytes:

@@ -10,10 +10,12 @@ from typing import NamedTuple, Protocol, Self
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.recording.codec import (
+    decode_desired,
     decode_imu,
     decode_inputs,
     decode_points,
     decode_touch,
+    encode_desired,
     encode_imu,
     encode_inputs,
     encode_points,
@@ -46,6 +48,7 @@ class _Passed(NamedTuple):
     touch: bytes | None
     imu: bytes | None
     points: bytes | None
+    desired: bytes | None
 
     def again(self) -> Cycle:
         if self.inputs is None:
@@ -59,6 +62,7 @@ class _Passed(NamedTuple):
             imu=None if self.imu is None else decode_imu(self.imu),
             points=None if self.points is None else decode_points(self.points)[1],
             payload=self.cycle.inputs.payload,  # nobody can change it
+            desired=None if self.desired is None else decode_desired(self.desired),
         )
         return replace(self.cycle, inputs=whole)
 
@@ -99,7 +103,7 @@ class LastSeconds:
         if self._recorder is not None:
             self._recorder.record(cycle, truth)
         data, whole = encode_inputs(0, cycle.inputs)
-        self._ring.append(self._passed(cycle, data, truth) if whole else _Passed(cycle, None, truth, None, None, None))
+        self._ring.append(self._passed(cycle, data, truth) if whole else _Passed(cycle, None, truth, *[None] * 4))
         begin = cycle.step.stamp - self._seconds
         while self._ring[0].cycle.step.stamp < begin:
             self._ring.popleft()
@@ -112,7 +116,7 @@ class LastSeconds:
         if given.points is not self._points[0]:
             self._points = given.points, None if given.points is None else encode_points(0, given.points, 0)
         imu = None if given.imu is None else encode_imu(0, cycle.step.stamp, given.imu)
-        return _Passed(cycle, data, truth, encode_touch(0, given), imu, self._points[1])
+        return _Passed(cycle, data, truth, encode_touch(0, given), imu, self._points[1], encode_desired(0, given))
 
     def change(self, controller: Controller) -> None:
         """Let the cycles from the next one on be those of another controller of the same arm."""

@@ -20,10 +20,10 @@ PACKAGE = "pretouch_msgs"
 OWN = (
     "RobotState", "RangeReadings", "Inputs", "Obstacles", "Thresholds", "Contact", "QpSolution", "Touched", "Step",
     "Run", "State", "Truth", "UnitSample", "Touch", "ImuReadings", "SeenPoints",
-    "Payload",
+    "Payload", "Desired",
 )  # fmt: skip
 """Our types; each has a file in `msg/`."""
-_ON_TOPICS = ("Run", "Inputs", "Step", "State", "Truth", "Touch", "SeenPoints", "Payload")
+_ON_TOPICS = ("Run", "Inputs", "Step", "State", "Truth", "Touch", "SeenPoints", "Payload", "Desired")
 TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in _ON_TOPICS}
 TOPICS["/pretouch/imu"] = f"{PACKAGE}/msg/ImuReadings"
 """Type of the messages on each of our topics."""

@@ -11,6 +11,7 @@ import numpy as np
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
 from pretouch.recording.codec import (
+    decode_desired,
     decode_imu,
     decode_inputs,
     decode_payload,
@@ -104,6 +105,9 @@ class Recorded:
         payload = raw["/pretouch/payload"].get(number)
         if inputs is not None and payload is not None:
             inputs = replace(inputs, payload=decode_payload(payload))
+        desired = raw["/pretouch/desired"].get(number)
+        if inputs is not None and desired is not None:
+            inputs = replace(inputs, desired=decode_desired(desired))
         return self._with_points(number, inputs)
 
     def _with_points(self, number: int, inputs: Inputs | None) -> Inputs | None:

@@ -16,6 +16,7 @@ import numpy as np
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.recording.codec import (
+    DESIRED,
     IMU,
     INPUTS,
     PAYLOAD,
@@ -23,6 +24,7 @@ from pretouch.recording.codec import (
     STEP,
     TOUCH,
     TRUTH,
+    encode_desired,
     encode_imu,
     encode_inputs,
     encode_payload,
@@ -130,6 +132,9 @@ class Recording:
         payload = encode_payload(number, cycle.inputs) if whole else None
         if payload is not None:
             items.append(Item("/pretouch/payload", PAYLOAD, number, time, payload))
+        desired = encode_desired(number, cycle.inputs) if whole else None
+        if desired is not None:
+            items.append(Item("/pretouch/desired", DESIRED, number, time, desired))
         self._command = step.command if whole else None
         items.append(Item("/pretouch/inputs", INPUTS, number, time, data))
         imu = getattr(cycle.inputs, "imu", None)

@@ -12,7 +12,7 @@ import numpy as np
 
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
-from pretouch.loop import Cycle, turn
+from pretouch.loop import Cycle, Options, turn
 from pretouch.profiles import Profile
 from pretouch.recording.surroundings import surroundings
 from pretouch.recording.truth import truth_of
@@ -112,7 +112,7 @@ class LiveSimulation:
             room.mouse.move(self.opening.target(self.frame.step))
             self.opening = None if self.opening.over else self.opening
         tick = room.tick()
-        cycle = turn(self.controller, self._state, room.plant, room.units, tick, resume)
+        cycle = turn(self.controller, self._state, room.plant, room.units, tick, Options(resume=lambda: resume))
         self._state = cycle.after
         hand = room.hand.position
         age = cycle.step.stamp - cycle.inputs.readings.stamp

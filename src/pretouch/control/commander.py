@@ -1,0 +1,110 @@
+"""What is asked of the arm in one step: by a commander in place of the path."""
+
+import math
+
+import numpy as np
+
+from pretouch.desired import Desired, DesiredKind
+from pretouch.params import TaskParams
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.types import FloatArray, RobotState
+from pretouch.values import value
+
+_TURN_RAD = 1.0
+"""Largest angle to an orientation that is asked for at once: the sine of `rotation_error` falls beyond a right one."""
+
+
+@value
+class Asked:
+    """What is asked before anything limits it."""
+
+    velocity: FloatArray
+    """(3,) of the end-effector origin [m/s]."""
+    point: FloatArray
+    """(3,) where it should be [m]; where it is, if only a velocity is asked for."""
+    rotation_goal: FloatArray
+    """(3, 3) R_O_ee to turn to."""
+    rotation_kept: FloatArray
+    """(3, 3) R_O_ee to hold when nobody asks for another."""
+    qd: FloatArray | None
+    """(n,) joint velocities asked for in place of all that [rad/s]."""
+
+    def scaled(self, scale: float) -> FloatArray:
+        """Velocity (3,) [m/s] times a factor."""
+        return scale * self.velocity
+
+
+def asked_by(
+    desired: Desired, now: float, kin: Kinematics, robot: RobotState, model: RobotModel, held: FloatArray,
+    params: TaskParams,
+) -> Asked:  # fmt: skip
+    """Ask for what a commander wants at an instant [s]; `held` is R_O_ee (3, 3) to hold where it says nothing of it.
+
+    A position is approached as the path is: with `position_gain_1_s`, no faster than `speed_m_s` at the end-effector.
+    """
+    number, rate = _at(desired, now)
+    R, here = kin.rotation[model.ee], kin.position[model.ee]
+    if desired.kind is DesiredKind.TWIST:
+        goal, kept = (held, held) if not number[3:].any() else (_led(R, number[3:], params), R)
+        return Asked(number[:3], here, goal, kept, None)
+    if desired.kind is DesiredKind.POSE:
+        velocity = rate[:3] + params.position_gain_1_s * (number[:3] - here)
+        fastest = max(params.speed_m_s, float(np.linalg.norm(rate[:3])))
+        goal = number[3:].reshape(3, 3)
+        return Asked(_shortened(velocity, fastest), number[:3], _nearer(R, goal), goal, None)
+    qd = number
+    if desired.kind is DesiredKind.JOINT_POSITIONS:
+        qd = rate + params.position_gain_1_s * (number - robot.q_commanded)
+    velocity = model.ee_jacobian(kin)[:3] @ qd
+    if desired.kind is DesiredKind.JOINT_POSITIONS:
+        fastest = max(params.speed_m_s, float(np.linalg.norm(model.ee_jacobian(kin)[:3] @ rate)))
+        factor = min(1.0, fastest / max(float(np.linalg.norm(velocity)), 1e-12))
+        velocity, qd = factor * velocity, factor * qd
+    return Asked(velocity, here, R, R, qd)
+
+
+def _at(desired: Desired, now: float) -> tuple[FloatArray, FloatArray]:
+    """Return what is asked at an instant, and how fast it changes [1/s]; 0 for velocities."""
+    stamp, number = desired.stamp, desired.number
+    i = int(np.searchsorted(stamp, now, side="right"))
+    still = np.zeros(number.shape[1])
+    if desired.kind in (DesiredKind.TWIST, DesiredKind.JOINT_VELOCITIES) or i in (0, len(stamp)):
+        return number[max(0, i - 1)], still
+    rate = (number[i] - number[i - 1]) / (stamp[i] - stamp[i - 1])
+    between = number[i - 1] + rate * (now - stamp[i - 1])
+    if desired.kind is DesiredKind.POSE:
+        between[3:] = number[i, 3:]  # what lies between two rotations element by element is none
+    return between, rate
+
+
+def _shortened(vector: FloatArray, longest: float) -> FloatArray:
+    length = float(np.linalg.norm(vector))
+    return vector if length <= longest else (longest / length) * vector
+
+
+def _led(R: FloatArray, angular: FloatArray, params: TaskParams) -> FloatArray:
+    """Return the orientation (3, 3) that the task's gain answers with an angular velocity (3,) [rad/s]."""
+    speed = float(np.linalg.norm(angular))
+    share = speed / params.orientation_gain_1_s if params.orientation_gain_1_s > 0.0 else 0.0
+    return rotation_about(angular / speed, math.asin(min(1.0, share))) @ R
+
+
+def _nearer(R: FloatArray, goal: FloatArray) -> FloatArray:
+    """Return the goal, or what lies on the way to it if it is far."""
+    difference = goal @ R.T
+    angle = math.acos(max(-1.0, min(1.0, 0.5 * (float(np.trace(difference)) - 1.0))))
+    if angle <= _TURN_RAD:
+        return goal
+    skew = difference - difference.T
+    axis = np.array((skew[2, 1], skew[0, 2], skew[1, 0]))
+    if np.linalg.norm(axis) < 1e-6:  # half a turn: any column of (D + I) is along the axis
+        both = difference + np.eye(3)
+        axis = both[:, int(np.argmax(np.diag(both)))]
+    return rotation_about(axis / np.linalg.norm(axis), _TURN_RAD) @ R
+
+
+def rotation_about(axis: FloatArray, angle: float) -> FloatArray:
+    """Rotation (3, 3) about a unit axis (3,) by an angle [rad] (Rodrigues)."""
+    x, y, z = axis
+    K = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K)
