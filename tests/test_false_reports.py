@@ -58,6 +58,50 @@ def test_a_standing_arm_that_is_told_it_moves_stays_where_it_is_and_says_why(pan
     assert "commanded joint velocities hold nan" in said[-1].reason
 
 
+class Shaker(Liar):
+    """Reports, of the commands of late, always the one that is farthest from the last."""
+
+    def __init__(self, model, seed):
+        super().__init__(model, seed)
+        self.commands = []
+
+    def command(self, qd):
+        self.commands = [*self.commands[-5:], qd.copy()]
+        super().command(qd)
+
+    def told(self, robot):
+        if not self.commands:
+            return robot
+        kept = np.array(self.commands)
+        far = np.abs(kept - kept[-1]).argmax(axis=0)
+        return replace(robot, qd_commanded=kept[far, np.arange(7)], stamp=robot.stamp + 1e-4)
+
+
+@pytest.mark.parametrize("name", ["paper", "paper:task.speed_m_s=0.5", "pretouch"])
+def test_reports_of_old_commands_do_not_shake_the_arm(panda_model, name):
+    arm = Shaker(panda_model, 0)
+    said = turned(controller(panda_model, name), arm, 150)
+    change = np.abs(np.diff([step.command for step in said], axis=0)).max(axis=0)
+    assert (change <= 5.0 * panda_model.description.qdd_max * DT).all()
+
+
+def test_states_that_waited_together_are_no_jump(panda_model, arm):
+    """Stamps may be times of arrival: after 40 ms without any, a state of then comes at once with the newest."""
+    control = controller(panda_model, "paper:task.speed_m_s=0.5")
+    state, held, kept = control.init(arm.read()), [], []
+    for step in range(400):
+        kept.append(World.read(arm))
+        late = step % 50 in (10, 11, 12, 13)
+        first = kept[-1 - step % 50 + 9] if late else kept[-1]
+        if step % 50 == 13:
+            first = replace(kept[-4], stamp=kept[-1].stamp)
+        arm.lie = lambda _, first=first: first
+        cycle = loop.turn(control, state, arm, arm.skin(), arm.tick())
+        state = cycle.after
+        held.append(cycle.step.reason if cycle.step.mode is Mode.HOLD else "")
+    assert "nan" not in "".join(held)
+
+
 @pytest.mark.parametrize(("step_rad", "held"), [(0.5, True), (-0.08, True), (0.01, False)])
 def test_an_encoder_that_jumps_makes_the_arm_hold_until_a_person_has_looked(panda_model, arm, step_rad, held):
     arm.told = lambda robot: replace(robot, q=robot.q + step_rad * (np.arange(7) == 3))

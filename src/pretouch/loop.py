@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from signal import SIGINT, SIGTERM
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,6 +26,8 @@ _ROUNDING_RAD_S = 1e-6
 """By how much the report of a command may be rounded [rad/s]."""
 _ENCODER_RAD = 0.02
 """By how much a measured joint position may jump [rad]: what an encoder and a joint's elasticity can do."""
+_LAG_S = 0.025
+"""By how much an arm may lag behind the last command [s]: its way there, and a pause of the process that brings it."""
 _BINS_PER_E = 1.0 / math.log(1.01)
 _BINS = 2316
 """Bins one per cent wide from a tenth of a microsecond to a thousand seconds."""
@@ -217,7 +218,7 @@ def run(
             if done(cycle.step):
                 return
     finally:
-        with noted(SIGINT, SIGTERM):  # until the arm is at rest
+        with noted():  # until the arm is at rest
             come_to_rest(controller.limits, robot, clock, state.watch.robot.q_commanded, sent)
 
 
@@ -254,7 +255,9 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
         return robot
     if q.shape != command.shape or reported.shape != command.shape:
         return robot
-    moved = (np.maximum(np.abs(last.qd), np.abs(command)) + limits.qdd_max * gap) * gap + _ENCODER_RAD
+    # stamps may be times of arrival: states that waited together come together
+    speed = np.maximum(np.minimum(np.abs(last.qd), limits.qd_max), np.abs(command))
+    moved = speed * (gap + controller.profile.failure.state_timeout_s) + limits.qdd_max * gap**2 + _ENCODER_RAD
     if (jumped := np.abs(q - last.q) > moved).any():
         return replace(robot, q=np.where(jumped, np.nan, q))
     reach = limits.qdd_max * max(limits.period, now - state.watch.stamp) + _ROUNDING_RAD_S
@@ -262,6 +265,8 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
         return robot
     recent = np.array([command, *(earlier for _, earlier in state.watch.sent)])
     known = (reported >= recent.min(axis=0) - reach) & (reported <= recent.max(axis=0) + reach)
+    if robot.stamp > state.watch.stamp:  # of after the last command, which it cannot lag behind by all of them
+        known &= np.abs(reported - command) <= reach + limits.qdd_max * _LAG_S
     return robot if known.all() else replace(robot, qd_commanded=np.where(known, reported, np.nan))
 
 

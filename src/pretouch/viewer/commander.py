@@ -23,7 +23,10 @@ class Commander:
 
     def refusal(self, visitor: int, control: Any = None) -> str:
         """Say why a visitor may not use a control, or ''; who does while nobody commands, commands from now on."""
-        if self._who is None or control is self.take:
+        there = self._server.get_clients()
+        if visitor not in there:
+            return "The page has not said where it looks from: wait a moment."
+        if self._who not in there or control is self.take:
             self._give(visitor)
         return "" if self._who == visitor else f"{_name(self._who)} commands: press Take command first."
 

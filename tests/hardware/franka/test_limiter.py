@@ -1,5 +1,6 @@
 """The limiter against an arm that checks each millisecond, and goes on by itself where a command is lost."""
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -30,6 +31,21 @@ def test_any_staircase_of_set_points_keeps_all_limits(limits: MotionLimits) -> N
             wanted = limits.qd_max * draw.choice([-1.0, 0.0, 0.3, 1.0], 7)
         arm.take(limiter.step(arm.state(), wanted.tolist()))
     assert np.abs(arm.q - middle(limits)).max() > 0.5
+
+
+@pytest.mark.parametrize("by", [1.0, -1.0])
+@pytest.mark.parametrize("steps", [0, 1, 300])
+def test_a_false_report_of_what_is_commanded_is_an_error_and_no_step(
+    limits: MotionLimits, steps: int, by: float
+) -> None:
+    arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
+    wanted = (0.1 * limits.qd_max).tolist()
+    for _ in range(steps):
+        arm.take(limiter.step(arm.state(), wanted))
+    state = arm.state()
+    lie = replace(state, dq_d=state.dq_d + by * (np.arange(7) == 1))
+    with pytest.raises(RobotError, match=r"^Joint 2 is said to be commanded .*, which no lost command explains"):
+        limiter.step(lie, wanted)
 
 
 @pytest.mark.parametrize(("lost", "of"), [(3, 50), (15, 200)])

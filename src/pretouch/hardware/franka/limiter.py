@@ -11,7 +11,7 @@ from pretouch.hardware.franka.state import JOINTS, FrankaState
 
 PERIOD_S = 0.001
 _UNHEARD_S = 0.02
-"""Before a position limit, so long may the arm go on as it does because commands are lost [s]."""
+"""So long may the arm go on as it does because commands are lost [s]: after so many in a row it stops by itself."""
 _REST_RAD_S = 1e-9
 _ROUNDING = 1.0 + 1e-9
 _BRAKING = 0.7
@@ -46,6 +46,7 @@ class SetPointLimiter:
         self._speed = [params.speed_share * v for v in limits.qd_max.tolist()]
         self._acceleration = [params.acceleration_share * a for a in limits.qdd_max.tolist()]
         jerk = [params.jerk_share * j for j in limits.qddd_max.tolist()]
+        self._unheard = (limits.qdd_max * _UNHEARD_S + params.reseed_rad_s).tolist()
         self._ends = _ends(limits, params.position_margin_rad, self._acceleration, jerk)
         self._ruckig, self._output = Ruckig(JOINTS, PERIOD_S), OutputParameter(JOINTS)
         self._input = InputParameter(JOINTS)
@@ -69,6 +70,13 @@ class SetPointLimiter:
             raise RobotError(
                 f"The arm reports the desired state {at} rad, {now} rad/s and {changing} rad/s^2, which is not finite:"
                 " check the arm and its library."
+            )
+        told = self._sent or [0.0] * JOINTS
+        far = [i for i in range(JOINTS) if abs(now[i] - told[i]) > self._unheard[i]]
+        if far:
+            raise RobotError(
+                f"Joint {far[0] + 1} is said to be commanded to {now[far[0]]:.3f} rad/s after {told[far[0]]:.3f} rad/s,"
+                " which no lost command explains: check what else commands the arm, then begin again."
             )
         self.lost = self._sent is not None and self._differs(now, self._sent)
         if self._sent is None or self.lost:

@@ -9,6 +9,8 @@ from pretouch.hardware.ros2.stamps import Stamps
 from pretouch.types import FloatArray
 from pretouch.values import value
 
+_NAMES_MOST = 1000
+"""Joints of a message; one with more is nobody's whose joints are ours."""
 _REMEMBERED = 64
 """Orders of names, and joints of others, that are kept: whoever publishes ever other names must not fill the memory."""
 
@@ -40,6 +42,8 @@ class Joints:
 
     def take(self, message: Any, received: float, writer: int) -> None:
         """Take a message in; one without all of our joints is another device's."""
+        if len(message.name) > _NAMES_MOST:
+            return
         places = self._where(tuple(message.name), len(message.position))
         if places is None:
             return

@@ -109,10 +109,10 @@ class Ros2Robot:
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point, kept for `hold_s` unless there is another one.
 
-        Before the arm has settled it stays at rest. Once it was found not to follow, commands are RobotErrors: it is at
-        rest when the last trajectory has ended.
+        Before the arm has settled it stays at rest. Once something was found wrong, `read` has said so: trajectories
+        are RobotErrors, for it is at rest when the last one has ended, but velocities are sent on, or nothing brakes.
         """
-        if self._lost:
+        if self._lost and self.params.command == "trajectory":
             raise RobotError(self._lost)
         if not np.isfinite(qd).all():
             raise RobotError(f"The command is {qd}: give finite joint velocities.")

@@ -15,6 +15,11 @@ from pretouch.hardware.ros2.stamps import Stamps
 from pretouch.sensing import skin as skins
 from pretouch.types import RangeReadings, RangeStatus
 
+_NOTHING = (-math.inf, 0.0, RangeStatus.NONE)
+"""Stamp, distance and status of a unit that is not heard."""
+_UNKNOWN_MOST, _SHOWN = 64, 80
+"""Names of other units that are kept, and their letters."""
+
 
 class Ros2Skin:
     """Sensor units behind topics; a unit that is not heard is silent, which the controller names."""
@@ -22,8 +27,7 @@ class Ros2Skin:
     def __init__(self, params: SkinParams, skin: skins.Skin, node: Ros2Node) -> None:
         self._ids, self._node, self.params = skin.ids, node, params
         self._stamps = [Stamps(params.shared_clock) for _ in skin.ids]
-        nothing = (-math.inf, 0.0, RangeStatus.NONE)
-        self._newest: list[tuple[float, float, RangeStatus]] = [nothing for _ in skin.ids]
+        self._newest: list[tuple[float, float, RangeStatus]] = [_NOTHING for _ in skin.ids]
         self._unknown: set[str] = set()
         if UNIT in params.topic:
             self._subscriptions = [
@@ -49,11 +53,16 @@ class Ros2Skin:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
-        return tuple(s.unreadable for s in self._subscriptions if s.unreadable)
+        several = [name for name, stamps in zip(self._ids, self._stamps, strict=True) if stamps.together()]
+        found = [f"Several publishers send as {name}: run only one; until then the unit is silent." for name in several]
+        return (*(s.unreadable for s in self._subscriptions if s.unreadable), *found)
 
     def read(self) -> RangeReadings:
-        """Return the newest reading of each unit, stamped with when it was received by the monotonic clock."""
-        newest = tuple(self._newest)
+        """Return the newest reading of each unit, stamped with when it was received by the monotonic clock.
+
+        A unit for which several publish is silent: nobody can say whose readings are its own.
+        """
+        newest = [_NOTHING if s.together() else one for s, one in zip(self._stamps, tuple(self._newest), strict=True)]
         return RangeReadings(
             np.array([stamp for stamp, _, _ in newest]),
             np.array([distance for _, distance, _ in newest]),
@@ -77,8 +86,8 @@ class Ros2Skin:
         name = message.header.frame_id
         if name in self._ids:
             self._take(self._ids.index(name), message, received, writer)
-        else:
-            self._unknown.add(name)
+        elif len(self._unknown) < _UNKNOWN_MOST:
+            self._unknown.add(name[:_SHOWN])
 
     def _take(self, unit: int, message: Any, received: float, writer: int) -> None:
         stamp = self._stamps[unit].instant(message.header, received, writer)
