@@ -9,31 +9,22 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pretouch import faults
 from pretouch.contact.announced_load import LoadState, announced, kept_free, most_kg, without_load
 from pretouch.contact.detector import Body, Detection, Sample
 from pretouch.contact.reaction import ReactionInputs, ReactionMotion
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.control import path as paths
-from pretouch.control.commander import Asked, asked_by
+from pretouch.control.commander import Asked, asked_by, commanded
 from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.motion import Motion, MotionState, joint_motion, restriction_on
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.control.setup import motion_setup
-from pretouch.desired import Desired, sound_desired
+from pretouch.desired import Desired
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import events_of
-from pretouch.faults import (
-    Watch,
-    examine,
-    sound_imu,
-    sound_points,
-    sound_readings,
-    sound_robot,
-    sound_touch,
-    watch_init,
-)
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.payload import sound_payload
 from pretouch.perception.obstacles import TrackState, track_init
@@ -61,7 +52,7 @@ from pretouch.values import value
 class ControllerState:
     """All the controller remembers from one step to the next."""
 
-    watch: Watch
+    watch: faults.Watch
     tracks: TrackState
     window: WindowState
     """Of the external force, eq. 8."""
@@ -120,11 +111,11 @@ class Controller:
 
         `learnt` is the arm's free motion as an earlier session left it, for a detector that learns it.
         """
-        sound, wrong = sound_robot(robot, self.limits.qd_max)
+        sound, wrong = faults.sound_robot(robot, self.limits.qd_max)
         if sound is None:
             raise RobotStateError(f"The controller cannot start: {wrong}: check the connection to the arm.")
         return ControllerState(
-            watch=watch_init(sound),
+            watch=faults.watch_init(sound),
             tracks=track_init(len(self.skin)),
             window=window_init(self.profile.window.samples),
             detector=self._detector.init(self.body, learnt),
@@ -200,12 +191,11 @@ class Controller:
         # along the path, or as a commander asks, as fast as eqs. 3-4 leave it, or as the reaction says
         slowed = 1.0 if p.slow is None else speed_scale(near.seen.nearest, p.slow.d_max_m)
         scale, reduction = reduce_speed(state.reduction, min(near.scale, slowed), p.task.restore_cycles)
-        asked = self._asked(state, given, kin)
+        asked = self._asked(state, given, kin, scale)
         answer, react = p.react.move(react, self.body, noticed, mode)
-        desired = asked.scaled(scale) if answer is None else answer.velocity
+        desired = asked.velocity if answer is None else answer.velocity
         mark("path")
-        request = self._request(state, near, mode, asked, desired, scale if answer is None else answer)
-        motion, mode, approach, moving = self._moved(state, noticed, near, mode, request)
+        motion, mode, approach, moving = self._moved(state, noticed, near, mode, asked, desired, answer)
         mark("motion")
 
         step = ControlStep(
@@ -222,10 +212,10 @@ class Controller:
         )  # fmt: skip
         after = ControllerState(
             watch=given.watch, tracks=near.tracks, window=window, detector=detector, reduction=reduction,
-            reaction=react, path=paths.advance(self.path, state.path, asked, motion.ee_velocity_commanded, p.task)
-            if mode.mode is Mode.TRACK and isinstance(asked, paths.Following) else paths.pause(state.path),
+            reaction=react, path=paths.advance(self.path, state.path, asked.path, motion.ee_velocity_commanded, p.task)
+            if mode.mode is Mode.TRACK and asked.path is not None else paths.pause(state.path),
             approach=approach, motion=moving, mode=mode, command=motion.qp.qd.copy(),
-            rotation_goal=_kept(asked, state), outside=near.outside,
+            rotation_goal=asked.rotation_kept, outside=near.outside,
             load=given.load and kept_free(given.load, robot.tau_ext, detection.residual),
         )  # fmt: skip
         mark("record")
@@ -234,21 +224,18 @@ class Controller:
     def _checked(self, state: ControllerState, inputs: Inputs) -> "_Given":
         """Return what of the inputs can be used, and what is wrong with the rest."""
         p, units = self.profile, self._units
-        robot, events, watch = examine(
+        robot, events, watch = faults.examine(
             state.watch, inputs, state.command, self.limits.period, self.limits.qd_max, p.failure, p.detect.by_torques
         )
-        readings, unfit = sound_readings(inputs.readings, units)
-        touches, wrong = sound_touch(inputs.touch, units) if self._touching else (None, "")
-        points, lost = sound_points(inputs.points)
+        readings, unfit = faults.sound_readings(inputs.readings, units)
+        touches, wrong = faults.sound_touch(inputs.touch, units) if self._touching else (None, "")
+        points, lost = faults.sound_points(inputs.points)
         payload, heavy = sound_payload(inputs.payload, self._most_kg)
         if heavy:
             events[Event.LOAD_UNFIT] = heavy
         load = announced(state.load, payload, robot)
-        desired, none = sound_desired(inputs.desired, self.model.n, watch.stamp)
-        if none:
-            events[Event.DESIRED_UNFIT] = none
-        elif desired is not None and watch.stamp - desired.stamp[-1] > p.failure.desired_timeout_s:
-            events[Event.DESIRED_STALE] = f"{watch.stamp - desired.stamp[-1]:.2f} s"
+        desired, ended = commanded(inputs.desired, self.model.n, watch.stamp, p.failure)
+        events |= ended
         return _Given(robot, events, watch, readings, touches, points, load, desired, unfit or wrong, lost)
 
     def _unloaded(self, given: "_Given", kin: Kinematics) -> "_Given":
@@ -279,7 +266,7 @@ class Controller:
         robot, before, p = given.robot, state.window, self.profile.window
         reacting = state.mode.mode is Mode.REACT
         window = add_force(before, None if robot.wrench is None else robot.wrench[:3], p)
-        imu = sound_imu(inputs.imu, self._units) if self._shaken else None
+        imu = faults.sound_imu(inputs.imu, self._units) if self._shaken else None
         sample = Sample(
             given.watch.stamp, kin, robot, window, before.full, near.seen.obstacles, reacting, near.watched,
             given.touches, imu, given.load.doubted_kg if given.load else 0.0,
@@ -287,33 +274,27 @@ class Controller:
         detection, detector = self._detector.step(state.detector, self.body, sample)
         return detection, before if reacting and p.freeze_while_reacting else window, detector
 
-    def _asked(self, state: ControllerState, given: "_Given", kin: Kinematics) -> paths.Following | Asked:
-        """Return what is asked, before anything limits it: what follows the path, or what a commander wants."""
-        task, model = self.profile.task, self.model
+    def _asked(self, state: ControllerState, given: "_Given", kin: Kinematics, scale: float) -> Asked:
+        """Return what is asked times a factor: what follows the path, or what a commander wants."""
+        task, goal = self.profile.task, state.rotation_goal
         if given.desired is None:
-            return paths.follow(self.path, state.path, kin.position[model.ee], task)
-        return asked_by(given.desired, given.watch.stamp, kin, given.robot, model, state.rotation_goal, task)
-
-    def _request(
-        self, state: ControllerState, near: "_Near", mode: ModeState, asked: paths.Following | Asked,
-        desired: FloatArray, answer: ReactionMotion | float,
-    ) -> MotionRequest:  # fmt: skip
-        """Return what is asked of the motion: by the reaction's answer, or by the task times a factor."""
-        goal, touch = state.rotation_goal, None
-        if isinstance(answer, ReactionMotion):
-            qd, touch = answer.qd, answer.touch_speed
-        elif isinstance(asked, Asked) and mode.mode is Mode.TRACK:
-            qd, goal = None if asked.qd is None else answer * asked.qd, asked.rotation_goal
-        else:
-            qd = None
-        room = self._units + (0 if near.outside is None else len(near.outside.sigma))
-        hold = mode.mode is Mode.HOLD and qd is None
-        return MotionRequest(desired, goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
+            following = paths.follow(self.path, state.path, kin.position[self.model.ee], task)
+            return Asked(following.scaled(scale), following.point, goal, goal, None, following)
+        return asked_by(given.desired, given.watch.stamp, kin, given.robot, self.model, goal, task, scale)
 
     def _moved(
-        self, state: ControllerState, noticed: ReactionInputs, near: "_Near", mode: ModeState, request: MotionRequest
-    ) -> tuple[Motion, ModeState, object, MotionState]:
+        self, state: ControllerState, noticed: ReactionInputs, near: "_Near", mode: ModeState, asked: Asked,
+        desired: FloatArray, answer: ReactionMotion | None,
+    ) -> tuple[Motion, ModeState, object, MotionState]:  # fmt: skip
         """Return the joint velocities that come nearest to what is asked: eqs. 5-7 and eq. 2."""
+        goal, qd, touch = state.rotation_goal, None, None
+        if answer is not None:
+            qd, touch = answer.qd, answer.touch_speed
+        elif mode.mode is Mode.TRACK:
+            goal, qd = asked.rotation_goal, asked.qd
+        room = self._units + (0 if near.outside is None else len(near.outside.sigma))
+        hold = mode.mode is Mode.HOLD and qd is None
+        request = MotionRequest(desired, goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
         kin, robot, obstacles = noticed.kin, noticed.robot, near.seen.obstacles
         allowed, approach = self._approach.step(state.approach, self._motion_body, kin, robot, obstacles, request)
         motion, moving = joint_motion(state.motion, self._setup, kin, robot, obstacles, request, allowed)
@@ -321,11 +302,6 @@ class Controller:
         if qp.outcome in _TROUBLE and (qp.outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)
         return motion, mode, approach, moving
-
-
-def _kept(asked: paths.Following | Asked, state: ControllerState) -> FloatArray:
-    """Return the orientation (3, 3) to hold from here on where nobody asks for another."""
-    return asked.rotation_kept if isinstance(asked, Asked) else state.rotation_goal
 
 
 def _points_per_link(profile: Profile) -> int:
@@ -337,7 +313,7 @@ class _Given(NamedTuple):
 
     robot: RobotState
     events: dict[Event, str]
-    watch: Watch
+    watch: faults.Watch
     readings: RangeReadings
     touches: TouchReadings | None
     points: SeenPoints | None

@@ -182,8 +182,7 @@ class Obstacles:
     """K sensed points, each with its closest point on the robot's body. Base frame."""
 
     unit: IntArray
-    """(K,) index of the sensing unit in the skin; from the number of units on, the place of a point of outside sources
-    in `perception.outside`."""
+    """(K,) index of the sensing unit in the skin; from their number on, of an outside point (`perception.outside`)."""
     point: FloatArray
     """(K, 3) obstacle positions, eq. 1 [m]."""
     ee_distance: FloatArray

@@ -1,11 +1,13 @@
-"""What is asked of the arm in one step: by a commander in place of the path."""
+"""What is asked of the arm in one step: along the path, or by a commander in its place."""
 
 import math
 
 import numpy as np
 
-from pretouch.desired import Desired, DesiredKind
-from pretouch.params import TaskParams
+from pretouch.control.path import Following
+from pretouch.desired import Desired, DesiredKind, sound_desired
+from pretouch.modes import Event
+from pretouch.params import FailureParams, TaskParams
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import FloatArray, RobotState
 from pretouch.values import value
@@ -16,7 +18,7 @@ _TURN_RAD = 1.0
 
 @value
 class Asked:
-    """What is asked before anything limits it."""
+    """What is asked before anything else limits it."""
 
     velocity: FloatArray
     """(3,) of the end-effector origin [m/s]."""
@@ -26,32 +28,43 @@ class Asked:
     """(3, 3) R_O_ee to turn to."""
     rotation_kept: FloatArray
     """(3, 3) R_O_ee to hold when nobody asks for another."""
-    qd: FloatArray | None
+    qd: FloatArray | None = None
     """(n,) joint velocities asked for in place of all that [rad/s]."""
+    path: Following | None = None
+    """How the path is followed; None where a commander asks."""
 
-    def scaled(self, scale: float) -> FloatArray:
-        """Velocity (3,) [m/s] times a factor."""
-        return scale * self.velocity
+
+def commanded(
+    desired: Desired | None, joints: int, now: float, params: FailureParams
+) -> tuple[Desired | None, dict[Event, str]]:
+    """Return a desired motion as far as it can be used at an instant [s], and what is wrong with it."""
+    sound, wrong = sound_desired(desired, joints, now)
+    if wrong:
+        return None, {Event.DESIRED_UNFIT: wrong}
+    if sound is not None and now - sound.stamp[-1] > params.desired_timeout_s:
+        return sound, {Event.DESIRED_STALE: f"{now - sound.stamp[-1]:.2f} s"}
+    return sound, {}
 
 
 def asked_by(
     desired: Desired, now: float, kin: Kinematics, robot: RobotState, model: RobotModel, held: FloatArray,
-    params: TaskParams,
+    params: TaskParams, scale: float,
 ) -> Asked:  # fmt: skip
-    """Ask for what a commander wants at an instant [s]; `held` is R_O_ee (3, 3) to hold where it says nothing of it.
+    """Ask for what a commander wants at an instant [s] times a factor on its speed.
 
-    A position is approached as the path is: with `position_gain_1_s`, no faster than `speed_m_s` at the end-effector.
+    `held` is R_O_ee (3, 3) to hold where the commander says nothing of it. A position is approached as the path is:
+    with `position_gain_1_s`, no faster than `speed_m_s` at the end-effector.
     """
     number, rate = _at(desired, now)
     R, here = kin.rotation[model.ee], kin.position[model.ee]
     if desired.kind is DesiredKind.TWIST:
         goal, kept = (held, held) if not number[3:].any() else (_led(R, number[3:], params), R)
-        return Asked(number[:3], here, goal, kept, None)
+        return Asked(scale * number[:3], here, goal, kept)
     if desired.kind is DesiredKind.POSE:
         velocity = rate[:3] + params.position_gain_1_s * (number[:3] - here)
         fastest = max(params.speed_m_s, float(np.linalg.norm(rate[:3])))
         goal = number[3:].reshape(3, 3)
-        return Asked(_shortened(velocity, fastest), number[:3], _nearer(R, goal), goal, None)
+        return Asked(scale * _shortened(velocity, fastest), number[:3], _nearer(R, goal), goal)
     qd = number
     if desired.kind is DesiredKind.JOINT_POSITIONS:
         qd = rate + params.position_gain_1_s * (number - robot.q_commanded)
@@ -60,7 +73,7 @@ def asked_by(
         fastest = max(params.speed_m_s, float(np.linalg.norm(model.ee_jacobian(kin)[:3] @ rate)))
         factor = min(1.0, fastest / max(float(np.linalg.norm(velocity)), 1e-12))
         velocity, qd = factor * velocity, factor * qd
-    return Asked(velocity, here, R, R, qd)
+    return Asked(scale * velocity, here, R, R, scale * qd)
 
 
 def _at(desired: Desired, now: float) -> tuple[FloatArray, FloatArray]:

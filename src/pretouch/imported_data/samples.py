@@ -84,6 +84,8 @@ def check_exists(place: Path) -> None:
     """Refuse a recording that is not there, or not of a known format."""
     if not os.path.exists(place):
         raise RecordingError(f"The recording {place} does not exist: check its name.")
+    if not (place.is_dir() or place.is_file()):  # as a pipe or a device, which may have no end
+        raise RecordingError(f"{place} is no file: give a recording that is one.")
     if place.is_dir() and not (place / "metadata.yaml").is_file():
         raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
     ending = place.suffix.lower()

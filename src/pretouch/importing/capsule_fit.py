@@ -137,6 +137,8 @@ def _refined(start: Rods, points: FloatArray, wanted: FloatArray) -> Rods:
     def slope(x: FloatArray) -> FloatArray:
         return _slope(_unpacked(x), points, wanted)
 
+    if len(points) < 7 * len(start):
+        return start  # too few corners to move capsules by
     x = np.column_stack([start.a, start.b, start.radius]).ravel()
     result = least_squares(error, x, slope, method="lm", max_nfev=_STEPS)
     return _lengthened(_unpacked(result.x))

@@ -85,6 +85,8 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
         data = path.read_bytes()
     except OSError as error:
         raise RobotModelError(f"The mesh {path} cannot be read: {error.strerror}.") from error
+    if data.startswith(b"PK"):  # a COLLADA reader would unpack it, whatever is in it
+        raise RobotModelError(f"The mesh {path} is a ZIP archive: unpack it first.")
     try:
         mesh = _obj(data) if suffix == ".obj" else _by_trimesh(data, suffix[1:])
     except Exception as error:  # whatever a library makes of a broken file

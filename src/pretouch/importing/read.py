@@ -57,6 +57,8 @@ def _check_included(root: ET.Element, file: Path) -> None:
 
 def _root(file: Path) -> ET.Element:
     try:
+        if file.exists() and not file.is_file():  # as a pipe or a device, which may have no end
+            raise RobotModelError(f"{file} is no file: give a URDF or MJCF file.")
         if file.stat().st_size > _LARGEST_FILE:
             raise RobotModelError(
                 f"The file {file} is larger than {_LARGEST_FILE // 10**6} MB: give a robot description without embedded"

@@ -49,6 +49,6 @@ def sound(made: Callable[[], Any]) -> Any:
         return made()
     except RecordingError:
         raise
-    except (PretouchError, ValueError, TypeError, KeyError, OSError) as error:
+    except (PretouchError, ValueError, TypeError, LookupError, AttributeError, OverflowError, OSError) as error:
         why = " ".join(str(error).split())
         raise RecordingError(f"The recording does not describe a controller that can be made again: {why}") from error

@@ -176,6 +176,8 @@ def open_recording(place: Path) -> Recorded:
     """
     place = Path(place)
     contents, raw = Contents(), {topic: dict[int, bytes]() for topic in TOPICS}
+    if place.exists() and not (place.is_file() or place.is_dir()):  # as a pipe or a device, which may have no end
+        raise RecordingError(f"{place} is no file: give a recording that is one.")
     try:
         with place.open("rb") as file:
             if not begins_as_mcap(file):

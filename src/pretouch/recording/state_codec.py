@@ -164,6 +164,11 @@ class _Reading:
         self._wholes = iter(message.wholes.tolist())
         self._texts = iter(message.texts)
 
+    @property
+    def left(self) -> int:
+        """How many parts have not been taken."""
+        return len(self._parts) - self._at
+
     def none(self, name: str) -> bool:
         """Whether nothing was kept under a name: then it is taken."""
         found = self._at < len(self._parts) and self._parts[self._at][:2] == (name, "none")
@@ -212,7 +217,7 @@ def decode_state(data: bytes) -> tuple[bool, ControllerState]:
     message = decoded(STATE, data)
     try:
         return message.anew, _give(_Reading(message), "", ControllerState)
-    except (ValueError, KeyError, IndexError, StopIteration) as error:
+    except (ValueError, TypeError, KeyError, IndexError, StopIteration, OverflowError) as error:
         raise RecordingError(
             f"The controller's state in the recording is from another version ({error}): open it with the version that"
             " made it."
@@ -235,6 +240,8 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
         return kind(**given)
     kind_name, shape = parts.next(name)
     if kind_name == "tuple":
+        if not 0 <= int(shape) <= parts.left:
+            raise ValueError(f"{name} has {shape} parts, more than follow")
         return tuple(_give(parts, f"{name}.{i}", inner) for i, inner in enumerate(_inner(hint, int(shape))))
     if kind_name == "array":
         numbers = parts.numbers(tuple(map(int, shape.split())))

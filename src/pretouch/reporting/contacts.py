@@ -62,11 +62,13 @@ class Unanswered:
 def detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
     """All detected contacts in order, each with the touch it answers if there is one."""
     found: list[Detection] = []
+    answered: set[int | None] = set()
     lasted, steps = durations(course.time), [i for i, _, _ in course.contacts]
     for (i, contact, speed), following in zip(course.contacts, [*steps[1:], len(course)], strict=False):
         time, end = float(course.time[i]), _reaction_end(course, i)
         touch = _answered(time, touches)
-        first = touch is not None and all(before.touch != touch for before in found)
+        first = touch is not None and touch not in answered
+        answered.add(touch)
         begun = touches[touch].start if first and touch is not None else time
         over = touches[touch].end + GRACE_S if touch is not None else time
         during = slice(

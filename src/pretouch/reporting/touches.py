@@ -1,5 +1,6 @@
 """True touches: what only a simulation knows of contacts."""
 
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,11 +46,11 @@ def touches_of(truth: TrueForces | None) -> list[Touch]:
     samples = max(1, round(MEAN_S / max(float(np.median(np.diff(time))), 1e-9)))
     mean = mean_over(force, samples)
     merged = _merged(spans(force > TOUCH_N), time)
-    found, before = [], -np.inf
+    found, before, begun = [], -np.inf, [touched for touched, _, _ in truth.touches]
     for first, past in merged:
         start, end = float(time[first]), float(time[past - 1])
         late = int(np.searchsorted(time, start + TRANSIENT_S))
-        link, velocity = _beginning(truth, before, start)
+        link, velocity = _beginning(truth, begun, before, start)
         found.append(
             Touch(
                 start, end,
@@ -79,7 +80,10 @@ def _largest(mean: FloatArray, first: int, past: int) -> float:
     return float(mean[max(first, 0) : past].max(initial=0.0))
 
 
-def _beginning(truth: TrueForces, after: float, start: float) -> tuple[str, FloatArray]:
-    """Link and velocity of the last contact that began after one instant and by another [s]."""
-    known = [(link, velocity) for time, link, velocity in truth.touches if after < time <= start + 1e-9]
-    return known[-1] if known else ("", np.full(3, np.nan))
+def _beginning(truth: TrueForces, begun: list[float], after: float, start: float) -> tuple[str, FloatArray]:
+    """Link and velocity of the last contact that began after one instant and by another [s], as `begun` has them."""
+    last = bisect_right(begun, start + 1e-9) - 1
+    if last < 0 or not begun[last] > after:
+        return "", np.full(3, np.nan)
+    _, link, velocity = truth.touches[last]
+    return link, velocity

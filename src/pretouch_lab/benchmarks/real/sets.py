@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -66,8 +67,11 @@ _GLOVE = {"q": "q", "qd": "dq", "torque": "tau_J"}
 
 def _of_arrays(files: list[Path]) -> list[Run]:
     """Read a file of NumPy arrays t, q, dq, tau and run, with label, ok and run_name where it has them."""
-    with np.load(files[0], allow_pickle=False) as stored:
-        data = {name: stored[name] for name in stored.files}
+    try:
+        with np.load(files[0], allow_pickle=False) as stored:
+            data = {name: stored[name] for name in stored.files}
+    except (ValueError, OSError, BadZipFile) as error:
+        raise ExperimentError(f"{files[0]} is no file of NumPy arrays ({error}): get it again.") from error
     if missing := {"t", "q", "dq", "tau", "run"} - set(data):
         raise ExperimentError(f"{files[0]} has no {', '.join(sorted(missing))}: get it again, or take it away.")
     label = data.get("label", np.zeros(len(data["t"]), np.int64))
