@@ -23,7 +23,7 @@ def run(capsys, *args):
         (("live", "--port", "0"), "The port is 0: give one from 1 to 65535"),
         (("live", "--path", "square"), "The path is 'square': choose circle or line"),
         (("replay", "/nowhere.mcap", "--no-page"), "/nowhere.mcap cannot be read: it does not exist"),
-        (("replay", "/dev/null", "--no-page"), "/dev/null is empty"),
+        (("replay", "/dev/null", "--no-page"), "/dev/null is no file"),
         (("recover", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
         (("report", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
         (("detect", "/nowhere.csv"), "/nowhere.csv does not exist"),
