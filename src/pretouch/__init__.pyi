@@ -1,5 +1,6 @@
 """The public names and where each is defined: what `__init__.py` loads by name, and what a type checker reads."""
 
+from pretouch import desired as desired
 from pretouch import loop as loop
 from pretouch import realtime as realtime
 from pretouch.composition import describe as describe
@@ -29,6 +30,7 @@ from pretouch.control.posture import brought_to as brought_to
 from pretouch.control.restriction import approach_rows as approach_rows
 from pretouch.controller import Controller as Controller
 from pretouch.controller import ControllerState as ControllerState
+from pretouch.desired import Desired as Desired
 from pretouch.errors import PretouchError as PretouchError
 from pretouch.errors import RecordingError as RecordingError
 from pretouch.explanation import explain as explain

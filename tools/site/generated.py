@@ -21,7 +21,7 @@ API = {
     "parts": ("Parts of a controller", ("contact", "control", "perception")),
     "loop": ("Loop and recordings", ("loop", "realtime", "recording", "reporting")),
     "simulation": ("Simulation", ("sim",)),
-    "values": ("Values and errors", ("types", "payload", "errors")),
+    "values": ("Values and errors", ("types", "payload", "desired", "errors")),
 }
 """Pages of public names: title and the modules whose names stand there."""
 PAGES = {
