@@ -255,11 +255,13 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
         return robot
     if q.shape != command.shape or reported.shape != command.shape:
         return robot
-    # stamps may be times of arrival: states that waited together come together
-    speed = np.maximum(np.minimum(np.abs(last.qd), limits.qd_max), np.abs(command))
-    moved = speed * (gap + controller.profile.failure.state_timeout_s) + limits.qdd_max * gap**2 + _ENCODER_RAD
-    if (jumped := np.abs(q - last.q) > moved).any():
-        return replace(robot, q=np.where(jumped, np.nan, q))
+    moved = np.abs(q - last.q)
+    if not (moved <= _ENCODER_RAD).all():  # hardly ever at 1 kHz
+        # stamps may be times of arrival: states that waited together come together
+        speed = np.maximum(np.minimum(np.abs(last.qd), limits.qd_max), np.abs(command))
+        reach = speed * (gap + controller.profile.failure.state_timeout_s) + limits.qdd_max * gap**2 + _ENCODER_RAD
+        if (jumped := moved > reach).any():
+            return replace(robot, q=np.where(jumped, np.nan, q))
     reach = limits.qdd_max * max(limits.period, now - state.watch.stamp) + _ROUNDING_RAD_S
     if (np.abs(reported - command) <= reach).all():  # nearly always, and all commands would cost 10 us at 1 kHz
         return robot
