@@ -1,5 +1,6 @@
 """The web server of a page: on this machine alone unless asked, on the port that was asked for, and quiet."""
 
+import ctypes
 import errno
 import ipaddress
 import logging
@@ -98,9 +99,17 @@ def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
                 raise _busy(options, server.get_port())
             door.keep(server)
             server.gui.add_html(_LOST)
+            server.on_client_disconnect(_give_back)
             yield server
         finally:
             server.stop()
+
+
+def _give_back(_visitor: object) -> None:
+    """Give the system back what a visitor needed: the C library keeps 0.3 MB of each, split into small pieces."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def check_port(options: ServeOptions) -> None:
