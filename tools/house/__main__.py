@@ -28,7 +28,7 @@ class Measure:
     350 and 3 for what the model of free motion cannot express, 162 and 1 for the force that is found, 223 and 2 for
     loads that a program announces, 368 and 2 for the door of the pages, 289 and 4 for bounds on files from elsewhere.
     Those of product and lab by 667, for the detectors on recordings of real arms. Both by 80 for faults of the arm's
-    side, the user stop of the served arm, and waits with an end; those of product and lab by 11 more. Then by 437 and
+    side, the user stop of the served arm, and waits with an end; those of product and lab by 11 more. Then by 448 and
     5, for a commander in place of the path (275) and for what a review as an attacker found: memory, pipes, terminals,
     topics; and a profile's parameters by one, after which a commander's silence counts.
     """
@@ -58,9 +58,9 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 55_071, 35_000),
+        Measure("lines of the product, comments aside", product.lines, 55_082, 35_000),
         Measure("files of the product", len(product.files), 459, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 75_835, 50_000),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 75_846, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
