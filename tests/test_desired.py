@@ -28,10 +28,10 @@ from tests.test_loop import DT, World
 class Commanded:
     """An arm that follows its commands, driven by a commander: asks(time, arm) for each step."""
 
-    def __init__(self, model: RobotModel, name="paper", asks=None, seconds=4.0, recorder=None):
+    def __init__(self, model: RobotModel, name="paper", asks=None, seconds=4.0, recorder=None, arm=World):
         self.model = model
         self.control = Controller(model, Skin([], model), no_fixtures(), Circle(), profile(name))
-        self.arm = World(model, 0)
+        self.arm = arm(model, 0)
         self.begin = model.kinematics(self.arm.read().q)
         self.steps: list[ControlStep] = []
         self.cycles: list[loop.Cycle] = []
@@ -42,6 +42,7 @@ class Commanded:
             cycle = loop.turn(self.control, state, self.arm, self.arm.skin(), now, options)
             state = cycle.after
             self.steps.append(cycle.step)
+            self.cycles.append(cycle)
             if recorder is not None:
                 recorder.record(cycle)
             if now > seconds:
@@ -54,6 +55,16 @@ class Commanded:
     def moved(self) -> np.ndarray:
         ee = self.model.ee
         return self.end.position[ee] - self.begin.position[ee]
+
+
+class Pushed(World):
+    """An arm that something pushes."""
+
+    push = np.zeros(3)
+
+    def read(self):
+        state = super().read()
+        return replace(state, wrench=state.wrench + np.r_[self.push, np.zeros(3)])
 
 
 TURN = rotation_about(np.array([0.0, 0.0, 1.0]), 0.3)
@@ -183,6 +194,45 @@ def test_a_recording_holds_what_was_asked_and_replays_to_the_bit(panda_model, tm
     assert verify(recorded).said.startswith("All")
     found = recorded[150].inputs.desired
     np.testing.assert_array_equal(found.number, plan.number)
+
+
+def test_nonsense_that_was_asked_replays_too(panda_model, tmp_path):
+    place, count = tmp_path / "a.mcap", iter(range(10_000))
+
+    def asks(now, _):
+        two = np.array([now, now + 0.1])
+        return (
+            desired.twist(now, np.full(3, np.nan)),
+            Desired(DesiredKind.TWIST, two, np.zeros((1, 5))),
+            Desired(DesiredKind.TWIST, np.zeros(0), np.zeros((0, 6))),
+            "left",
+            desired.joint_velocities(now, np.full(7, 0.05)),
+        )[next(count) // 40 % 5]
+
+    control = Controller(panda_model, Skin([], panda_model), no_fixtures(), Circle(), profile("paper"))
+    with Recording(place, control) as recording:
+        run = Commanded(panda_model, asks=asks, recorder=recording, seconds=4.5)
+    recorded = open_recording(place)
+    assert len(recorded) == len(run.steps)
+    unread = [kept.inputs is None for kept in recorded]
+    assert [all(unread[k + 1 : k + 39]) for k in (0, 40, 80, 120, 160)] == [False, True, True, True, False]
+    assert verify(recorded).differing == 0
+
+
+def test_while_the_arm_yields_its_orientation_is_held_and_not_turned_to_what_is_asked(panda_model):
+    far, ee = rotation_about(np.array([0.0, 0.0, 1.0]), 1.5), panda_model.ee
+
+    def asks(now, run):
+        run.arm.push = np.array([0.0, 40.0, 0.0]) * (3.0 < now < 3.3)
+        T = np.eye(4)
+        T[:3, 3], T[:3, :3] = run.begin.position[ee], far @ run.begin.rotation[ee]
+        return desired.pose(now, T) if now > 2.9 else desired.twist(now, np.zeros(3))
+
+    run = Commanded(panda_model, asks=asks, seconds=4.0, arm=Pushed)
+    yielding = [k for k, step in enumerate(run.steps) if step.mode is Mode.REACT]
+    assert len(yielding) > 20
+    goals = {run.cycles[k].after.rotation_goal.tobytes() for k in yielding}
+    assert len(goals) == 1
 
 
 def test_what_is_sound_is_copied():

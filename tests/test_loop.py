@@ -276,7 +276,7 @@ def test_an_arm_whose_state_is_lost_is_brought_to_rest_by_what_it_was_last_told(
 
 
 @pytest.mark.parametrize("times", [1, 3])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals_that_come_while_the_arm_brakes_wait(controller: Controller, world: World, number: int, times: int):
     before = signal.signal(number, signal.default_int_handler)
     ticks = 0

@@ -215,7 +215,7 @@ class Controller:
             reaction=react, path=paths.advance(self.path, state.path, asked.path, motion.ee_velocity_commanded, p.task)
             if mode.mode is Mode.TRACK and asked.path is not None else paths.pause(state.path),
             approach=approach, motion=moving, mode=mode, command=motion.qp.qd.copy(),
-            rotation_goal=asked.rotation_kept, outside=near.outside,
+            rotation_goal=asked.rotation_kept if mode.mode is Mode.TRACK else state.rotation_goal, outside=near.outside,
             load=given.load and kept_free(given.load, robot.tau_ext, detection.residual),
         )  # fmt: skip
         mark("record")

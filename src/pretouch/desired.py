@@ -42,6 +42,8 @@ _MOST = 1000
 """Instants of a horizon."""
 _LARGEST = 1e3
 """A desired number [rad, rad/s, m, m/s] from here on is none."""
+_ROUNDING = 1e-6
+"""By how much the columns of a rotation may miss unit length and right angles."""
 _AHEAD_S = 60.0
 """A horizon that begins so far in the future is stamped by another clock."""
 _WIDTH = {DesiredKind.TWIST: 6, DesiredKind.POSE: 12}
@@ -105,4 +107,5 @@ def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Des
 
 
 def _are_rotations(R: FloatArray) -> bool:
-    return np.allclose(R @ R.transpose(0, 2, 1), np.eye(3), atol=1e-6) and bool((np.linalg.det(R) > 0.0).all())
+    orthonormal = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)) < _ROUNDING
+    return bool(orthonormal.all() and (np.linalg.det(R) > 0.0).all())

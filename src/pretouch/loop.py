@@ -250,7 +250,7 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     limits, command, last = controller.limits, state.command, state.watch.robot
     try:
         q, reported = np.asarray(robot.q, dtype=np.float64), np.asarray(robot.qd_commanded, dtype=np.float64)
-        gap = max(limits.period, float(robot.stamp) - last.stamp)
+        stamp = float(robot.stamp)
     except (AttributeError, TypeError, ValueError, OverflowError):
         return robot
     if q.shape != command.shape or reported.shape != command.shape:
@@ -258,6 +258,7 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     moved = np.abs(q - last.q)
     if not (moved <= _ENCODER_RAD).all():  # hardly ever at 1 kHz
         # stamps may be times of arrival: states that waited together come together
+        gap = max(limits.period, stamp - last.stamp)
         speed = np.maximum(np.minimum(np.abs(last.qd), limits.qd_max), np.abs(command))
         reach = speed * (gap + controller.profile.failure.state_timeout_s) + limits.qdd_max * gap**2 + _ENCODER_RAD
         if (jumped := moved > reach).any():
@@ -267,7 +268,7 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
         return robot
     recent = np.array([command, *(earlier for _, earlier in state.watch.sent)])
     known = (reported >= recent.min(axis=0) - reach) & (reported <= recent.max(axis=0) + reach)
-    if robot.stamp > state.watch.stamp:  # of after the last command, which it cannot lag behind by all of them
+    if stamp > state.watch.stamp:  # of after the last command, which it cannot lag behind by all of them
         known &= np.abs(reported - command) <= reach + limits.qdd_max * _LAG_S
     return robot if known.all() else replace(robot, qd_commanded=np.where(known, reported, np.nan))
 

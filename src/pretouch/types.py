@@ -312,7 +312,7 @@ class ControlStep:
     ee_velocity: FloatArray
     """(3,) measured end-effector velocity [m/s]."""
     path_position: FloatArray
-    """(3,) where on the path the arm should be [m]."""
+    """(3,) where on the path the arm should be, or where it is while a commander asks [m]."""
     path_phase: float
     """Arc length travelled along the path [m]."""
     desired_velocity: FloatArray

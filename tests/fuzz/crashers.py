@@ -9,7 +9,7 @@ import zstandard
 from tests.importing.made import six_axis
 
 
-def _chunk(packed: bytes, size: int, compression: bytes = b"zstd", more: int = 0) -> bytes:
+def chunk_of(packed: bytes, size: int, compression: bytes = b"zstd", more: int = 0) -> bytes:
     """A chunk's record that says it holds `size` bytes, and that it has `more` packed ones than are there."""
     text = struct.pack("<I", len(compression)) + compression + struct.pack("<Q", len(packed) + more) + packed
     body = struct.pack("<QQQI", 0, 0, size, 0) + text
@@ -27,10 +27,10 @@ _MAGIC = b"\x89MCAP0\r\n"
 _EMPTY = bytes(100_000_000)
 _REPLICATE = '<replicate count="999">' * 4 + '<geom size="1"/>' + "</replicate>" * 4
 MCAP = [
-    _MAGIC + _chunk(zstandard.compress(_EMPTY), 100),
-    _MAGIC + _chunk(zstandard.compress(_EMPTY), len(_EMPTY)),
-    _MAGIC + _chunk(lz4.frame.compress(_EMPTY[: 1 << 24]), 10, b"lz4"),
-    _MAGIC + _chunk(b"", 10, more=10_000_000) * 2000,
+    _MAGIC + chunk_of(zstandard.compress(_EMPTY), 100),
+    _MAGIC + chunk_of(zstandard.compress(_EMPTY), len(_EMPTY)),
+    _MAGIC + chunk_of(lz4.frame.compress(_EMPTY[: 1 << 24]), 10, b"lz4"),
+    _MAGIC + chunk_of(b"", 10, more=10_000_000) * 2000,
     _MAGIC + b"\0\1" * 50_000,
 ]
 MJCF = [

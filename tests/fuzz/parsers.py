@@ -85,11 +85,12 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
         **_of_tables(folder, model),
         **_of_robots(folder),
         **_of_tomls(folder, model),
-        "profile": Parser([b"pretouch:detect.memory_s=100:react.reach_m=0.2"], lambda data: profile(data.decode())),
+        "profile": Parser(
+            [b"pretouch:detect.memory_s=100:react.reach_m=0.2"], lambda data: profile(data.decode(errors="replace"))
+        ),
         "page": Parser([msgspec.msgpack.encode(CAMERA), *crashers.PAGE], _understood, (Refused,)),
         "worker": _of_workers(folder),
     }
-    found["profile"] = replace(found["profile"], allowed=(PretouchError, UnicodeDecodeError))
     with Bench() as bench, ServedArm(ArmSetup(model, "panda", model.description.q_ready, SceneSpec())) as arm:
         bench.join()
         yield found | {"wire": _of_units(bench), "FCI": _of_clients(arm)}

@@ -60,6 +60,8 @@ class Found:
     """Motions that the arm ended because this machine was too busy."""
     reflexes: int = 0
     """Motions that the arm ended because something touched it."""
+    others: int = 0
+    """Motions that the arm ended for any other reason: each is a trouble."""
     speed: float = 0.0
     """Largest joint speed as a share of its limit."""
     memory: dict[str, tuple[float, float]] = field(default_factory=dict)
@@ -197,6 +199,7 @@ class Soak:
             elif all(error.endswith("_reflex") for error in errors):
                 found.reflexes += 1
             else:
+                found.others += 1
                 found.troubles.append(f"The arm ended a motion: {names}.")
 
     def _judge_recording(self, place: Path) -> None:

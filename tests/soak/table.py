@@ -26,7 +26,7 @@ ended at random. Wall clocks step by up to a day, and the disk of the run that s
 | visits of the page | {found.visits} |
 | steps of the wall clock | {found.clock_steps} |
 | largest joint speed | {100 * found.speed:.0f} % of its limit |
-| motions ended by the arm: machine too busy, contact, other | {found.busy}, {found.reflexes}, 0 |
+| motions ended by the arm: machine too busy, contact, other | {found.busy}, {found.reflexes}, {found.others} |
 
 Rest: largest and median time from the end of a run in motion until the arm rests [s], up to 0.1 s too long; bound
 {RESTS_S:g} s.

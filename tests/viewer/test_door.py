@@ -313,6 +313,20 @@ def test_who_comes_while_another_commands_is_told_so(place: tuple[LivePage, Serv
         assert (told["title"], told["body"]) == ("You are Visitor 2", "Visitor 1 commands.")
 
 
+def test_who_has_not_said_where_he_looks_from_commands_nothing(
+    place: tuple[LivePage, ServeOptions], visitor: Visitor
+) -> None:
+    page, options = place
+    pause = control(page, "Pause")
+    with Visitor.unseen(options) as ghost:
+        ghost.send(msgspec.msgpack.encode(update(pause, value=True)))
+        ghost.send(msgspec.msgpack.encode(update(control(page, "Take command"), value=True)))
+        assert ghost.ping().wait(20.0)
+    visitor.set(pause, True)
+    visitor.settle()
+    assert shown(page) == "Visitor 1 commands."
+
+
 def shown(page: LivePage) -> str:
     """What the page says of who commands."""
     (commander,) = {told.__self__ for told in page._server._client_disconnect_cb if hasattr(told, "__self__")}

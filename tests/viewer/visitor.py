@@ -12,7 +12,7 @@ import msgspec
 import viser
 import zstandard
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 
 from pretouch.viewer.server import ServeOptions, url_of
 
@@ -48,15 +48,17 @@ class Visitor:
     def __init__(self, server: viser.ViserServer, options: ServeOptions) -> None:
         self._server, self._stack = server, ExitStack()
         before = set(server.get_clients())
-        address = url_of(options).replace("http", "ws", 1).rstrip("/")
-        protocol = f"viser-v{viser.__version__}"
-        self._socket = self._stack.enter_context(
-            connect(address, subprotocols=[protocol], max_size=None, max_queue=None)
-        )
+        self._socket = self._stack.enter_context(self.unseen(options))
         self.say(CAMERA)
         until(lambda: set(server.get_clients()) > before)
         (self.number,) = set(server.get_clients()) - before
         self._marks = itertools.count(1)
+
+    @staticmethod
+    def unseen(options: ServeOptions) -> ClientConnection:
+        """A bare connection: viser knows a visitor only once he has said where he looks from."""
+        address = url_of(options).replace("http", "ws", 1).rstrip("/")
+        return connect(address, subprotocols=[f"viser-v{viser.__version__}"], max_size=None, max_queue=None)  # type: ignore[list-item]
 
     def __enter__(self) -> "Visitor":
         return self

@@ -23,11 +23,11 @@ class Asked:
     velocity: FloatArray
     """(3,) of the end-effector origin [m/s]."""
     point: FloatArray
-    """(3,) where it should be [m]; where it is, if only a velocity is asked for."""
+    """(3,) where on the path it should be [m]; where it is, if a commander asks."""
     rotation_goal: FloatArray
     """(3, 3) R_O_ee to turn to."""
     rotation_kept: FloatArray
-    """(3, 3) R_O_ee to hold when nobody asks for another."""
+    """(3, 3) R_O_ee to hold from here on where nobody asks for another."""
     qd: FloatArray | None = None
     """(n,) joint velocities asked for in place of all that [rad/s]."""
     path: Following | None = None
@@ -56,24 +56,19 @@ def asked_by(
     with `position_gain_1_s`, no faster than `speed_m_s` at the end-effector.
     """
     number, rate = _at(desired, now)
-    R, here = kin.rotation[model.ee], kin.position[model.ee]
+    R, here, gain = kin.rotation[model.ee], kin.position[model.ee], params.position_gain_1_s
     if desired.kind is DesiredKind.TWIST:
         goal, kept = (held, held) if not number[3:].any() else (_led(R, number[3:], params), R)
         return Asked(scale * number[:3], here, goal, kept)
     if desired.kind is DesiredKind.POSE:
-        velocity = rate[:3] + params.position_gain_1_s * (number[:3] - here)
-        fastest = max(params.speed_m_s, float(np.linalg.norm(rate[:3])))
-        goal = number[3:].reshape(3, 3)
-        return Asked(scale * _shortened(velocity, fastest), number[:3], _nearer(R, goal), goal)
-    qd = number
+        velocity = rate[:3] + gain * (number[:3] - here)
+        share = scale * _share(velocity, rate[:3], params)
+        return Asked(share * velocity, here, _nearer(R, number[3:].reshape(3, 3)), R)
+    J, qd, share = model.ee_jacobian(kin)[:3], number, scale
     if desired.kind is DesiredKind.JOINT_POSITIONS:
-        qd = rate + params.position_gain_1_s * (number - robot.q_commanded)
-    velocity = model.ee_jacobian(kin)[:3] @ qd
-    if desired.kind is DesiredKind.JOINT_POSITIONS:
-        fastest = max(params.speed_m_s, float(np.linalg.norm(model.ee_jacobian(kin)[:3] @ rate)))
-        factor = min(1.0, fastest / max(float(np.linalg.norm(velocity)), 1e-12))
-        velocity, qd = factor * velocity, factor * qd
-    return Asked(scale * velocity, here, R, R, scale * qd)
+        qd = rate + gain * (number - robot.q_commanded)
+        share *= _share(J @ qd, J @ rate, params)
+    return Asked(share * (J @ qd), here, R, R, share * qd)
 
 
 def _at(desired: Desired, now: float) -> tuple[FloatArray, FloatArray]:
@@ -90,9 +85,10 @@ def _at(desired: Desired, now: float) -> tuple[FloatArray, FloatArray]:
     return between, rate
 
 
-def _shortened(vector: FloatArray, longest: float) -> FloatArray:
-    length = float(np.linalg.norm(vector))
-    return vector if length <= longest else (longest / length) * vector
+def _share(velocity: FloatArray, planned: FloatArray, params: TaskParams) -> float:
+    """Share of a velocity (3,) [m/s] that is no faster than the task's, or than the plan's where that is faster."""
+    length, fastest = float(np.linalg.norm(velocity)), max(params.speed_m_s, float(np.linalg.norm(planned)))
+    return 1.0 if length <= fastest else fastest / length
 
 
 def _led(R: FloatArray, angular: FloatArray, params: TaskParams) -> FloatArray:

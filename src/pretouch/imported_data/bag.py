@@ -38,11 +38,11 @@ class Topic:
         """Take in a message that was recorded at a time [ns]."""
         row = self._row(message)
         if row is not None:
+            if len(row) != self._width:
+                raise RecordingError(f"A message on {self.name} has {len(row)} numbers, not {self._width}: check it.")
             self.frame = self.frame or message.header.frame_id
             self.logged.append(time)
             self.header.append(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
-            if len(row) != self._width:
-                raise RecordingError(f"A message on {self.name} has {len(row)} numbers, not {self._width}: check it.")
             self._values.extend(row)
 
     def series(self, headers: bool) -> Series:

@@ -240,8 +240,10 @@ def encode_desired(sequence: int, inputs: Inputs) -> bytes | None:
     if inputs.desired is None:
         return None
     kind, stamp = DesiredKind(inputs.desired.kind), _numbers(inputs.desired.stamp)
-    number = _numbers(np.reshape(inputs.desired.number, -1))
-    given = {"quantity": int(kind), "stamp": stamp, "number": number}
+    rows = np.asarray(inputs.desired.number)
+    if rows.ndim != 2 or len(rows) != len(stamp) or not rows.size:
+        raise UnreadableError("the desired motion has not one row a stamp")
+    given = {"quantity": int(kind), "stamp": stamp, "number": _numbers(rows.reshape(-1))}
     return encoded(DESIRED, None, sequence=sequence, step_stamp=_number(inputs.stamp), **given)
 
 

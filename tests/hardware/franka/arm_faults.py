@@ -10,7 +10,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from subprocess import Popen
-from typing import Any
 
 import numpy as np
 
@@ -29,13 +28,16 @@ from pretouch.realtime import warm_up
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Mode
+from pretouch.session.session import NoUnits
+from pretouch.types import ControlStep, Mode
 from tests.hardware.franka.served import Served, child
 from tests.soak.truth import Truth
 
-FAULT_S, LASTS_S, RESUME_S, ENDS_S = 3.0, 1.5, 5.0, 7.0
 PERIOD_S = 0.01
+FAULT_S, LASTS_S, RESUME_S, ENDS_S = 3.0, 1.5, 5.0, 7.0
 """When a fault begins and how long it lasts, when a person resumes, and when the run ends [s]."""
+_LOOK_S = 0.8
+"""How long after a fault was noticed the truth is looked at: the arm rests by then, and has not been resumed [s]."""
 
 Change = Callable[[list[Feedback], Feedback], Feedback]
 """Given the feedback so far, the newest last, and the last before the fault, what is told instead."""
@@ -159,7 +161,8 @@ class Rehearsal:
         """The last feedback before the fault."""
         self._truth = Truth(served.truth, panda().qd_max)
         self._begun = self._instant = np.nan
-        self._robot_instant = np.inf
+        self._robot_instant = self._newest_step = self._rest_by = np.inf
+        self._pushed = self._moved = False
 
     def play(self) -> Seen:
         """Play it."""
@@ -175,7 +178,7 @@ class Rehearsal:
             self._begun = time.monotonic()
             try:
                 loop.run(
-                    control, arm, _NoUnits(), loop.MonotonicClock(PERIOD_S), self, self._done, loop.Options(self._asked)
+                    control, arm, NoUnits(), loop.MonotonicClock(PERIOD_S), self, self._done, loop.Options(self._asked)
                 )
                 arm.end()
             except RobotError as error:
@@ -205,7 +208,7 @@ class Rehearsal:
         since = time.monotonic() - self._begun
         return self._fault.resumes and RESUME_S <= since < RESUME_S + 0.05
 
-    def _done(self, step: Any) -> bool:
+    def _done(self, step: ControlStep) -> bool:
         now = time.monotonic()
         since = now - self._begun
         if np.isnan(self._instant):
@@ -218,8 +221,6 @@ class Rehearsal:
                 self._fault.do(self._served)
         return since > ENDS_S
 
-    _pushed = _moved = False
-
     def record(self, cycle: loop.Cycle) -> None:
         """Look at a step."""
         self._newest_step = time.monotonic()
@@ -228,12 +229,10 @@ class Rehearsal:
             named = step.mode is Mode.HOLD and self._fault.said and re.search(self._fault.said, step.reason)
             if named and not np.isfinite(seen.held_s):
                 seen.held_s, seen.reason = time.monotonic() - self._instant, step.reason
-                self._rest_by = time.monotonic() + 0.8
+                self._rest_by = time.monotonic() + _LOOK_S
             seen.modes.append(step.mode)
         if np.isfinite(self.seen.held_s) and not np.isfinite(self.seen.rested_s) and time.monotonic() > self._rest_by:
             self._read_rest()
-
-    _rest_by = _newest_step = np.inf
 
     def _read_rest(self) -> None:
         self._truth.read()
@@ -258,15 +257,6 @@ class Rehearsal:
             moves = self._served.moves()
             arm.end()
         return moves
-
-
-class _NoUnits:
-    """A skin without units."""
-
-    def read(self) -> Any:
-        from pretouch.session.session import NoUnits
-
-        return NoUnits().read()
 
 
 def play(folder: Path, name: str) -> Seen:

@@ -126,7 +126,9 @@ def test_what_strangers_publish_takes_bounded_memory() -> None:
     for k in range(1000):
         joints.take(SimpleNamespace(name=[f"x{k}"], position=[0.0], velocity=[], header=at(0)), 0.0, 1)
         stamps.instant(at(10), float(k), k)
+    joints.take(SimpleNamespace(name=["a"] * 2000, position=[0.0] * 2000, velocity=[], header=at(0)), 0.0, 1)
     assert len(joints._places) <= 64
+    assert max(map(len, joints._places)) == 1
     assert len(joints.others) <= 65
     assert len(stamps._writers) <= 8
     joints.take(joint_state(1, "a", [1.0]), 5.0, 1)

@@ -119,6 +119,38 @@ def test_units_that_are_not_there_are_named(node: Ros2Node, other: Ros2Node, pap
         assert (readings.distance[1:] == 0.5).all()
 
 
+def test_a_unit_for_which_several_publish_is_silent_and_named_and_strangers_take_little_memory(
+    node: Ros2Node, other: Ros2Node, paper_skin: Skin, domain: int
+) -> None:
+    def say(by: Ros2Node, name: str, number: int, distance: float) -> None:
+        given = {
+            "header": by.messages.header((number, 0), name),
+            "min_range": 0.04,
+            "max_range": 4.0,
+            "range": distance,
+        }
+        publishers[by].publish(by.messages.types[RANGE](**(by.messages.blank(RANGE) | given)))
+
+    ours = paper_skin.ids[0]
+    with Ros2Skin(SkinParams("/ranges"), paper_skin, node) as units, Ros2Node(NodeParams(domain=domain)) as third:
+        publishers = {by: by.publisher("/ranges", RANGE) for by in (other, third)}
+        assert all(by.wait_for(lambda one=one: one.subscribers == 1, 10) for by, one in publishers.items())
+        say(other, ours, 1, 0.25)
+        assert node.wait_for(lambda: units.read().distance[0] == 0.25, 5)
+        assert units.notes == ()
+        for number in range(2, 5):
+            say(other, ours, number, 0.25)
+            say(third, ours, number, 3.0)
+        assert node.wait_for(lambda: units.read().stamp[0] == -np.inf, 5)
+        assert units.notes == (f"Several publishers send as {ours}: run only one; until then the unit is silent.",)
+        for number in range(100):
+            say(other, f"{number}" + 1000 * "x", number, 0.5)
+        say(other, paper_skin.ids[1], 1000, 0.5)
+        assert node.wait_for(lambda: units.read().distance[1] == 0.5, 5)
+        assert len(units._unknown) <= 64
+        assert max(map(len, units._unknown)) <= 80
+
+
 SENDER = """
 import sys, time
 import numpy as np

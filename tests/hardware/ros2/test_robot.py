@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pretouch.control.joint_box import joint_limits
 from pretouch.errors import RobotError
 from pretouch.hardware.ros2.messages import JOINT_STATE, TRAJECTORY, VELOCITIES, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, NodeParams, seconds
 from pretouch.hardware.ros2.robot import Ros2Robot
+from pretouch.loop import MonotonicClock, come_to_rest
 from pretouch.robot.model import RobotModel
 
 SLOW = np.full(7, 0.05)
@@ -257,6 +259,26 @@ def test_velocities_go_to_the_named_controller_in_the_order_of_the_joints(
     with pytest.raises(KeyError), robot:
         raise KeyError
     assert not np.any(driver.command(2).data)
+
+
+@pytest.mark.parametrize(
+    "params", [ArmParams("on-robot", "base", command="velocities", controller="velocities", timeout_s=0.5)]
+)
+def test_an_arm_that_is_commanded_by_velocities_is_braked_after_what_ends_the_run(
+    pair: tuple[Ros2Robot, Driver], params: ArmParams, domain: int, panda_model: RobotModel
+) -> None:
+    robot, driver = pair
+    robot.read()
+    robot.command(SLOW)
+    with Ros2Node(NodeParams(domain=domain)) as third:
+        third.publisher(params.commands_on, VELOCITIES)  # it says nothing
+        assert robot._node.wait_for(lambda: bool(robot._conflict()), 10)
+        with pytest.raises(RobotError, match="Another program publishes"):
+            robot.read()
+        come_to_rest(joint_limits(panda_model, 0.01, 0.01), robot, MonotonicClock(0.01), robot.read().q, SLOW)
+        last = len(driver.commands)
+        assert driver.node.wait_for(lambda: not np.any(driver.commands[-1].data), 5)
+        assert last <= len(driver.commands) <= 1 + np.ceil(SLOW / (panda_model.description.qdd_max * 0.01)).max() + 1
 
 
 @pytest.mark.parametrize("params", [ArmParams("on-robot", "base", shared_clock=False, settle_s=0.2)])

@@ -59,6 +59,9 @@ def test_a_file_of_arrays_is_read_run_by_run_without_what_the_logger_missed(tmp_
     np.testing.assert_array_equal(wrist.q, motions[1].q)
     np.testing.assert_array_equal(np.flatnonzero(wrist.label == -1), np.arange(60, 70))
     assert (wrist.joints, wrist.touched) == ((4, 5, 6), True)
+    (tmp_path / "c.npz").write_bytes(b"no archive")
+    with pytest.raises(ExperimentError, match=r"c\.npz is no file of NumPy arrays .*: get it again"):
+        UR10E.read([tmp_path / "c.npz"])
     np.savez(tmp_path / "b.npz", t=given["t"], q=given["q"])
     with pytest.raises(ExperimentError, match=r"b\.npz has no dq, run, tau: get it again"):
         UR10E.read([tmp_path / "b.npz"])

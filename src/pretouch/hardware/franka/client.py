@@ -140,9 +140,8 @@ def demand_answer(address: str) -> None:
 
     It asks with version 0, which no arm speaks: the answer says so, and no session begins.
     """
-    ip = reachable(address)
     try:
-        with socket.create_connection((ip, PORT), ANSWER_S) as asked:
+        with socket.create_connection((reachable(address), PORT), ANSWER_S) as asked:
             asked.sendall(_CONNECT.pack(0, 1, _CONNECT.size, 0, 0))
             asked.recv(1)
     except OSError:

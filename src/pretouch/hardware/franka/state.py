@@ -86,9 +86,8 @@ class TorqueWatch:
         self._last = robot.tau_ext
         if not new.any():
             robot = replace(robot, stamp=float(self._changed.max()))
-        if robot.stamp - self._changed.min() <= STUCK_S:
-            return robot
-        return replace(robot, tau_ext=np.full(JOINTS, np.nan), wrench=None)
+        sticks = robot.stamp - self._changed.min() > STUCK_S
+        return replace(robot, tau_ext=np.full(JOINTS, np.nan), wrench=None) if sticks else robot
 
 
 def franka_state(raw: Any) -> FrankaState:

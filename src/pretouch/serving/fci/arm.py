@@ -133,7 +133,7 @@ class ServedArm:
             ending = Ending("emergency")
             self.stop()
             self.mode = RobotMode.USER_STOPPED
-        if self.motion is not None:
+        elif self.motion is not None:
             ending = self.motion.follow(self.report.q_commanded, setpoint)
             self.qd, self.qdd, self.success_rate = self.motion.qd, self.motion.qdd, self.motion.success_rate
             if ending is not None:
