@@ -13,7 +13,7 @@ from tools.site.links import Layout, source_page
 from tools.site.navigation import navigation
 
 ROOT = Path(__file__).parents[2]
-_BESIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+_BESIDE = {"CONTRIBUTING.md": "contributing.md", "SECURITY.md": "security.md", "CHANGELOG.md": "changelog.md"}
 """Documents of the repository's root, and the pages that they become."""
 
 
