@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.explanation import Doing, Explanation, explain, finds, resumable, still
+from pretouch.limited import Limit, Limited
 from pretouch.modes import TABLE
 from pretouch.types import Contact, ControlStep, Mode, Obstacles, QpOutcome, QpSolution, Thresholds, Touched
 
@@ -46,9 +47,9 @@ def said(step: ControlStep, **changes: object) -> Explanation:
 
 
 def test_an_arm_that_nothing_limits_follows_its_path(step: ControlStep) -> None:
-    assert said(step) == Explanation(Doing.MOVING, "Following its path at 0.30 m/s: nothing near is seen.")
+    assert said(step) == Explanation(Doing.MOVING, "Moving at 0.30 m/s: nothing near is seen.")
     far = said(step, obstacles=seen((0, 0.9, 0.75, 2), (1, 0.6, 0.45, 2)))
-    assert far == Explanation(Doing.MOVING, "Following its path at 0.30 m/s: hand_left sees something at 0.45 m.")
+    assert far == Explanation(Doing.MOVING, "Moving at 0.30 m/s: hand_left sees something at 0.45 m.")
 
 
 def test_an_arm_too_loud_for_a_light_push_says_what_it_finds(step: ControlStep) -> None:
@@ -107,9 +108,7 @@ def test_a_row_that_limits_the_direction_alone_names_unit_and_link(step: Control
         step, obstacles=seen((1, 0.5, 0.15, 1)), restricted=np.array([0]), approach_limit=np.array([limit]),
         qp=limited(),
     )  # fmt: skip
-    assert found == Explanation(
-        Doing.MOVING, f"Following its path, but hand_left sees something at 0.15 m, and {words}."
-    )
+    assert found == Explanation(Doing.MOVING, f"Moving, but hand_left sees something at 0.15 m, and {words}.")
 
 
 def test_a_row_that_does_not_bind_limits_nothing(step: ControlStep) -> None:
@@ -117,7 +116,7 @@ def test_a_row_that_does_not_bind_limits_nothing(step: ControlStep) -> None:
         step, obstacles=seen((1, 0.5, 0.15, 1)), restricted=np.array([0]), approach_limit=np.array([0.4]),
         qp=limited(multiplier=0.0),
     )  # fmt: skip
-    assert found.sentence == "Following its path at 0.30 m/s: hand_left sees something at 0.15 m."
+    assert found.sentence == "Moving at 0.30 m/s: hand_left sees something at 0.15 m."
 
 
 def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_follows(step: ControlStep) -> None:
@@ -218,3 +217,18 @@ def test_what_latches_says_that_a_person_has_to_resume_and_nothing_else_promises
     if sentence != "{}":  # a hold that lasts says what it said
         held = replace(step, mode=row.target, reason=sentence)  # type: ignore[attr-defined]
         assert resumable(held) == row.latches  # type: ignore[attr-defined]
+
+
+def test_a_commander_reads_off_what_limits_the_arm_by_how_much_and_who_sees_it(step: ControlStep) -> None:
+    assert step.limited == Limited(Limit.NOTHING, 1.0)
+    near = {"obstacles": seen((0, 0.4, 0.2, 2), (1, 0.2, 0.12, 1)), "restricted": np.array([0])}
+    row = replace(step, **near, approach_limit=np.array([0.05]), qp=limited(), ee_velocity=0.35 * AHEAD)
+    assert row.limited == Limited(Limit.APPROACH, pytest.approx(0.35), obstacle=0, unit=0, link=2)
+    slowed = replace(step, obstacles=near["obstacles"], speed_scale=0.17)
+    assert slowed.limited == Limited(Limit.SLOWED, 0.17, obstacle=1, unit=1, link=1)
+    assert replace(step, speed_scale=0.17).limited == Limited(Limit.SLOWED, 0.17)
+    fast = replace(step.qp, multipliers=np.array([0.0, 0.1, 0.0, -0.4, 0.0, 0.0, 0.0]))
+    assert replace(step, qp=fast, ee_velocity=0.5 * AHEAD).limited == Limited(Limit.JOINTS, pytest.approx(0.5), joint=3)
+    touched = Touched(np.array([2]), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1), np.ones(1))
+    assert replace(step, mode=Mode.REACT, touched=touched).limited == Limited(Limit.CONTACT, 0.0, link=2)
+    assert replace(step, mode=Mode.HOLD).limited == Limited(Limit.HOLD, 0.0)

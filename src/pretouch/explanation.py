@@ -6,20 +6,17 @@ from enum import Enum
 
 import numpy as np
 
-from pretouch.types import BoolArray, ControlStep, Mode
+from pretouch.limited import ASKED_M_S, FULL, Limit, binding
+from pretouch.types import ControlStep, Mode
 
 OFF_PATH_M = 0.01
 """Distance from the path at which the arm is off it [m]; following it takes less."""
-_FULL = 0.95
-"""Share of the speed asked for from which on the arm is not called slowed: what a joint velocity's noise leaves."""
 _REST_M_S = 0.015
 """Speed of the end-effector below which it rests [m/s], of a measured velocity with its noise."""
 _REST_RAD_S = 0.01
 """Largest commanded joint velocity of an arm that is held still [rad/s]: 5 mm/s at half a metre."""
 _ANSWER_M_S = 1e-3
 """Speed of the end-effector from which on a reaction moves the arm [m/s]."""
-_ASKED_M_S = 0.005
-"""Speed from which on a motion is asked for [m/s]."""
 LOUD_N = 15.0
 """Force that should be found; where it takes more, the arm is too loud [N]: a hand that touches lightly has less."""
 
@@ -87,18 +84,6 @@ def answers(step: ControlStep) -> bool:
     return not still(step) and float(np.linalg.norm(step.reaction_velocity)) >= _ANSWER_M_S
 
 
-def binding(step: ControlStep) -> BoolArray:
-    """Which of the restricted obstacles (K',) keep the arm from what it would do."""
-    count, qp = len(step.restricted), step.qp
-    bound = np.zeros(count, dtype=np.bool_)
-    if count and len(qp.slack) == count:
-        bound = (qp.multipliers[-count:] > 1e-9) | (qp.slack > 1e-6)
-        if "violated" in qp.status and not bound.any():
-            # a row across a normal, which the solution leaves out: it is of what is nearest
-            bound[step.obstacles.body_distance[step.restricted].argmin()] = True
-    return bound
-
-
 @dataclass(frozen=True)
 class _Names:
     """Names of units and links."""
@@ -121,24 +106,21 @@ class _Names:
 
 
 def _on_the_way(step: ControlStep, names: _Names) -> Explanation:
-    """Explain a step in which the arm follows its path."""
-    limiting = step.restricted[binding(step)]
+    """Explain a step in which the arm does what is asked, as far as it can."""
+    limited = step.limited
     off = float(np.linalg.norm(step.ee_position - step.path_position))
     speed = float(np.linalg.norm(step.ee_velocity))
-    share, near = _share(step), step.obstacles.body_distance
-    slowed = step.speed_scale < _FULL
-    if not (slowed or len(limiting)):
+    restricted = limited.by is Limit.APPROACH
+    if not (restricted or limited.by is Limit.SLOWED):
         if off >= OFF_PATH_M:
             return Explanation(Doing.RETURNING, f"Returning to its path, {off:.2f} m away.")
+        near = step.obstacles.body_distance
         seen = f"{names.sees(step, int(near.argmin()))}." if len(near) else "nothing near is seen."
-        follows = np.linalg.norm(step.desired_velocity) >= _ASKED_M_S
-        return Explanation(
-            Doing.MOVING, (f"Following its path at {speed:.2f} m/s: " if follows else "In its place: ") + seen
-        )
-    # the row that bites is the cause; without one it is eq. 3, by the distance from the end-effector
-    cause = int(limiting[near[limiting].argmin()]) if len(limiting) else _slowing(step)
+        moves = np.linalg.norm(step.desired_velocity) >= ASKED_M_S
+        return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In its place: ") + seen)
+    cause, share = limited.obstacle, limited.share if restricted else step.speed_scale
     why = names.sees(step, cause) if cause >= 0 else "what was seen has gone from view, or a unit is late"
-    if len(limiting) and off >= OFF_PATH_M:
+    if restricted and off >= OFF_PATH_M:
         kept = f"{off:.2f} m from its path: {why}."
         if speed < _REST_M_S:
             return Explanation(Doing.BLOCKED, f"At rest {kept} It goes on when the way is clear.")
@@ -146,23 +128,9 @@ def _on_the_way(step: ControlStep, names: _Names) -> Explanation:
     if speed < _REST_M_S and share < 0.1:
         return Explanation(Doing.BLOCKED, f"At rest: {why}. It goes on when the way is clear.")
     back = "" if off < OFF_PATH_M else f" on its way back to the path, {off:.2f} m away"
-    if share < _FULL:
+    if share < FULL:
         return Explanation(Doing.SLOWED, f"Slowed to {100 * share:.0f} %{back}: {why}.")
-    return Explanation(Doing.MOVING, f"Following its path, but {_limit(step, names, cause)}.")
-
-
-def _share(step: ControlStep) -> float:
-    """Share of the speed that the path alone would ask for, from 0 to 1: eq. 3, and what the rows leave of it."""
-    asked = float(np.linalg.norm(step.desired_velocity))
-    if asked < _ASKED_M_S or not binding(step).any():
-        return step.speed_scale
-    along = float(step.ee_velocity @ step.desired_velocity) / asked**2
-    return step.speed_scale * min(max(along, 0.0), 1.0)
-
-
-def _slowing(step: ControlStep) -> int:
-    """Index of the obstacle nearest to the end-effector, -1 of none."""
-    return int(step.obstacles.ee_distance.argmin()) if len(step.obstacles.unit) else -1
+    return Explanation(Doing.MOVING, f"Moving, but {_limit(step, names, cause)}.")
 
 
 def _limit(step: ControlStep, names: _Names, cause: int) -> str:
@@ -193,7 +161,7 @@ def _in_contact(step: ControlStep, names: _Names) -> Explanation:
         speed = float(np.linalg.norm(step.ee_velocity))
         return Explanation(Doing.YIELDING, f"{pushed}: moving with the push at {speed:.2f} m/s.")
     limiting = step.restricted[binding(step)]
-    if len(limiting) and float(np.linalg.norm(step.reaction_velocity)) >= _ASKED_M_S:
+    if len(limiting) and float(np.linalg.norm(step.reaction_velocity)) >= ASKED_M_S:
         return Explanation(Doing.TOUCHED, f"{pushed}: held still, for {names.sees(step, int(limiting[0]))}.")
     return Explanation(Doing.TOUCHED, f"{pushed}: held still, the push is below what moves the arm.")
 

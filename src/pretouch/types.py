@@ -5,27 +5,22 @@ All are set once, when they are made; arrays are read and not written to (`docs/
 
 from dataclasses import field
 from enum import Enum, IntEnum
-from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pretouch.arrays import WHOLE as WHOLE
 from pretouch.arrays import BoolArray as BoolArray
 from pretouch.arrays import FloatArray as FloatArray
 from pretouch.arrays import IntArray as IntArray
+from pretouch.arrays import Number as Number
 from pretouch.desired import Desired
+from pretouch.limited import Limited, limited_by
 from pretouch.payload import Payload
 from pretouch.values import value
 
-Number = TypeVar("Number", float, NDArray[np.float64])
-
 
 class RangeStatus(IntEnum):
-    """Range status codes of the VL53L1X (ST, UM2356); 255 is set by the driver before the first measurement.
-
-    254 is no code of the sensor's: whoever receives its readings sets it when they repeat to the last digit.
-    """
+    """Range status codes of the VL53L1X (ST, UM2356), and one of ours."""
 
     OK = 0
     SIGMA = 1
@@ -41,7 +36,9 @@ class RangeStatus(IntEnum):
     MIN_RANGE = 13
     INVALID = 14
     STUCK = 254
+    """Set by whoever receives readings that repeat to the last digit."""
     NONE = 255
+    """Set by the driver before the first measurement."""
 
 
 @value
@@ -134,8 +131,7 @@ class SeenPoints:
     """
 
     heard: float
-    """Instant of the newest measurement, of the source that has been silent for longest [s]; -inf before the first. A
-    set without points that was heard says that nothing is seen."""
+    """Newest measurement of the source silent for longest [s], -inf before the first; no points: nothing is seen."""
     stamp: FloatArray
     """(M,) instant at which each point was measured [s]."""
     point: FloatArray
@@ -196,8 +192,7 @@ class Obstacles:
     body_distance: FloatArray
     """(K,) signed distance from the body's surface, less the point's spread [m] (eqs. 5-7)."""
     closing_speed: FloatArray
-    """(K,) estimated speed of the object itself towards the closest body point, the arm's own motion not in it [m/s];
-    0 where it is not known or not estimated."""
+    """(K,) estimated speed of the object itself towards the closest body point [m/s]; 0 where it is not estimated."""
 
 
 @value
@@ -348,3 +343,8 @@ class ControlStep:
     """Where the arm is touched; empty where no contact is detected or the profile does not localise."""
     detectable_n: float = np.nan
     """Force at the end-effector that is found, see `Detection.detectable_n` [N]."""
+
+    @property
+    def limited(self) -> Limited:
+        """What keeps the arm from what is asked, and what is left of it."""
+        return limited_by(self)

@@ -31,7 +31,7 @@ def status(html: Html) -> Status:
     return Status(SimpleNamespace(add_html=lambda content: html))  # type: ignore[arg-type]
 
 
-FREE = Explanation(Doing.MOVING, "Following its path.")
+FREE = Explanation(Doing.MOVING, "Moving.")
 
 
 def test_each_word_comes_with_its_sentence_and_the_mode(status: Status, html: Html) -> None:
