@@ -33,7 +33,7 @@ def step() -> ControlStep:
     parts[0], parts[1], parts[2] = 11.0, -9.0, 1.0
     free = QpSolution(np.full(7, 0.2), np.zeros(0), np.zeros(7), QpOutcome.SOLVED, "solved")
     return ControlStep(
-        stamp=4.0, mode=Mode.TRACK, reason="Following the path.", q=np.zeros(7), q_commanded=np.zeros(7),
+        stamp=4.0, mode=Mode.TRACK, reason="Moving as asked.", q=np.zeros(7), q_commanded=np.zeros(7),
         ee_position=np.array([0.5, 0.25, 0.25]), ee_velocity=AHEAD, path_position=np.array([0.5, 0.25, 0.25]),
         path_phase=1.0, desired_velocity=AHEAD, speed_scale=1.0, range_distance=np.full(2, np.nan), obstacles=seen(),
         force=still, filtered_force=still, thresholds=Thresholds(parts), armed=True, contact=None,
@@ -120,7 +120,7 @@ def test_a_row_that_does_not_bind_limits_nothing(step: ControlStep) -> None:
 
 
 def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_follows(step: ControlStep) -> None:
-    # the page's old sentence at 0.05 m/s, pushed off the path: "Following the path."
+    # the page's old sentence at 0.05 m/s, pushed off the path: "Moving as asked."
     off = {"path_position": step.ee_position + np.array([0.0, 0.0, 0.12]), "obstacles": seen((1, 0.2, 0.06, 2))}
     near = {"restricted": np.array([0]), "approach_limit": np.array([0.02]), "qp": limited(slack=0.01)}
     found = said(step, **off, **near, desired_velocity=AHEAD / 6, ee_velocity=np.array([0.0, 0.05, 0.0]))

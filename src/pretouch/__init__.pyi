@@ -34,6 +34,8 @@ from pretouch.desired import Desired as Desired
 from pretouch.errors import PretouchError as PretouchError
 from pretouch.errors import RecordingError as RecordingError
 from pretouch.explanation import explain as explain
+from pretouch.limited import Limit as Limit
+from pretouch.limited import Limited as Limited
 from pretouch.loop import Cycle as Cycle
 from pretouch.loop import MonotonicClock as MonotonicClock
 from pretouch.loop import Recorder as Recorder
@@ -65,6 +67,8 @@ from pretouch.sensing.skin import sensor_unit as sensor_unit
 from pretouch.sensing.skin import skin_for as skin_for
 from pretouch.sensing.unit import SensorUnit as SensorUnit
 from pretouch.sensing.unit import TouchPatch as TouchPatch
+from pretouch.shielding import Shield as Shield
+from pretouch.shielding import shield as shield
 from pretouch.sim.hand import Hand as Hand
 from pretouch.sim.hand import HandGoal as HandGoal
 from pretouch.sim.plant import Plant as Plant

@@ -149,7 +149,7 @@ TABLE: tuple[Transition, ...] = (
         Event.PATH_BLOCKED, frozenset({Mode.TRACK}), Mode.TRACK,
         "An obstacle has kept the hand from its path for {}: waiting until it is clear.",
     ),
-    Transition(Event.CLEAR, _ANY, Mode.TRACK, "Following the path."),
+    Transition(Event.CLEAR, _ANY, Mode.TRACK, "Moving as asked."),
 )  # fmt: skip
 """Read from the top: the first row whose event is present and whose source holds the mode is taken."""
 

@@ -191,7 +191,7 @@ def test_a_path_blocked_for_long_is_said_to_be_and_its_phase_waits(panda_model: 
     assert "kept the hand from its path" in step.reason
     assert step.path_phase - begun < 0.15
     steps = arm.run(100)
-    assert steps[-1].reason == "Following the path."
+    assert steps[-1].reason == "Moving as asked."
 
 
 def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: RobotModel):

@@ -17,7 +17,7 @@ WORDS = {
     "failed": "gave no answer", "blocked": "The approach limits cannot be met",
     "blocked reaction": "allow no motion within", "contact": "A contact of", "reacting": "Moving with a contact",
     "silent": "No usable reading from", "no force": "no force estimate", "overrun": "The step before this one was",
-    "filling": "The force window is filling", "clear": "Following the path.", "opening": "Clamped between two objects",
+    "filling": "The force window is filling", "clear": "Moving as asked.", "opening": "Clamped between two objects",
     "caught": "The arm was clamped between two objects", "yielding": "Yielding to a contact",
     "given up": "Given up after", "pressed": "A force that does not move the arm",
     "path blocked": "An obstacle has kept the hand from its path",

@@ -34,7 +34,7 @@ OVERRUN = (
 FILLING = (
     "The force window is filling ({}): contacts cannot be distinguished from noise yet. The arm moves once it is full."
 )
-TRACKING = "Following the path."
+TRACKING = "Moving as asked."
 
 LARGEST = 1e3
 """What no joint position or velocity reaches [rad, rad/s]."""

@@ -32,7 +32,7 @@ def test_numbers_of_a_trial_by_hand():
     assert row["board_mean_n"] == pytest.approx(40.5)
     assert (row["board_s"], row["leaning"], row["latched"]) == (0.1, False, True)
     force[-800:] = 30.0
-    assert clamp.results(force, record(Mode.TRACK, "Following the path."))["leaning"]
+    assert clamp.results(force, record(Mode.TRACK, "Moving as asked."))["leaning"]
 
 
 def test_an_arm_that_never_came_to_the_board_is_in_the_table():

@@ -17,7 +17,7 @@ def step(i, **changed):
     usual = {
         "stamp": 0.01 * i,
         "mode": Mode.TRACK,
-        "reason": "Following the path.",
+        "reason": "Moving as asked.",
         "q": np.zeros(7),
         "ee_position": np.zeros(3),
         "path_position": np.zeros(3),

@@ -1,0 +1,62 @@
+"""For a program that has its own loop and its own commander: what stands between them and the arm."""
+
+from dataclasses import replace
+
+from pretouch.contact.residual_model import ResidualModel
+from pretouch.control.path import line
+from pretouch.controller import Controller
+from pretouch.desired import twist
+from pretouch.loop import Cycle, explained
+from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.profiles import Profile
+from pretouch.profiles import profile as named
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, Inputs, RobotState
+
+_STILL = (0.0, 0.0, 0.0)
+
+
+class Shield:
+    """Takes what a program wants (`Inputs.desired`) and returns what its arm may do; made by `shield`.
+
+    To be called once a period, `controller.limits.period`; the arm is sent `command` of each step. Before the loop ends
+    `loop.come_to_rest` brings it to rest.
+    """
+
+    def __init__(self, controller: Controller, robot: RobotState, learnt: ResidualModel | None = None) -> None:
+        """Begin with an arm's state; one that cannot be used is a RobotStateError."""
+        self.controller = controller
+        self.state = controller.init(robot, learnt)
+        self.cycle: Cycle | None = None
+        """The last turn, for a recorder (`pretouch.Recording`)."""
+
+    def __call__(self, inputs: Inputs) -> ControlStep:
+        """Return the step of a period; where nothing is desired, the hand stays where it is."""
+        robot = explained(self.controller, self.state, inputs.robot, inputs.stamp)
+        given = replace(inputs, robot=robot, desired=inputs.desired or twist(inputs.stamp, _STILL))
+        before = self.state
+        step, self.state = self.controller.step(before, given)
+        self.cycle = Cycle(given, before, step, self.state)
+        return step
+
+
+def shield(
+    model: RobotModel, skin: Skin, robot: RobotState, profile: Profile | str = "pretouch",
+    fixtures: Fixtures | None = None, learnt: ResidualModel | None = None,
+) -> Shield:  # fmt: skip
+    """Put the controller between a program's commander and its arm.
+
+    Args:
+        model: of the arm.
+        skin: on it.
+        robot: state of the arm before the first step.
+        profile: or the text of one; its `task.control_period_s` is the period of the program's loop (`at_rate`).
+        fixtures: what stands round the arm and is no obstacle; None for nothing.
+        learnt: free motion as an earlier session left it.
+    """
+    x, y, z = model.kinematics(robot.q).position[model.ee].tolist()
+    nowhere = line((x, y, z), (x, y, z + 0.001))  # a controller has a path; this one is never followed
+    chosen = named(profile) if isinstance(profile, str) else profile
+    around = no_fixtures() if fixtures is None else fixtures
+    return Shield(Controller(model, skin, around, nowhere, chosen), robot, learnt)
