@@ -52,7 +52,7 @@ def at_begin(monkeypatch, seconds, then):
             ("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--approach"),
             "--approach does not go with --robot ros2",
         ),
-        (("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base"), "ROS 2 has no message for them"),
+        (("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base"), "give their topic by --ros-torques"),
         (("--no-skin",), "choose --profile blind"),
         (("--no-skin", "--skin", "a.toml"), "--no-skin does not go with --skin"),
         (("--skin", "missing.toml"), "missing.toml cannot be read"),

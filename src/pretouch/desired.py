@@ -36,6 +36,8 @@ class Desired:
     """(M,) instants, increasing, by the clock of the steps [s]."""
     number: FloatArray
     """(M, w) what is asked, see `DesiredKind`."""
+    refused: str = ""
+    """Why what was asked is none, found where it came in: the arm holds, and says this."""
 
 
 _MOST = 1000
@@ -75,6 +77,11 @@ def joint_positions(stamp: ArrayLike, q: ArrayLike) -> Desired:
     return _made(DesiredKind.JOINT_POSITIONS, stamp, np.atleast_2d(np.asarray(q, float)))
 
 
+def refused(stamp: float, reason: str) -> Desired:
+    """Ask for nothing, for a reason that a person reads: what came in at an instant [s] could not be used."""
+    return Desired(DesiredKind.TWIST, np.array([stamp]), np.zeros((1, 6)), reason)
+
+
 def _made(kind: DesiredKind, stamp: ArrayLike, number: FloatArray) -> Desired:
     stamps = np.atleast_1d(np.asarray(stamp, float))
     if stamps.shape != number.shape[:1]:
@@ -89,6 +96,8 @@ def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Des
     try:
         kind = DesiredKind(desired.kind)
         stamp, number = np.array(desired.stamp, dtype=np.float64), np.array(desired.number, dtype=np.float64)
+        if desired.refused:
+            return None, str(desired.refused)
     except (AttributeError, TypeError, ValueError, OverflowError):
         return None, f"it is a {type(desired).__name__} that holds no kind, stamps and numbers"
     wanted = _WIDTH.get(kind, joints)

@@ -243,7 +243,8 @@ def encode_desired(sequence: int, inputs: Inputs) -> bytes | None:
     rows = np.asarray(inputs.desired.number)
     if rows.ndim != 2 or len(rows) != len(stamp) or not rows.size:
         raise UnreadableError("the desired motion has not one row a stamp")
-    given = {"quantity": int(kind), "stamp": stamp, "number": _numbers(rows.reshape(-1))}
+    numbers = _numbers(rows.reshape(-1))
+    given = {"quantity": int(kind), "stamp": stamp, "number": numbers, "refused": str(inputs.desired.refused)}
     return encoded(DESIRED, None, sequence=sequence, step_stamp=_number(inputs.stamp), **given)
 
 
@@ -251,7 +252,7 @@ def decode_desired(data: bytes) -> Desired:
     """Return a desired motion."""
     m = decoded(DESIRED, data)
     try:
-        return Desired(DesiredKind(m.quantity), m.stamp, m.number.reshape(len(m.stamp), -1))
+        return Desired(DesiredKind(m.quantity), m.stamp, m.number.reshape(len(m.stamp), -1), m.refused)
     except ValueError as error:
         raise RecordingError(
             f"A desired motion in it cannot be read ({error}): use a recording that is whole."

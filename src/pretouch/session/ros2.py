@@ -12,7 +12,7 @@ from pretouch.types import FloatArray, RobotState
 
 def identity(node: NodeParams, arm: ArmParams) -> Identity:
     """Return what a robot is known by: its topics, and the settings that say what they mean."""
-    where = f"{node.interface}, domain {domain_of(node)}, {arm.wrench}"
+    where = ", ".join(filter(None, (node.interface, f"domain {domain_of(node)}", arm.wrench, arm.torques)))
     return Identity("ros2", where, f"sign {arm.sign}, frame {arm.frame}, zeros {arm.zeros}")
 
 

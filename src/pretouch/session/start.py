@@ -63,13 +63,14 @@ def _point(path: Path) -> str:
 _PLACES = 200
 
 
-def announcement(controller: Controller, seconds: float, way: Plan | None) -> tuple[str, ...]:
+def announcement(controller: Controller, seconds: float, way: Plan | None, asks: str = "") -> tuple[str, ...]:
     """Say in sentences what the arm will do.
 
     Args:
         controller: that is going to move it.
         seconds: how long it will [s]; infinite until it is stopped.
         way: the way to the start of its path, if it goes there first.
+        asks: what a commander lets it do in place of its path, if one does.
     """
     path, profile = controller.path, controller.profile
     points = np.array([path.point(phase) for phase in np.linspace(0.0, path.length, _PLACES)])
@@ -82,12 +83,13 @@ def announcement(controller: Controller, seconds: float, way: Plan | None) -> tu
             " During this it does not avoid anybody, and stops if it is pushed."
         )
     still = bool(np.all(high - low < 1e-3))
-    said.append(
+    where = (
         f"The arm keeps its end-effector at ({', '.join(f'{v:.2f}' for v in low)}) m (base frame)."
         if still
         else f"The arm moves its end-effector at up to {profile.task.speed_m_s:g} m/s within {room} m (base frame);"
         " the arm as a whole needs more space."
     )
+    said.append(asks or where)
     said.append(profile.react.announced(profile.task.control_period_s))
     said.append(f"It runs for {seconds:g} s." if np.isfinite(seconds) else "It runs until it is stopped.")
     said.append(

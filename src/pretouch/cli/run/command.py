@@ -67,7 +67,8 @@ def _run(command: "Run", made: RunSetup, found: OpenedRobot, last: ExitStack, wr
         if found.identity:
             remembered.keep(found.identity)
         say("The force sign is confirmed: the robot reports the force on the arm, in the base frame.")
-    return execute(command, session, found, _confirm_motion(command, session, made, rest), learnt, last, write)
+    asks = found.commander.announced if found.commander else ""
+    return execute(command, session, found, _confirm_motion(command, session, made, rest, asks), learnt, last, write)
 
 
 def _checked(session: Session, approach: bool, notes: Sequence[str]) -> Standstill:
@@ -92,7 +93,7 @@ def _confirm(session: Session, found: OpenedRobot, rest: Standstill) -> None:
     GuidedPush(session.arm, session.clock, session.controller.model, ask, say, PUSH).confirm(rest)
 
 
-def _confirm_motion(command: "Run", session: Session, made: RunSetup, rest: Standstill) -> PlannedRun:
+def _confirm_motion(command: "Run", session: Session, made: RunSetup, rest: Standstill, asks: str) -> PlannedRun:
     """Say what the arm will do, and ask; return it if the arm may do it, and stands where it was checked."""
     approach = command.task.approach
     q = session.recheck(rest, PREFLIGHT, approach)
@@ -100,7 +101,7 @@ def _confirm_motion(command: "Run", session: Session, made: RunSetup, rest: Stan
         plan_to_start(made.model, q, session.controller.path, made.floor) if approach else None,
         command.task.seconds or np.inf,
     )
-    for sentence in announcement(session.controller, way.seconds, way.approach):
+    for sentence in announcement(session.controller, way.seconds, way.approach, asks):
         say(sentence)
     if not command.yes:
         require_yes("Go on?", "The arm was not moved")

@@ -61,7 +61,7 @@ def execute(
         kept = stack.enter_context(open_run_files(controller, session.arm.name, place, folder, tell, learnt, further))
         reporter = ProgressReporter(kept.recorder, tell, latched, controller)
         known, priority, cpu = learnt.begin if learnt else None, command.priority, command.cpu
-        options = Options(enter, known, priority=priority, cpu=cpu, tell=tell)
+        options = Options(enter, known, desired=found.commander or _nobody, priority=priority, cpu=cpu, tell=tell)
         try:
             if _go_to_start(session, way.approach, tell, ending):
                 _follow(session, way, reporter, clock, options, ending)
@@ -71,6 +71,10 @@ def execute(
             _report(session, reporter, clock, kept, ending, further.notes if further else ())
             write(reporter.summary.numbers(clock.period) | ending.numbers() | {"timing": clock.timing().numbers()})
     return int(ending.early or bool(kept.trouble))
+
+
+def _nobody() -> None:
+    """Ask for nothing: the path is followed."""
 
 
 def _go_to_start(session: Session, approach: Plan | None, tell: Callable[[str], None], ending: Ending) -> bool:

@@ -51,6 +51,15 @@ class RobotOptions:
     """With ros2: names of the joints in the messages; by default the arm's own."""
     ros_wrench: str = "/wrench"
     """With ros2: topic of the wrench."""
+    ros_torques: str = ""
+    """With ros2: topic of external joint torques, which the profile pretouch needs: joint states, or a robot_state."""
+    ros_desired: Literal["", "twist", "trajectory", "velocities"] = ""
+    """With ros2: the arm follows a commander in place of a path: a TwistStamped, the velocities of a JointTrajectory,
+    or a Float64MultiArray."""
+    ros_desired_topic: str = ""
+    """With ros2: its topic; by default /pretouch/twist, /pretouch/joint_trajectory or /pretouch/commands."""
+    ros_base_frame: str = ""
+    """With ros2: name of the base frame, beside the model's own."""
     ros_commands: str = ""
     """With ros2: topic of the commands; by default that of a joint_trajectory_controller, or of --ros-controller."""
     ros_ranges: str = "/skin/{unit}/range"
@@ -149,9 +158,11 @@ def check_options(command: Run) -> None:
         )
     if kind == "ros2" and command.task.approach:
         raise RobotError(
-            "--approach does not go with --robot ros2, which has no joint torques that could stop the arm on the way:"
-            " guide it by hand to the start of its path."
+            "--approach does not go with --robot ros2, where nobody has tried it: guide the arm by hand to the start of"
+            " its path."
         )
+    if robot.ros_desired_topic and not robot.ros_desired:
+        raise RobotError("--ros-desired-topic needs --ros-desired, which says what is asked there: give both.")
     if units.no_skin and (units.skin or units.keys):
         raise HardwareError("--no-skin does not go with --skin and --keys: leave one or the other out.")
     if robot.no_learnt and (robot.learnt or robot.learn_anew):
@@ -187,7 +198,8 @@ _ONLY = {
     "franka": ("ip", "lockstep", "recover"),
     "ros2": (
         "ros_sign", "ros_frame", "ros_command", "ros_controller", "ros_timeout", "ros_own_clock", "ros_joint_states",
-        "ros_joints", "ros_wrench", "ros_commands", "ros_ranges", "ros_distribution", "ros_domain", "ros_interface",
+        "ros_joints", "ros_wrench", "ros_torques", "ros_commands", "ros_ranges", "ros_distribution", "ros_domain",
+        "ros_interface", "ros_desired", "ros_desired_topic", "ros_base_frame",
     ),
 }  # fmt: skip
 """Options that only one kind of robot has."""

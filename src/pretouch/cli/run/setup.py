@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,6 +14,7 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, line
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
+from pretouch.desired import Desired
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.limits import LimiterParams, planned
 from pretouch.hardware.keys import Keys, load_keys
@@ -99,11 +100,13 @@ def run_setup(command: "Run") -> RunSetup:
     else:
         skin = skin_for(model, units.skin)
     by_torques = profile.detect.by_torques or profile.react.by_torques
-    if command.robot.robot == "ros2" and by_torques:
+    if command.robot.robot == "ros2" and by_torques and not command.robot.ros_torques:
         raise ParameterError(
-            f"The profile {profile.name} detects contacts by external joint torques, but ROS 2 has no message for them:"
-            " choose --profile paper, or pretouch:detect=thresholds:react=decay."
+            f"The profile {profile.name} detects contacts by external joint torques: give their topic by --ros-torques,"
+            " or choose --profile paper, or pretouch:detect=thresholds:react=decay."
         )
+    if command.robot.ros_desired:
+        task = replace(task, path="hold")
     simulated = command.robot.robot == "simulated" or command.robot.lockstep
     floor = (SceneSpec().floor_height if simulated else 0.0) if task.floor is None else task.floor
     if not np.isfinite(floor):
@@ -154,6 +157,19 @@ class Output(Recorder, Protocol):
         ...
 
 
+class Commander(Protocol):
+    """Who asks for a motion in place of a path; see `loop.Options.desired`."""
+
+    def __call__(self) -> Desired | None:
+        """Return what is asked for now."""
+        ...
+
+    @property
+    def announced(self) -> str:
+        """Say what the arm will do, before it moves."""
+        ...
+
+
 def _no_output(_controller: Controller) -> AbstractContextManager[Output | None]:
     return nullcontext()
 
@@ -176,6 +192,8 @@ class OpenedRobot:
     """Opens what else is told of each control step."""
     free_motion_id: str = ""
     """What the robot is known by as its free motion is remembered, where that may be learnt."""
+    commander: Commander | None = None
+    """Whom the arm follows, if it is not the path."""
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import numpy as np
 from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl import types as idl
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pretouch.errors import RobotError
 from pretouch.hardware.ros2.params import Distribution
@@ -26,10 +26,18 @@ TEXT = "std_msgs/msg/String"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 MARKERS = "visualization_msgs/msg/MarkerArray"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+TWIST = "geometry_msgs/msg/TwistStamped"
+FRANKA_STATE = "franka_msgs/msg/FrankaRobotState"
 USED = (
-    JOINT_STATE, WRENCH, RANGE, TRAJECTORY, VELOCITIES, CLOUD, VECTOR, TEXT, TRANSFORMS, MARKERS, DIAGNOSTICS,
+    JOINT_STATE, WRENCH, RANGE, TRAJECTORY, VELOCITIES, CLOUD, VECTOR, TEXT, TRANSFORMS, MARKERS, DIAGNOSTICS, TWIST,
 )  # fmt: skip
-"""All types on our topics."""
+"""All standard types on our topics."""
+_FRANKA = (
+    "std_msgs/Header header\ngeometry_msgs/Vector3[4] cartesian\nfloat64[14] joint\n"
+    "sensor_msgs/JointState measured\nsensor_msgs/JointState desired\nsensor_msgs/JointState motor\n"
+    "float64[7] ddq_d\nfloat64[7] dtau_j\nsensor_msgs/JointState tau_ext_hat_filtered\n"
+)
+"""How a FrankaRobotState begins, bytes alike: its end differs by release, and is not read."""
 
 _BASE: dict[str, Any] = {
     "bool": bool, "byte": idl.uint8, "octet": idl.uint8, "char": idl.uint8, "int8": idl.int8, "uint8": idl.uint8,
@@ -59,12 +67,13 @@ class Messages:
     def __init__(self, distribution: Distribution) -> None:
         self.distribution = distribution
         self._store = get_typestore(Stores(f"ros2_{distribution}"))
+        self._store.register(get_types_from_msg(_FRANKA, FRANKA_STATE))
         self.types = self._store.types
         """Classes by type name, as sensor_msgs/msg/JointState."""
         self.idl_type = cache(self._idl_type)
         self.wire_type = cache(self._wire_type)
         self.blank = cache(self._blank)
-        for kind in USED:
+        for kind in (*USED, FRANKA_STATE):
             self._store.get_msgdef(kind)  # makes the code that encodes: the first message would wait for it
 
     def make(self, kind: str, *fields: Any) -> Any:
@@ -87,6 +96,10 @@ class Messages:
     def decoded(self, kind: str, data: bytes) -> Any:
         """Return the message that bytes hold; those of another type or distribution are a RobotError."""
         try:
+            if kind == FRANKA_STATE:  # more follows than is read
+                definition = self._store.get_msgdef(kind)
+                read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
+                return read(data[4:], 0, definition.cls, self._store)[0]
             return self._store.deserialize_cdr(data, kind)
         except Exception as error:  # any bytes may come from a network
             raise RobotError(
@@ -95,8 +108,8 @@ class Messages:
             ) from error
 
     def type_hash(self, kind: str) -> str:
-        """Return the hash of a type that rmw sends along since Iron."""
-        return self._store.hash_rihs01(kind)
+        """Return the hash of a type that rmw sends along since Iron; '' of one that is only known in part."""
+        return "" if kind == FRANKA_STATE else self._store.hash_rihs01(kind)
 
     def _wire_type(self, kind: str) -> Any:
         """Class of a type's messages for DDS, which know their type and hold `cdr`: rosbags takes half the time."""

@@ -13,6 +13,7 @@ Sign = Literal["on-robot", "by-robot"]
 Frame = Literal["base", "ee"]
 Zeros = Literal["auto", "missing", "kept"]
 Command = Literal["trajectory", "velocities"]
+Asked = Literal["twist", "trajectory", "velocities"]
 
 LOOPBACK = "127.0.0.1"
 ENVIRONMENT = "environment"
@@ -59,8 +60,11 @@ class ArmParams(Checked):
     """The arm's joints as the messages and the arm's controller call them, in the model's order; () is the model's."""
     wrench: str = "/wrench"
     """Topic of geometry_msgs/WrenchStamped."""
+    torques: str = ""
+    """Topic whose efforts are external joint torques, of the wrench's sign: sensor_msgs/JointState, or, where its name
+    ends in robot_state, franka_msgs/FrankaRobotState; '': there is none."""
     wrench_timeout_s: Annotated[float, Check(low=0.0, high=0.5, open_low=True)] = 0.05
-    """Age of a wrench from which it is no estimate any more [s]."""
+    """Age of a wrench, and of torques, from which they are no estimate any more [s]."""
     shared_clock: bool = True
     """Whether the time of ROS is this machine's time of day, to some milliseconds: then stamps of headers count, and
     trajectories say when they begin. Otherwise what counts is when a message comes, and the arm moves smoothly by
@@ -95,6 +99,8 @@ class ArmParams(Checked):
         if self.command == "velocities":
             self._check_controller()
         check_topic("ArmParams", "command_topic", self.commands_on)
+        if self.torques:
+            check_topic("ArmParams", "torques", self.torques)
         if len(set(self.joint_names)) < len(self.joint_names):
             raise ParameterError(f"ArmParams.joint_names is {', '.join(self.joint_names)}: name each joint once.")
 
@@ -117,6 +123,31 @@ class ArmParams(Checked):
     def zeros_missing(self) -> bool:
         """Whether a wrench of zeros only is none."""
         return self.zeros == "missing" or (self.zeros == "auto" and self.sign == "by-robot")
+
+
+@dataclass(frozen=True)
+class CommanderParams(Checked):
+    """A commander behind a topic, whom the arm follows in place of a path."""
+
+    asked: Asked
+    """twist: geometry_msgs/TwistStamped. trajectory: the velocities of trajectory_msgs/JointTrajectory, as MoveIt Servo
+    sends. velocities: std_msgs/Float64MultiArray [rad/s], as for a forward_command_controller."""
+    topic: str = ""
+    """Its topic; '': /pretouch/twist, /pretouch/joint_trajectory or /pretouch/commands."""
+    shared_clock: bool = True
+    """See `ArmParams`."""
+    base_frame: str = ""
+    """Further name of the base frame, beside the model's own."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_topic("CommanderParams", "topic", self.heard_on)
+
+    @property
+    def heard_on(self) -> str:
+        """Topic of what is asked."""
+        names = {"twist": "twist", "trajectory": "joint_trajectory", "velocities": "commands"}
+        return self.topic or f"/pretouch/{names[self.asked]}"
 
 
 @dataclass(frozen=True)

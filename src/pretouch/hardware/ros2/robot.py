@@ -1,4 +1,4 @@
-"""The port `Robot` over ROS 2 topics: joint states and wrench in, commands out."""
+"""The port `Robot` over ROS 2 topics: joint states, wrench and external torques in, commands out."""
 
 import math
 from time import monotonic, sleep
@@ -13,13 +13,14 @@ from pretouch.hardware.ros2.messages import JOINT_STATE, TRAJECTORY, VELOCITIES,
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams
 from pretouch.hardware.ros2.stamps import Stamps
+from pretouch.hardware.ros2.torques import JointTorques
 from pretouch.hardware.ros2.trajectory_commands import TrajectoryCommands
 from pretouch.hardware.ros2.wrench import Wrench
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
 
 _PERIOD_S = 0.01
-_SHARED_S = 0.05
+SHARED_S = 0.05
 """How far the stamps of a clock that is shared may be from the time of day [s]."""
 
 
@@ -46,6 +47,10 @@ class Ros2Robot:
         self._wrench = Wrench(params, Stamps(params.shared_clock))
         self._states = node.subscribe(params.joint_states, JOINT_STATE, self._joints.take)
         self._wrenches = node.subscribe(params.wrench, WRENCH, self._wrench.take)
+        self._torques = JointTorques(params, self._joints.names, Stamps(params.shared_clock))
+        self._efforts = (
+            [node.subscribe(params.torques, self._torques.kind, self._torques.take)] if params.torques else []
+        )
         self._commands: CommandSender = (
             TrajectoryCommands(params, model, self._joints.names, node, period)
             if params.command == "trajectory"
@@ -55,7 +60,7 @@ class Ros2Robot:
         self._lost = ""
 
     def wait(self, timeout: float = 5.0) -> None:
-        """Wait until states and a wrench come and nobody else commands the controller, for so long at most [s].
+        """Wait until all inputs come and nobody else commands the controller, for so long at most [s].
 
         What is not so by then is a RobotError that says what there is instead.
         """
@@ -66,7 +71,8 @@ class Ros2Robot:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
-        p, found = self.params, [self._wrench.warning, self._states.unreadable, self._wrenches.unreadable]
+        p, found = self.params, [self._wrench.warning]
+        found += [heard.unreadable for heard in (self._states, self._wrenches, *self._efforts)]
         if self._joints.differentiated:
             found.append(f"{p.joint_states} has no velocities: they are computed from the positions.")
         if p.shared_clock and self._joints.newest is not None and self._joints.stamps.behind is None:
@@ -102,9 +108,9 @@ class Ros2Robot:
                 raise
         # a state of this turn, measured before the last command, is not moved on by the controller
         q, qd = self._commands.at(joints, now if joints.stamp > self._tick_before else joints.stamp)
-        wrench = self._wrench.read(now, self._orientation(joints.q))
-        no_torques = np.full(self._model.n, np.nan)
-        return RobotState(joints.stamp, joints.q, joints.qd, q, qd, no_torques, wrench)
+        R_O_ee = np.eye(3) if self.params.frame == "base" else self.orientation()
+        wrench = self._wrench.read(now, R_O_ee)
+        return RobotState(joints.stamp, joints.q, joints.qd, q, qd, self._torques.read(now), wrench)
 
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point, kept for `hold_s` unless there is another one.
@@ -127,6 +133,16 @@ class Ros2Robot:
         self._commands.rest()
         sleep(max(self._commands.ends - monotonic(), 0.0))
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The arm's joints as the messages call them."""
+        return self._joints.names
+
+    def orientation(self) -> FloatArray:
+        """R_O_ee (3, 3) by the newest joint state; the identity where that has no numbers, which the step names."""
+        q = self._newest().q
+        return self._model.kinematics(q).rotation[self._model.ee] if np.isfinite(q).all() else np.eye(3)
+
     def __enter__(self) -> Self:
         return self
 
@@ -137,12 +153,6 @@ class Ros2Robot:
         if self._joints.newest is None:
             raise RobotError(self._missing_input())
         return self._joints.newest
-
-    def _orientation(self, q: FloatArray) -> FloatArray:
-        """Orientation of the end-effector (3, 3), if the wrench needs it."""
-        if self.params.frame == "base" or not np.isfinite(q).all():
-            return np.eye(3)
-        return self._model.kinematics(q).rotation[self._model.ee]
 
     def _check_sound(self) -> None:
         wrong = self._node.failure or self._conflict()
@@ -157,15 +167,16 @@ class Ros2Robot:
                 f"Another program publishes on {p.commands_on}: only one program may command the arm, so end it, or"
                 " wait 10 s if it was killed."
             )
-        for stamps, topic in ((self._joints.stamps, p.joint_states), (self._wrench.stamps, p.wrench)):
-            if stamps.together():
+        sources = (self._joints, p.joint_states), (self._wrench, p.wrench), (self._torques, p.torques)
+        for source, topic in sources:
+            if source.stamps.together():
                 return f"Several publishers send on {topic}: run only one, or give each its own topic."
         return ""
 
     def _check_clock(self) -> None:
         """Refuse a clock that is not shared: trajectories would begin at another time than meant."""
         p, behind = self.params, self._joints.stamps.behind
-        if p.shared_clock and behind is not None and abs(behind) > _SHARED_S:
+        if p.shared_clock and behind is not None and abs(behind) > SHARED_S:
             raise RobotError(
                 f"The stamps of {p.joint_states} are {behind:.3g} s behind this machine's time of day: set the clocks"
                 " by NTP, or set shared_clock = false."
@@ -183,6 +194,10 @@ class Ros2Robot:
             )
         if not self._wrench.received_any:
             return _no_publisher(p.wrench, WRENCH, "wrench", self._node.topics(WRENCH))
+        if p.torques and not self._torques.received_any:
+            if not self._torques.others:
+                return _no_publisher(p.torques, self._torques.kind, "torques", self._node.topics(self._torques.kind))
+            return f"{p.torques} has efforts of {', '.join(self._torques.others)}, not of {', '.join(joints.names)}."
         if self._commands.publisher.subscribers:
             return ""
         kind = TRAJECTORY if p.command == "trajectory" else VELOCITIES
