@@ -1,9 +1,9 @@
 """A simulated arm behind ROS 2 topics, in a process of its own: a joint_trajectory_controller as ros2_control has it.
 
-It takes trajectories as `spline.py` has it for a release, at 1 kHz, and publishes joint states, a wrench in the
-vendor's sign, and ranges that show nothing near. Lines on its input: `push FX FY FZ` [N, on the arm], `freeze` (the
-same states again and again), `mute`, `deaf` (no command arrives), `clear`, `stop`. At the end it writes to a file the
-positions that were commanded at each millisecond.
+It takes trajectories as `spline.py` has it for a release, at 1 kHz, and publishes joint states, wrench and external
+torques in the vendor's sign, and ranges that show nothing near. Lines on its input: `push FX FY FZ` [N, on the arm],
+`freeze` (the same states again and again), `mute`, `deaf` (no command arrives), `clear`, `stop`. At the end it writes
+to a file the positions that were commanded at each millisecond.
 """
 
 import argparse
@@ -47,6 +47,7 @@ class Peer:
         node.subscribe("/joint_trajectory_controller/joint_trajectory", TRAJECTORY,
                        lambda message, received, writer: self.told.put(message), reliable=True)  # fmt: skip
         self.states, self.wrenches = node.publisher("/joint_states", JOINT_STATE), node.publisher("/wrench", WRENCH)
+        self.torques = node.publisher("/external_joint_torques", JOINT_STATE)
         self.ranges = [(name, node.publisher(f"/skin/{name}/range", RANGE)) for name in skin.ids]
 
     def advance(self, now: float, steps: int) -> None:
@@ -87,6 +88,10 @@ class Peer:
         self.states.publish(make(JOINT_STATE, header(stamp, ""), self.names,
                                  np.append(positions[self.shuffled], self.more),
                                  np.append(velocities[self.shuffled], self.more), np.zeros(0)))  # fmt: skip
+        # as a state broadcaster does: positions and velocities that say nothing
+        nothing = np.zeros(len(self.shuffled))
+        self.torques.publish(make(JOINT_STATE, header(stamp, ""), self.names[: len(nothing)], nothing, nothing,
+                                  -robot.tau_ext[self.shuffled]))  # fmt: skip
         given = np.zeros(6) if robot.wrench is None else -robot.wrench
         pair = xyz("Vector3", given[:3]), xyz("Vector3", given[3:])
         self.wrenches.publish(make(WRENCH, header(stamp, "panda_link0"), make("geometry_msgs/msg/Wrench", *pair)))

@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pretouch.hardware.ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, WRENCH
+from pretouch.hardware.ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, TRAJECTORY, TWIST, VELOCITIES, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
-from pretouch.hardware.ros2.params import Distribution, NodeParams
+from pretouch.hardware.ros2.params import ArmParams, Distribution, NodeParams
+from pretouch.hardware.ros2.stamps import Stamps
+from pretouch.hardware.ros2.torques import JointTorques
 from tests.needs import skip_for
 
 HERE = Path(__file__).parent
@@ -25,12 +27,18 @@ LAYOUTS = {
     WRENCH: "iusdddddd",
     RANGE: "iusbfffff",
     TRAJECTORY: "ius[s][[d][d][d][d]iu]",
+    TWIST: "iusdddddd",
+    VELOCITIES: "[suu]u[d]",
 }
+JOINTS = "ius[s][d][d][d]"
 DDS_NAMES = {
     JOINT_STATE: "sensor_msgs::msg::dds_::JointState_",
     WRENCH: "geometry_msgs::msg::dds_::WrenchStamped_",
     RANGE: "sensor_msgs::msg::dds_::Range_",
     TRAJECTORY: "trajectory_msgs::msg::dds_::JointTrajectory_",
+    TWIST: "geometry_msgs::msg::dds_::TwistStamped_",
+    VELOCITIES: "std_msgs::msg::dds_::Float64MultiArray_",
+    FRANKA_STATE: "franka_msgs::msg::dds_::FrankaRobotState_",
 }
 LINES = {
     JOINT_STATE: [
@@ -44,6 +52,8 @@ LINES = {
         "0 0 : 2 :j1 :j2 2 2 0.1 0.2 2 1 -1 0 0 0 50000000 2 0.3 0.4 2 0 0 0 0 1 0",
         "0 0 :base 1 :joint 0",
     ],
+    TWIST: ["1 2 :panda_link0 0.1 0 -0.25 0 nan 1"],
+    VELOCITIES: ["0 0 3 0.5 -1 1e-300", "1 :joints 2 2 0 2 0.1 0.2"],
 }
 
 
@@ -132,6 +142,29 @@ def test_fast_dds_reads_what_is_published(
     assert process.returncode == 0
     lines = [line.strip() for line in printed.splitlines()]
     assert all(same(a, b) for a, b in zip(lines, LINES[kind], strict=True)), lines
+
+
+def test_the_torques_in_a_state_of_franka_are_read_and_what_follows_them_is_not(
+    fast_peer: Path, node: Ros2Node, domain: int
+) -> None:
+    efforts = [0.5, -1.25, 3.0]
+    layout = f"ius{'d' * 26}{JOINTS * 3}{'d' * 14}{JOINTS}[d]dsb"
+    words = ["7 8 :fr3_link0", *["1"] * 26, *["0 0 :l 1 :j 1 0.5 0 0"] * 3, *["2"] * 14,
+             "7 8 :fr3_link0 3 :a :b :c 3 0 0 0 3 0 0 0 3", *map(str, efforts), "2 0.1 0.2 9.5 :more 1"]  # fmt: skip
+    torques = JointTorques(ArmParams("by-robot", "base", torques="/arm/robot_state"), ("c", "a", "b"), Stamps())
+    assert torques.kind == FRANKA_STATE
+    read: list[list[float]] = []
+
+    def take(message: Any, received: float, writer: int) -> None:
+        torques.take(message, received, writer)
+        read.append(torques.read(received).tolist())
+
+    subscription = node.subscribe("/topic", FRANKA_STATE, take)
+    with peer(fast_peer, domain, FRANKA_STATE, "pub", "best", layout=layout) as process:
+        assert node.wait_for(lambda: subscription.publishers == 1, 20)
+        process.communicate(" ".join(words) + "\n", timeout=30)
+    assert node.wait_for(lambda: bool(read), 5), subscription.unreadable
+    assert read == [[-3.0, -0.5, 1.25]]
 
 
 @pytest.mark.parametrize("distribution", ["humble", "jazzy"])

@@ -1,5 +1,6 @@
 """What a commander asks of the arm over a topic, as the loop takes it: who is wrong is named, and the arm holds."""
 
+from itertools import zip_longest
 from time import time as wall_clock
 from types import SimpleNamespace
 from typing import Any
@@ -116,10 +117,11 @@ class Ros2Commander:
     def _trajectory(self, message: Any, instant: float) -> Desired:
         """Return the velocities of a trajectory's points, which may lie ahead."""
         names, ours, points = tuple(message.joint_names), self._robot.joints, message.points
-        if names != ours:
-            shown = ", ".join(names)[:_SHOWN]
+        other = next((pair for pair in zip_longest(ours, names, fillvalue="") if pair[0] != pair[1]), None)
+        if other is not None:
             raise _UnfitError(
-                f"on {self.params.heard_on} the joints are {shown or 'none'}: give {', '.join(ours)}, in this order"
+                f"on {self.params.heard_on} the joint {other[1][:_SHOWN]!r} is in the place of {other[0]!r}: give"
+                f" {', '.join(ours)}, in this order"
             )
         if not 0 < len(points) <= _POINTS_MOST:
             raise _UnfitError(
