@@ -150,6 +150,7 @@ def test_a_motion_that_goes_stale_brings_the_arm_to_rest_says_so_and_is_taken_up
         (lambda now: desired.twist((now, now), np.zeros((2, 3))), "do not increase"),
         (lambda _: "left", "it is a str"),
         (lambda now: Desired(7, np.array([now]), np.zeros((1, 6))), "holds no kind"),
+        (lambda now: desired.refused(now, "two programs ask"), r"cannot be used \(two programs ask\)"),
     ],
 )
 def test_nonsense_is_a_named_hold(panda_model, wrong, said):
@@ -203,6 +204,7 @@ def test_nonsense_that_was_asked_replays_too(panda_model, tmp_path):
         two = np.array([now, now + 0.1])
         return (
             desired.twist(now, np.full(3, np.nan)),
+            desired.refused(now, "two programs ask"),
             Desired(DesiredKind.TWIST, two, np.zeros((1, 5))),
             Desired(DesiredKind.TWIST, np.zeros(0), np.zeros((0, 6))),
             "left",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, TEXT, TRANSFORMS, VECTOR, WRENCH
+from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, VECTOR, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.output import Ros2Output
 from pretouch.hardware.ros2.params import OutputParams
@@ -22,7 +22,7 @@ from tests.following_arm import DT, Arm
 TOPICS = {
     "/pretouch/obstacles": CLOUD, "/pretouch/markers": MARKERS, "/pretouch/force": WRENCH,
     "/pretouch/threshold_upper": VECTOR, "/pretouch/threshold_lower": VECTOR, "/pretouch/contact": WRENCH,
-    "/pretouch/mode": TEXT, "/diagnostics": DIAGNOSTICS, "/tf": TRANSFORMS, "/tf_static": TRANSFORMS,
+    "/pretouch/mode": TEXT, "/pretouch/limited": STATUS, "/diagnostics": DIAGNOSTICS, "/tf": TRANSFORMS, "/tf_static": TRANSFORMS,
 }  # fmt: skip
 LATCHED = ("/pretouch/mode", "/tf_static")
 
@@ -106,6 +106,11 @@ def test_a_step_is_published_by_standard_messages(
     assert listener.last("/pretouch/threshold_upper").vector.x == pytest.approx(step.thresholds.upper[0])
     assert listener.last("/pretouch/threshold_lower").vector.y == pytest.approx(step.thresholds.lower[1])
     assert listener.last("/pretouch/mode").data.startswith("HOLD: The force window is filling")
+    limited = listener.last("/pretouch/limited")
+    assert {pair.key: pair.value for pair in limited.values} == {
+        "by": "hold", "share": "0.000", "unit": "", "link": "", "joint": "",
+    }  # fmt: skip
+    assert (limited.level, limited.message) == (1, step.reason)
     spheres, lines, _, words = listener.last("/pretouch/markers").markers
     assert [(p.x, p.y, p.z) for p in spheres.points] == [pytest.approx(tuple(p)) for p in step.obstacles.point]
     assert len(lines.points) == 4

@@ -22,6 +22,8 @@ _NO_STAMP = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0))
 _POINTS_MOST = 1000
 _AHEAD_S = 1.0
 """How far ahead trajectories may begin [s]: MoveIt Servo leaves room for its latency."""
+_POSTURE_RAD, _ALIKE_RAD = 0.3, 0.05
+"""Velocities that are so near to the positions of an arm that is so far from 0 are positions [rad]."""
 _SHOWN = 80
 """Letters of a name from elsewhere that are shown."""
 
@@ -102,6 +104,12 @@ class Ros2Commander:
         if self.kind == TRAJECTORY:
             return self._trajectory(message, instant), False
         self._check_count(len(message.data))
+        q = self._robot.measured().q
+        if np.abs(q).max() > _POSTURE_RAD and np.abs(message.data - q).max() < _ALIKE_RAD:
+            raise _UnfitError(
+                f"on {self.params.heard_on} the joints' positions are sent, not velocities: set MoveIt Servo's"
+                " publish_joint_positions to false, or ask by trajectories"
+            )
         return desired.joint_velocities(instant, message.data), False
 
     def _twist(self, message: Any, instant: float) -> tuple[Desired, bool]:

@@ -26,10 +26,12 @@ TEXT = "std_msgs/msg/String"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 MARKERS = "visualization_msgs/msg/MarkerArray"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 TWIST = "geometry_msgs/msg/TwistStamped"
 FRANKA_STATE = "franka_msgs/msg/FrankaRobotState"
 USED = (
-    JOINT_STATE, WRENCH, RANGE, TRAJECTORY, VELOCITIES, CLOUD, VECTOR, TEXT, TRANSFORMS, MARKERS, DIAGNOSTICS, TWIST,
+    JOINT_STATE, WRENCH, RANGE, TRAJECTORY, VELOCITIES, CLOUD, VECTOR, TEXT, TRANSFORMS, MARKERS, DIAGNOSTICS, STATUS,
+    TWIST,
 )  # fmt: skip
 """All standard types on our topics."""
 _FRANKA = (

@@ -92,13 +92,13 @@ class Ros2Robot:
         """Begin at rest where the arm is, and wait until it has settled there; RobotError where that is not known."""
         self._check_sound()
         if not self._commands.begun:
-            sleep(self._commands.begin(self._newest(), monotonic()))
+            sleep(self._commands.begin(self.measured(), monotonic()))
 
     def read(self) -> RobotState:
         """Return the newest state; an arm that does not follow its commands is a RobotError, once."""
         now = monotonic()
         self._tick_before, self._tick = self._tick, now
-        joints = self._newest()
+        joints = self.measured()
         if not self._lost:
             try:
                 self._check_sound()
@@ -124,7 +124,7 @@ class Ros2Robot:
             raise RobotError(f"The command is {qd}: give finite joint velocities.")
         now = self._tick if self._tick > -math.inf else monotonic()
         if not self._commands.begun:
-            self._commands.begin(self._newest(), now)
+            self._commands.begin(self.measured(), now)
         self._commands.send(qd, now)
         self._tick = -math.inf
 
@@ -138,9 +138,15 @@ class Ros2Robot:
         """The arm's joints as the messages call them."""
         return self._joints.names
 
+    def measured(self) -> Measured:
+        """Return the newest joint state; a RobotError where there is none."""
+        if self._joints.newest is None:
+            raise RobotError(self._missing_input())
+        return self._joints.newest
+
     def orientation(self) -> FloatArray:
         """R_O_ee (3, 3) by the newest joint state; the identity where that has no numbers, which the step names."""
-        q = self._newest().q
+        q = self.measured().q
         return self._model.kinematics(q).rotation[self._model.ee] if np.isfinite(q).all() else np.eye(3)
 
     def __enter__(self) -> Self:
@@ -148,11 +154,6 @@ class Ros2Robot:
 
     def __exit__(self, *_: object) -> None:
         self.end()
-
-    def _newest(self) -> Measured:
-        if self._joints.newest is None:
-            raise RobotError(self._missing_input())
-        return self._joints.newest
 
     def _check_sound(self) -> None:
         wrong = self._node.failure or self._conflict()

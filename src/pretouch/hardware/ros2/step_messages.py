@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pretouch.controller import Controller
-from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, TRANSFORMS, VECTOR, WRENCH, Messages
+from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TRANSFORMS, VECTOR, WRENCH, Messages
+from pretouch.limited import Limit
 from pretouch.loop import Cycle
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, FloatArray, Mode, RangeReadings, RangeStatus
@@ -88,6 +89,16 @@ class StepMessages:
         ]
         return self._m.make(MARKERS, made)
 
+    def limited(self, step: ControlStep) -> Any:
+        """What keeps the arm from what is asked, for who asks: `ControlStep.limited` by name."""
+        of = step.limited
+        names = {"unit": self._skin.ids, "link": self._links, "joint": self._model.joints}
+        places = {"unit": of.unit, "link": of.link, "joint": of.joint}
+        values = {"by": of.by.value, "share": f"{of.share:.3f}"} | {
+            key: names[key][at] if 0 <= at < len(names[key]) else "" for key, at in places.items()
+        }
+        return self._status("pretouch: limited", _OK if of.by is Limit.NOTHING else _WARN, step.reason, "", values)
+
     def diagnostics(self, cycle: Cycle, at: Stamp) -> Any:
         """Mode and reason, and how old each unit's newest reading is."""
         step = cycle.step
@@ -110,7 +121,7 @@ class StepMessages:
 
     def _status(self, name: str, level: int, said: str, hardware: str, values: dict[str, str]) -> Any:
         pairs = [self._m.make("diagnostic_msgs/msg/KeyValue", *pair) for pair in values.items()]
-        return self._m.make("diagnostic_msgs/msg/DiagnosticStatus", level, name, said, hardware, pairs)
+        return self._m.make(STATUS, level, name, said, hardware, pairs)
 
     def _header(self, at: Stamp) -> Any:
         return self._m.header(at, self.base)
