@@ -22,7 +22,8 @@ from tests.following_arm import DT, Arm
 TOPICS = {
     "/pretouch/obstacles": CLOUD, "/pretouch/markers": MARKERS, "/pretouch/force": WRENCH,
     "/pretouch/threshold_upper": VECTOR, "/pretouch/threshold_lower": VECTOR, "/pretouch/contact": WRENCH,
-    "/pretouch/mode": TEXT, "/pretouch/limited": STATUS, "/diagnostics": DIAGNOSTICS, "/tf": TRANSFORMS, "/tf_static": TRANSFORMS,
+    "/pretouch/mode": TEXT, "/pretouch/limited": STATUS, "/diagnostics": DIAGNOSTICS,
+    "/tf": TRANSFORMS, "/tf_static": TRANSFORMS,
 }  # fmt: skip
 LATCHED = ("/pretouch/mode", "/tf_static")
 
