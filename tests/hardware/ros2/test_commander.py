@@ -1,10 +1,8 @@
 """A commander behind a topic: what it asks for is taken as it is meant, and what is wrong is said and holds the arm."""
 
-import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from threading import Event, Thread
 from time import time
 from types import SimpleNamespace
 from typing import Any
@@ -19,7 +17,7 @@ from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import ParameterError, RobotError
 from pretouch.hardware.ros2.commander import Ros2Commander
 from pretouch.hardware.ros2.joints import Measured
-from pretouch.hardware.ros2.messages import TRAJECTORY, TWIST, VELOCITIES, Messages
+from pretouch.hardware.ros2.messages import TRAJECTORY, TWIST
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, Asked, CommanderParams, NodeParams
 from pretouch.hardware.ros2.robot import Ros2Robot
@@ -28,40 +26,12 @@ from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RangeReadings
+from tests.hardware.ros2.asking import NAMES, SLOW, Publishing, trajectory, twist, velocities
 from tests.hardware.ros2.processes import ArmPeer, arm_peer
 
-MESSAGES = Messages("jazzy")
 R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """R_O_ee of the arm that is only made up."""
-NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
-SLOW = np.full(7, 0.05)
 Q = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
-
-
-def stamp(seconds: float) -> tuple[int, int]:
-    return math.floor(seconds), round(seconds % 1 * 1e9)
-
-
-def twist(linear: Any, angular: Any = (0, 0, 0), frame: str = "panda_link0", at: float | None = None) -> Any:
-    pair = MESSAGES.xyz("Vector3", linear), MESSAGES.xyz("Vector3", angular)
-    header = MESSAGES.header(stamp(time() if at is None else at), frame)
-    return MESSAGES.make(TWIST, header, MESSAGES.make("geometry_msgs/msg/Twist", *pair))
-
-
-def trajectory(names: tuple[str, ...], *points: tuple[float, Any], at: float = 0.0) -> Any:
-    """Points of a time [s] and velocities."""
-    none, make = np.zeros(0), MESSAGES.make
-    made = [
-        make("trajectory_msgs/msg/JointTrajectoryPoint", none, np.asarray(qd, float), none, none,
-             make("builtin_interfaces/msg/Duration", *stamp(after)))
-        for after, qd in points
-    ]  # fmt: skip
-    return make(TRAJECTORY, MESSAGES.header(stamp(at), ""), list(names), made)
-
-
-def velocities(qd: Any) -> Any:
-    layout = MESSAGES.make("std_msgs/msg/MultiArrayLayout", [], 0)
-    return MESSAGES.make(VELOCITIES, layout, np.asarray(qd, float))
 
 
 class Told:
@@ -190,26 +160,6 @@ def test_what_the_arm_is_told_is_no_commander(panda_model: RobotModel) -> None:
         Told(panda_model, "trajectory", topic="/joint_trajectory_controller/joint_trajectory")
     with pytest.raises(ParameterError, match="give the full name of a topic"):
         CommanderParams("twist", "1st")
-
-
-class Publishing:
-    """A commander's program: sends a message again and again, stamped as it goes, until it is left."""
-
-    def __init__(self, node: Ros2Node, topic: str, kind: str, made: Callable[[], Any]) -> None:
-        self._publisher, self._made, self._over = node.publisher(topic, kind), made, Event()
-        self._thread = Thread(target=self._send)
-
-    def _send(self) -> None:
-        while not self._over.wait(0.02):
-            self._publisher.publish(self._made())
-
-    def __enter__(self) -> "Publishing":
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._thread.join()
 
 
 @pytest.fixture

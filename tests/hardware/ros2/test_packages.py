@@ -49,7 +49,7 @@ def test_another_parser_reads_each_message_as_ours_does_and_rosidl_takes_its_nam
 
 @pytest.mark.parametrize("package", ["pretouch_msgs", "pretouch_bringup"])
 def test_a_package_names_itself_alike_and_declares_what_it_uses(package: str) -> None:
-    root = ElementTree.parse(ROOT / package / "package.xml").getroot()
+    root = ElementTree.parse(ROOT / package / "package.xml").getroot()  # noqa: S314
     assert (root.attrib["format"], root.findtext("name"), root.findtext("version")) == ("3", package, __version__)
     cmake = (ROOT / package / "CMakeLists.txt").read_text()
     assert f"project({package})" in cmake
@@ -67,8 +67,9 @@ class Launch:
         self.made: list[tuple[str, dict[str, Any]]] = []
         self.arguments = arguments
         names = {
-            "launch": ["LaunchDescription"], "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess", "OpaqueFunction"],
-            "launch_ros": [], "launch_ros.actions": ["Node"],
+            "launch": ["LaunchDescription"], "launch_ros": [],
+            "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess", "OpaqueFunction"],
+            "launch_ros.actions": ["Node"],
         }  # fmt: skip
         for module, classes in names.items():
             self._module(monkeypatch, module, **{name: self._kept(name) for name in classes})

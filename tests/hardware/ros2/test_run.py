@@ -11,11 +11,16 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 
+from pretouch.hardware.ros2.messages import TWIST
+from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, NodeParams
+from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
 from pretouch.robot.description import panda
 from pretouch.session.confirmations import ConfirmedRobots
 from pretouch.session.push import DIRECTIONS
 from pretouch.session.ros2 import identity
+from tests.hardware.ros2.asking import Publishing, twist
 from tests.hardware.ros2.processes import ArmPeer, arm_peer
 
 # two processes in real time: alone, lest another test takes the arm's time and it is rightly found not to follow
@@ -28,10 +33,10 @@ PROFILE = "blind:failure.state_timeout_s=1"
 
 
 @contextmanager
-def running(domain: int, folder: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
+def running(domain: int, folder: Path, *words: str, profile: str = PROFILE) -> Iterator[subprocess.Popen[str]]:
     command = [
         sys.executable, "-u", "-m", "pretouch.cli", "run", "--robot", "ros2", "--ros-sign", "by-robot", "--ros-frame",
-        "base", "--ros-domain", str(domain), "--no-skin", "--profile", PROFILE, "--path", "hold", "--yes",
+        "base", "--ros-domain", str(domain), "--no-skin", "--profile", profile, "--path", "hold", "--yes",
         "--holds", str(folder / "holds"), *words,
     ]  # fmt: skip
     environment = os.environ | {"XDG_STATE_HOME": str(folder / "state")}
@@ -121,3 +126,43 @@ def test_guided_pushes_confirm_the_sign(domain: int, tmp_path: Path, arm: ArmPee
     assert run.returncode == 0, out
     assert "The force sign is confirmed" in out
     assert speeds(arm.stop())[-50:].max() < 1e-9
+
+
+def test_a_commander_drives_by_the_profile_pretouch_after_pushes_that_torques_confirm(
+    domain: int, tmp_path: Path, arm: ArmPeer
+) -> None:
+    place = tmp_path / "a.mcap"
+    words = "--ros-torques", "/external_joint_torques", "--ros-desired", "twist", "--record", str(place)
+    chosen = "pretouch:perception=none:failure.state_timeout_s=1"
+    with running(domain, tmp_path, *words, "--seconds", "12", profile=chosen) as run:
+        said = []
+        for direction in DIRECTIONS:
+            said += lines_until(run, "Push the hand")
+            arm.tell("push " + " ".join(str(14.0 * part) for part in direction.axis))
+            said += lines_until(run, "Let go.")
+            arm.tell("push 0 0 0")
+        said += lines_until(run, "was received on /pretouch/twist yet")
+        with (
+            Ros2Node(NodeParams(domain=domain)) as theirs,
+            Publishing(theirs, "/pretouch/twist", TWIST, lambda: twist((0.0, 0.05, 0.0))),
+        ):
+            said += lines_until(run, "TRACK")
+            sleep(1.5)
+            arm.tell("push 0 0 25")
+            said += lines_until(run, "REACT")
+            arm.tell("push 0 0 0")
+            said += lines_until(run, "TRACK")
+            sleep(0.5)
+        said += lines_until(run, "The desired motion ended")
+        out, _ = run.communicate(timeout=LIMIT_S)
+    out = "".join(said) + out
+    assert run.returncode == 0, out
+    for part in ("The force sign is confirmed", "The arm does what is asked on /pretouch/twist", "The arm is at rest."):
+        assert part in out
+    assert "keeps its end-effector" not in out
+    log = arm.stop()
+    assert speeds(log)[-50:].max() < 1e-9
+    recorded = open_recording(place)
+    y = [kept.step.ee_position[1] for kept in recorded if kept.step is not None]
+    assert max(y) - y[0] > 0.03
+    assert verify(recorded).differing == 0
