@@ -11,7 +11,7 @@ from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.limits import LimiterParams
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES
+from pretouch.profiles import PROFILES, profile
 from pretouch.sensing.skin import Skin
 from pretouch.session.preflight import PreflightParams, check
 from pretouch.session.standstill import watch
@@ -58,6 +58,17 @@ def test_no_force_estimate_is_refused(controller, panda_model):
     standing = seen(panda_model)
     findings = found(controller, replace(standing, wrench=np.full_like(standing.wrench, np.nan)))
     assert [finding.what for finding in findings] == ["no force"]
+
+
+def test_missing_torques_are_refused_where_they_detect_contacts(controller, panda_model):
+    standing = seen(panda_model)
+    untold = replace(standing, tau_ext=np.full_like(standing.tau_ext, np.nan))
+    by_torques = Controller(
+        panda_model, Skin((), panda_model), no_fixtures(), Circle(), profile("pretouch:perception=none")
+    )
+    assert found(controller, untold) == found(by_torques, standing) == ()
+    (finding,) = found(by_torques, untold)
+    assert "no external joint torques in 100% of its states, and the profile pretouch" in finding.sentence
 
 
 def test_an_arm_that_moves_is_refused(controller, panda_model):

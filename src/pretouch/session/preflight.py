@@ -70,6 +70,7 @@ def check(controller: Controller, seen: Standstill, floor: float, params: Prefli
         *_limits(controller, seen.newest.q, params),
         *_rest(controller, seen, params),
         *_force(controller, seen, params),
+        *_torques(controller, seen, params),
         *_floor(controller, floor, params),
     )
 
@@ -125,6 +126,16 @@ def _force(controller: Controller, seen: Standstill, params: PreflightParams) ->
             "touched",
             f"During the checks the force changed by {seen.disturbance:.1f} N (limit {most:g} N): do not touch the arm"
             " yet.",
+        )
+
+
+def _torques(controller: Controller, seen: Standstill, params: PreflightParams) -> Iterator[Finding]:
+    profile, missing = controller.profile, float(np.mean(~np.isfinite(seen.tau_ext).all(axis=1)))
+    if (profile.detect.by_torques or profile.react.by_torques) and missing > params.missing_share:
+        yield Finding(
+            "no torques",
+            f"The robot gives no external joint torques in {100 * missing:.0f}% of its states, and the profile"
+            f" {profile.name} needs them: check that its driver estimates them, or choose another profile.",
         )
 
 
