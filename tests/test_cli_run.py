@@ -53,6 +53,11 @@ def at_begin(monkeypatch, seconds, then):
             "--approach does not go with --robot ros2",
         ),
         (("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base"), "give their topic by --ros-torques"),
+        (
+            ("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--ros-desired-topic", "/joy"),
+            "--ros-desired-topic needs --ros-desired",
+        ),
+        (("--ros-desired", "twist"), "--ros-desired does not go with --robot simulated"),
         (("--no-skin",), "choose --profile blind"),
         (("--no-skin", "--skin", "a.toml"), "--no-skin does not go with --skin"),
         (("--skin", "missing.toml"), "missing.toml cannot be read"),

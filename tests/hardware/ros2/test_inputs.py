@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pretouch.errors import RobotError
 from pretouch.hardware.ros2.joints import Joints
-from pretouch.hardware.ros2.messages import JOINT_STATE, RANGE, WRENCH, Messages
+from pretouch.hardware.ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, WRENCH, Messages
 from pretouch.hardware.ros2.params import ArmParams, Frame, Sign, Zeros
 from pretouch.hardware.ros2.skin import status_of, topic_name
 from pretouch.hardware.ros2.stamps import Stamps
+from pretouch.hardware.ros2.torques import JointTorques
 from pretouch.hardware.ros2.wrench import Wrench
 from pretouch.recording import standard
 from pretouch.types import RangeStatus
@@ -186,6 +188,42 @@ def test_a_wrench_that_is_old_or_no_number_is_no_estimate() -> None:
     assert taken.read(5.06, np.eye(3)) is None
     taken.take(wrench(2, 1, math.nan, 3, 4, 5, 6), 5.1, 1)
     assert taken.read(5.1, np.eye(3)) is None
+
+
+def efforts(stamp: float, names: str, tau: list[float]) -> Any:
+    return MESSAGES.make(JOINT_STATE, header(stamp), list(names), np.zeros(3), np.zeros(3), np.array(tau))
+
+
+@pytest.mark.parametrize(("sign", "factor"), [("on-robot", 1), ("by-robot", -1)])
+def test_torques_are_those_of_our_joints_in_our_order_and_sign_while_they_are_new(sign: Sign, factor: int) -> None:
+    torques = JointTorques(ArmParams(sign, "base", torques="/tau"), NAMES, Stamps())
+    assert np.isnan(torques.read(5.0)).all()
+    torques.take(efforts(1, "xcab", [9, 3, 1, 2]), 5.0, 1)
+    assert torques.read(5.04).tolist() == [factor, factor * 2, factor * 3]
+    assert np.isnan(torques.read(5.06)).all()
+    torques.take(efforts(2, "abc", [1, math.nan, 3]), 5.1, 1)
+    assert np.isnan(torques.read(5.1)[1])
+
+
+def test_torques_of_others_or_too_few_are_none_and_zeros_neither_where_they_mean_that() -> None:
+    torques = JointTorques(ArmParams("by-robot", "base", torques="/tau"), NAMES, Stamps())
+    torques.take(efforts(1, "abd", [1, 2, 3]), 5.0, 1)
+    torques.take(efforts(2, "abc", []), 5.1, 1)
+    assert (torques.received_any, torques.others) == (False, ("a", "b", "c"))
+    torques.take(efforts(3, "abc", [0, 0, 0]), 5.2, 1)
+    assert torques.received_any
+    assert np.isnan(torques.read(5.2)).all()
+    kept = JointTorques(ArmParams("on-robot", "base", torques="/tau"), NAMES, Stamps())
+    kept.take(efforts(3, "abc", [0, 0, 0]), 5.2, 1)
+    assert not kept.read(5.2).any()
+
+
+def test_only_the_beginning_of_a_state_of_franka_is_read_and_half_of_it_is_refused() -> None:
+    data = MESSAGES.encoded(FRANKA_STATE, MESSAGES.types[FRANKA_STATE](**MESSAGES.blank(FRANKA_STATE)))
+    assert MESSAGES.decoded(FRANKA_STATE, data + b"more").tau_ext_hat_filtered.name == []
+    for cut in (0, 1, 4, len(data) // 2):
+        with pytest.raises(RobotError, match="is not a franka_msgs/msg/FrankaRobotState"):
+            MESSAGES.decoded(FRANKA_STATE, data[:cut])
 
 
 @pytest.mark.parametrize(

@@ -207,6 +207,35 @@ def test_a_second_driver_of_the_arm_is_refused(
             robot.read()
 
 
+@pytest.mark.parametrize("params", [ArmParams("by-robot", "base", torques="/tau")])
+def test_torques_that_were_asked_for_are_waited_for_and_read(
+    params: ArmParams, panda_model: RobotModel, node: Ros2Node, other: Ros2Node
+) -> None:
+    with Ros2Robot(params, panda_model, node) as robot:
+        driver = Driver(other, params, panda_model)
+        driver.tell(panda_model.description.q_ready, robot)
+        with pytest.raises(
+            RobotError, match=r"Nothing was received on /tau: start its publisher, .* set torques to one"
+        ):
+            robot.wait(0.1)
+        make, header = other.messages.make, other.messages.header
+        publisher, none = other.publisher("/tau", JOINT_STATE), np.zeros(0)
+        assert other.wait_for(lambda: publisher.subscribers == 1, 10)
+
+        def send(names: list[str]) -> None:
+            stamp = header(divmod(time_ns(), 10**9), "")
+            publisher.publish(make(JOINT_STATE, stamp, names, none, none, np.arange(len(names), dtype=float)))
+
+        send(["finger"])
+        assert node.wait_for(lambda: bool(robot._torques.others), 5)
+        with pytest.raises(RobotError, match=r"/tau has efforts of finger, not of panda_joint1, "):
+            robot.wait(0.1)
+        send(driver.names)
+        assert node.wait_for(lambda: robot._torques.received_any, 5)
+        assert robot.read().tau_ext.tolist() == [0, -1, -2, -3, -4, -5, -6]
+        robot.wait(10)
+
+
 def test_a_failure_of_the_receiving_thread_stops_the_arm(pair: tuple[Ros2Robot, Driver], node: Ros2Node) -> None:
     robot, driver = pair
 

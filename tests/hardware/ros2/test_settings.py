@@ -16,6 +16,7 @@ from pretouch.hardware.ros2.params import ArmParams, NodeParams, OutputParams, S
         (lambda: ArmParams("up", "base"), "ArmParams.sign is 'up': choose one of on-robot, by-robot"),  # type: ignore[arg-type]
         (lambda: ArmParams("on-robot", "base", joint_states="joint_states"), "give the full name of a topic"),
         (lambda: ArmParams("on-robot", "base", wrench="/a//b"), "give the full name of a topic"),
+        (lambda: ArmParams("on-robot", "base", torques="tau"), "give the full name of a topic"),
         (lambda: ArmParams("on-robot", "base", command_topic="/1st"), "give the full name of a topic"),
         (lambda: ArmParams("on-robot", "base", joint_names=("a", "a")), "name each joint once"),
         (lambda: ArmParams("on-robot", "base", command="velocities"), "a controller that stops by itself"),
