@@ -1,5 +1,6 @@
 """A commander behind a topic: what it asks for is taken as it is meant, and what is wrong is said and holds the arm."""
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from pretouch import loop
 from pretouch.control.path import line
 from pretouch.controller import Controller
-from pretouch.desired import Desired, DesiredKind
+from pretouch.desired import Desired, DesiredKind, sound_desired
 from pretouch.errors import ParameterError, RobotError
 from pretouch.hardware.ros2.commander import Ros2Commander
 from pretouch.hardware.ros2.joints import Measured
@@ -26,8 +27,9 @@ from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RangeReadings
-from tests.hardware.ros2.asking import NAMES, SLOW, Publishing, trajectory, twist, velocities
+from tests.hardware.ros2.asking import MESSAGES, NAMES, SLOW, Publishing, trajectory, twist, velocities
 from tests.hardware.ros2.processes import ArmPeer, arm_peer
+from tests.hardware.ros2.test_messages import Drawn
 
 R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """R_O_ee of the arm that is only made up."""
@@ -160,6 +162,22 @@ def test_what_the_arm_is_told_is_no_commander(panda_model: RobotModel) -> None:
         Told(panda_model, "trajectory", topic="/joint_trajectory_controller/joint_trajectory")
     with pytest.raises(ParameterError, match="give the full name of a topic"):
         CommanderParams("twist", "1st")
+
+
+@pytest.mark.parametrize("asked", ["twist", "trajectory", "velocities"])
+def test_whatever_a_message_holds_is_taken_or_said(panda_model: RobotModel, asked: Asked) -> None:
+    told, rng = Told(panda_model, asked, shared_clock=False), np.random.default_rng(0)
+    odd, drawn = [math.nan, math.inf, -math.inf, 1e300, 0.0, 0.1], Drawn(MESSAGES, 1)
+    for k in range(200):
+        numbers = rng.choice(odd, 7)
+        message = {
+            "twist": twist(numbers[:3], numbers[3:6], str(rng.choice(["world", "panda_hand_tcp", "x"]))),
+            "trajectory": trajectory(NAMES, (0.0, numbers), (float(rng.choice([0.0, 1.0])), numbers)),
+            "velocities": velocities(numbers),
+        }[asked] if k % 2 else drawn.pair(told.commander.kind)[0]  # fmt: skip
+        found = told(message, 5.0 + k)
+        _, wrong = sound_desired(found, 7, 5.0 + k)
+        assert wrong or np.isfinite(found.number).all()
 
 
 @pytest.fixture

@@ -76,7 +76,9 @@ class Ros2Commander:
         if not in_ee:
             return asked
         R = self._robot.orientation()
-        return Desired(asked.kind, asked.stamp, np.hstack([asked.number[:, :3] @ R.T, asked.number[:, 3:] @ R.T]))
+        with np.errstate(invalid="ignore"):  # the step names what is no number
+            number = np.hstack([asked.number[:, :3] @ R.T, asked.number[:, 3:] @ R.T])
+        return Desired(asked.kind, asked.stamp, number)
 
     def _take(self, message: Any, received: float, writer: int) -> None:
         header = getattr(message, "header", _NO_STAMP)
