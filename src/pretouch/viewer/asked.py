@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.control.commander import asked_by, commanded
 from pretouch.desired import Desired, DesiredKind
 from pretouch.explanation import Explanation, explain
-from pretouch.limited import ASKED_M_S, Limit
+from pretouch.limited import ASKED_M_S, FULL, Limit
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.frame import Frame, World
@@ -62,10 +62,10 @@ def told(asked: Asked | None, step: ControlStep, units: Sequence[str], links: Se
     if asked is None:
         return found
     wanted, left = float(np.linalg.norm(asked.velocity)), float(np.linalg.norm(asked.allowed))
-    said = f"Asked {wanted:.2f} m/s, allowed {left:.2f} m/s{_why(step, units, links)}."
-    return replace(
-        found, sentence=f"{found.sentence} {said if max(wanted, left) >= ASKED_M_S else 'No motion is asked.'}"
-    )
+    if max(wanted, left) < ASKED_M_S:
+        return replace(found, sentence=f"{found.sentence} No motion is asked.")
+    why = _why(step, units, links) if float(asked.allowed @ asked.velocity) < FULL * wanted**2 else ""
+    return replace(found, sentence=f"{found.sentence} Asked {wanted:.2f} m/s, allowed {left:.2f} m/s{why}.")
 
 
 def _why(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> str:
