@@ -8,6 +8,7 @@ import pytest
 from pretouch import desired
 from pretouch.desired import Desired
 from pretouch.explanation import explain
+from pretouch.limited import Limit
 from pretouch.types import FloatArray
 from pretouch.viewer.asked import Asked, asked_in, told
 from pretouch.viewer.simulation import LiveSimulation
@@ -87,6 +88,13 @@ def test_the_sentence_names_unit_and_link_that_limit_what_is_asked() -> None:
     assert simulation.skin.ids[limited.unit] == "hand_left"
     assert "Asked 0.30 m/s, allowed 0." in said
     assert said.endswith(" what hand_left sees near panda_hand.")
+
+
+def test_an_arm_at_the_end_of_its_reach_says_so(simulation: LiveSimulation) -> None:
+    step, way = simulation.frame.step, np.array([0.0, 0.2, 0.0])
+    assert step.limited.by is Limit.NOTHING
+    found = told(Asked(way, 0.5 * way, None), step, simulation.skin.ids, simulation.model.links)
+    assert found.sentence.endswith(" Asked 0.20 m/s, allowed 0.10 m/s: this posture allows no more.")
 
 
 def test_what_is_allowed_in_full_needs_no_reason_and_rest_is_named() -> None:

@@ -83,5 +83,5 @@ def _why(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> str:
             return ": it yields to a contact"
         case Limit.HOLD:
             return ": it holds"
-        case Limit.NOTHING:
-            return ""
+        case Limit.NOTHING:  # as near a singularity: at the end of its reach
+            return ": this posture allows no more"
