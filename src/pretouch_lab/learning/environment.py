@@ -18,8 +18,9 @@ from pretouch_lab.learning.scene import Scene
 PEOPLE = ("person -y", "person +y", "beside", "inside", "walking")
 """Scenes of the avoidance benchmark with people."""
 SHIELDED = "pretouch"
-ALONE = "blind:detect.f_base_n=10000"
-"""Limits of the joints alone: it knows nothing of what is near, and no force is a contact."""
+ALONE = "blind:detect.f_base_n=10000:failure.force_timeout_s=1e6"
+"""Limits of the joints alone: it knows nothing of what is near, no force is a contact, and it needs no estimate of one:
+`blind` as it is stops near a singularity, for want of an estimate, and does not go on."""
 SKINS = ("paper", "dense")
 CYCLES = 5
 """Control cycles of a step: 0.05 s, within which an action does not go stale."""
