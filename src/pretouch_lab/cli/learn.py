@@ -13,7 +13,7 @@ class Learn:
     quick: bool = False
     """A few minutes of training, too few to learn much."""
     steps: int = 0
-    """Steps of each of the two trainings, of 0.05 s; by default 300 000, with --quick 8192."""
+    """Steps of each of the two trainings, of 0.05 s; by default 300 000, with --quick 12 288."""
     out: str = ""
     """Folder for policies and results; by default runs/learn, with -quick if it is."""
     json: str = ""

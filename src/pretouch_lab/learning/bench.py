@@ -19,7 +19,7 @@ TRAINED = {"alone": False, "shielded": True}
 """Policies, and whether each was trained under the shield."""
 PLAYED = {"alone": ("alone", False), "alone, shielded": ("alone", True), "shielded": ("shielded", True)}
 """Contenders: a policy, and whether it plays under the shield."""
-_STEPS, _QUICK_STEPS = 300_000, 8_192
+_STEPS, _QUICK_STEPS = 300_000, 12_288
 _STEP_COST, _EPISODE_COST = 6e-3, 2.0
 """Processor time of a step of training, and of an episode [s]."""
 _SHIELD_COST = 1.15
