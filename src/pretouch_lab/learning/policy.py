@@ -33,7 +33,7 @@ class Policy:
 
     def act(self, observation: Observation) -> FloatArray:
         """Return the action, between -1 and 1, that it takes for best."""
-        flat = np.concatenate(list(observation.values()))
+        flat = np.concatenate([observation[name] for name in sorted(observation)])  # as Gymnasium flattens them
         x = np.clip((flat - self.mean) / self.deviation, -_CLIP, _CLIP)
         for weight, bias in self.layers[:-1]:
             x = np.tanh(weight @ x + bias)
@@ -50,7 +50,7 @@ class Policy:
 def load_policy(file: Path) -> Policy:
     """Read a policy; nothing in the file is run. What is no policy is an ExperimentError."""
     try:
-        with np.load(file, allow_pickle=False) as held:
+        with file.open("rb") as source, np.load(source, allow_pickle=False) as held:
             of = {name: held[name] for name in held.files}
         layers = tuple((of[f"w{i}"], of[f"b{i}"]) for i in range((len(of) - 4) // 2))
         policy = Policy(str(of["about"]), of["mean"], of["deviation"], layers, of["curve"])

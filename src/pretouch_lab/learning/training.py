@@ -19,7 +19,7 @@ from pretouch_lab.learning.policy import Policy
 
 _ARMS = 4
 """Episodes under way at once; they take turns, for each of the two trainings has a processor."""
-_STEPS = 256
+_STEPS = 128
 """Steps of each between two updates."""
 _GAMMA = 0.95
 """A reward 1 s ahead counts a third: what is near is a second away, and progress is paid as it is made."""
@@ -28,12 +28,12 @@ _SEED = 1_000_000
 _HIDDEN = (64, 64)
 _SETTINGS: dict[str, Any] = {
     "n_steps": _STEPS,
-    "batch_size": 128,
+    "batch_size": 64,
     "n_epochs": 10,
-    "learning_rate": 1e-3,
+    "learning_rate": 7e-4,
     "gamma": _GAMMA,
     "gae_lambda": 0.95,
-    "policy_kwargs": {"net_arch": list(_HIDDEN), "log_std_init": -0.7},
+    "policy_kwargs": {"net_arch": list(_HIDDEN), "log_std_init": -0.5},
 }
 
 
