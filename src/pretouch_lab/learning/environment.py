@@ -70,7 +70,7 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
     last control cycle `limited` (`Limit`, by its value) and `share`.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012  # Gymnasium's
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  # Gymnasium's
     render_mode = None
 
     def __init__(
@@ -90,14 +90,14 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
             raise ParameterError(f"The action is {action!r}: choose twist or joint_velocities.")
         if skin_name not in SKINS:
             raise ParameterError(f"The skin is {skin_name!r}: choose from {', '.join(SKINS)}.")
-        self._choices = _Choices(
-            _found(scenes), SHIELDED if shield else ALONE, skin_name, reward or Reward()
-        )
+        self._choices = _Choices(_found(scenes), SHIELDED if shield else ALONE, skin_name, reward or Reward())
         self.interface = Interface(arm(), len(skin(skin_name)), action)
         bounds = self.interface.bounds()
         self.observation_space = Dict({name: Box(*_float32(*pair)) for name, pair in bounds.items()})
         self.action_space = Box(-1.0, 1.0, self.interface.scale.shape, np.float32)
         self._scene: Scene | None = None
+        self._goal, self._distance, self._begun = np.zeros(3), 0.0, 0.0
+        self._goals = self._at_goal = 0
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -60,9 +60,7 @@ class Interface:
         ee = self.model.kinematics(robot.q).position[self.model.ee]
         ranges = np.where(readings.status == RangeStatus.OK, readings.distance, _SEEN_M)
         parts = {"ranges": ranges, "q": robot.q, "qd": robot.qd, "ee": ee, "goal": goal - ee}
-        return {
-            name: np.clip(parts[name], low, high).astype(np.float32) for name, (low, high) in self.bounds().items()
-        }
+        return {name: np.clip(parts[name], low, high).astype(np.float32) for name, (low, high) in self.bounds().items()}
 
     @property
     def scale(self) -> FloatArray:

@@ -4,6 +4,7 @@ import zipfile
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,9 +43,11 @@ class Policy:
 
     def save(self, file: Path) -> None:
         """Write it whole."""
-        numbers = {f"{kind}{i}": each[n] for i, each in enumerate(self.layers) for n, kind in enumerate("wb")}
+        layers = enumerate(self.layers)
+        numbers: dict[str, Any] = {f"{kind}{i}": each[n] for i, each in layers for n, kind in enumerate("wb")}
         with atomic_replacement(file) as place, place.open("wb") as out:
-            np.savez(out, about=self.about, mean=self.mean, deviation=self.deviation, curve=self.curve, **numbers)
+            given: dict[str, Any] = {"about": self.about, "mean": self.mean, "deviation": self.deviation}
+            np.savez(out, **given, curve=self.curve, **numbers)
 
 
 def load_policy(file: Path) -> Policy:
