@@ -2,7 +2,7 @@
 
 from pretouch.extras import Extra
 
-LEARN = Extra("learn", ("gymnasium", "stable_baselines3", "torch"), "learn", "pretouch-lab")
+LEARN = Extra("learn", ("gymnasium", "stable_baselines3"), "learn", "pretouch-lab")
 REACH = "pretouch/Reach-v0"
 
 
