@@ -12,7 +12,7 @@ from pretouch.profiles import profile
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import arm, skin
-from pretouch_lab.learning.observation import ActionKind, Interface, Observation
+from pretouch_lab.learning.observation import CYCLES, HELD, NEAR_M, ActionKind, Interface, Observation
 from pretouch_lab.learning.scene import Scene
 
 PEOPLE = ("person -y", "person +y", "beside", "inside", "walking")
@@ -22,16 +22,10 @@ ALONE = "blind:detect.f_base_n=10000:failure.force_timeout_s=1e6"
 """Limits of the joints alone: it knows nothing of what is near, no force is a contact, and it needs no estimate of one:
 `blind` as it is stops near a singularity, for want of an estimate, and does not go on."""
 SKINS = ("paper", "dense")
-CYCLES = 5
-"""Control cycles of a step: 0.05 s, within which an action does not go stale."""
 GOALS = 3
 """Goals held that end an episode."""
 _TIME_S = 12.0
 """Longest episode."""
-_NEAR_M = 0.05
-"""The end-effector is at its goal within this."""
-_HELD = 5
-"""Steps at the goal after which it is held."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +113,8 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
         scene.turn(self.interface.desired(scene.step.stamp, action), CYCLES)
         self._distance = float(np.linalg.norm(self._goal - scene.ee_position))
         earned = reward.progress_1_m * (before - self._distance) - reward.force_1_n * scene.mean_force
-        self._at_goal = self._at_goal + 1 if self._distance < _NEAR_M else 0
-        if self._at_goal == _HELD:
+        self._at_goal = self._at_goal + 1 if self._distance < NEAR_M else 0
+        if self._at_goal == HELD:
             earned += reward.held
             self._goals += 1
             self._next_goal()

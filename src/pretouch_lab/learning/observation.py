@@ -13,6 +13,12 @@ from pretouch.types import FloatArray, RangeReadings, RangeStatus, RobotState
 ActionKind = Literal["twist", "joint_velocities"]
 Observation = dict[str, FloatArray]
 
+CYCLES = 5
+"""Control cycles of a step: 0.05 s, within which an action does not go stale."""
+NEAR_M = 0.05
+"""The end-effector is at its goal within this."""
+HELD = 5
+"""Steps at the goal after which it is held."""
 SPEED_M_S = 0.3
 """Velocity of the end-effector that an action of 1 along an axis asks for: the paper's speed."""
 TURN_RAD_S = 0.5

@@ -33,6 +33,7 @@ _SETTINGS: dict[str, Any] = {
     "learning_rate": 7e-4,
     "gamma": _GAMMA,
     "gae_lambda": 0.95,
+    "stats_window_size": 20,  # of the curve, not of the learning
     "policy_kwargs": {"net_arch": list(_HIDDEN), "log_std_init": -0.5},
 }
 

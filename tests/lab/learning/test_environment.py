@@ -8,7 +8,8 @@ from pretouch.profiles import profile
 from pretouch.types import Mode
 from pretouch_lab.benchmarks.avoidance.scenario import scenarios
 from pretouch_lab.learning import REACH
-from pretouch_lab.learning.environment import ALONE, CYCLES, ReachEnv, Reward
+from pretouch_lab.learning.environment import ALONE, ReachEnv, Reward
+from pretouch_lab.learning.observation import CYCLES
 from pretouch_lab.learning.scene import Scene
 
 TOWARDS_Y = np.array([0, 1, 0, 0, 0, 0], np.float32)
