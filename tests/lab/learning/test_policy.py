@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -90,5 +91,5 @@ def test_one_command_trains_and_plays(tmp_path):
     assert {name for name, _ in cells} == {"alone", "alone, shielded", "shielded"}
     assert cells["shielded", "all"]["trials"] == 3
     for name, about in found["policies"].items():
-        assert load_policy(about["file"]).about.startswith("pretouch, 1024" if name == "shielded" else "blind")
+        assert load_policy(Path(about["file"])).about.startswith("pretouch, 1024" if name == "shielded" else "blind")
         assert len(about["curve"]) <= 1
