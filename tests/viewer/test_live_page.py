@@ -19,6 +19,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import LIVE_SKIN, load_skin
 from pretouch.types import Mode
 from pretouch.viewer.controls import toggle_recording
+from pretouch.viewer.drive import TASKS
 from pretouch.viewer.gui import PANEL_PX, SETTLE_S, TYPED_S
 from pretouch.viewer.live import PERIOD_S, LivePage
 from pretouch.viewer.room import Faults, LiveSettings
@@ -313,11 +314,13 @@ def test_three_arms_with_one_hand_go_through_the_same_cycles(monkeypatch: pytest
         assert beside._arms[0].most > 30.0
         assert 0.0 < beside._most < 0.5 * beside._arms[0].most
         assert beside._arms[0].label.text.endswith(f"touched with {beside._arms[0].most:.0f} N")
+        give(clock.page, "Task", TASKS[1])
         clock.page.ask(lambda: simulation.set_path("line"))
         clock.page.ask(lambda: simulation.set_faults(frozenset({"hand_left"})))
         clock.turn(0.1)
         assert {arm.simulation.settings.path for arm in beside._arms} == {"line"}
         assert {arm.simulation.settings.faults for arm in beside._arms} == {simulation.settings.faults}
+        assert {arm.simulation.commander for arm in beside._arms} == {clock.page.drive.steering}
         clock.page.ask(simulation.reset)
         clock.turn(0.1)
         assert max(arm.simulation.time for arm in beside._arms) < 1.0

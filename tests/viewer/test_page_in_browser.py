@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.viewer.browser import Served, chromium
+from tests.viewer.browser import Served, Visitor, chromium
 
 from pretouch.explanation import explain
 from pretouch.hardware.keys import Keys, UnitKey
@@ -210,6 +210,55 @@ def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
         visitor.wait_for("rates", "5.01 of ")
         visitor.press("Play")
         visitor.wait_for("rates", f"{recorded.stamps()[-1] - recorded.stamps()[0]:.2f} of ")
+
+
+PAD = """window.pad = [0, 0, 0, 0];
+navigator.getGamepads = () => [{connected: true, mapping: "standard", axes: window.pad}, null];"""
+"""A gamepad of a browser that has none."""
+
+
+def test_a_person_drives_the_arm_at_another_by_target_keys_and_gamepad(tmp_path: Path, pages: list[LivePage]) -> None:
+    simulation = LiveSimulation()
+    with live(simulation) as served, chromium() as visitor:
+        visitor.page.add_init_script(PAD)
+        visitor.open(served)
+        visitor.wait_for("mode", Mode.TRACK.name)
+        visitor.choose("Task", "drive yourself")
+        visitor.wait_for("reason", "No motion is asked.")
+        start, view = rest(visitor, simulation), camera(pages[0])
+        visitor.page.keyboard.down("KeyE")
+        visitor.wait_until(lambda: hand_of_arm(simulation)[2] > start[2] + 0.05)
+        visitor.page.keyboard.up("KeyE")
+        start = rest(visitor, simulation)
+        visitor.page.evaluate("() => (window.pad = [0, 1, 0, 0])")  # the left stick back: towards who looks
+        visitor.wait_until(lambda: np.linalg.norm(hand_of_arm(simulation) - start) > 0.05)
+        visitor.page.evaluate("() => (window.pad = [0, 0.1, 0, 0])")
+        way = rest(visitor, simulation) - start
+        assert way[:2] @ view[:2] > 0.9 * np.linalg.norm(way) * np.linalg.norm(view[:2])
+        np.testing.assert_allclose(camera(pages[0]), view, atol=1e-9)  # keys that drive turn no camera
+
+        start = rest(visitor, simulation)
+        simulation.move_hand(start + np.array([0.0, 0.45, 0.05]))
+        handle = start - np.array([0.0, 0.17, 0.0])  # an arrow of the target, with the fingers down
+        visitor.drag(handle, handle + np.array([0.0, 0.6, 0.0]))
+        visitor.wait_for("reason", "what hand_left sees near panda_hand")
+        visitor.keep("driven", tmp_path)
+        goal = pages[0].drive.steering.goal
+        assert goal is not None
+        assert goal[1, 3] > start[1] + 0.2
+        assert np.linalg.norm(goal[[0, 2], 3] - start[[0, 2]]) < 0.05
+
+
+def hand_of_arm(simulation: LiveSimulation) -> FloatArray:
+    """Where the arm's hand is (3,) [m]."""
+    return simulation.frame.step.ee_position
+
+
+def rest(visitor: Visitor, simulation: LiveSimulation) -> FloatArray:
+    """Wait until nothing is asked and the arm stands, and return where its hand is (3,) [m]."""
+    visitor.wait_for("reason", "No motion is asked.")
+    visitor.wait_until(lambda: float(np.abs(simulation.frame.step.command).max()) < 0.03)
+    return hand_of_arm(simulation)
 
 
 def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path: Path) -> None:

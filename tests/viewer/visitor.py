@@ -84,12 +84,12 @@ class Visitor:
 
         until(heard)
 
-    def heard(self, kind: str) -> dict[str, Any]:
-        """The next message of a kind that this visitor is sent."""
+    def heard(self, kind: str, **fields: object) -> dict[str, Any]:
+        """The next message of a kind that this visitor is sent, of those with some fields."""
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline:
             for message in _messages(self._socket.recv(timeout=PATIENCE_S)):
-                if message["type"] == kind:
+                if message["type"] == kind and fields.items() <= message.items():
                     return message
         raise AssertionError(f"no {kind} has come")
 

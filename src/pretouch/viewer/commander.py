@@ -30,6 +30,10 @@ class Commander:
             self._give(visitor)
         return "" if self._who == visitor else f"{_name(self._who)} commands: press Take command first."
 
+    def holds(self, visitor: int) -> bool:
+        """Whether a visitor is there and commands."""
+        return self._who == visitor and visitor in self._server.get_clients()
+
     def _give(self, visitor: int | None) -> None:
         self._who = visitor
         self._show()

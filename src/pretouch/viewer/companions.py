@@ -86,6 +86,7 @@ class Companions:
     def _tell(self, arm: Companion) -> None:
         """Have an arm go by what has been changed of the page's own, but for the profile."""
         wanted, simulation = self._main.settings, arm.simulation
+        simulation.commander = self._main.commander
         if simulation.settings.path != wanted.path:
             simulation.set_path(wanted.path)
             arm.scene.show_world(simulation.world)

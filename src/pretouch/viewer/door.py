@@ -18,9 +18,18 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import msgspec
-from viser import GuiButtonHandle, GuiCheckboxHandle, GuiDropdownHandle, GuiSliderHandle, GuiTextHandle
+from viser import GuiButtonHandle, GuiCheckboxHandle, GuiDropdownHandle, GuiSliderHandle, GuiTextHandle, ViserServer
 from viser import _messages as viser_messages
-from viser._messages import GuiUpdateMessage, SceneNodeDragMessage, ViewerCameraMessage
+from viser._messages import (
+    GuiUpdateMessage,
+    SceneNodeDragMessage,
+    SetOrientationMessage,
+    SetPositionMessage,
+    TransformControlsDragEndMessage,
+    TransformControlsDragStartMessage,
+    TransformControlsUpdateMessage,
+    ViewerCameraMessage,
+)
 from websockets.asyncio import server as websockets_server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
@@ -29,8 +38,6 @@ from pretouch.errors import ViewerError
 from pretouch.viewer.commander import Commander
 
 if TYPE_CHECKING:
-    from viser import ViserServer
-
     from pretouch.viewer.server import ServeOptions
 
 RATE_HZ, BURST = 100.0, 200.0
@@ -41,7 +48,11 @@ _MOST_BYTES = 4096
 _LARGEST = 1e6
 """Largest number in a message: places are in metres, pictures in pixels."""
 _TOLD_EVERY_S = 1.0
-_KINDS: dict[str, Any] = {kind.__name__: kind for kind in (ViewerCameraMessage, GuiUpdateMessage, SceneNodeDragMessage)}
+_HANDLE = TransformControlsUpdateMessage, TransformControlsDragStartMessage, TransformControlsDragEndMessage
+"""What is said of a handle in the scene that is dragged."""
+_KINDS: dict[str, Any] = {
+    kind.__name__: kind for kind in (ViewerCameraMessage, GuiUpdateMessage, SceneNodeDragMessage, *_HANDLE)
+}
 """All that a page has to say."""
 _ADDRESS = "Open the page at the address that the program printed: each start has its own."
 _STARTING = threading.Lock()
@@ -49,6 +60,13 @@ _STARTING = threading.Lock()
 
 class Refused(ViewerError):
     """What a visitor said is not passed on; the sentence is for the visitor."""
+
+
+class PageServer(ViserServer):
+    """A server behind a door."""
+
+    commander: Commander
+    """Who of its visitors commands."""
 
 
 class _Visit(ServerConnection):
@@ -87,7 +105,7 @@ class Door:
         self._token = options.token.encode()
         here = socket.gethostname().lower()
         self._names = {options.host.lower(), "localhost", here, f"{here}.local"}
-        self._server: ViserServer | None = None
+        self._server: PageServer | None = None
         self._built = False
 
     @contextmanager
@@ -107,13 +125,13 @@ class Door:
             finally:
                 setattr(websockets_server, "serve", theirs)  # noqa: B010
 
-    def keep(self, server: "ViserServer") -> None:
+    def keep(self, server: PageServer) -> None:
         """Let people in to a server, which no longer shares its page; one without this door is a ViewerError."""
         if not self._built:
             raise ViewerError("This version of viser goes round the checks of the page: install viser 1.1.1.")
         for kind in (viser_messages.ShareUrlRequest, viser_messages.ShareUrlDisconnect):
             server._websock_server.unregister_handler(kind)
-        self._commander = Commander(server)
+        server.commander = Commander(server)
         self._server = server
 
     # who may come in
@@ -162,8 +180,10 @@ class Door:
             heard = _understood(raw)
             if isinstance(heard, GuiUpdateMessage):
                 heard = self._change(server, number, heard)
+            elif isinstance(heard, _HANDLE):
+                self._check_drag(server, number, heard.name)
             elif not isinstance(heard, ViewerCameraMessage):
-                self._check_command(number)
+                self._check_command(server, number)
             said = {field.name: getattr(heard, field.name) for field in fields(heard)}
             return msgspec.msgpack.encode(said | {"type": type(heard).__name__})
         except Refused as refused:
@@ -172,19 +192,31 @@ class Door:
                 client.add_notification("Not done", str(refused), auto_close_seconds=6.0)
             return None
 
-    def _check_command(self, number: int, control: Any = None) -> None:
-        refusal = self._commander.refusal(number, control)
+    def _check_command(self, server: PageServer, number: int, control: Any = None) -> None:
+        refusal = server.commander.refusal(number, control)
         if refusal:
             raise Refused(refusal)
 
-    def _change(self, server: "ViserServer", number: int, heard: GuiUpdateMessage) -> GuiUpdateMessage:
+    def _check_drag(self, server: PageServer, number: int, name: str) -> None:
+        """Check a drag of a handle in the scene; a visitor whose drag is refused is shown again where it is."""
+        try:
+            self._check_command(server, number)
+        except Refused:
+            client, handle = server.get_clients().get(number), server.scene.get_handle_by_name(name)
+            if client and handle:
+                queue = client._websock_connection.queue_message
+                queue(SetPositionMessage(handle.name, tuple(map(float, handle.position))))  # type: ignore[arg-type]
+                queue(SetOrientationMessage(handle.name, tuple(map(float, handle.wxyz))))  # type: ignore[arg-type]
+            raise
+
+    def _change(self, server: PageServer, number: int, heard: GuiUpdateMessage) -> GuiUpdateMessage:
         """Check a change of a control; a visitor whose change is refused is shown again what holds."""
         handle = server.gui._gui_input_handle_from_uuid.get(heard.uuid)
         if handle is None:
             raise Refused("This control is gone: load the page again.")
         try:
             value = _checked(handle, heard.updates)
-            self._check_command(number, handle)
+            self._check_command(server, number, handle)
             return replace(heard, updates={"value": value})
         except Refused:
             client = server.get_clients().get(number)

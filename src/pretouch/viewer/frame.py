@@ -9,7 +9,7 @@ from pretouch.profiles import Profile
 from pretouch.recording.surroundings import KnownBox
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, ControlStep, FloatArray
+from pretouch.types import BoolArray, ControlStep, FloatArray, Inputs
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class Frame:
     """(3,) where that force acts [m], base frame; None where it is not known."""
     age: FloatArray | None = None
     """(K,) time since the newest reading of each unit [s]; None where it is not known."""
+    inputs: Inputs | None = None
+    """What the step was given, a commander's wish included; None where it is not known."""
 
     def late(self, limit: float) -> BoolArray:
         """Which units (K,) have given no reading for longer than a time [s]."""

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pretouch.errors import PretouchError
-from pretouch.explanation import explain, finds, resumable
+from pretouch.explanation import finds, resumable
 from pretouch.loop import MonotonicClock
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.action_queue import Action, ActionQueue
+from pretouch.viewer.asked import told
 from pretouch.viewer.companions import Companions
 from pretouch.viewer.controls import Controls
+from pretouch.viewer.drive import Drive
 from pretouch.viewer.gui import PERIOD_S, style_page, when_changed
 from pretouch.viewer.pacing import Pace
 from pretouch.viewer.plots import History, Plots
@@ -21,7 +23,7 @@ from pretouch.viewer.simulation import LiveSimulation
 from pretouch.viewer.status import Status
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from pretouch.viewer.door import PageServer
 
 
 _ARMS = ("one arm", "three arms")
@@ -34,7 +36,7 @@ class LivePage:
     """
 
     def __init__(
-        self, server: "ViserServer", simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None
+        self, server: "PageServer", simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None
     ) -> None:
         self._server, self._simulation, self._say = server, simulation, say
         self._world, self._time = simulation.world, simulation.time
@@ -53,6 +55,7 @@ class LivePage:
             arms = server.gui.add_dropdown("Arms", _ARMS, hint="Three: blind, paper and pretouch with one hand.")
             when_changed(arms, self._actions, self._show_arms, "arms")
         self.controls = Controls(server.gui, simulation, self._actions)
+        self.drive = Drive(server, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
         self._status.notice = self._scene.said
         self.controls.on_view = self._scene.show
@@ -101,6 +104,7 @@ class LivePage:
             return
         running, recording = self.controls.running, self._simulation.recording
         before = self._simulation.time
+        self.drive.turn()
         steps = self._pass_time()
         late = self._simulation.frame.late(self._simulation.world.profile.sight.slow_after_s)
         for step in steps:
@@ -150,6 +154,7 @@ class LivePage:
                 self._companions.begin()
             self._scene.trail.clear()
             self._history.clear()
+            self.drive.steering.stand()
         self._time = self._simulation.time
         if self._simulation.world is not self._world:
             self._world = self._simulation.world
@@ -158,8 +163,9 @@ class LivePage:
     def _draw(self, now: float) -> None:
         frame, pace = self._simulation.frame, self.pace
         with self._server.atomic():
-            self._scene.draw(frame, now)
+            asked = self._scene.draw(frame, now)
             self._follow_target(frame.hand_target)
+            self.drive.draw(frame.step)
             if self._companions:
                 self._companions.draw(now)
             self._plots.draw(now)
@@ -171,7 +177,7 @@ class LivePage:
             )  # fmt: skip
             step, skin, links = frame.step, self._simulation.skin, self._simulation.model.links
             self._status.draw(
-                step.mode, explain(step, skin.ids, links),
+                step.mode, told(asked, step, skin.ids, links),
                 " · ".join(filter(None, (f"{step.stamp:.1f} s", rates, finds(step), recorded))),
                 pace.sentence(), now,
             )  # fmt: skip

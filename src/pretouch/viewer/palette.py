@@ -27,6 +27,9 @@ PAIR: Colour = (132, 168, 142)
 PAIR_BINDING: Colour = (214, 40, 57)
 """Of a pair that keeps the arm from what it would do."""
 FORCE: Colour = (232, 119, 34)
+ASKED: Colour = (49, 104, 196)
+ALLOWED: Colour = (38, 166, 91)
+"""Of the velocities that a commander asked for and was allowed."""
 TRUE_FORCE: Colour = (38, 44, 54)
 PLACE: Colour = (190, 24, 120)
 """Of the forces at the places where the arm is said to be touched."""

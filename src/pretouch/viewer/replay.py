@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.explanation import explain, finds
+from pretouch.explanation import finds
 from pretouch.loop import MonotonicClock
 from pretouch.recording.codec import decode_step
 from pretouch.recording.compare import Comparison, Found
@@ -16,6 +16,7 @@ from pretouch.recording.reader import Kept, Recorded, Run
 from pretouch.recording.surroundings import surroundings
 from pretouch.types import FloatArray
 from pretouch.viewer.action_queue import ActionQueue
+from pretouch.viewer.asked import Asked, told
 from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.gui import PERIOD_S, add_button, add_view_boxes, put, style_page, when_changed
 from pretouch.viewer.player import Player, Timeline, TimelineEvent
@@ -54,9 +55,9 @@ def frame_of(kept: Kept) -> Frame:
     """What a page draws of a recorded step."""
     truth, age = kept.truth, _age(kept)
     if truth is None:
-        return Frame(kept.step, None, None, None, age=age)
+        return Frame(kept.step, None, None, None, age=age, inputs=kept.inputs)
     hand = truth.hand if np.all(np.isfinite(truth.hand)) else None
-    return Frame(kept.step, hand, None, truth.force[-1] if len(truth.force) else None, age=age)
+    return Frame(kept.step, hand, None, truth.force[-1] if len(truth.force) else None, age=age, inputs=kept.inputs)
 
 
 def _age(kept: Kept) -> FloatArray | None:
@@ -148,9 +149,9 @@ class ReplayPage:
         """Draw the step at the player's time, and return it."""
         kept = self._advance_history(self.player.index)
         with self._server.atomic():
-            self._scene.draw(frame_of(kept), now)
+            asked = self._scene.draw(frame_of(kept), now)
             self._plots.draw(now)
-            self._show(kept, now)
+            self._show(kept, asked, now)
         return kept
 
     def _advance_history(self, index: int) -> Kept:
@@ -181,7 +182,7 @@ class ReplayPage:
         at = max(0, int(np.searchsorted(other.time, stamp + 1e-9)) - 1)
         return *other.upper[at].tolist(), *other.lower[at].tolist()
 
-    def _show(self, kept: Kept, now: float) -> None:
+    def _show(self, kept: Kept, asked: Asked | None, now: float) -> None:
         player, step = self.player, kept.step
         if abs(float(self._slider.value) - player.time) > 0.2 or not player.playing:
             put(self._slider, round(player.time, 2))
@@ -189,7 +190,7 @@ class ReplayPage:
         rates = f"{player.time:.2f} of {player.duration:.2f} s · stamp {step.stamp:.2f} s · {self.run_name(kept.run)}"
         rates = " · ".join(filter(None, (rates, finds(step))))
         run = self._recorded.runs[kept.run]
-        self._status.draw(step.mode, explain(step, run.skin.ids, run.model.links), rates, "", now)
+        self._status.draw(step.mode, told(asked, step, run.skin.ids, run.model.links), rates, "", now)
 
     def run_name(self, run: int) -> str:
         """Name the controller of a run; of several, one may differ from another by nothing but its path."""

@@ -9,7 +9,8 @@ from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.robot.model import Kinematics
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer import palette
-from pretouch.viewer.arm import Arm, capsule_surfaces
+from pretouch.viewer.arm import Arm, capsule_surfaces, quaternions
+from pretouch.viewer.asked import Asked, asked_in
 from pretouch.viewer.expectation import expectation, in_levels
 from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.person import Drag, PersonHand
@@ -27,6 +28,9 @@ CAMERA_FOV = math.radians(42.0)
 
 ARROW_M_PER_N, ARROW_MOST_M, ARROW_LEAST_N = 0.012, 0.45, 6.0
 """Length of a force arrow [m/N] and at most [m], and the force below which none is drawn [N]: noise is less."""
+
+ARROW_S, ARROW_LEAST_M_S = 1.0, 0.01
+"""Length of an arrow of a velocity [m per m/s], and the speed below which none is drawn [m/s]."""
 
 PARTS = ("cones", "points", "pairs", "path", "trail", "forces")
 """What can be shown and hidden."""
@@ -66,15 +70,22 @@ class Scene:
         self._shows_pairs = self._shows_forces = True
         self._ee = scene.add_frame(f"{root}/ee", show_axes=False)
         self._force = self._arrow(f"{root}/ee/force", palette.FORCE)
+        self._asked = self._arrow(f"{root}/ee/asked", palette.ASKED, 0.004)
+        self._allowed = self._arrow(f"{root}/ee/allowed", palette.ALLOWED, 0.008)
+        self._goal = scene.add_frame(
+            f"{root}/goal", axes_length=0.1, axes_radius=0.004, origin_radius=0.012, origin_color=palette.ASKED,
+            visible=False,
+        )  # fmt: skip
         self._touched = scene.add_frame(f"{root}/touched", show_axes=False)
         self._true_force = self._arrow(f"{root}/touched/true_force", palette.TRUE_FORCE)
         self._places = [self._arrow(f"{root}/place/{number}", palette.PLACE) for number in range(2)]
         self._hand = None if world.hand_radius is None else PersonHand(server, world.hand_radius, root)
 
-    def _arrow(self, name: str, colour: palette.Colour) -> "ArrowsHandle":
+    def _arrow(self, name: str, colour: palette.Colour, radius: float = 0.007) -> "ArrowsHandle":
         return self._server.scene.add_arrows(
-            name, np.zeros((1, 2, 3)), colour, shaft_radius=0.007, head_radius=0.018, head_length=0.04, visible=False
-        )
+            name, np.zeros((1, 2, 3)), colour, shaft_radius=radius, head_radius=2.5 * radius, head_length=0.04,
+            visible=False,
+        )  # fmt: skip
 
     def on_hand(self, act: Drag) -> None:
         """Have a function told of each drag of the hand."""
@@ -120,8 +131,8 @@ class Scene:
                 )
             )  # fmt: skip
 
-    def draw(self, frame: Frame, now: float) -> None:
-        """Draw one instant."""
+    def draw(self, frame: Frame, now: float) -> Asked | None:
+        """Draw one instant, and return what a commander asked in it."""
         step, world = frame.step, self._world
         kin = world.model.kinematics(step.q)
         self._arm.place(kin)
@@ -135,6 +146,22 @@ class Scene:
         self._draw_forces(frame, kin)
         if self._hand:
             self._hand.draw(frame.hand, frame.hand_target)
+        asked = asked_in(frame, world, kin)
+        self._draw_asked(asked)
+        return asked
+
+    def _draw_asked(self, asked: Asked | None) -> None:
+        goal = None if asked is None else asked.goal
+        self._goal.visible = goal is not None
+        if goal is not None:
+            self._goal.position, self._goal.wxyz = goal[:3, 3], quaternions(goal[:3, :3])
+        for handle, velocity in (
+            (self._asked, None if asked is None else asked.velocity),
+            (self._allowed, None if asked is None else asked.allowed),
+        ):
+            handle.visible = velocity is not None and float(np.linalg.norm(velocity)) >= ARROW_LEAST_M_S
+            if handle.visible and velocity is not None:
+                handle.points = np.array([[np.zeros(3), ARROW_S * velocity]], dtype=np.float32)
 
     def _draw_pairs(self, step: ControlStep) -> None:
         near = step.obstacles

@@ -18,7 +18,7 @@ from pretouch.errors import ViewerError
 from pretouch.extras import LIVE
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from pretouch.viewer.door import PageServer
 
 _PORTS_TRIED = 100
 _EVERYWHERE = {"0.0.0.0": "localhost", "::": "localhost"}  # noqa: S104  # named to be replaced
@@ -82,18 +82,16 @@ nobody add a script; a style sheet can tell by the greying."""
 
 
 @contextmanager
-def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
+def served(options: ServeOptions, title: str) -> Iterator["PageServer"]:
     """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
     LIVE.need("The page")
     check_port(options)
-    import viser
-
-    from pretouch.viewer.door import Door
+    from pretouch.viewer.door import Door, PageServer
 
     door = Door(options)
     with _quiet():
         with door.built():
-            server = viser.ViserServer(options.host, options.port, label=title, verbose=False)
+            server = PageServer(options.host, options.port, label=title, verbose=False)
         try:
             if server.get_port() != options.port:
                 raise _busy(options, server.get_port())

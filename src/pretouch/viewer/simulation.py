@@ -4,6 +4,7 @@
 between two control cycles: the same commands before the same cycles give the same run, bit for bit.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, cast
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from pretouch.controller import Controller
+from pretouch.desired import Desired
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, Options, turn
 from pretouch.profiles import Profile
@@ -30,6 +32,11 @@ from pretouch.viewer.room import Faults, LiveSettings, PathName, Room, live_path
 if TYPE_CHECKING:
     from pretouch.recording.writer import Closed, Recording
     from pretouch.viewer.real_units import RealUnits
+
+
+def nobody(now: float) -> Desired | None:
+    """Ask for nothing: the arm follows its path."""
+    return None
 
 
 class LiveSimulation:
@@ -66,6 +73,8 @@ class LiveSimulation:
         """The last notice for a person, as a sentence; whoever shows it may empty it."""
         self.opening: Opening | None = None
         """The hand's script under way; None: the hand is a person's."""
+        self.commander: Callable[[float], Desired | None] = nobody
+        """What is asked of the arm at an instant [s]; None: the path."""
         self._begin(settings or LiveSettings())
 
     def _begin(self, settings: LiveSettings) -> None:
@@ -112,12 +121,13 @@ class LiveSimulation:
             room.mouse.move(self.opening.target(self.frame.step))
             self.opening = None if self.opening.over else self.opening
         tick = room.tick()
-        cycle = turn(self.controller, self._state, room.plant, room.units, tick, Options(resume=lambda: resume))
+        options = Options(resume=lambda: resume, desired=lambda: self.commander(tick))
+        cycle = turn(self.controller, self._state, room.plant, room.units, tick, options)
         self._state = cycle.after
         hand = room.hand.position
         age = cycle.step.stamp - cycle.inputs.readings.stamp
         force = room.plant.true_force + self._pushes.force
-        self.frame = Frame(cycle.step, hand, room.mouse.target, force, room.touched, age)
+        self.frame = Frame(cycle.step, hand, room.mouse.target, force, room.touched, age, cycle.inputs)
         if self._push:
             self.notice = self._push.take(cycle.step) or self.notice
         self._keep(cycle, hand)

@@ -97,6 +97,7 @@ def legend() -> str:
         ("path", palette.PATH), ("followed", palette.FOLLOWING), ("avoiding", palette.AVOIDING),
         ("recovering", palette.RECOVERING), ("reacting", palette.REACTING), ("holding", palette.HOLDING),
         ("force estimate", palette.FORCE), ("true force", palette.TRUE_FORCE),
+        ("asked", palette.ASKED), ("allowed", palette.ALLOWED),
     ]  # fmt: skip
     marks = "".join(_mark(name, colour, 14, 4, 2) for name, colour in paths)
     marks += _mark("sensed", palette.SENSED, 9, 9, 5) + _mark("closest pair", palette.PAIR, 14, 2, 0)

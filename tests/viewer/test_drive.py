@@ -1,0 +1,229 @@
+"""Driving the arm from a page: what a visitor says comes through the door, and ends when he leaves or lets go."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.ports import free_port
+from tests.viewer.test_door import control, turns
+from tests.viewer.visitor import Visitor
+
+from pretouch.desired import DesiredKind
+from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
+from pretouch.types import FloatArray, Mode
+from pretouch.viewer.asked import asked_in
+from pretouch.viewer.drive import TASKS
+from pretouch.viewer.live import LivePage
+from pretouch.viewer.replay import frame_of, world_of
+from pretouch.viewer.server import ServeOptions, served
+from pretouch.viewer.simulation import LiveSimulation
+
+AHEAD = np.array([-2.0, -1.0, 0.0]) / np.sqrt(5.0)
+"""Where the tests' visitors look, on the level."""
+
+
+@pytest.fixture
+def place() -> Iterator[tuple[LivePage, ServeOptions]]:
+    options = ServeOptions(port=free_port())
+    with served(options, "test") as server:
+        yield LivePage(server, LiveSimulation()), options
+
+
+@pytest.fixture
+def page(place: tuple[LivePage, ServeOptions]) -> LivePage:
+    return place[0]
+
+
+@pytest.fixture
+def driver(place: tuple[LivePage, ServeOptions]) -> Iterator[Visitor]:
+    """Somebody who drives an arm that stands."""
+    page, options = place
+    page._simulation.advance(1.5)
+    with Visitor(page._server, options) as somebody:
+        do(page, somebody, control(page, "Task"), TASKS[1])
+        turns(page, 30)
+        yield somebody
+
+
+def do(page: LivePage, visitor: Visitor, handle: Any, value: object) -> None:
+    """Have a visitor set a control, and the page do it."""
+    visitor.set(handle, value)
+    visitor.settle()
+    turns(page, 1)
+
+
+def keys(page: LivePage, visitor: Visitor, said: str) -> None:
+    do(page, visitor, control(page, "Keys"), said)
+
+
+def aim(page: LivePage, visitor: Visitor, position: FloatArray, wxyz: tuple[float, ...] = (0.0, 1.0, 0.0, 0.0)) -> None:
+    """Have a visitor drag the target, the hand's fingers down."""
+    visitor.say({
+        "type": "TransformControlsUpdateMessage", "name": "/target", "wxyz": list(wxyz), "position": position.tolist(),
+        "owner": "",
+    })  # fmt: skip
+    visitor.settle()
+    turns(page, 1)
+
+
+def hand(page: LivePage) -> FloatArray:
+    return page._simulation.frame.step.ee_position
+
+
+def speed(page: LivePage) -> float:
+    """Speed at which the end-effector is commanded [m/s]."""
+    frame, world = page._simulation.frame, page._simulation.world
+    asked = asked_in(frame, world, world.model.kinematics(frame.step.q))
+    assert asked
+    return float(np.linalg.norm(asked.allowed))
+
+
+def test_the_arm_stands_where_it_was_until_somebody_drives(page: LivePage, driver: Visitor) -> None:
+    before = hand(page)
+    turns(page, 30)
+    np.testing.assert_allclose(hand(page), before, atol=0.002)
+    assert page._simulation.frame.step.mode is Mode.TRACK
+    np.testing.assert_allclose(page.drive._target.position, hand(page), atol=0.01)
+    do(page, driver, control(page, "Task"), TASKS[0])
+    turns(page, 60)
+    assert page._simulation.frame.inputs.desired is None  # type: ignore[union-attr]
+    assert np.linalg.norm(hand(page) - before) > 0.1
+    assert not page.drive._target.visible
+
+
+def test_keys_move_the_hand_the_way_somebody_looks_and_released_it_rests(page: LivePage, driver: Visitor) -> None:
+    before = hand(page)
+    for number in range(10):
+        keys(page, driver, f"100 0 0 {number}")
+        turns(page, 3)
+    way = hand(page) - before
+    assert way @ AHEAD > 0.15
+    assert np.linalg.norm(way - (way @ AHEAD) * AHEAD) < 0.03
+    keys(page, driver, "0 0 0 11")
+    turns(page, 15)
+    assert speed(page) < 0.02
+    assert page._simulation.frame.step.mode is Mode.TRACK
+
+
+def test_keys_that_are_no_longer_heard_of_count_no_longer(page: LivePage, driver: Visitor) -> None:
+    keys(page, driver, "0 100 0 1")
+    turns(page, 7)
+    assert speed(page) > 0.1
+    turns(page, 20)
+    assert speed(page) < 0.02
+
+
+def test_the_hand_goes_to_a_target_that_is_dragged_and_stays(page: LivePage, driver: Visitor) -> None:
+    goal = hand(page) + np.array([-0.05, 0.1, 0.05])
+    aim(page, driver, goal)
+    turns(page, 120)
+    np.testing.assert_allclose(hand(page), goal, atol=0.005)
+    assert page._simulation.frame.inputs.desired.kind is DesiredKind.POSE  # type: ignore[union-attr]
+    aim(page, driver, goal + 0.1, (0.0, 0.0, 0.0, 0.0))  # no orientation
+    turns(page, 15)
+    np.testing.assert_allclose(hand(page), goal, atol=0.005)
+
+
+def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
+    place: tuple[LivePage, ServeOptions], driver: Visitor
+) -> None:
+    page, options = place
+    with Visitor(page._server, options) as other:
+        do(page, other, control(page, "Take command"), True)
+        aim(page, other, hand(page) + np.array([0.0, 0.4, 0.0]))
+        turns(page, 10)
+        assert speed(page) > 0.1
+    turns(page, 15)
+    step = page._simulation.frame.step
+    assert (step.mode, step.reason.split(" ended ")[0]) == (Mode.HOLD, "The desired motion")
+    assert np.abs(step.command).max() < 1e-9
+    rest = hand(page)
+    turns(page, 30)
+    np.testing.assert_allclose(hand(page), rest, atol=0.002)
+    aim(page, driver, rest)
+    turns(page, 3)
+    assert page._simulation.frame.step.mode is Mode.TRACK
+
+
+def test_who_takes_the_command_has_the_arm_come_to_rest(place: tuple[LivePage, ServeOptions], driver: Visitor) -> None:
+    page, options = place
+    aim(page, driver, hand(page) + np.array([0.0, 0.4, 0.0]))
+    turns(page, 10)
+    with Visitor(page._server, options) as other:
+        do(page, other, control(page, "Take command"), True)
+        turns(page, 15)
+        assert page._simulation.frame.step.mode is Mode.HOLD
+
+
+def test_who_does_not_command_drives_nothing_and_is_shown_again_where_the_target_is(
+    place: tuple[LivePage, ServeOptions], driver: Visitor
+) -> None:
+    page, options = place
+    before = page.drive._target.position
+    with Visitor(page._server, options) as other:
+        other.heard("SetPositionMessage", name="/target")  # as all are shown it who come
+        aim(page, other, np.array([0.3, 0.3, 0.3]))
+        np.testing.assert_allclose(other.heard("SetPositionMessage", name="/target")["position"], before)
+        keys(page, other, "100 0 0 1")
+    turns(page, 5)
+    assert page.drive.steering.goal is None
+    assert speed(page) < 0.01
+
+
+@pytest.mark.parametrize("said", ["100 0 0", "1e9 0 0 1", "nan 0 0 1", "abc"])
+def test_keys_that_no_page_says_are_named_and_move_nothing(page: LivePage, driver: Visitor, said: str) -> None:
+    keys(page, driver, said)
+    assert page.notice.startswith(f"Not done: The keys say {said!r}: ")
+    turns(page, 5)
+    assert speed(page) < 0.01
+
+
+def test_a_page_that_is_not_driven_hears_no_keys_and_no_target(
+    place: tuple[LivePage, ServeOptions],
+) -> None:
+    page, options = place
+    with Visitor(page._server, options) as somebody:
+        keys(page, somebody, "100 0 0 1")
+        assert "Keys cannot be changed now" in somebody.heard("NotificationShowMessage")["props"]["body"]
+        aim(page, somebody, np.array([0.3, 0.3, 0.3]))
+        turns(page, 3)
+    assert page._simulation.frame.inputs.desired is None  # type: ignore[union-attr]
+
+
+def test_a_reset_has_a_driven_arm_stand_at_its_beginning(page: LivePage, driver: Visitor) -> None:
+    aim(page, driver, hand(page) + np.array([0.0, 0.3, 0.0]))
+    turns(page, 10)
+    do(page, driver, control(page, "Reset"), True)
+    begun = hand(page)
+    turns(page, 60)
+    np.testing.assert_allclose(hand(page), begun, atol=0.003)
+    assert page._simulation.frame.step.mode is Mode.TRACK
+
+
+def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
+    page: LivePage, driver: Visitor, tmp_path: Path
+) -> None:
+    simulation, start = page._simulation, hand(page)
+    simulation.move_hand(start + np.array([0.0, 0.4, 0.05]))
+    turns(page, 60)
+    simulation.start_recording(tmp_path / "drive.mcap")
+    for number in range(5):
+        keys(page, driver, f"0 0 50 {number}")
+    aim(page, driver, simulation.hand_target)
+    turns(page, 90)
+    simulation.stop_recording()
+    recorded = open_recording(tmp_path / "drive.mcap")
+    verdict = verify(recorded)
+    assert verdict.exact, verdict.said
+    assert (verdict.checked, verdict.skipped) == (len(recorded), {})
+    assert {kept.inputs.desired.kind for kept in recorded} == {DesiredKind.TWIST, DesiredKind.POSE}
+    kept, world = recorded[len(recorded) - 1], world_of(recorded.runs[0])
+    asked = asked_in(frame_of(kept), world, world.model.kinematics(kept.step.q))
+    assert asked
+    np.testing.assert_allclose(asked.goal[:3, 3], simulation.hand_target)  # type: ignore[index]
+    limits = [kept.step.limited for kept in recorded]
+    assert {simulation.skin.ids[limit.unit] for limit in limits if limit.unit >= 0} >= {"hand_left"}
+    assert max(np.linalg.norm(kept.truth.force, axis=1).max() for kept in recorded) < 30.0
