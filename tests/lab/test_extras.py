@@ -21,7 +21,7 @@ URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename=
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
 ARM = ("run", "--robot", "franka", "--ip", "127.0.0.1")
-LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn")  # requires figures
+LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn", "policy")  # requires figures
 X = ("--vary", "threshold.f_base_n=7:20", "--samples", "2", "--processes", "1")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
 ASKED = [
@@ -39,6 +39,7 @@ ASKED = [
     (("sweep", "static", *X, "--out", "sweep"), SWEEP),
     (("sweep", "nothing"), None),
     (("learn", "--quick"), LEARN),
+    (("policy", "gone.npz"), LIVE),
     (("robot", "import", "arm.urdf", "--out", "arm"), MESHES),
     (("robot", "check", "gone"), None),
     (("demo", "--seeds", "0"), None),
