@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka ros2 meshes browser docs micropython test test-skipped test-slow soak golden golden-values lint house bench peers \
+.PHONY: setup demo live franka learn ros2 meshes browser docs micropython test test-skipped test-slow soak golden golden-values lint house bench peers \
 	format clean
 
 setup: $(STAMP)
@@ -28,6 +28,10 @@ live: setup
 # the vendor's libraries for the Panda and the FR3, 30 MB
 franka: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[franka]'
+
+# Gymnasium, and PyTorch for training: some hundred megabytes
+learn: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[learn]'
 
 # DDS, which ROS 2 speaks: no ROS installation is needed
 ros2: setup

@@ -12,6 +12,7 @@ from pretouch import extras
 from pretouch.cli.registry import command_names
 from pretouch.errors import MissingExtraError
 from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, ROS2
+from pretouch_lab.learning import LEARN
 from pretouch_lab.sweep.run import SWEEP
 
 EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, LIVE)
@@ -20,7 +21,7 @@ URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename=
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
 ARM = ("run", "--robot", "franka", "--ip", "127.0.0.1")
-LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")  # requires figures
+LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn", "policy")  # requires figures
 X = ("--vary", "threshold.f_base_n=7:20", "--samples", "2", "--processes", "1")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
 ASKED = [
@@ -37,6 +38,8 @@ ASKED = [
     (("run", "--skin", "gone.toml"), None),
     (("sweep", "static", *X, "--out", "sweep"), SWEEP),
     (("sweep", "nothing"), None),
+    (("learn", "--quick"), LEARN),
+    (("policy", "gone.npz"), LIVE),
     (("robot", "import", "arm.urdf", "--out", "arm"), MESHES),
     (("robot", "check", "gone"), None),
     (("demo", "--seeds", "0"), None),
@@ -97,8 +100,8 @@ def test_without_an_extra_a_command_does_without_it_or_says_what_to_run(tmp_path
         (tmp_path / name).write_text("")
     (tmp_path / "force.csv").write_text("time_s,force_x_N,force_y_N,force_z_N\n0,0,0,0\n")
     monkeypatch.chdir(tmp_path)
-    asked = [(extra, words, needed) for extra in (*EXTRAS, SWEEP) for words, needed in asked_without(extra)]
-    given = [[extra.modules, [words for words, _ in asked_without(extra)]] for extra in (*EXTRAS, SWEEP)]
+    asked = [(extra, words, needed) for extra in (*EXTRAS, LEARN, SWEEP) for words, needed in asked_without(extra)]
+    given = [[extra.modules, [words for words, _ in asked_without(extra)]] for extra in (*EXTRAS, LEARN, SWEEP)]
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, json.dumps(given)], capture_output=True, text=True, check=False
     )
@@ -204,7 +207,7 @@ def test_a_hint_is_for_what_made_the_environment(monkeypatch, tmp_path, maker, o
     assert extras.install_command(extras.LAB) == lab
 
 
-@pytest.mark.parametrize("extra", [*EXTRAS, SWEEP], ids=lambda extra: extra.name)
+@pytest.mark.parametrize("extra", [*EXTRAS, LEARN, SWEEP], ids=lambda extra: extra.name)
 def test_an_extra_is_one_that_its_distribution_has_and_make_installs(extra):
     root = Path(__file__).parents[2]
     project = root / ("lab" if extra.distribution == "pretouch-lab" else "") / "pyproject.toml"

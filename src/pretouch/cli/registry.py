@@ -25,7 +25,7 @@ OWN = {
     "serve-fci": "pretouch.cli.commands:ServeFci",
 }
 """Class of each command of the product: a table, because a look at all installed distributions takes time."""
-LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")
+LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn", "policy")
 """Commands of the distribution pretouch-lab."""
 
 MOVED = {
