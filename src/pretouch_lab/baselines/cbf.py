@@ -1,9 +1,9 @@
 """OSCBF's velocity formulation (Morton, Pavone, IROS 2025): a safety filter of control barrier functions, on cbfpy.
 
-Nothing of their repository is used, which is not packaged; its formulation is written anew: relative degree 1, alpha(h) =
-10 h, soft barriers, an objective in the operational space and its null space. Their spheres are our capsules, their
-known obstacles what our units sense, with perception, latencies, contact detection, reaction and joint box as in
-`pretouch`. `cbf_barriers` has the mathematics.
+Nothing of their repository is used, which is not packaged; its formulation is written anew: relative degree 1,
+alpha(h) = 10 h, soft barriers, an objective in the operational space and its null space. Their spheres are our
+capsules, their known obstacles what our units sense, with perception, latencies, contact detection, reaction and joint
+box as in `pretouch`. `cbf_barriers` has the mathematics.
 """
 
 from dataclasses import dataclass, replace

@@ -75,7 +75,7 @@ class VelocityBarriers(CBFConfig):  # type: ignore[misc]  # cbfpy has no types
             turned.append(R)
             moved.append(t)
         R, t = jnp.stack(turned)[self._joints], jnp.stack(moved)[self._joints]
-        return tuple(t + jnp.einsum("cij,cj->ci", R, end) for end in (self._a, self._b))  # type: ignore[return-value]
+        return tuple(t + jnp.einsum("cij,cj->ci", R, end) for end in (self._a, self._b))
 
     def alpha(self, h: jax.Array, *given: jax.Array) -> jax.Array:
         """How fast a barrier may be approached [1/s] times what is left of it."""
@@ -109,7 +109,8 @@ class SafetyFilter:
         self._cbf = CBF.from_config(VelocityBarriers(body, gain))
         n = body.model.n
         self._twist = jax.jit(lambda M, J, v: consistent_inverse(M, J) @ v)
-        self(np.zeros(n), np.zeros(n), *no_points(), np.eye(n), np.eye(6, n))  # compiles
+        M, J = np.eye(n), np.eye(6, n)
+        self(np.zeros(n), self.of_twist(M, J, np.zeros(6)), *no_points(), M, J)  # compiles both
 
     def __call__(
         self, q: FloatArray, qd: FloatArray, point: FloatArray, spread: FloatArray, M: FloatArray, J: FloatArray

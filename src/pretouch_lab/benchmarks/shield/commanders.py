@@ -7,6 +7,7 @@ import numpy as np
 
 from pretouch.control.path import Path
 from pretouch.desired import Desired, DesiredKind, joint_velocities, twist
+from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.avoidance.obstacle import Shape, nearest
@@ -15,8 +16,8 @@ _EXTREME = 3.0
 """Times the joints' speed limits that wild commanders ask for, and as many m/s."""
 _HELD = 7
 """Steps for which one of them asks for the same at most."""
-_DRIVE_M_S = 1.5
-"""Speed at which a point of the arm is driven at the person [m/s]."""
+_DRIVE_M_S = 0.2, 1.5
+"""Speeds at which a point of the arm is driven at the person [m/s]."""
 _DAMPING = 0.05
 """Of the pseudo-inverse that drives it [m]."""
 
@@ -67,7 +68,7 @@ class Extremes:
 
 
 def _at(s: Situation, share: FloatArray) -> Desired:
-    """Shares (13,) of the largest that is asked for: of a twist where the last is positive, else of joint velocities."""
+    """Ask for shares (13,) of the largest: of a twist where the last is positive, else of joint velocities."""
     if share[-1] > 0.0:
         return twist(s.now, _EXTREME * share[:3], _EXTREME * share[3:6])
     return joint_velocities(s.now, _EXTREME * s.model.description.qd_max * share[: s.model.n])
@@ -122,18 +123,25 @@ _BROKEN: tuple[Callable[[Situation], Desired | None] | None, ...] = (
 
 
 class AtPerson:
-    """Drives at the person on purpose: the hand, or whatever point of the arm is nearest."""
+    """Drives at the person on purpose, at a speed it draws: the hand, what is nearest, or one of the arm's capsules."""
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self._hand = bool(rng.integers(0, 2))
+        self._way, self._part, self._speed = int(rng.integers(0, 3)), rng.random(), rng.uniform(*_DRIVE_M_S)
 
     def __call__(self, s: Situation) -> Desired:
         """See `Commander`."""
-        if self._hand:
+        if self._way == 0:
             way = s.person - s.kin.position[s.model.ee]
-            return twist(s.now, _DRIVE_M_S * way / max(float(np.linalg.norm(way)), 1e-6))
-        near = nearest(s.kin, s.model.body, s.shape)
-        return _driven(s, near.link, near.point, _DRIVE_M_S * near.direction)
+            return twist(s.now, self._speed * way / max(float(np.linalg.norm(way)), 1e-6))
+        body = s.model.body if self._way == 1 else part_of(s.model.body, self._part)
+        near = nearest(s.kin, body, s.shape)
+        return _driven(s, near.link, near.point, self._speed * near.direction)
+
+
+def part_of(body: Capsules, share: float) -> Capsules:
+    """Return one of a body's capsules, from the first at 0 to the last at 1."""
+    c = min(int(share * len(body)), len(body) - 1)
+    return Capsules(body.link[c : c + 1], body.a[c : c + 1], body.b[c : c + 1], body.radius[c : c + 1])
 
 
 def _driven(s: Situation, link: int, point: FloatArray, velocity: FloatArray) -> Desired:
@@ -173,10 +181,9 @@ class Learned:
 
     def __call__(self, s: Situation) -> Desired:
         """See `Commander`."""
-        p, body = self._p, s.model.body
-        c = min(int(p.part * len(body)), len(body) - 1)
-        link = int(body.link[c])
-        point = s.kin.position[link] + s.kin.rotation[link] @ (0.5 * (body.a[c] + body.b[c]))
+        p, part = self._p, part_of(s.model.body, self._p.part)
+        link = int(part.link[0])
+        point = s.kin.position[link] + s.kin.rotation[link] @ (0.5 * (part.a[0] + part.b[0]))
         to_person = s.person + 0.5 * p.lead * s.velocity - point
         distance = float(np.linalg.norm(to_person))
         if distance > 0.05 + 1.15 * p.dash:

@@ -19,4 +19,4 @@ def filters() -> tuple[str, ...]:
 
 def left_out() -> str:
     """Say what cannot run here, and what would change that; '' for nothing."""
-    return "" if not CBF.missing() else f"The filter cbf was left out, for the extra is not installed: run {CBF.command}"
+    return f"The filter cbf was left out, for its extra is not installed: run {CBF.command}" if CBF.missing() else ""

@@ -1,5 +1,6 @@
 """Steps of the controller under wild commanders, on an arm that does exactly as it is commanded, among moving balls."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,12 @@ from pretouch_lab.benchmarks.shield.filters import FILTERS
 from pretouch_lab.benchmarks.shield.measures import asked_velocity, breaks_limits
 from pretouch_lab.rows import Row
 
-WILD = {"noise": Noise, "extremes": Extremes, "nonsense": Nonsense, "at-person": AtPerson}
+WILD: dict[str, Callable[[np.random.Generator], Commander]] = {
+    "noise": Noise,
+    "extremes": Extremes,
+    "nonsense": Nonsense,
+    "at-person": AtPerson,
+}
 """Commanders of this part."""
 _BALLS, _RADIUS_M, _CENTER, _REACH_M = 3, 0.1, np.array([0.3, 0.0, 0.5]), 0.9
 _SPEED_M_S, _MEMORY_S = 0.8, 1.0
