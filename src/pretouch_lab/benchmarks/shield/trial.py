@@ -30,8 +30,8 @@ SEEN_S = 0.4
 """How long the touching part has to have been known to be near [s]: latency and what a row takes, at its rate of
 tightening, from the fastest approach that the braking curve leaves at its greatest distance (0.06 s + 0.8 / 3 s), and
 two readings."""
-SEEN_M = 0.02
-"""By how much it may have been thought farther than it is [m]: what the VL53L1X's data sheet allows."""
+CLOSE_M = 0.02
+"""By how much it may be thought farther than it is to be seen well [m]: what the VL53L1X's data sheet allows."""
 SAME_M = 0.1
 """How near to the touching place of the arm a sensed point's closest point has to be [m]."""
 _FAR_M = 10.0
@@ -40,14 +40,13 @@ _AFTER_S, _APART_S = 1.5, 0.2
 """A trial ends so long after its first touch; touches so near after the last contact belong to it [s]."""
 
 
-def speed_bound(following: float = 0.0) -> float:
-    """Largest speed of a touching point along the normal at a touch that was seen in time [m/s].
+def speed_bound(mistaken: float) -> float:
+    """Largest speed of a touching point along the normal, if it was thought so much farther than it was [m/s].
 
-    The braking curve of the profile `pretouch` where the surface is `SEEN_M` nearer than it was thought, and by how
-    much the arm's drives are faster than commanded.
+    The braking curve of the profile `pretouch` at that distance: the touch speed where nothing was mistaken.
     """
     p = BrakingParams()
-    return following + braking_cap(SEEN_M, p.touch_speed_max_m_s, p.deceleration_m_s2, p.latency_s, p.margin_m)
+    return float(braking_cap(mistaken, p.touch_speed_max_m_s, p.deceleration_m_s2, p.latency_s, p.margin_m))
 
 
 @dataclass(frozen=True)
@@ -162,12 +161,12 @@ def touches_of(record: Record, made: Setting) -> list[Row]:
 
 
 def seen_in_time(touch: Row) -> bool:
-    """Whether the controller knew, all the time before a touch, that the touching part was near.
+    """Whether the controller knew, all the time before a touch, of something near the touching part.
 
-    In each step of the last `SEEN_S` one of its obstacles was nearest to the touching body within `SAME_M` of the place
-    that is truly nearest, and at most `SEEN_M` farther than that is.
+    In each step of the last `SEEN_S` the point of the body nearest to one of its obstacles lay on the touching body,
+    within `SAME_M` of the place that is truly nearest.
     """
-    return touch["mistaken_m"] is not None and touch["mistaken_m"] <= SEEN_M
+    return touch["mistaken_m"] is not None
 
 
 def _mistaken(record: Record, made: Setting, at: int, link: int) -> float | None:
