@@ -87,9 +87,10 @@ def guarantees(rows: list[Row]) -> str:
         " arm's touching point towards the person. A touch was seen in time if in each step of the"
         f" {SEEN_S:g} s before it the controller knew a point whose closest point on the body lay within"
         f" {100 * SAME_M:.0f} cm of the touching place. If that was thought up to e farther than it was, the braking"
-        " curve leaves the touch speed of 0.05 m/s and what it allows at e in addition: 0.05 m/s in all where e is"
-        f" 1 cm or less, {speed_bound(CLOSE_M):.2f} m/s at 2 cm, {speed_bound(0.05):.2f} m/s at 5 cm. That is the bound"
-        " of each touch. Where nothing was seen no filter can know: a column of its own."
+        " curve leaves the touch speed of 0.05 m/s and what it allows at e in addition, and the drives are off by up to"
+        f" 0.03 m/s when it begins to bind: {speed_bound(0.01):.2f} m/s in all where e is 1 cm or less,"
+        f" {speed_bound(CLOSE_M):.2f} m/s at 2 cm, {speed_bound(0.05):.2f} m/s at 5 cm. That is the bound of each touch."
+        " Where nothing was seen no filter can know: a column of its own."
     )
 
 

@@ -43,10 +43,17 @@ _AFTER_S, _APART_S = 1.5, 0.2
 def speed_bound(mistaken: float) -> float:
     """Largest speed of a touching point along the normal, if it was thought so much farther than it was [m/s].
 
-    The braking curve of the profile `pretouch` at that distance: the touch speed where nothing was mistaken.
+    The braking curve of the profile `pretouch` at that distance, which is the touch speed where nothing was mistaken,
+    and what the drives are off by: a critically damped impedance of w = 50 rad/s (3000 Nm/rad, 1.2 kg m^2) answers an
+    acceleration that changes by a with a velocity that is off by up to a / (e w), here for what a row may loosen and
+    tighten by.
     """
     p = BrakingParams()
-    return float(braking_cap(mistaken, p.touch_speed_max_m_s, p.deceleration_m_s2, p.latency_s, p.margin_m))
+    cap = braking_cap(mistaken, p.touch_speed_max_m_s, p.deceleration_m_s2, p.latency_s, p.margin_m)
+    return float(cap + (p.loosen_m_s2 + p.tighten_m_s2) / (np.e * _DRIVE_1_S))
+
+
+_DRIVE_1_S = 50.0
 
 
 @dataclass(frozen=True)
