@@ -120,8 +120,8 @@ class Localization(BenchOptions):
 class Shield(BenchOptions):
     """Hold filters between a commander and the arm against each other: what holds whoever commands, and what it costs.
 
-    Wild commanders, and such as drive at a person on purpose. About twenty minutes on two processors, with --quick
-    two. A run that was stopped goes on with the same --out.
+    Wild commanders, and such as drive at a person on purpose. About twenty-five minutes on two processors, with
+    --quick two. A run that was stopped goes on with the same --out.
     """
 
     docs: str = ""

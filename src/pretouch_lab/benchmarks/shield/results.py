@@ -73,7 +73,7 @@ def guarantees(rows: list[Row]) -> str:
     of = {row["filter"] for row in rows}
     cbf = (
         " `cbf`: OSCBF's velocity formulation on cbfpy, with what `pretouch` senses as its obstacles"
-        " ([baselines](../explanation/baselines.md#oscbf))." if "cbf" in of else ""
+        " ([below](#oscbf))." if "cbf" in of else ""
     )  # fmt: skip
     return (
         "Filters between the commander and the arm: `pretouch` and `paper` as they are; `none`: `pretouch` without"
@@ -89,7 +89,7 @@ def guarantees(rows: list[Row]) -> str:
         f" {100 * SAME_M:.0f} cm of the touching place. If that was thought up to e farther than it was, the braking"
         " curve leaves the touch speed of 0.05 m/s and what it allows at e in addition, and the drives are off by up to"
         f" 0.03 m/s when it begins to bind: {speed_bound(0.01):.2f} m/s in all where e is 1 cm or less,"
-        f" {speed_bound(CLOSE_M):.2f} m/s at 2 cm, {speed_bound(0.05):.2f} m/s at 5 cm. That is the bound of each touch."
+        f" {speed_bound(CLOSE_M):.2f} m/s at 2 cm, {speed_bound(0.05):.2f} m/s at 5 cm: the bound of each touch."
         " Where nothing was seen no filter can know: a column of its own."
     )
 
@@ -107,7 +107,9 @@ def tables_of(rows: list[Row]) -> list[TextTable]:
 
 
 def _number(key: str, digits: int, factor: float = 1.0) -> Callable[[Row], str]:
-    return lambda row: "-" if row[key] is None else f"{factor * row[key]:.{digits}f}"
+    return lambda row: (
+        "-" if row[key] is None else f"{round(factor * row[key], digits) + 0.0:.{digits}f}"
+    )  # no minus before a zero
 
 
 _NAMES = (("filter", plain("filter")), ("commander", plain("commander")))

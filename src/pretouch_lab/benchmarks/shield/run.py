@@ -38,12 +38,12 @@ class Amount:
 
 FULL = {
     "pretouch": Amount(1000, (50, 100), (10, 10)),
-    "paper": Amount(100, (10, 20), (6, 8)),
-    "cbf": Amount(40, (10, 20), (6, 8)),
-    "none": Amount(100, (10, 20), (6, 8)),
+    "paper": Amount(100, (6, 14), (5, 8)),
+    "cbf": Amount(40, (6, 14), (5, 8)),
+    "none": Amount(100, (6, 14), (5, 8)),
 }
-QUICK = {name: Amount(8 if name == "pretouch" else 4, (1, 1), (1, 1)) for name in FILTERS}
-"""A million steps and a thousand trials of `pretouch`; quick: 20 000 of all, and twelve trials each."""
+QUICK = {name: Amount(8 if name == "pretouch" else 4, (1, 1), (2, 2)) for name in FILTERS}
+"""A million steps and a thousand trials of `pretouch`; quick: 20 000 steps of all, and some trials of each."""
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,8 @@ POINTS = 32
 _RATE_HZ = 1000.0
 _SETTLE = 1500
 """Steps before those that are timed: the force window fills, and the arm gets up to speed."""
+_STARTS = 2
+"""New processes, of which the quicker one counts: the first may have to compile."""
 _SPEED_M_S, _TURN_S = 0.2, 4.0
 """The commander moves the hand to and fro along y: how fast, and how long a turn takes."""
 
@@ -56,8 +58,9 @@ def time_steps(filter_name: str, steps: int) -> Row:
     for _ in range(_SETTLE):
         timed.step()
     took = 1e-3 * np.array([timed.step()[0] for _ in range(steps)])
+    begun = min(_start_up(filter_name) for _ in range(_STARTS))
     median, p999 = np.percentile(took, [50, 99.9])
-    return {"median_us": rounded(median, 1), "p999_us": rounded(p999, 1), "startup_s": rounded(_start_up(filter_name))}
+    return {"median_us": rounded(median, 1), "p999_us": rounded(p999, 1), "startup_s": rounded(begun)}
 
 
 def _start_up(filter_name: str) -> float:
