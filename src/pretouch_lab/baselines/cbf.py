@@ -26,7 +26,7 @@ CBF = Extra("cbf", ("cbfpy", "elastiqp", "jax"), "cbf", LAB)
 
 
 @dataclass(frozen=True)
-class BarrierFunctions(Restriction, name="cbf"):
+class BarrierFunctions(Restriction):
     """Control barrier functions of joint limits and of what is sensed."""
 
     gain_1_s: Positive = 10.0
