@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka learn ros2 meshes browser docs micropython test test-skipped test-slow soak golden golden-values lint house bench peers \
+.PHONY: setup demo live cbf franka learn ros2 meshes browser docs micropython test test-skipped test-slow soak golden golden-values lint house bench peers \
 	format clean
 
 setup: $(STAMP)
@@ -44,6 +44,10 @@ meshes: setup
 # what the tests of the page need beside a Chromium of the system's; without both they are skipped
 browser: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
+
+# control barrier functions and JAX, 300 MB, which `pretouch bench shield` compares with
+cbf: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[cbf]'
 
 # the documentation site, as build/site
 docs: setup

@@ -6,7 +6,9 @@ from pathlib import Path
 from pretouch.errors import ExperimentError
 from pretouch_lab.experiment import Picture
 
-BENCHMARKS, LOCALIZATION, SENSITIVITY = (f"results/{name}.md" for name in ("benchmarks", "localization", "sensitivity"))
+BENCHMARKS, LOCALIZATION, SENSITIVITY, SHIELD = (
+    f"results/{name}.md" for name in ("benchmarks", "localization", "sensitivity", "shield")
+)
 """Generated documents, in a folder of documents."""
 
 

@@ -12,6 +12,7 @@ from pretouch import ports
 from pretouch.control.path import Path
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
+from pretouch.desired import Desired
 from pretouch.errors import RecordingError
 from pretouch.hardware.traffic import UnitTraffic
 from pretouch.loop import Cycle, Options, run
@@ -67,6 +68,8 @@ class Setup:
     world: str = ""
     """Set of the domain randomisation (`sim.randomisation`) of which the seed draws one; none: plant, ranging and skin
     as they are."""
+    commander: Callable[[Plant, Hand | None], Callable[[], Desired | None]] | None = None
+    """Makes what is asked for a desired motion in each step; none, and the arm follows the path."""
     prepare: Callable[[Plant, RangeFinders], None] | None = None
     """What else is to happen: may have things done before each physics step, to the arm or to its units."""
 
@@ -199,6 +202,8 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         with _recording(setup, controller) as recording:
             recorder = _Recorder(plant, hand, recording)
             options = Options(points=camera)
+            if setup.commander:
+                options = replace(options, desired=setup.commander(plant, hand))
             run(controller, plant, sensed, clock, recorder, lambda step: done(step, plant), options)
     return Record(
         recorder.steps,

@@ -10,7 +10,7 @@ from pretouch.cli.words import words
 from pretouch.errors import ParameterError
 from pretouch_lab.cli.bench_calibration import Calibration
 from pretouch_lab.cli.bench_real import Real
-from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization
+from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization, Shield
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class Bench:
         Annotated[Detection, tyro.conf.subcommand("detection")]
         | Annotated[Avoidance, tyro.conf.subcommand("avoidance")]
         | Annotated[Localization, tyro.conf.subcommand("localization")]
+        | Annotated[Shield, tyro.conf.subcommand("shield")]
         | Annotated[Both, tyro.conf.subcommand("both")]
         | Annotated[FreeMotion, tyro.conf.subcommand("free-motion")]
         | Annotated[Cycle, tyro.conf.subcommand("cycle")]

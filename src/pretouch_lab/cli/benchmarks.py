@@ -1,4 +1,4 @@
-"""`pretouch bench detection`, `avoidance`, `localization` and `both`: their docstrings are the help."""
+"""`pretouch bench detection`, `avoidance`, `localization`, `shield` and `both`: their docstrings are the help."""
 
 import sys
 from dataclasses import dataclass
@@ -114,6 +114,27 @@ class Localization(BenchOptions):
 
         out = self.folder("bench-localization")
         run_bench(LocalizationBench(out, self.quick, self.seeds, self.world), self, self.json)
+
+
+@dataclass(frozen=True)
+class Shield(BenchOptions):
+    """Hold filters between a commander and the arm against each other: what holds whoever commands, and what it costs.
+
+    Wild commanders, and such as drive at a person on purpose. About twenty-five minutes on two processors, with
+    --quick two. A run that was stopped goes on with the same --out.
+    """
+
+    docs: str = ""
+    """Folder of documents (docs) whose results/shield.md is to be made anew; by default none."""
+    json: str = ""
+    """File for the numbers, with a row for each filter and commander; by default results.json in the folder.
+    -: also to standard output, and text to standard error."""
+
+    def run(self) -> None:
+        """Run it, with tables and numbers."""
+        from pretouch_lab.benchmarks.shield.run import ShieldBench
+
+        run_bench(ShieldBench(self.folder("bench-shield"), self.quick, self.seeds, self.world), self, self.json)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""The shield benchmark: what holds whoever commands, and other filters in the same place."""
