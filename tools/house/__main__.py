@@ -30,9 +30,9 @@ class Measure:
     Those of product and lab by 667, for the detectors on recordings of real arms. Both by 80 for faults of the arm's
     side, the user stop of the served arm, and waits with an end; those of product and lab by 11 more. Then by 448 and
     5, for a commander in place of the path (275) and for what a review as an attacker found: memory, pipes, terminals,
-    topics; and a profile's parameters by one, after which a commander's silence counts. Then those of the product by 903
-    and 8 for commanders over ROS 2 (371), on the page (410) and in programs with loops of their own, and those of the
-    lab by 2097, for the benchmark of commanders (1320) and learning under the shield.
+    topics; and a profile's parameters by one, after which a commander's silence counts. Then those of the product by
+    903 and 8 for commanders over ROS 2 (371), on the page (410) and in programs with loops of their own, and those of
+    the lab by 2097, for the benchmark of commanders (1320) and learning under the shield.
     """
 
     name: str
