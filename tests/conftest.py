@@ -28,8 +28,9 @@ def paper_skin(panda_model: RobotModel) -> skin.Skin:
 
 
 def pytest_configure() -> None:
-    """Heed Ctrl-C, here and in what is started: a background job of a shell inherits that it is ignored."""
+    """Heed Ctrl-C and SIGHUP, here and in what is started: background jobs and nohup's inherit that they are ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_collection_finish() -> None:

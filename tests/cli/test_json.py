@@ -27,6 +27,7 @@ WITHOUT = {
     "warm-up": "compiles",
     "serve-fci": "serves an arm",
     "figure": "writes a picture",
+    "policy": "serves a page",
 }
 """Commands that conclude with no numbers."""
 

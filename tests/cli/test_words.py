@@ -120,7 +120,7 @@ def test_help_wraps_the_sentences_of_an_option_anew(capsys, monkeypatch):
 REQUIRED = {
     "skin monitor": ("--keys", "k"), "skin simulate": ("--keys", "k"), "robot import": ("a",), "replay": ("a",),
     "skin provision": ("--id", "a", "--keys", "k", "--ssid", "s", "--host", "h"), "detect": ("a",), "figure": ("a",),
-    "sweep": ("a",),
+    "sweep": ("a",), "policy": ("a",),
 }  # fmt: skip
 """Words that a command needs."""
 

@@ -19,9 +19,9 @@ API = {
     "arm-and-skin": ("Arm and skin", ("robot", "sensing")),
     "controller": ("Controller and profiles", ("controller", "profiles", "composition", "params", "explanation")),
     "parts": ("Parts of a controller", ("contact", "control", "perception")),
-    "loop": ("Loop and recordings", ("loop", "realtime", "recording", "reporting")),
+    "loop": ("Loop and recordings", ("loop", "shielding", "realtime", "recording", "reporting")),
     "simulation": ("Simulation", ("sim",)),
-    "values": ("Values and errors", ("types", "payload", "desired", "errors")),
+    "values": ("Values and errors", ("types", "payload", "desired", "limited", "errors")),
 }
 """Pages of public names: title and the modules whose names stand there."""
 PAGES = {

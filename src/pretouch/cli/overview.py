@@ -27,6 +27,8 @@ GROUPS = {
         "figure": "one figure of the paper",
         "bench": "compare detectors, avoidance, forces, step times",
         "sweep": "vary parameters, and see which matter",
+        "learn": "a policy that reaches among people, shielded and not",
+        "policy": "watch one drive the arm of the live page",
     },
     "Setup": {"warm-up": "compile, once after an installation"},
 }
