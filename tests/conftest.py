@@ -28,7 +28,7 @@ def paper_skin(panda_model: RobotModel) -> skin.Skin:
 
 
 def pytest_configure() -> None:
-    """Heed Ctrl-C and SIGHUP, here and in what is started: background jobs and nohup's inherit that they are ignored."""
+    """Heed Ctrl-C and SIGHUP, here and in what is started: in the background both are ignored, which is inherited."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
