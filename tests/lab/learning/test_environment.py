@@ -32,7 +32,8 @@ def test_gymnasium_finds_nothing_wrong(shield, action):
 
 def test_processes_play_what_one_plays_and_a_seed_decides_all():
     moves = np.random.default_rng(0).uniform(-1, 1, (10, 2, 6)).astype(np.float32)
-    both = gymnasium.make_vec(REACH, num_envs=2, vectorization_mode="async", shield=True)
+    anew = {"context": "spawn"}  # a fork of a process with threads, as JAX has some, is no way to start
+    both = gymnasium.make_vec(REACH, num_envs=2, vectorization_mode="async", vector_kwargs=anew, shield=True)
     try:
         seen, _ = both.reset(seed=[3, 4])
         played = [(seen, np.zeros(2)), *(both.step(move)[:2] for move in moves)]
