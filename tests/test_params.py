@@ -36,6 +36,7 @@ from pretouch.profiles import (
     value_of,
     with_restriction,
 )
+from pretouch.sim.plant_params import PlantParams
 
 SETS = [
     PerceptionParams(), OutsidePoints(), ClosingSpeed(), TaskParams(), SpeedReduction(), RestrictionParams(),
@@ -283,3 +284,10 @@ def test_commands_are_remembered_for_a_second_at_most():
     assert FailureParams(state_timeout_s=1.0).state_timeout_s == 1.0
     with pytest.raises(ParameterError, match=r"state_timeout_s is 1000000\.0: it must be at most 1"):
         FailureParams(state_timeout_s=1e6)
+
+
+def test_a_whole_number_that_no_float_holds_is_refused():
+    with pytest.raises(ParameterError, match=r"speed_m_s is 10{400}: it must be finite"):
+        TaskParams(speed_m_s=10**400)
+    with pytest.raises(ParameterError, match="give finite numbers"):
+        PlantParams(friction_f1_nm=(10**400,) * 7)

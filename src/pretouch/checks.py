@@ -1,6 +1,7 @@
 """Checks of parameters: what a field may hold stands in its type."""
 
 import math
+import sys
 from dataclasses import dataclass, fields
 from functools import cache
 from numbers import Integral, Real
@@ -10,6 +11,11 @@ from typing import Annotated, Literal, Union, get_args, get_origin, get_type_hin
 from pretouch.errors import ParameterError
 
 _SMALLEST, _LARGEST = 1e-6, 1e6
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number that a float can hold: a text may have whole numbers of any size."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 @dataclass(frozen=True)
@@ -23,7 +29,7 @@ class Check:
 
     def problem(self, value: float) -> str | None:
         """Say what is wrong with the value, or None."""
-        if not math.isfinite(value):
+        if not abs(value) <= sys.float_info.max:
             return "must be finite"
         if value != 0 and not _SMALLEST <= abs(value) <= _LARGEST:
             return f"must be between {_SMALLEST:g} and {_LARGEST:g} in size; check its unit"
@@ -67,6 +73,6 @@ def _check_field(owner: str, name: str, hint: object, value: object) -> None:
     for check in getattr(hint, "__metadata__", ()):
         if whole and not isinstance(value, Integral):
             raise ParameterError(f"{owner}.{name} is {value}: it must be a whole number.")
-        problem = check.problem(float(value)) if isinstance(value, Real) else "must be a number"
+        problem = check.problem(value) if isinstance(value, Real) else "must be a number"
         if problem:
             raise ParameterError(f"{owner}.{name} is {value}: it {problem}.")

@@ -1,12 +1,11 @@
 """How far the simulated arm is from its model, and how its sensors err: figures of real Pandas."""
 
-import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
 
-from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
+from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive, is_number
 from pretouch.errors import ParameterError
 from pretouch.robot.description import RobotDescription, panda
 
@@ -110,7 +109,7 @@ class PlantParams(Checked):
         super().__post_init__()
         for name in (*_SCALED, *_KEPT, *_KNOWN):
             values = getattr(self, name)
-            if not all(math.isfinite(value) for value in values):
+            if not all(map(is_number, values)):
                 raise ParameterError(f"PlantParams.{name} is {values}: give finite numbers.")
         problem = None if self.payload_kg is None else Check(low=0.0).problem(self.payload_kg)
         if problem:

@@ -9,6 +9,7 @@ from zlib import crc32
 
 import numpy as np
 
+from pretouch.checks import is_number
 from pretouch.errors import ParameterError
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
@@ -156,7 +157,7 @@ def _spread(place: Path, field: str, entry: Any) -> Spread:
         )
     numbers = entry[ways[0]]
     if ways[0] != "value":
-        good = isinstance(numbers, list) and len(numbers) == 2 and all(_number(n) for n in numbers)
+        good = isinstance(numbers, list) and len(numbers) == 2 and all(is_number(n) for n in numbers)
         ordered = good and (ways[0] == "normal" or numbers[0] <= numbers[1])
         if not ordered or (ways[0] == "log_uniform" and numbers[0] <= 0.0):
             raise ParameterError(
@@ -167,10 +168,6 @@ def _spread(place: Path, field: str, entry: Any) -> Spread:
         field, ways[0], numbers, bool(entry.get("times", False)), bool(entry.get("each", False)),
         str(entry.get("source", "")),
     )  # fmt: skip
-
-
-def _number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def drawn(chosen: WorldSet, seed: int, usual: PlantParams | None = None) -> World:
@@ -194,7 +191,7 @@ def _value(spread: Spread, seed: int, usual: Any) -> Any:
     """Draw a field's value, of the form that its usual one has."""
     if isinstance(usual, tuple):
         if spread.way == "value":
-            if not isinstance(spread.numbers, list) or not all(_number(n) for n in spread.numbers):
+            if not isinstance(spread.numbers, list) or not all(is_number(n) for n in spread.numbers):
                 raise ParameterError(f"{spread.field} is {spread.numbers!r}: give a list of numbers, one a joint.")
             return tuple(float(n) for n in spread.numbers)
         numbers = np.broadcast_to(spread.draw(seed, len(usual) if spread.each else 1), len(usual))
@@ -204,7 +201,7 @@ def _value(spread: Spread, seed: int, usual: Any) -> Any:
     if spread.way == "value":
         if not isinstance(usual, float | None):
             return spread.numbers
-        if not _number(spread.numbers):
+        if not is_number(spread.numbers):
             raise ParameterError(f"{spread.field} is {spread.numbers!r}: give a number.")
         return float(spread.numbers)
     number = float(spread.draw(seed, 1)[0])

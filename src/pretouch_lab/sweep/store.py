@@ -1,12 +1,12 @@
 """Where a sweep keeps its cells: one file each, whole or not there, named by a digest of all that decides it."""
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pretouch.atomic_write import write_json
+from pretouch.checks import is_number
 from pretouch_lab.sweep.measures import Measure
 from pretouch_lab.sweep.work import Cell, Job
 
@@ -90,7 +90,7 @@ class Store:
 
     def _checked(self, row: dict[str, Any]) -> Result:
         metrics, reason, seconds = row.get("metrics"), row.get("reason") or "", row.get("seconds", -1.0)
-        if not _number(seconds) or float(seconds) < 0:
+        if not is_number(seconds) or float(seconds) < 0:
             raise Damaged("it says not how long it took")
         if metrics is None:
             if not isinstance(reason, str) or not reason:
@@ -98,7 +98,7 @@ class Store:
             return Result(None, reason[:_LARGEST_REASON], float(seconds))
         if not isinstance(metrics, dict) or set(metrics) != set(self._what.metrics):
             raise Damaged(f"it does not hold the numbers of {self._what.name}")
-        if not all(value is None or _number(value) for value in metrics.values()):
+        if not all(value is None or is_number(value) for value in metrics.values()):
             raise Damaged("it holds something else than numbers")
         ordered = {name: None if metrics[name] is None else float(metrics[name]) for name in self._what.metrics}
         return Result(ordered, "", float(seconds))
@@ -106,10 +106,6 @@ class Store:
 
 def _failed(reason: str) -> Result:
     return Result(None, reason, 0.0)
-
-
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _loaded(text: str) -> Any:
