@@ -96,6 +96,10 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
         yield found | {"wire": _of_units(bench), "FCI": _of_clients(arm)}
 
 
+_HUGE = b"1" + 400 * b"0"
+"""A whole number that no float holds."""
+
+
 def _of_file(folder: Path, name: str, corpus: list[bytes], read: Callable[[Path], object]) -> Parser:
     return Parser(corpus, _file(folder, name, read))
 
@@ -173,13 +177,13 @@ def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
 
     (folder / "described").mkdir()
     (folder / "described" / panda().mjcf.name).write_bytes(panda().mjcf.read_bytes())
-    described = description_text(panda()).encode()
+    described, world = description_text(panda()).encode(), (FOLDER / "realistic.toml").read_bytes()
     return {
         "skin": _of_file(
             folder, "s.toml", [skin_file(panda()).read_bytes(), *crashers.TOML], partial(load_skin, model=model)
         ),
         "keys": _of_file(folder, "k.toml", [(folder / "keys.toml").read_bytes(), *crashers.TOML], keys),
-        "world": _of_file(folder, "w.toml", [(FOLDER / "realistic.toml").read_bytes()], lambda p: world_set(str(p))),
+        "world": _of_file(folder, "w.toml", [world, world.replace(b"0.06", _HUGE)], lambda p: world_set(str(p))),
         "sweeps": _of_file(folder, "p.toml", [sweep], load_sweeps),
         "learnt": _of_file(
             folder,
@@ -205,7 +209,8 @@ def _of_workers(folder: Path) -> Parser:
         assert (result.metrics is None) == bool(result.reason)
         assert all(v is None or np.isfinite(v) for v in (result.metrics or {}).values())
 
-    return Parser([json.dumps([row]).encode(), *crashers.ANSWERS], read, ())
+    whole = json.dumps([row]).encode()
+    return Parser([whole, whole.replace(b"1.0}]", _HUGE + b"}]"), *crashers.ANSWERS], read, ())
 
 
 def _of_units(bench: Bench) -> Parser:

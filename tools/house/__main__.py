@@ -31,7 +31,7 @@ class Measure:
     side, the user stop of the served arm, and waits with an end; those of product and lab by 11 more. Then by 448 and
     5, for a commander in place of the path (275) and for what a review as an attacker found: memory, pipes, terminals,
     topics; and a profile's parameters by one, after which a commander's silence counts. Then those of the product by
-    905 and 8 for commanders over ROS 2 (371), on the page (410) and in programs with loops of their own, and those of
+    907 and 8 for commanders over ROS 2 (371), on the page (410) and in programs with loops of their own, and those of
     the lab by 2097, for the benchmark of commanders (1320) and learning under the shield.
     """
 
@@ -60,7 +60,7 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 55_987, 35_000),
+        Measure("lines of the product, comments aside", product.lines, 55_989, 35_000),
         Measure("files of the product", len(product.files), 467, 300),
         Measure("lines of product and lab, likewise", product.lines + lab.lines, 78_848, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
