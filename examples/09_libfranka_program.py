@@ -31,9 +31,10 @@ robot = pylibfranka.Robot(sys.argv[1], pylibfranka.RealtimeConfig.kIgnore)
 robot.set_collision_behavior([60.0] * 7, [60.0] * 7, [60.0] * 6, [60.0] * 6)  # the arm's own reflex comes after ours
 state, now = franka_state(robot.read_once()), 0.0
 shield = pt.shield(arm, pt.Skin([], arm), robot_state(state, now))
-for _ in range(100):  # at rest: the force window fills, and all is compiled, before anything moves
-    now += 0.01
-    step = asked(shield, franka_state(robot.read_once()), now, 0.0)
+for i in range(1000):  # a second at rest: the force window fills, and all is compiled, before anything moves
+    state, now = franka_state(robot.read_once()), now + 0.001
+    if i % 10 == 9:
+        step = asked(shield, state, now, 0.0)
 
 limiter = SetPointLimiter(motion_limits(arm, "fr3"), LimiterParams())  # the arm limits jerk, too, each millisecond
 begun, turns, mode, ended = now, 0, step.mode, False

@@ -55,3 +55,13 @@ def test_a_shield_begins_with_a_state_that_can_be_used(panda_model, plant):
     broken = replace(plant.read(), qd=np.full(7, np.nan))
     with pytest.raises(RobotStateError, match="cannot start"):
         pt.shield(panda_model, pt.Skin([], panda_model), broken, "blind")
+
+
+def test_a_program_may_read_the_arm_after_the_clock(panda_model, plant):
+    shield = pt.shield(panda_model, pt.Skin([], panda_model), plant.read(), "blind")
+    turned(shield, plant, 1.5, lambda now: None)
+    last = shield.cycle.inputs
+    robot = replace(plant.read(), stamp=last.stamp + 0.012)
+    step = shield(replace(last, stamp=last.stamp + 0.01, robot=robot, desired=None))
+    assert step.mode is pt.Mode.TRACK
+    assert step.stamp == robot.stamp

@@ -15,6 +15,8 @@ FULL = 0.95
 """Share of the speed asked for from which on the arm is not called slowed: what a joint velocity's noise leaves."""
 ASKED_M_S = 0.005
 """Speed from which on a motion is asked for [m/s]."""
+_PRESSED = 1e-9
+"""Multiplier above which a limit is pressed against."""
 
 
 class Limit(Enum):
@@ -82,7 +84,3 @@ def binding(step: "ControlStep") -> BoolArray:
             # a row across a normal, which the solution leaves out: it is of what is nearest
             bound[step.obstacles.body_distance[step.restricted].argmin()] = True
     return bound
-
-
-_PRESSED = 1e-9
-"""Multiplier above which a limit is pressed against."""

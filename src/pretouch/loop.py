@@ -231,7 +231,7 @@ def turn(
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
     imu = imu_of(skin) if "imu" in controller.profile.detect.reads else None
     seen = None if points is None else points.read()
-    stamp = _instant(tick, controller.limits.period, report, readings, touch)
+    stamp = instant(tick, controller.limits.period, report, readings, touch)
     believed = explained(controller, state, report, stamp)
     inputs = Inputs(stamp, believed, readings, resume, touch, imu, seen, payload, desired)
     step, after = controller.step(state, inputs)
@@ -273,7 +273,7 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     return robot if known.all() else replace(robot, qd_commanded=np.where(known, reported, np.nan))
 
 
-def _instant(
+def instant(
     tick: float, period: float, report: RobotState, readings: RangeReadings, touch: TouchReadings | None
 ) -> float:
     """Instant of a step [s]: a port that stamps what it reads as it reads it is a little later than the tick."""

@@ -6,7 +6,7 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.desired import twist
-from pretouch.loop import Cycle, explained
+from pretouch.loop import Cycle, explained, instant
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.profiles import Profile
 from pretouch.profiles import profile as named
@@ -33,9 +33,10 @@ class Shield:
 
     def __call__(self, inputs: Inputs) -> ControlStep:
         """Return the step of a period; where nothing is desired, the hand stays where it is."""
-        robot = explained(self.controller, self.state, inputs.robot, inputs.stamp)
-        given = replace(inputs, robot=robot, desired=inputs.desired or twist(inputs.stamp, _STILL))
-        before = self.state
+        before, period = self.state, self.controller.limits.period
+        now = instant(inputs.stamp, period, inputs.robot, inputs.readings, inputs.touch)
+        robot = explained(self.controller, before, inputs.robot, now)
+        given = replace(inputs, stamp=now, robot=robot, desired=inputs.desired or twist(now, _STILL))
         step, self.state = self.controller.step(before, given)
         self.cycle = Cycle(given, before, step, self.state)
         return step
