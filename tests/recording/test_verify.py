@@ -183,7 +183,7 @@ def test_a_bit_that_was_flipped_is_the_first_difference(made):
         (lambda s: replace(s, mode=Mode.REACT), "mode", "react"),
         (lambda s: replace(s, reason="Because."), "reason", "Because."),
         (lambda s: replace(s, path_phase=-s.path_phase), "path_phase", -0.0),
-        (lambda s: replace(s, range_distance=s.range_distance[:2]), "range_distance", "shape (2,)"),
+        (lambda s: replace(s, restricted=np.arange(9), approach_limit=np.ones(9)), "restricted", "shape (9,)"),
         (lambda s: replace(s, armed=not s.armed), "armed", False),
     ],
 )

@@ -84,10 +84,16 @@ class Recorded:
         truth = raw["/pretouch/truth"].get(number)
         state = raw["/pretouch/state"].get(number)
         anew, snapshot = (False, None) if state is None else decode_state(state)
+        run, step = max(0, bisect_right(self._begins, number) - 1), decode_step(raw["/pretouch/step"][number])[1]
+        if not _fits(step, *self.runs[run].sizes):
+            raise RecordingError(
+                f"Step {number} of {self.place} is not of the arm and skin that the recording says made it: use one"
+                " that is whole."
+            )
         return Kept(
-            run=max(0, bisect_right(self._begins, number) - 1),
+            run=run,
             inputs=self._inputs(number),
-            step=decode_step(raw["/pretouch/step"][number])[1],
+            step=step,
             truth=None if truth is None else decode_truth(truth)[1],
             snapshot=snapshot,
             anew=anew,
@@ -166,6 +172,21 @@ class Recorded:
                 if len(tangent):
                     found[step.path_phase] = step.path_position, tangent
         return found
+
+
+def _fits(step: ControlStep, joints: int, units: int) -> bool:
+    """Whether the arrays of a step are as long as those of an arm with so many joints and units."""
+    near, touched = step.obstacles, step.touched
+    of_joints = (step.q, step.q_commanded, step.command, step.residual, step.qp.qd)
+    of_obstacles = (near.point, near.ee_distance, near.body_point, near.link, near.direction, near.body_distance)
+    of_touches = (touched.point, touched.force, touched.sigma, touched.probability)
+    return (
+        all(len(array) == joints for array in of_joints)
+        and len(step.range_distance) == units
+        and all(len(array) == len(near.unit) for array in (*of_obstacles, near.closing_speed))
+        and all(len(array) == len(touched.link) for array in of_touches)
+        and len(step.restricted) == len(step.approach_limit)
+    )
 
 
 def open_recording(place: Path) -> Recorded:

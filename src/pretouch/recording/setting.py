@@ -91,6 +91,11 @@ class Run:
     _tangents: Callable[[], Tangents]
 
     @cached_property
+    def sizes(self) -> tuple[int, int]:
+        """How many joints the arm has, and how many units the skin."""
+        return sound(lambda: (len(from_json(self._message.robot)["q_ready"]), len(self._message.unit_id)))
+
+    @cached_property
     def model(self) -> RobotModel:
         """The arm."""
         return sound(lambda: _model(self._message))
