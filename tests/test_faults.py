@@ -8,14 +8,14 @@ import pytest
 from pretouch.faults import MOST_IMU, Watch, examine, sound_imu, sound_readings, sound_robot, watch_init
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.sensing.unit import MIN_DISTANCE
+from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.types import ImuReadings, Inputs, RangeReadings, RangeStatus, RobotState
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
 QD_MAX = np.array([2.0, 2.0])
 COMMAND = np.array([0.5, -0.2])
-READINGS = RangeReadings(np.zeros(1), np.full(1, MIN_DISTANCE), np.zeros(1, np.int64))
+READINGS = RangeReadings(np.zeros(1), np.full(1, PAPER_SENSOR.nearest_m), np.zeros(1, np.int64))
 PARTS = [
     ("q", "joint positions"),
     ("qd", "joint velocities"),

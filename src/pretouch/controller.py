@@ -249,7 +249,7 @@ class Controller:
         """Return what is near: eq. 1 and the closest points of the body."""
         sight, robot, now = self._sight, given.robot, given.watch.stamp
         if sight is None:
-            return _Near(nothing_seen(given.readings), state.tracks, state.outside)
+            return _Near(nothing_seen(given.readings, self.skin), state.tracks, state.outside)
         anew = Event.TIME_BACKWARDS in given.events
         known = track_init(self._units) if anew else state.tracks
         seen, tracks = perceive(known, sight, kin, given.readings, now, robot)

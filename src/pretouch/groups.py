@@ -108,6 +108,19 @@ class Sensors(NamedTuple):
     """(K,) link each sits on."""
 
 
+class Cones(NamedTuple):
+    """What K sensors of T kinds see: a cone about the axis of each."""
+
+    kind: IntArray
+    """(K,) which kind each is of."""
+    edge: FloatArray
+    """(T, 3) cosine, sine and tangent of half the angle."""
+    range: FloatArray
+    """(T, 2) nearest and farthest distance that is measured [m]."""
+    rays: FloatArray
+    """(T, R, 3) unit vectors that fill the cone, sensor frame, the axis first."""
+
+
 class SkinArrays(NamedTuple):
     """The K units of a `Skin`."""
 
@@ -119,6 +132,8 @@ class SkinArrays(NamedTuple):
     """(K,) standard deviation of its position [m]."""
     orientation_sigma: FloatArray
     """(K,) standard deviation of its orientation [rad]."""
+    cones: Cones
+    """What each sees."""
 
 
 class NearArrays(NamedTuple):

@@ -18,7 +18,7 @@ def test_the_back_of_a_capsule_with_a_unit_in_front(tmp_path):
         model, ROOM, CoverageParams(), surface_of(model, 1500), np.zeros((2, 2)), 10, np.random.default_rng(1)
     )
     worn = skin(model)
-    found = covered(made, seen_by(made, worn.link, worn.T_link_sensor))
+    found = covered(made, seen_by(made, worn))
     spots = blind_spots(made, found)
     back = next(spot for spot in spots if spot.link == "one" and spot.facing == "-x")
     # a quarter of the way round along 0.4 m, and what of the two ends faces that way
@@ -49,7 +49,7 @@ def test_spots_of_the_panda_are_blind_and_the_largest_come_first(panda_model, pa
         panda_model, fixtures(SceneSpec()), CoverageParams(), surface_of(panda_model, 800), q, 4,
         np.random.default_rng(2),
     )  # fmt: skip
-    found = covered(made, seen_by(made, paper_skin.link, paper_skin.T_link_sensor))
+    found = covered(made, seen_by(made, paper_skin))
     spots = blind_spots(made, found)
     areas = [spot.area_m2 for spot in spots]
     assert areas == sorted(areas, reverse=True)

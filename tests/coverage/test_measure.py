@@ -26,7 +26,7 @@ def ways(model, params, surface=None, each=20_000, q=READY, room=ROOM):
 
 def share(model, params, units, each=20_000):
     found, worn = ways(model, params, each=each), skin(model, *units)
-    return covered(found, seen_by(found, worn.link, worn.T_link_sensor)).arm.ways.value
+    return covered(found, seen_by(found, worn)).arm.ways.value
 
 
 def test_directions_are_cosine_weighted(tmp_path):
@@ -83,7 +83,7 @@ def few(panda_model):
 
 def found_by(model, worn, few, params):
     made = ways_to(model, fixtures(SceneSpec()), params, few[0], q=few[1], each=2, rng=np.random.default_rng(4))
-    return made, seen_by(made, worn.link, worn.T_link_sensor)
+    return made, seen_by(made, worn)
 
 
 @settings(max_examples=25)

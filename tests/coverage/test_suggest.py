@@ -45,9 +45,7 @@ def test_gains_fall_and_add_up_to_what_the_larger_skin_sees(made, panda_model, p
     assert gains[-1] > 0
     assert sum(gains) <= found.most
     more = Skin((*paper_skin.units, *found.units), panda_model)
-    before, after = (
-        covered(made, seen_by(made, worn.link, worn.T_link_sensor)).arm.ways.value for worn in (paper_skin, more)
-    )
+    before, after = (covered(made, seen_by(made, worn)).arm.ways.value for worn in (paper_skin, more))
     assert after - before == pytest.approx(sum(gains), rel=1e-6)
 
 

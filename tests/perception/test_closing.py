@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from pretouch.groups import Sensors
 from pretouch.perception.closing import LastSeen, closing_speeds, follow_points, motion_init, reckon
+from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
 
 MEMORY, PERIOD = 0.09, 0.02
 TOWARDS_ME = np.array([0.0, 0.0, 1.0])
@@ -86,7 +87,7 @@ def reckoned(distance: float, last: float | None, sensor: float = 0.0, velocity:
     stamp = np.array([-np.inf if last is None else 1.0 - age])
     reckon(
         points, np.array([distance]), np.ones(1), LastSeen(before, stamp, motion),
-        Sensors(sensor * TOWARDS_ME[None], np.eye(3)[None], np.zeros(1, np.int64)), 0.04, 0.18,
+        Sensors(sensor * TOWARDS_ME[None], np.eye(3)[None], np.zeros(1, np.int64)), cones_of([PAPER_SENSOR]), 0.18,
     )  # fmt: skip
     return float(points[0, 2] - sensor)
 

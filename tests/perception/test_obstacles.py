@@ -17,6 +17,7 @@ from pretouch.perception.obstacles import (
     track_init,
 )
 from pretouch.robot.description import panda
+from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
 from pretouch.sensing.skin import Skin
 from pretouch.types import RangeReadings, RangeStatus
 
@@ -90,11 +91,13 @@ def test_an_empty_skin_has_no_poses(panda_model):
 
 # What a reading stands for
 
+ONE = cones_of([PAPER_SENSOR])
+
 
 @pytest.mark.parametrize("status", [s for s in RangeStatus if s not in SHOWN])
 def test_only_good_and_too_near_readings_show_a_target(status):
     for distance in (0.5, 0.0, NAN, INF, -1.0):
-        (shown,) = measured_distance(_readings(0.0, distance, status))
+        (shown,) = measured_distance(_readings(0.0, distance, status), ONE)
         np.testing.assert_equal(shown, 0.04 if status in NEAR else NAN)
 
 
@@ -105,12 +108,12 @@ def test_only_good_and_too_near_readings_show_a_target(status):
     + [(impossible, NAN) for impossible in (-0.01, 4.1, 65.535, 1e300, INF, NAN)],
 )
 def test_a_good_reading_is_taken_within_what_the_sensor_can_measure(distance, shown, status):
-    np.testing.assert_equal(measured_distance(_readings(0.0, distance, status)), [shown])
+    np.testing.assert_equal(measured_distance(_readings(0.0, distance, status), ONE), [shown])
 
 
 @given(distance=anything, status=st.integers(-1, 300))
 def test_whatever_arrives_is_a_distance_or_nothing(distance, status):
-    (shown,) = measured_distance(_readings(0.0, distance, status))
+    (shown,) = measured_distance(_readings(0.0, distance, status), ONE)
     assert np.isnan(shown) or 0.04 <= shown <= 4.0
 
 
@@ -119,7 +122,7 @@ def test_whatever_arrives_is_a_distance_or_nothing(distance, status):
 
 def _tells(status, distance) -> bool:
     readings = _readings(0.0, distance, status)
-    (tells,) = is_evidence(readings, measured_distance(readings))
+    (tells,) = is_evidence(readings, measured_distance(readings, ONE), ONE)
     return bool(tells)
 
 
@@ -131,7 +134,7 @@ def test_a_target_tells_and_so_does_its_absence_but_no_failure(status):
 
 @given(distance=anything, status=st.integers(-1, 300))
 def test_without_a_distance_only_a_missing_or_far_target_tells(distance, status):
-    (shown,) = measured_distance(_readings(0.0, distance, status))
+    (shown,) = measured_distance(_readings(0.0, distance, status), ONE)
     far = status in SHOWN and 4.0 < distance < INF
     assert _tells(status, distance) == (not np.isnan(shown) or far or status in NO_TARGET)
 

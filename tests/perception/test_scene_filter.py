@@ -6,13 +6,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
+from pretouch.groups import Sensors
 from pretouch.perception.closest import closest_points
-from pretouch.perception.obstacles import sensor_poses
+from pretouch.perception.obstacles import placed_sensors, sensor_poses
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures, ray_capsule
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.model import Kinematics
-from pretouch.sensing.unit import CONE_ANGLE, cone_rays
+from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays, cones_of
 
 INF = np.inf
 LOW, HIGH = np.zeros(3), np.array([0.0, 0.0, 1.0])
@@ -41,7 +42,8 @@ def _looking(p, along, fixtures: Fixtures, body: Capsules | None = None, own: in
     R = Rotation.align_vectors([along], [[0, 0, 1]])[0].as_matrix()
     body = no_fixtures().capsules if body is None else body
     position = np.array(p, dtype=np.float64)[None]
-    return float(expected_range(still, position, R[None], np.array([own]), body, fixtures)[0])
+    sensors = Sensors(position, R[None], np.array([own]))
+    return float(expected_range(still, sensors, cones_of([PAPER_SENSOR]), body, fixtures)[0])
 
 
 def _floor(height: float) -> Fixtures:
@@ -144,7 +146,7 @@ def test_on_the_floor_it_is_at_no_distance():
 def test_the_floor_is_seen_by_the_lowest_ray_of_the_cone(height, tilt, turn):
     along = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), -np.cos(tilt)])
     seen = _looking((0, 0, height - 0.2), along, _floor(-0.2))
-    assert height / np.cos(max(0.0, tilt - CONE_ANGLE / 2)) <= seen + 1e-12
+    assert height / np.cos(max(0.0, tilt - PAPER_SENSOR.angle / 2)) <= seen + 1e-12
     assert seen <= height / np.cos(tilt) + 1e-12  # no farther than along the beam
 
 
@@ -184,12 +186,14 @@ def mujoco_arm():
 
 def test_the_arm_is_seen_where_mujocos_rays_meet_it(panda_model, paper_skin, mujoco_arm):
     model, data = mujoco_arm
-    rays, seen, buried = cone_rays(2), 0, 0
+    rays, seen, buried = cone_rays(2, PAPER_SENSOR.angle), 0, 0
     for fraction in np.random.default_rng(1).uniform(size=(500, 7)):
         q = panda_model.q_min + fraction * (panda_model.q_max - panda_model.q_min)
         kin = panda_model.kinematics(q)
         position, rotation = sensor_poses(paper_skin, kin)
-        expected = expected_range(kin, position, rotation, paper_skin.link, panda_model.capsules, no_fixtures())
+        expected = expected_range(
+            kin, placed_sensors(paper_skin, kin), paper_skin.cones, panda_model.capsules, no_fixtures()
+        )
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
         for k, own in enumerate(paper_skin.link):

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from pretouch.params import PerceptionParams
-from pretouch.perception.obstacles import sensor_poses, track_init
+from pretouch.perception.obstacles import placed_sensors, track_init
 from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import LIVE_SKIN, Skin, load_skin, paper_skin
-from pretouch.sensing.unit import CONE_ANGLE, MIN_DISTANCE
 from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.types import RangeReadings, RangeStatus
 
@@ -39,11 +39,12 @@ def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(pand
         believed = misplaced(truly, panda_model, placed_by_hand, seed)[0]
         for _ in range(50):
             kin = panda_model.kinematics(rng.uniform(panda_model.q_min, panda_model.q_max))
-            position, rotation = sensor_poses(truly, kin)
-            at = expected_range(kin, position, rotation, truly.link, panda_model.capsules, no_fixtures())
+            at = expected_range(kin, placed_sensors(truly, kin), truly.cones, panda_model.capsules, no_fixtures())
             near = at < 0.3
             readings += int(near.sum())
-            shown += shown_by(panda_model, believed, kin, np.where(near, np.maximum(at, MIN_DISTANCE), np.nan))
+            shown += shown_by(
+                panda_model, believed, kin, np.where(near, np.maximum(at, PAPER_SENSOR.nearest_m), np.nan)
+            )
     assert readings > 1000
     assert shown < 10  # 46 without the allowance
 
@@ -52,8 +53,8 @@ def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(pand
 def test_what_is_barely_missed_explains_what_is_about_there_and_hides_nothing(panda_model, distance, shown):
     # a post whose surface lies 3 mm outside of the cone, 0.2 m before the unit of the hand that looks along +y
     unit = TCP + np.array([0.0, 0.108, 0.1034 - 0.045])
-    edge = 0.2 * np.tan(CONE_ANGLE / 2) + 0.003 / np.cos(CONE_ANGLE / 2)
-    post = unit + np.array([0.0, 0.2, edge + 0.01 / np.cos(CONE_ANGLE / 2)])
+    edge = 0.2 * np.tan(PAPER_SENSOR.angle / 2) + 0.003 / np.cos(PAPER_SENSOR.angle / 2)
+    post = unit + np.array([0.0, 0.2, edge + 0.01 / np.cos(PAPER_SENSOR.angle / 2)])
     ends = post[None] - np.array([0.3, 0, 0]), post[None] + np.array([0.3, 0, 0])
     beside = Fixtures(np.zeros((0, 4)), Capsules(np.zeros(1, np.int64), *ends, np.full(1, 0.01)))
     skin, kin = paper_skin(panda_model), panda_model.kinematics(panda().q_ready)

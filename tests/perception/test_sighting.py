@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.groups import CapsuleArrays, Sensors
-from pretouch.perception.sighting import GRID_M, BallWays, Stretch, common_area, in_view, ways_free, ways_seen
+from pretouch.perception.sighting import GRID_M, BallWays, Stretch, View, common_area, in_view, ways_free, ways_seen
+from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
 
 HALF = np.deg2rad(13.5)
 LIGHT = 2.0 / 3.0 * 0.5 / 0.17 * 1.3**2
@@ -34,27 +35,28 @@ def test_a_fist_on_the_axis_is_seen_as_far_as_its_light_reaches():
     product = 0.05 * np.sqrt(LIGHT) / np.tan(HALF)
     farthest = 0.05 / 3 + np.sqrt((0.05 / 3) ** 2 + product)
     assert farthest == pytest.approx(0.633, abs=0.001)
-    assert in_view(farthest - 1e-6, (farthest - 1e-6) ** 2, 0.05, 1.3, LIGHT)
-    assert not in_view(farthest + 1e-6, (farthest + 1e-6) ** 2, 0.05, 1.3, LIGHT)
+    assert in_view(farthest - 1e-6, (farthest - 1e-6) ** 2, 0.05, np.tan(HALF), 1.3, LIGHT)
+    assert not in_view(farthest + 1e-6, (farthest + 1e-6) ** 2, 0.05, np.tan(HALF), 1.3, LIGHT)
 
 
 def test_at_the_edge_behind_and_beyond_the_limit():
     bright = 1e9
     aside = 0.4 * np.tan(HALF) + 0.05
-    assert in_view(0.4, 0.16 + (aside - 1e-4) ** 2, 0.05, 1.3, bright)
-    assert not in_view(0.4, 0.16 + (aside + 1e-4) ** 2, 0.05, 1.3, bright)
-    assert not in_view(-0.4, 0.16, 0.05, 1.3, bright)
+    assert in_view(0.4, 0.16 + (aside - 1e-4) ** 2, 0.05, np.tan(HALF), 1.3, bright)
+    assert not in_view(0.4, 0.16 + (aside + 1e-4) ** 2, 0.05, np.tan(HALF), 1.3, bright)
+    assert not in_view(-0.4, 0.16, 0.05, np.tan(HALF), 1.3, bright)
     reading = 0.4 - 2 / 3 * 0.05
-    assert in_view(0.4, 0.16, 0.05, reading + 1e-6, bright)
-    assert not in_view(0.4, 0.16, 0.05, reading - 1e-6, bright)
-    assert in_view(-0.01, 0.01**2, 0.05, 1.3, bright), "a ball on the unit itself"
+    assert in_view(0.4, 0.16, 0.05, np.tan(HALF), reading + 1e-6, bright)
+    assert not in_view(0.4, 0.16, 0.05, np.tan(HALF), reading - 1e-6, bright)
+    assert in_view(-0.01, 0.01**2, 0.05, np.tan(HALF), 1.3, bright), "a ball on the unit itself"
 
 
 def seen(start, way, first=10, last=50, run=2, limit=1.3, free=True):
     out = np.zeros((1, 1), np.bool_)
     ways_seen(
         BallWays(np.array([start]), np.array([way]), 0.05), np.array([free]), Stretch(first, last, run),
-        Sensors(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1, np.int64)), np.array([limit]), 1e9, out,
+        Sensors(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1, np.int64)), cones_of([PAPER_SENSOR]),
+        View(np.array([limit]), 1e9), out,
     )  # fmt: skip
     return bool(out[0, 0])
 

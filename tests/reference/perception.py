@@ -6,12 +6,12 @@ import numpy as np
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import MAX_DISTANCE, MIN_DISTANCE, cone_rays
 from pretouch.types import Obstacles, RangeReadings, RangeStatus
 from tests.reference.geometry import Posture, closest, first_hit
 
-RAYS = cone_rays(2)
+RAYS = cone_rays(2, PAPER_SENSOR.angle)
 FAILURES = {
     RangeStatus.HARDWARE: " (it reports a hardware failure)",
     RangeStatus.STUCK: " (it repeats the same reading)",
@@ -24,9 +24,9 @@ NOTHING_NEAR = {RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS
 def shown(distance: float, status: int) -> float:
     """Distance a reading stands for [m], NaN for none: at least what the sensor can measure, none beyond its range."""
     if status in TOO_NEAR:
-        return MIN_DISTANCE
-    if status in A_TARGET and 0 <= distance <= MAX_DISTANCE:
-        return max(distance, MIN_DISTANCE)
+        return PAPER_SENSOR.nearest_m
+    if status in A_TARGET and 0 <= distance <= PAPER_SENSOR.farthest_m:
+        return max(distance, PAPER_SENSOR.nearest_m)
     return np.nan
 
 
@@ -37,7 +37,7 @@ def shown_by(readings: RangeReadings) -> np.ndarray:
 
 def tells(distance: float, status: int) -> bool:
     """Whether a reading tells anything: a target, one far away, or that none near returns light. Failures do not."""
-    far = status in A_TARGET and MAX_DISTANCE < distance < np.inf
+    far = status in A_TARGET and PAPER_SENSOR.farthest_m < distance < np.inf
     return bool(np.isfinite(shown(distance, status)) or far or status in NOTHING_NEAR)
 
 

@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import SkinError
-from pretouch.sensing.unit import CONE_ANGLE, SensorUnit, cone_rays
+from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
+from pretouch.sensing.unit import SensorUnit
 
 
 def _pose(**changes: np.ndarray) -> np.ndarray:
@@ -80,7 +81,7 @@ def test_an_uncertainty_that_is_none_is_refused_with_the_units_name(sigma):
 
 @pytest.mark.parametrize(("rings", "count"), [(0, 1), (1, 7), (2, 19), (3, 37)])
 def test_cone_rays_are_unit_vectors_from_axis_to_edge(rings, count):
-    rays = cone_rays(rings)
+    rays = cone_rays(rings, PAPER_SENSOR.angle)
     assert rays.shape == (count, 3)
     np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1.0, atol=1e-12)
     np.testing.assert_array_equal(rays[0], [0, 0, 1])
@@ -90,6 +91,6 @@ def test_cone_rays_are_unit_vectors_from_axis_to_edge(rings, count):
 
 @given(tilt=st.floats(0.0, 1.0), turn=st.floats(0.0, 2 * np.pi))
 def test_no_direction_in_the_field_of_view_is_far_from_a_ray(tilt, turn):
-    seen = Rotation.from_euler("zy", [turn, tilt * CONE_ANGLE / 2]).apply([0, 0, 1])
-    nearest = (cone_rays(2) @ seen).max()
+    seen = Rotation.from_euler("zy", [turn, tilt * PAPER_SENSOR.angle / 2]).apply([0, 0, 1])
+    nearest = (cone_rays(2, PAPER_SENSOR.angle) @ seen).max()
     assert np.rad2deg(np.arccos(min(nearest, 1.0))) < 5.0  # rings and rays lie about 7 degrees apart

@@ -16,7 +16,6 @@ from pretouch.perception.obstacles import sensor_poses
 from pretouch.robot.model import Kinematics
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import CONE_ANGLE
 from pretouch.types import BoolArray, FloatArray
 
 _VIEWS = (("from the front left", 20, 40), ("from the back right", 20, 220), ("from below", -35, -50))
@@ -106,10 +105,11 @@ def _skin_faces(kin: Kinematics, skin: Skin, new: frozenset[str]) -> Faces:
     turn = np.linspace(0.0, 2 * np.pi, 13)
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
     faces: Faces = []
-    for name, p, R in zip(skin.ids, position, rotation, strict=True):
+    for unit, p, R in zip(skin.units, position, rotation, strict=True):
+        name, half = unit.id, unit.sensor.angle / 2
         colour = _NEW if name in new else _OLD
         faces.append((p + 0.014 * ring @ R.T, colour, colour))
-        rim = p + (_BEAM_M * np.array([0, 0, 1]) + _BEAM_M * np.tan(CONE_ANGLE / 2) * ring) @ R.T
+        rim = p + (_BEAM_M * np.array([0, 0, 1]) + _BEAM_M * np.tan(half) * ring) @ R.T
         faces += [(np.array([p, *rim[i : i + 2]]), (0, 0, 0, 0.08), (*_rgb(new, name), 0.35)) for i in range(12)]
     return faces
 

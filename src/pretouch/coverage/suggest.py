@@ -12,9 +12,11 @@ from pretouch.control.braking import tangents_of
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import SkinError
+from pretouch.groups import Sensors
 from pretouch.perception.obstacles import poses
 from pretouch.perception.scene_filter import expected_range
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import cones_of
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import BoolArray, FloatArray
@@ -62,7 +64,8 @@ def candidates(ways: Ways, skin: Skin) -> tuple[SensorUnit, ...]:
     ]
     T = np.array([unit.T_link_sensor for unit in units])
     position, rotation = poses(kin.position, kin.rotation, at.link, T)
-    view = expected_range(kin, position, rotation, np.full(len(at), -1, np.int64), model.capsules, ways.room)
+    of_no_link = Sensors(position, rotation, np.full(len(at), -1, np.int64))
+    view = expected_range(kin, of_no_link, cones_of([unit.sensor for unit in units]), model.capsules, ways.room)
     taken = [(unit.link, unit.T_link_sensor[:3, 3]) for unit in skin.units]
     return tuple(
         unit
@@ -81,9 +84,9 @@ def suggest(ways: Ways, skin: Skin, count: int, places: tuple[SensorUnit, ...] |
         )
     weight = (ways.surface.area[ways.point] * ways.free).ravel()
     weight /= max(float(weight.sum()), 1e-12)
-    by_skin = seen_by(ways, skin.link, skin.T_link_sensor).any(axis=0).ravel()
+    by_skin = seen_by(ways, skin).any(axis=0).ravel()
     offered = Skin(places, ways.model)
-    by_place = seen_by(ways, offered.link, offered.T_link_sensor).reshape(len(places), -1)
+    by_place = seen_by(ways, offered).reshape(len(places), -1)
     order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), count)
     ids = _free_ids(skin, count)
     chosen = tuple(

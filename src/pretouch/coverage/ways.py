@@ -8,11 +8,12 @@ from pretouch.control.braking import tangents_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.surface import Surface
 from pretouch.groups import CapsuleArrays, Sensors
-from pretouch.perception.obstacles import poses
+from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import Fixtures, expected_range
-from pretouch.perception.sighting import BallWays, Stretch, ways_free, ways_seen
+from pretouch.perception.sighting import BallWays, Stretch, View, ways_free, ways_seen
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
+from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
@@ -78,22 +79,22 @@ def cosine_weighted(normal: FloatArray, rng: np.random.Generator) -> FloatArray:
     return drawn
 
 
-def seen_by(ways: Ways, link: IntArray, T_link_sensor: FloatArray) -> BoolArray:
-    """Whether (K, S, W) each of K units, on links (K,) with poses (K, 4, 4), sees the ball of each way in time.
+def seen_by(ways: Ways, skin: Skin) -> BoolArray:
+    """Whether (K, S, W) each of the K units of a skin sees the ball of each way in time.
 
     A unit sees nothing behind the arm or the room in its own view, its own link included.
     """
     p = ways.params
-    seen = np.zeros((len(link), len(ways.postures), len(ways.point)), np.bool_)
+    seen = np.zeros((len(skin), len(ways.postures), len(ways.point)), np.bool_)
     for s, kin in enumerate(ways.postures):
-        position, rotation = poses(kin.position, kin.rotation, link, T_link_sensor)
-        everything = np.full(len(link), -1, np.int64)
-        own_view = expected_range(kin, position, rotation, everything, ways.model.capsules, ways.room)
+        position, rotation = sensor_poses(skin, kin)
+        of_no_link = Sensors(position, rotation, np.full(len(skin), -1, np.int64))
+        own_view = expected_range(kin, of_no_link, skin.cones, ways.model.capsules, ways.room)
         limit = np.minimum(p.range_m, own_view - p.self_margin_m)
-        found = np.zeros((len(link), len(ways.point)), np.bool_)
+        found = np.zeros((len(skin), len(ways.point)), np.bool_)
         ways_seen(
             BallWays(ways.start[s], ways.way[s], p.object_radius_m), ways.free[s], Stretch(p.first, p.last, p.run),
-            Sensors(position, rotation, link), limit, p.light_m2, found,
+            Sensors(position, rotation, skin.link), skin.cones, View(limit, p.light_m2), found,
         )  # fmt: skip
         seen[:, s] = found
     return seen

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.checks import Checked, Fraction, Positive, PositiveCount
-from pretouch.groups import CapsuleArrays, Sensors
+from pretouch.groups import CapsuleArrays, Cones, Sensors
 from pretouch.hardware.findings import Finding
 from pretouch.perception.closest import bounds
-from pretouch.perception.obstacles import is_evidence, measured_distance, sensor_poses
-from pretouch.perception.scene_filter import RAYS, Fixtures, expected_range, nearest_capsule, plane_return
+from pretouch.perception.obstacles import is_evidence, measured_distance, placed_sensors
+from pretouch.perception.scene_filter import Fixtures, expected_range, nearest_capsule, plane_return
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, FloatArray, IntArray, RangeReadings
+from pretouch.types import BoolArray, FloatArray, RangeReadings
 
-_INNER = RAYS[:7]
-"""The axis, and the ring half-way to the edge of the cone: where all of these end, a return is strong."""
+_INNER = 7
+"""Rays: the axis, and the ring half-way to the edge of the cone: where all of these end, a return is strong."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ class ModelCheck:
         """
         fresh = readings.stamp > self._used
         self._used = np.maximum(self._used, readings.stamp)
-        distance = measured_distance(readings)
-        fresh &= is_evidence(readings, distance)
+        distance = measured_distance(readings, self._skin.cones)
+        fresh &= is_evidence(readings, distance, self._skin.cones)
         if not fresh.any():
             return
         position, nearest, farthest = self._predicted(q, fresh)
@@ -82,10 +82,10 @@ class ModelCheck:
     def _predicted(self, q: FloatArray, wanted: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the sensors are (K, 3), the nearest they can see of the model (K,), and what wanted ones must (K,)."""
         kin = self._model.kinematics(q)
-        position, rotation = sensor_poses(self._skin, kin)
-        body, link, fixtures = self._model.capsules, self._skin.link, self._fixtures
-        nearest = expected_range(kin, position, rotation, link, body, fixtures)
-        return position, nearest, _certain_return(kin, position, rotation, link, wanted, body, fixtures)
+        sensors, cones = placed_sensors(self._skin, kin), self._skin.cones
+        body, fixtures = self._model.capsules, self._fixtures
+        nearest = expected_range(kin, sensors, cones, body, fixtures)
+        return sensors.position, nearest, _certain_return(kin, sensors, cones, wanted, body, fixtures)
 
     def findings(self) -> tuple[Finding, ...]:
         """Return what disagrees by now, in the order of the skin."""
@@ -130,20 +130,19 @@ class _NearReadings:
 
 
 def _certain_return(
-    kin: Kinematics, position: FloatArray, rotation: FloatArray, own: IntArray, wanted: BoolArray,
-    body: Capsules, fixtures: Fixtures,
+    kin: Kinematics, sensors: Sensors, cones: Cones, wanted: BoolArray, body: Capsules, fixtures: Fixtures
 ) -> FloatArray:  # fmt: skip
     """Distance (K,) [m] by which all inner rays of a wanted sensor have ended, infinite where one goes on."""
     shapes = []
     for part in (body, fixtures.capsules):
         a, b = placed(part, kin)
         shapes.append((CapsuleArrays(part.link, a, b, part.radius), bounds(a, b, part.radius)))
-    sensors, far = Sensors(position, rotation, own), np.full(len(own), np.inf)
+    far = np.full(len(sensors.link), np.inf)
     for k in np.flatnonzero(wanted).tolist():
         far[k] = 0.0
-        for i in range(len(_INNER)):
-            ray = _INNER[i : i + 1]
-            end = plane_return(position, rotation, k, fixtures.planes, ray, np.inf)
+        for i in range(_INNER):
+            ray = cones._replace(rays=cones.rays[:, i : i + 1])
+            end = plane_return(sensors, k, fixtures.planes, ray, np.inf)
             for shape in shapes:
                 end = min(end, nearest_capsule(sensors, k, *shape, ray))
             far[k] = max(far[k], end)

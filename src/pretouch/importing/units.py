@@ -9,8 +9,9 @@ from pretouch.importing.sampling import spread
 from pretouch.importing.surface_distance import SurfaceDistance
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit, cone_rays
+from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray
 
 HEIGHT = 0.008
@@ -161,7 +162,7 @@ def _pose(foot: FloatArray, radius: float, x: FloatArray, z: FloatArray) -> Floa
 def _free(model: RobotModel, kin: Kinematics, link: int, T: FloatArray) -> float:
     """Part of a unit's beams that no other link of the arm is in, in one posture."""
     others = model.capsules.of_links(np.flatnonzero(np.arange(len(model.links)) != link))
-    rays = cone_rays(1) @ (kin.rotation[link] @ T[:3, :3]).T
+    rays = cone_rays(1, PAPER_SENSOR.angle) @ (kin.rotation[link] @ T[:3, :3]).T
     start = kin.position[link] + kin.rotation[link] @ T[:3, 3]
     along = np.linspace(0.0, _RANGE, 26)[1:]
     points = (start + along[:, None, None] * rays).reshape(-1, 3)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.groups import Sensors
+from pretouch.groups import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 FASTEST = 2.0
@@ -67,19 +67,21 @@ class LastSeen(NamedTuple):
 
 @compiled
 def reckon(
-    points: FloatArray, distance: FloatArray, stamp: FloatArray, before: LastSeen, sensors: Sensors, least: float,
+    points: FloatArray, distance: FloatArray, stamp: FloatArray, before: LastSeen, sensors: Sensors, cones: Cones,
     within: float,
 ) -> None:  # fmt: skip
     """Put points (K, 3) that are nearer than the sensor measures where they were last seen, as far as that may be.
 
-    A reading of `least` [m] says only that something is between 0 and that. Where the unit saw a point up to `within`
-    [s] before, it is on the beam at the height of that, moved on if it came nearer by itself faster than 0.1 m/s;
-    where it saw none, it is at the sensor. `stamp` (K,) [s] is that of the reading.
+    A reading of the nearest distance that a sensor measures, `least` [m], says only that something is between 0 and
+    that. Where the unit saw a point up to `within` [s] before, it is on the beam at the height of that, moved on if it
+    came nearer by itself faster than 0.1 m/s; where it saw none, it is at the sensor. `stamp` (K,) [s] is that of the
+    reading.
     """
     last, last_stamp, motion = before
     position, rotation = sensors.position, sensors.rotation
     for k in range(len(distance)):
-        # `measured` has raised what is nearer to `least`, and NaN is passed over
+        least = cones.range[cones.kind[k], 0]
+        # `measured` has raised what is nearer to that, and NaN is passed over
         if not distance[k] <= least:
             continue
         dt, ahead, nearing = stamp[k] - last_stamp[k], 0.0, 0.0

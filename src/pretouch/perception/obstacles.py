@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.groups import Cones, Sensors
 from pretouch.perception.closing import motion_init
 from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import MAX_DISTANCE, MIN_DISTANCE
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus
 from pretouch.values import value
 
@@ -64,6 +64,11 @@ def sensor_poses(skin: Skin, kin: Kinematics) -> tuple[FloatArray, FloatArray]:
     return poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
 
 
+def placed_sensors(skin: Skin, kin: Kinematics) -> Sensors:
+    """Return the sensors of a skin where they are in a posture."""
+    return Sensors(*sensor_poses(skin, kin), skin.link)
+
+
 @compiled
 def poses(
     link_position: FloatArray, link_rotation: FloatArray, link: IntArray, T_link_sensor: FloatArray
@@ -96,25 +101,25 @@ def locate(position: FloatArray, rotation: FloatArray, distance: FloatArray) -> 
     return point
 
 
-def measured_distance(readings: RangeReadings) -> FloatArray:
+def measured_distance(readings: RangeReadings, cones: Cones) -> FloatArray:
     """Distance (K,) [m] each reading stands for, NaN where it shows no target.
 
     A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone. A number
     beyond what it can measure shows nothing, whatever its status.
     """
     shown = np.empty(len(readings.distance))
-    measured(readings.distance, readings.status, shown)
+    measured(readings.distance, readings.status, cones, shown)
     return shown
 
 
-def is_evidence(readings: RangeReadings, distance: FloatArray) -> BoolArray:
+def is_evidence(readings: RangeReadings, distance: FloatArray, cones: Cones) -> BoolArray:
     """Say which readings (K,) tell anything: that a target is there, or that none near returns enough light.
 
     A failure (hardware, synchronisation, cross-talk, no measurement yet, a distance that is negative or no number)
     tells nothing, and is no more free space than silence is. A target beyond what the sensor can measure is far away.
     `distance` is what `measured_distance` makes of the readings.
     """
-    return tells_anything(readings.distance, readings.status, distance)
+    return tells_anything(readings.distance, readings.status, distance, cones)
 
 
 # UM2356: 6 is a valid range whose wrap-around was not checked, 11 one of several pulses merged into one
@@ -128,25 +133,27 @@ _NO_TARGET = tuple(
 
 
 @compiled
-def tells_anything(distance: FloatArray, status: IntArray, shown: FloatArray) -> BoolArray:
+def tells_anything(distance: FloatArray, status: IntArray, shown: FloatArray, cones: Cones) -> BoolArray:
     """Answer of `is_evidence`; `shown` (K,) is that of `measured_distance`."""
     tells = np.empty(len(status), np.bool_)
     for k in range(len(status)):
         # a number beyond the data sheet's range is no distance, but the sensor is at work; infinity and NaN are faults
-        far = status[k] in _SHOWN and np.isfinite(distance[k]) and distance[k] > MAX_DISTANCE
+        farthest = cones.range[cones.kind[k], 1]
+        far = status[k] in _SHOWN and np.isfinite(distance[k]) and distance[k] > farthest
         tells[k] = not np.isnan(shown[k]) or far or status[k] in _NO_TARGET
     return tells
 
 
 @compiled
-def measured(distance: FloatArray, status: IntArray, shown: FloatArray) -> None:
+def measured(distance: FloatArray, status: IntArray, cones: Cones, shown: FloatArray) -> None:
     """Write the answer (K,) of `measured_distance`."""
     for k in range(len(distance)):
+        nearest, farthest = cones.range[cones.kind[k]]
         shown[k] = np.nan
         if status[k] in _NEAR:
-            shown[k] = MIN_DISTANCE
-        elif status[k] in _SHOWN and 0 <= distance[k] <= MAX_DISTANCE:  # false for NaN
-            shown[k] = max(distance[k], MIN_DISTANCE)
+            shown[k] = nearest
+        elif status[k] in _SHOWN and 0 <= distance[k] <= farthest:  # false for NaN
+            shown[k] = max(distance[k], nearest)
 
 
 def track(

@@ -25,13 +25,12 @@ from pretouch.perception.obstacles import (
     take_in,
     tells_anything,
 )
-from pretouch.perception.scene_filter import RAYS, Fixtures, leave_out, leave_out_planes
+from pretouch.perception.scene_filter import Fixtures, leave_out, leave_out_planes
 from pretouch.perception.spread import bring_nearer, widen
 from pretouch.perception.stamped import move_back
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed_capsules, rotate
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import MIN_DISTANCE
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus, RobotState
 from pretouch.values import value
 
@@ -60,8 +59,6 @@ class Scene(NamedTuple):
     """Of fixtures."""
     planes: FloatArray
     """(P, 4) of fixtures."""
-    rays: FloatArray
-    """(R, 3) that stand for what a sensor sees."""
     moved_by: BoolArray
     """(L, n) whether a joint moves a link."""
     ee: int
@@ -108,7 +105,7 @@ def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: 
     """Return what `perceive` is made with."""
     p = params
     scene = Scene(
-        model.capsules.arrays, model.body.arrays, fixtures.capsules.arrays, fixtures.planes, RAYS, model.moved_by,
+        model.capsules.arrays, model.body.arrays, fixtures.capsules.arrays, fixtures.planes, model.moved_by,
         model.ee,
     )  # fmt: skip
     estimates, memory = p.closing is not None, math.inf if p.closing is None else p.closing.memory_s
@@ -125,9 +122,9 @@ def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: 
     return PerceptionSetup(model, skin, fixtures, params, flattened(scene, skin.arrays, numbers), points)
 
 
-def nothing_seen(readings: RangeReadings) -> Perception:
+def nothing_seen(readings: RangeReadings, skin: Skin) -> Perception:
     """Return what is seen without a unit, or where nobody looks."""
-    return Perception(no_obstacles(), measured_distance(readings), np.inf, 0.0)
+    return Perception(no_obstacles(), measured_distance(readings, skin.cones), np.inf, 0.0)
 
 
 def perceive(
@@ -144,7 +141,7 @@ def perceive(
     """
     params, count = setup.params, len(setup.skin)
     if count == 0:
-        return nothing_seen(readings), state
+        return nothing_seen(readings, setup.skin), state
     # a step is pure: what compiled code writes to is copied first
     motion = state.motion if params.closing is None else state.motion.copy()
     tracks = TrackState(state.point.copy(), state.direction.copy(), state.times.copy(), motion)
@@ -225,7 +222,7 @@ def _perceive(
     longest last reported anything.
     """
     now, times, distance = instant.now, tracks.times, room.distance
-    measured(readings.distance, readings.status, distance)
+    measured(readings.distance, readings.status, skin.cones, distance)
 
     # which readings are new, show what is not known to be there, and where
     fresh, any_fresh = newer(times[USED], readings.stamp, now), False
@@ -287,10 +284,13 @@ def _take_readings(
     instant: Instant, shown: NewShown,
 ) -> None:  # fmt: skip
     """Take the readings that are new and show what is not known to be there into the tracks."""
-    times, distance, fresh, now = tracks.times, shown.distance, shown.fresh, instant.now
+    times, distance, fresh, now, cones = tracks.times, shown.distance, shown.fresh, instant.now, skin.cones
     position, rotation = poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
     sensors = Sensors(position, rotation, skin.link)
-    tells, shows = tells_anything(readings.distance, readings.status, distance), np.empty(len(distance), np.bool_)
+    tells, shows = (
+        tells_anything(readings.distance, readings.status, distance, cones),
+        np.empty(len(distance), np.bool_),
+    )
     # a return expected before `ends`, up to `margin_m` behind the reading, explains it: nothing is seen through a body
     ends = distance + p.margin_m
     for k in range(len(shows)):
@@ -298,20 +298,20 @@ def _take_readings(
     if p.filters:
         if p.sigmas > 0:
             widen(ends, p.sigmas, skin.position_sigma, skin.orientation_sigma, distance, p.margin_m)
-        leave_out(shows, fresh, distance, ends, p.aside_m, sensors, placed_capsules(scene.arm, kin), scene.rays)
+        leave_out(shows, fresh, distance, ends, p.aside_m, sensors, placed_capsules(scene.arm, kin), cones)
     if instant.moves:
         # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
         chain = Chain(kin.anchor, kin.axis, scene.moved_by, instant.qd)
         # changes `position` and `rotation`, the arrays of `sensors`, for all that follows
         move_back(sensors, readings.stamp, chain, instant.posed, p.persistence_s)
     if p.filters:
-        leave_out(shows, fresh, distance, ends, p.aside_m, sensors, placed_capsules(scene.others, kin), scene.rays)
-        leave_out_planes(shows, fresh, ends, position, rotation, scene.planes, scene.rays)
+        leave_out(shows, fresh, distance, ends, p.aside_m, sensors, placed_capsules(scene.others, kin), cones)
+        leave_out_planes(shows, fresh, ends, sensors, scene.planes, cones)
     points = locate(position, rotation, distance)  # eq. 1
     # both look at what was seen last, before `take_in` overwrites it
     if p.reckons:
         before = LastSeen(tracks.point, times[SEEN], tracks.motion)
-        reckon(points, distance, readings.stamp, before, sensors, MIN_DISTANCE, 3 * p.persistence_s)
+        reckon(points, distance, readings.stamp, before, sensors, cones, 3 * p.persistence_s)
     if p.estimates:
         taken = fresh & shows & (now - readings.stamp <= p.persistence_s)  # by `take_in`
         follow_points(tracks.motion, tracks.point, times[SEEN], points, readings.stamp, taken, p.memory_s)

@@ -7,18 +7,13 @@ import numpy as np
 
 from pretouch.compiled import compiled, entry, inlined
 from pretouch.errors import FixtureError
-from pretouch.groups import CapsuleArrays, Sensors
+from pretouch.groups import CapsuleArrays, Cones, Sensors
 from pretouch.perception.closest import bounds, to_axis, to_spheres
 from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import Kinematics
 from pretouch.robot.vectors import dot, placed, rotate
-from pretouch.sensing.unit import CONE_ANGLE, cone_rays
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray
 
-RAYS = cone_rays(2)
-"""Unit vectors (19, 3) that stand for all a sensor sees, sensor frame; the first is its axis."""
-
-_COS, _SIN = float(np.cos(CONE_ANGLE / 2)), float(np.sin(CONE_ANGLE / 2))
 _ROUNDING = 1e-9
 """Distance within which rounding may put a point on either side of a surface [m]."""
 
@@ -68,33 +63,24 @@ def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:
     )
 
 
-def expected_range(
-    kin: Kinematics,
-    position: FloatArray,
-    rotation: FloatArray,
-    own_link: IntArray,
-    body: Capsules,
-    fixtures: Fixtures,
-) -> FloatArray:
+def expected_range(kin: Kinematics, sensors: Sensors, cones: Cones, body: Capsules, fixtures: Fixtures) -> FloatArray:
     """Distance (K,) [m] at which each sensor would see the arm or a fixture, infinite where it would not.
 
     The least over rays that fill the sensor's cone. A unit does not see the link it sits on.
 
     Args:
         kin: posture.
-        position: (K, 3) sensor origins, base frame [m].
-        rotation: (K, 3, 3) sensor orientations, z outwards.
-        own_link: (K,) link each sensor sits on.
+        sensors: K of them, placed.
+        cones: what each sees.
         body: the arm as capsules, base included.
         fixtures: what stands around it.
     """
-    near = np.array([plane_return(position, rotation, k, fixtures.planes, RAYS, np.inf) for k in range(len(own_link))])
+    near = np.array([plane_return(sensors, k, fixtures.planes, cones, np.inf) for k in range(len(sensors.link))])
     for part in (body, fixtures.capsules):
         a, b = placed(part, kin)
-        sensors, capsules = Sensors(position, rotation, own_link), CapsuleArrays(part.link, a, b, part.radius)
-        spheres = bounds(a, b, part.radius)
+        capsules, spheres = CapsuleArrays(part.link, a, b, part.radius), bounds(a, b, part.radius)
         for k in range(len(near)):
-            near[k] = min(near[k], nearest_capsule(sensors, k, capsules, spheres, RAYS))
+            near[k] = min(near[k], nearest_capsule(sensors, k, capsules, spheres, cones))
     return near
 
 
@@ -114,7 +100,7 @@ class Wanted(NamedTuple):
 @compiled
 def leave_out(
     shows: BoolArray, fresh: BoolArray, distance: FloatArray, ends: FloatArray, aside: float, sensors: Sensors,
-    capsules: CapsuleArrays, rays: FloatArray,
+    capsules: CapsuleArrays, cones: Cones,
 ) -> None:  # fmt: skip
     """Take from `shows` (K,) each fresh reading that a placed capsule explains: one seen up to its `ends` (K,) [m].
 
@@ -125,37 +111,38 @@ def leave_out(
         end = ends[k]
         if fresh[k] and shows[k]:
             # nothing farther explains the reading, and the first return within is enough
-            shows[k] = capsule_return(sensors, k, capsules, spheres, rays, Wanted(0.0, -np.inf, end, end)) > end
+            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, Wanted(0.0, -np.inf, end, end)) > end
         if fresh[k] and shows[k] and aside > 0:
             # A capsule that is missed hides nothing behind it: only a reading from about there is taken for it. One
             # that comes nearer than that is out at its first such ray.
             wanted = Wanted(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
-            shows[k] = capsule_return(sensors, k, capsules, spheres, rays, wanted) > end
+            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, wanted) > end
 
 
 @compiled
 def leave_out_planes(
-    shows: BoolArray, fresh: BoolArray, ends: FloatArray, position: FloatArray, rotation: FloatArray,
-    planes: FloatArray, rays: FloatArray,
+    shows: BoolArray, fresh: BoolArray, ends: FloatArray, sensors: Sensors, planes: FloatArray, cones: Cones
 ) -> None:  # fmt: skip
     """Take from `shows` (K,) what planes explain, as `leave_out` does for capsules."""
     for k in range(len(shows)):
         if fresh[k] and shows[k]:
-            shows[k] = plane_return(position, rotation, k, planes, rays, ends[k]) > ends[k]
+            shows[k] = plane_return(sensors, k, planes, cones, ends[k]) > ends[k]
 
 
 @entry
-def nearest_capsule(sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, rays: FloatArray) -> float:
+def nearest_capsule(sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, cones: Cones) -> float:
     """Least distance [m] at which sensor k sees a placed capsule; `spheres` are those of `bounds`."""
-    return capsule_return(sensors, k, capsules, spheres, rays, Wanted(0.0, -np.inf, np.inf, -np.inf))
+    return capsule_return(sensors, k, capsules, spheres, cones, Wanted(0.0, -np.inf, np.inf, -np.inf))
 
 
 @compiled
 def capsule_return(
-    sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, rays: FloatArray, wanted: Wanted
+    sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, cones: Cones, wanted: Wanted
 ) -> float:
     """Least distance [m] at which sensor k sees a capsule that counts, infinite for none; `spheres` of `bounds`."""
     position, rotation, link, own = sensors.position, sensors.rotation, capsules.link, sensors.link[k]
+    edge, rays = cones.edge[cones.kind[k]], cones.rays[cones.kind[k]]
+    cos, sin = edge[0], edge[1]
     far2 = np.empty(len(link))
     to_spheres(position, k, spheres, far2)
     bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
@@ -168,11 +155,11 @@ def capsule_return(
         # the cone can meet the sphere only if it is ahead, and if cos l - sin z <= reach as in `_cone_meets`
         along = spheres[0, c] * bx + spheres[1, c] * by + spheres[2, c] * bz - start
         # the test below is squared: `inside` is positive where along >= -reach, for sin < 1
-        inside = reach + _SIN * along
-        if along < -reach or (far2[c] - along * along) * (_COS * _COS) > inside * inside:
+        inside = reach + sin * along
+        if along < -reach or (far2[c] - along * along) * (cos * cos) > inside * inside:
             continue
         # rays cost most: they are cast only at what passes both tests
-        if _cone_meets(sensors, k, capsules, c, wanted):
+        if _cone_meets(sensors, k, capsules, c, edge, wanted):
             at = _cast(sensors, k, capsules, c, rays, wanted)
             if at >= wanted.beyond:
                 least = min(least, at)
@@ -182,10 +169,9 @@ def capsule_return(
 
 
 @compiled
-def plane_return(
-    position: FloatArray, rotation: FloatArray, k: int, planes: FloatArray, rays: FloatArray, within: float
-) -> float:
+def plane_return(sensors: Sensors, k: int, planes: FloatArray, cones: Cones, within: float) -> float:
     """Least distance [m] at which sensor k sees a plane from its free side, infinite for none nearer than `within`."""
+    position, rotation, rays = sensors.position, sensors.rotation, cones.rays[cones.kind[k]]
     least, ray = np.inf, np.empty(3)
     for m in range(len(planes)):
         normal = planes[m]
@@ -201,14 +187,17 @@ def plane_return(
 
 
 @inlined
-def _cone_meets(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, wanted: Wanted) -> bool:
-    """Whether the cone of sensor k can meet capsule c within what is wanted; never wrongly no.
+def _cone_meets(
+    sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, edge: FloatArray, wanted: Wanted
+) -> bool:  # fmt: skip
+    """Whether the cone of sensor k, of such an edge, can meet capsule c within what is wanted; never wrongly no.
 
     With z along the beam and l across it, z sin - l cos is by how much a point lies inside the tangent plane of the
     cone: no point of the capsule's axis may be farther out than the radius. On the axis that is a convex function,
     whose least value is where its slope vanishes or at an end.
     """
     position, rotation, a, b = sensors.position, sensors.rotation, capsules.a, capsules.b
+    cos, sin = edge[0], edge[1]
     reach = capsules.radius[c] + wanted.aside + _ROUNDING
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = a[c, 0] - position[k, 0], a[c, 1] - position[k, 1], a[c, 2] - position[k, 2]
@@ -223,19 +212,19 @@ def _cone_meets(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, wante
     mixed = x * ux + y * uy + z * uz - start * rise
     slope = max(0.0, ux * ux + uy * uy + uz * uz - rise * rise)
     least = min(
-        _COS * np.sqrt(across) - _SIN * start,
-        _COS * np.sqrt(max(0.0, across + 2 * mixed + slope)) - _SIN * (start + rise),
+        cos * np.sqrt(across) - sin * start,
+        cos * np.sqrt(max(0.0, across + 2 * mixed + slope)) - sin * (start + rise),
     )
     # The slope vanishes where l cos grows as fast as z sin. With spread <= 0 it does so nowhere: the axis is closer to
     # the beam's direction than the edge of the cone is, and the least value is at an end.
-    spread = _COS * _COS * slope - _SIN * _SIN * rise * rise
+    spread = cos * cos * slope - sin * sin * rise * rise
     if slope > 0 and spread > 0:
         middle = -mixed / slope
         off = np.sqrt(max(0.0, across - mixed * mixed / slope))
-        s = middle + _SIN * rise * off / np.sqrt(slope * spread)  # (s - middle)^2 slope spread = (sin rise off)^2
+        s = middle + sin * rise * off / np.sqrt(slope * spread)  # (s - middle)^2 slope spread = (sin rise off)^2
         if 0 < s < 1:
             l2 = max(0.0, across + s * (2 * mixed + s * slope))
-            least = min(least, _COS * np.sqrt(l2) - _SIN * (start + s * rise))
+            least = min(least, cos * np.sqrt(l2) - sin * (start + s * rise))
     return bool(least <= reach)
 
 

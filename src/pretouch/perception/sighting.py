@@ -10,15 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, entry
-from pretouch.groups import CapsuleArrays, Sensors
+from pretouch.groups import CapsuleArrays, Cones, Sensors
 from pretouch.perception.scene_filter import ray_capsule
-from pretouch.sensing.unit import CONE_ANGLE
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 GRID_M = 0.01
 """Distance between two places of a way that are looked at [m]."""
 
-_TAN = float(np.tan(CONE_ANGLE / 2))
 _TOUCHING_M = 1e-6
 """Depth to which rounding may put a ball into what it touches [m]."""
 
@@ -77,9 +75,18 @@ def ways_free(
                 free[w] = ray_capsule(start[w], way[w], a[c], b[c], reach) > length
 
 
+class View(NamedTuple):
+    """How far units see."""
+
+    limit: FloatArray
+    """(K,) farthest reading that shows the ball, and not the arm or the room [m]."""
+    light: float
+    """Of `in_view` [m^2]."""
+
+
 @entry
 def ways_seen(
-    ways: BallWays, free: BoolArray, stretch: Stretch, sensors: Sensors, limit: FloatArray, light: float,
+    ways: BallWays, free: BoolArray, stretch: Stretch, sensors: Sensors, cones: Cones, view: View,
     seen: BoolArray,
 ) -> None:  # fmt: skip
     """Write whether (K, W) each unit has the ball in view at `run` + 1 places of the grid in a row.
@@ -89,17 +96,19 @@ def ways_seen(
         free: (W,) ways to look at; the others count as not seen.
         stretch: places that count.
         sensors: K units.
-        limit: (K,) farthest reading that shows the ball, and not the arm or the room [m].
-        light: of `in_view` [m^2].
+        cones: what each sees.
+        view: how far they see.
         seen: (K, W) the answer.
     """
     start, way, radius = ways
     first, last, run = stretch
+    limit, light = view
     position, rotation = sensors.position, sensors.rotation
     near, far = first * GRID_M, last * GRID_M
     for k in range(len(position)):
         ox, oy, oz = position[k, 0], position[k, 1], position[k, 2]
         zx, zy, zz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
+        widening = cones.edge[cones.kind[k], 2]
         reach = limit[k] + radius
         for w in range(len(start)):
             seen[k, w] = False
@@ -117,7 +126,7 @@ def ways_seen(
             in_row = 0
             for i in range(first, last + 1):
                 s = i * GRID_M
-                if in_view(depth + s * rise, offset2 + s * (2 * along + s), radius, limit[k], light):
+                if in_view(depth + s * rise, offset2 + s * (2 * along + s), radius, widening, limit[k], light):
                     in_row += 1
                     if in_row > run:
                         seen[k, w] = True
@@ -129,7 +138,9 @@ def ways_seen(
 
 
 @compiled
-def in_view(depth: float, distance2: float, radius: float, limit: float, light: float) -> bool:
+def in_view(
+    depth: float, distance2: float, radius: float, widening: float, limit: float, light: float
+) -> bool:  # fmt: skip
     """Whether a unit sees a ball: enough of it in the cone, and nearer than `limit` [m].
 
     A reading comes from the ball's surface, on average 2/3 of the radius before its centre, d. With A the part of the
@@ -139,6 +150,7 @@ def in_view(depth: float, distance2: float, radius: float, limit: float, light: 
         depth: of the ball's centre along the beam [m].
         distance2: of the centre from the unit, squared [m^2].
         radius: of the ball [m].
+        widening: tangent of half the cone's angle.
         limit: farthest reading that counts [m].
         light: square of the distance at which something that fills the cone, as slanted as a ball, is just seen [m^2].
     """
@@ -149,7 +161,7 @@ def in_view(depth: float, distance2: float, radius: float, limit: float, light: 
     if depth <= 0 or read > limit:
         return False
     # the ball is taken for a disc across the beam at the depth of its centre: both circles lie in that plane
-    cone, aside = depth * _TAN, np.sqrt(max(0.0, distance2 - depth * depth))
+    cone, aside = depth * widening, np.sqrt(max(0.0, distance2 - depth * depth))
     if aside >= cone + radius:
         return False
     # light A / d^2 >= 1 with A = common area / cone area, multiplied out

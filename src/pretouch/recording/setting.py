@@ -12,7 +12,7 @@ from weakref import finalize
 
 import numpy as np
 
-from pretouch.composition import as_table
+from pretouch.composition import as_table, from_table
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError, RecordingError
@@ -25,6 +25,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
 from pretouch.robot.mjcf_check import check_mjcf
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.types import FloatArray
@@ -131,7 +132,7 @@ def encode_run(sequence: int, controller: Controller, about: Mapping[str, JSON])
     kind, numbers = _path_numbers(controller.path)
     return encoded(RUN, make(
         RUN, sequence, FORMAT, time.time(), as_json(versions()), as_json(dict(about)),
-        as_json(as_table(controller.profile)), as_json(_description(model.description) | _sigmas(skin) | _touch(skin)),
+        as_json(as_table(controller.profile)), as_json(_description(model.description) | _units(skin)),
         _mjcf(model.description),
         list(skin.ids),
         [unit.link for unit in skin.units], skin.T_link_sensor.reshape(-1).copy(),
@@ -214,15 +215,27 @@ def _touch(skin: Skin) -> dict[str, JSON]:
     return {_TOUCH: [None if u.touch is None else asdict(u.touch) for u in skin.units]} if len(skin.touching) else {}
 
 
+_SENSOR = "unit_sensor"
+
+
+def _units(skin: Skin) -> dict[str, JSON]:
+    """Describe what is not as usual of the units of a skin: uncertain places, touch sensors, types of sensor."""
+    sensors = [unit.sensor for unit in skin.units]
+    own = {_SENSOR: [as_table(sensor) for sensor in sensors]} if any(s != PAPER_SENSOR for s in sensors) else {}
+    return _sigmas(skin) | _touch(skin) | own
+
+
 def _skin(m: Any, model: RobotModel) -> Skin:
     poses = m.unit_pose.reshape(-1, 4, 4)
     sigmas = from_json(m.robot).get(_SIGMAS, [[0.0, 0.0]] * len(poses))
     patches = from_json(m.robot).get(_TOUCH, [None] * len(poses))
-    units = zip(m.unit_id, m.unit_link, poses, sigmas, patches, strict=True)
+    tables = from_json(m.robot).get(_SENSOR)
+    sensors = [from_table(Sensor, table, "unit_sensor", []) for table in tables or []] or [PAPER_SENSOR] * len(poses)
+    units = zip(m.unit_id, m.unit_link, poses, sigmas, patches, sensors, strict=True)
     return Skin(
         [
-            SensorUnit(name, link, pose, at, turn, None if patch is None else TouchPatch(**patch))
-            for name, link, pose, (at, turn), patch in units
+            SensorUnit(name, link, pose, at, turn, None if patch is None else TouchPatch(**patch), sensor)
+            for name, link, pose, (at, turn), patch, sensor in units
         ],
         model,
     )

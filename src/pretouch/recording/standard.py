@@ -11,7 +11,7 @@ import numpy as np
 from pretouch.controller import Controller
 from pretouch.recording.codec import decode_inputs
 from pretouch.recording.messages import Item, encoded, make
-from pretouch.sensing.unit import CONE_ANGLE, MAX_DISTANCE, MIN_DISTANCE
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.types import ControlStep, FloatArray, RangeReadings, RangeStatus
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -62,10 +62,10 @@ class Standard:
 
     def __init__(self, controller: Controller) -> None:
         model = controller.model
-        self._ids = controller.skin.ids
+        self._units = controller.skin.units
         self._base = model.links[0]
         self._joints = list(model.joints)
-        self._newest = np.full(len(self._ids), -np.inf)
+        self._newest = np.full(len(self._units), -np.inf)
 
     def items(self, given: bytes | None, step: ControlStep, sequence: int, time: int) -> Iterator[Item]:
         """Yield the messages of one cycle; without the inputs, as CDR, those that a step can tell."""
@@ -87,19 +87,23 @@ class Standard:
     def _ranges(self, readings: RangeReadings, sequence: int, time: int) -> Iterator[Item]:
         """Yield a message for each unit whose reading is not the one before."""
         stamps, distances, statuses = readings.stamp, readings.distance, readings.status
-        if not len(stamps) == len(distances) == len(statuses) == len(self._ids):
+        if not len(stamps) == len(distances) == len(statuses) == len(self._units):
             return
         fresh = np.flatnonzero((stamps != self._newest) & np.isfinite(stamps))
         self._newest = stamps
         for k in fresh.tolist():
-            yield range_item(self._ids[k], sequence, time, float(stamps[k]), float(distances[k]), int(statuses[k]))
+            reading = float(stamps[k]), float(distances[k]), int(statuses[k])
+            yield range_item(self._units[k].id, sequence, time, *reading, self._units[k].sensor)
 
 
-def range_item(unit_id: str, sequence: int, time: int, stamp: float, distance: float, status: int) -> Item:
+def range_item(
+    unit_id: str, sequence: int, time: int, stamp: float, distance: float, status: int, sensor: Sensor = PAPER_SENSOR
+) -> Item:  # fmt: skip
     """Return a unit's reading measured at a stamp [s], logged at an instant [ns]: distance [m] and `RangeStatus`."""
     at = header(nanoseconds(stamp, time), unit_id)
     shown = _single(distance) if status in _SHOWN else math.inf
-    message = make(RANGE, at, _INFRARED, CONE_ANGLE, MIN_DISTANCE, MAX_DISTANCE, shown, _ACCURACY_M**2)
+    sees = sensor.angle, sensor.nearest_m, sensor.farthest_m
+    message = make(RANGE, at, _INFRARED, *sees, shown, _ACCURACY_M**2)
     return Item(f"/skin/{topic_name(unit_id)}/range", RANGE, sequence, time, encoded(RANGE, message))
 
 

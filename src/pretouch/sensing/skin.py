@@ -11,10 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.atomic_write import atomic_write
 from pretouch.errors import SkinError
-from pretouch.groups import SkinArrays
+from pretouch.groups import Cones, SkinArrays
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.seat import seat
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
+from pretouch.sensing.sensor_types import own_types, sensor_called, tables_of
 from pretouch.sensing.unit import (
     LARGEST_NUMBER,
     LARGEST_ORIENTATION_SIGMA,
@@ -65,7 +67,9 @@ class Skin:
         """(K,) standard deviation of each unit's position [m]."""
         self.orientation_sigma: FloatArray = np.array([u.orientation_sigma for u in self.units], dtype=np.float64)
         """(K,) standard deviation of each unit's orientation [rad]."""
-        self.arrays = SkinArrays(self.link, self.T_link_sensor, self.position_sigma, self.orientation_sigma)
+        self.cones: Cones = cones_of([u.sensor for u in self.units])
+        """What each unit sees, for compiled code."""
+        self.arrays = SkinArrays(self.link, self.T_link_sensor, self.position_sigma, self.orientation_sigma, self.cones)
         """The same for compiled code."""
         self.exact = not (self.position_sigma.any() or self.orientation_sigma.any())
         """Whether the place of every unit is taken as exact."""
@@ -111,7 +115,8 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
     if not isinstance(entries, list) or not entries:
         raise SkinError(f"The skin file {path} has no unit: give at least one [[unit]] with id, link and pose.")
     try:
-        return Skin([_unit_from(entry) for entry in entries], model)
+        types = own_types(data.get("sensor", {}))
+        return Skin([_unit_from(entry, types) for entry in entries], model)
     except SkinError as error:
         raise SkinError(f"{error} (in {path})") from error
 
@@ -123,7 +128,8 @@ def save_skin(skin: Skin, path: Path) -> None:
     it leads to is replaced.
     """
     try:
-        atomic_write(path, tomli_w.dumps({"unit": [_entry(unit) for unit in skin.units]}))
+        units = {"unit": [_entry(unit) for unit in skin.units]}
+        atomic_write(path, tomli_w.dumps(tables_of(unit.sensor for unit in skin.units) | units))
     except OSError as error:
         raise SkinError(f"The skin cannot be written to {path}: {error.strerror}.") from error
 
@@ -164,7 +170,7 @@ def skin_for(model: RobotModel, file: Path | str = "") -> Skin:
     return load_skin(file or skin_file(model.description), model)
 
 
-_KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad", "touch")
+_KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad", "touch", "sensor")
 _ARRAYS = ("position_m", "quaternion_wxyz")
 _TOUCH_KEYS = {"radius_m": "radius", "force_min_n": "force_min", "measures_force": "measures_force"}
 
@@ -179,6 +185,7 @@ def _entry(unit: SensorUnit) -> dict[str, Any]:
     }
     sigmas = {"position_sigma_m": unit.position_sigma, "orientation_sigma_rad": unit.orientation_sigma}
     entry |= {key: sigma for key, sigma in sigmas.items() if sigma}
+    entry |= {} if unit.sensor == PAPER_SENSOR else {"sensor": unit.sensor.label}
     return entry if unit.touch is None else entry | {"touch": _touch_entry(unit.touch)}
 
 
@@ -192,13 +199,15 @@ def sensor_unit(**entry: Any) -> SensorUnit:
 
     Args:
         entry: `id`, `link`, `position_m` (3,) [m] from the link's origin, `quaternion_wxyz` (4,) of the sensor's axes
-            in the link's, and, where they are known, `position_sigma_m` [m], `orientation_sigma_rad` [rad] and `touch`
-            (true, or its values).
+            in the link's, and, where they are known, `position_sigma_m` [m], `orientation_sigma_rad` [rad], `touch`
+            (true, or its values) and `sensor` (the name of a type).
     """
-    return _unit_from({key: np.asarray(value).tolist() if key in _ARRAYS else value for key, value in entry.items()})
+    return _unit_from(
+        {key: np.asarray(value).tolist() if key in _ARRAYS else value for key, value in entry.items()}, {}
+    )
 
 
-def _unit_from(entry: Any) -> SensorUnit:
+def _unit_from(entry: Any, types: dict[str, Sensor]) -> SensorUnit:
     if not isinstance(entry, dict):
         raise SkinError(f"A unit is {_shown(entry)}: write it as a [[unit]] table.")
     name = entry.get("id")
@@ -220,7 +229,8 @@ def _unit_from(entry: Any) -> SensorUnit:
     T[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
     position_sigma = _sigma(entry, "position_sigma_m", LARGEST_POSITION_SIGMA)
     orientation_sigma = _sigma(entry, "orientation_sigma_rad", LARGEST_ORIENTATION_SIGMA)
-    return SensorUnit(name, entry["link"], T, position_sigma, orientation_sigma, _touch(entry))
+    sensor = sensor_called(entry.get("sensor", PAPER_SENSOR.name), f"Unit {name}", types)
+    return SensorUnit(name, entry["link"], T, position_sigma, orientation_sigma, _touch(entry), sensor)
 
 
 def _touch(entry: dict[str, Any]) -> TouchPatch | None:

@@ -5,16 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.errors import SkinError
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.types import FloatArray
-
-CONE_ANGLE = np.deg2rad(27.0)
-"""Full angle of the VL53L1X field of view [rad] (data sheet DS12385, 16 x 16 SPAD)."""
-
-MIN_DISTANCE = 0.04
-"""Smallest distance the VL53L1X measures [m] (data sheet)."""
-
-MAX_DISTANCE = 4.0
-"""Largest distance the VL53L1X measures [m] (data sheet, paper III-A)."""
 
 LARGEST_NUMBER = 1000.0
 """Largest number a pose may hold: any larger one is a mistake, and its square may not be finite."""
@@ -77,6 +69,8 @@ class SensorUnit:
     """Standard deviation of its orientation about the worst axis [rad]; 0 takes it as exact."""
     touch: TouchPatch | None = None
     """Its touch sensor, if it has one."""
+    sensor: Sensor = PAPER_SENSOR
+    """Its range finder."""
 
     def __post_init__(self) -> None:
         if not self.id:
@@ -108,16 +102,3 @@ class SensorUnit:
                 f"Unit {self.id}: its {name} is {sigma!r}: give a standard deviation from 0 to {largest:.4g} {si}."
             )
         object.__setattr__(self, name, float(sigma))
-
-
-def cone_rays(rings: int) -> FloatArray:
-    """Unit vectors (1 + 3 rings (rings + 1), 3) that fill the field of view, sensor frame.
-
-    The axis comes first, then `rings` circles of 6, 12, ... rays, the outermost on the edge of the cone.
-    """
-    rays = [np.array([0.0, 0.0, 1.0])]
-    for ring in range(1, rings + 1):
-        tilt = CONE_ANGLE / 2 * ring / rings
-        for turn in 2 * np.pi * np.arange(6 * ring) / (6 * ring):
-            rays.append(np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)]))
-    return np.array(rays)

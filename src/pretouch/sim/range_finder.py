@@ -10,8 +10,8 @@ import numpy as np
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled, entry
 from pretouch.errors import ParameterError
+from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import MIN_DISTANCE, cone_rays
 from pretouch.sim.plant import Plant
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, RangeReadings, RangeStatus
@@ -118,7 +118,7 @@ class RangeFinders:
         self._plant, self._skin, self._params, self._mode = plant, skin, params, MODES[params.mode]
         self._rng = np.random.default_rng([seed, 3])
         self._send, self._light = send, np.random.default_rng([seed, 4])
-        self._rays = cone_rays(params.rings)
+        self._rays = cone_rays(params.rings, PAPER_SENSOR.angle)
         self._calibration = _flat_wall(self._rays[:, 2])
         rays = len(self._rays)
         self._geom, self._hit, self._normal = np.zeros(rays, np.int32), np.zeros(rays), np.zeros(3 * rays)
@@ -189,6 +189,7 @@ class RangeFinders:
         )  # fmt: skip
 
 
+_NEAREST_M = PAPER_SENSOR.nearest_m
 _SIGNAL_LIMIT_MCPS = 1.024
 """Signal of a target that is just detected [Mcps] (data sheet: readings below 1024 kcps are rejected)."""
 _AMBIENT_MCPS = 0.3
@@ -316,6 +317,6 @@ def _reading(
     measured = max(0.0, mean + offset + sigma * draw)
     if sigma > errors.sigma_limit_m:
         return measured, _SIGMA, sigma, total
-    if measured < MIN_DISTANCE:
+    if measured < _NEAREST_M:
         return measured, _MIN_RANGE, sigma, total
     return measured, _OK, sigma, total

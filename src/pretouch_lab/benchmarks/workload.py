@@ -10,8 +10,9 @@ from pretouch.control.path import Circle
 from pretouch.errors import ExperimentError
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import CONE_ANGLE, SensorUnit
+from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray, Inputs, IntArray, RangeReadings, RangeStatus, RobotState
 
 LARGEST_SKIN = 10_000
@@ -179,7 +180,7 @@ def _sees_past(body: _Body, link: int, p: FloatArray, beam: FloatArray, seen: fl
         return False
     along = np.linspace(0.0, seen, 16)
     others = body.distance(p + along[:, None] * beam)[:, body.link != link]
-    return bool(np.all(others > along[:, None] * np.tan(CONE_ANGLE / 2)))
+    return bool(np.all(others > along[:, None] * np.tan(PAPER_SENSOR.angle / 2)))
 
 
 def _ranges(origin: FloatArray, beam: FloatArray, centers: FloatArray) -> FloatArray:

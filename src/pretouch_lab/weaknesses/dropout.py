@@ -16,8 +16,8 @@ from pretouch.perception.closest import no_obstacles
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import cone_rays
 from pretouch.sim.paper_scenes import static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import MODES, RangeFinders
@@ -105,7 +105,7 @@ class Loss:
 
 def facing(plant: Plant, skin: Skin, name: str) -> list[int]:
     """Units in whose cone a geom of the scene is the first that some ray meets."""
-    wanted, rays = plant.mj_model.geom(name).id, cone_rays(2)
+    wanted, rays = plant.mj_model.geom(name).id, cone_rays(2, PAPER_SENSOR.angle)
     position, rotation = sensor_poses(skin, plant.model.kinematics(plant.mj_data.qpos[: plant.model.n]))
     geom, distance = np.zeros(len(rays), np.int32), np.zeros(len(rays))
     found = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.params import PerceptionParams
-from pretouch.perception.obstacles import sensor_poses
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
 from pretouch.profiles import Profile, profile
 from pretouch.sensing.skin import Skin
@@ -137,7 +137,7 @@ def _expected(record: Record, context: Context, known: Fixtures) -> FloatArray:
     model, skin, near = context.model, context.skin, []
     for step in record.steps:
         kin = model.kinematics(step.q)
-        near.append(expected_range(kin, *sensor_poses(skin, kin), skin.link, model.capsules, known))
+        near.append(expected_range(kin, placed_sensors(skin, kin), skin.cones, model.capsules, known))
     return np.array(near)
 
 

@@ -4,7 +4,7 @@ from tests.lab.limits import assert_within_limits
 from tests.lab.rows import made_up
 from tests.lab.width import width
 
-from pretouch.perception.obstacles import sensor_poses
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import expected_range, no_fixtures
 from pretouch.profiles import profile
 from pretouch.sim.scene import fixtures
@@ -48,10 +48,10 @@ def test_without_it_the_arm_slows_for_itself(trials):
 def test_readings_are_sorted_by_what_the_model_predicts(context, panda_model, paper_skin):
     q = panda_model.description.q_ready
     kin = panda_model.kinematics(q)
-    poses = sensor_poses(paper_skin, kin)
+    poses = placed_sensors(paper_skin, kin)
     room = fixtures(views.scene("low"))
-    arm = expected_range(kin, *poses, paper_skin.link, panda_model.capsules, no_fixtures())
-    either = expected_range(kin, *poses, paper_skin.link, panda_model.capsules, room)
+    arm = expected_range(kin, poses, paper_skin.cones, panda_model.capsules, no_fixtures())
+    either = expected_range(kin, poses, paper_skin.cones, panda_model.capsules, room)
     shown = np.full(len(paper_skin), np.nan)
     sees_arm = int(np.flatnonzero(np.isfinite(arm))[0])
     sees_floor = int(np.flatnonzero(either < arm - 0.2)[0])
@@ -75,9 +75,9 @@ def test_the_unit_that_looks_down_sees_the_table_and_nothing_of_the_arm(context,
     assert skin.ids == (*context.skin.ids, "hand_down")
     assert views.skin("low", context) is context.skin
     kin = panda_model.kinematics(panda_model.description.q_ready)
-    poses, room = sensor_poses(skin, kin), fixtures(views.scene("down"))
-    arm = expected_range(kin, *poses, skin.link, panda_model.capsules, no_fixtures())
-    either = expected_range(kin, *poses, skin.link, panda_model.capsules, room)
+    poses, room = placed_sensors(skin, kin), fixtures(views.scene("down"))
+    arm = expected_range(kin, poses, skin.cones, panda_model.capsules, no_fixtures())
+    either = expected_range(kin, poses, skin.cones, panda_model.capsules, room)
     # the ready posture has its TCP 0.48688 m above the base, fingers down
     assert either[-1] == pytest.approx(0.48688 - 0.03, abs=1e-4)
     assert arm[-1] == np.inf

@@ -12,8 +12,8 @@ from pretouch.desired import Desired
 from pretouch.loop import Options, turn
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import CONE_ANGLE
 from pretouch.types import FloatArray, Mode, RangeReadings, RangeStatus, RobotState
 from pretouch_lab.benchmarks.avoidance.obstacle import Ball
 from pretouch_lab.benchmarks.avoidance.setting import arm, skin
@@ -106,7 +106,7 @@ class World:
         to = self._ball[None] - origin[:, None]
         far = np.maximum(np.linalg.norm(to, axis=2), _RADIUS_M)
         aside = np.arccos(np.clip(np.einsum("kbi,ki->kb", to, beam) / far, -1.0, 1.0))
-        seen = aside < 0.5 * CONE_ANGLE + np.arcsin(_RADIUS_M / far)
+        seen = aside < 0.5 * PAPER_SENSOR.angle + np.arcsin(_RADIUS_M / far)
         distance = np.where(seen, far - _RADIUS_M, np.inf).min(axis=1)
         distance = np.maximum(distance + _NOISE_M * self._rng.normal(size=len(link)), 0.0)
         status = np.where(distance < _FARTHEST_M, int(RangeStatus.OK), int(RangeStatus.SIGNAL))

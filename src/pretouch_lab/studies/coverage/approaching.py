@@ -86,7 +86,7 @@ class ApproachingObstacles:
             if not ways.free.any():
                 continue
             i = int(np.argmax(ways.free[0]))
-            sees = seen_by(ways, self._skin.link, self._skin.T_link_sensor)[:, 0, i]
+            sees = seen_by(ways, self._skin)[:, 0, i]
             link, normal = int(ways.surface.link[i]), ways.surface.normal[i]
             along = ways.postures[0].rotation[link].T @ ways.way[0, i]
             return ApproachingObstacle(link, ways.surface.point[i] + r * normal, normal, along, bool(sees.any()))

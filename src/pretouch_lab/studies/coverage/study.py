@@ -108,7 +108,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
 def _predicted(model: RobotModel, own: Skin, skin: Skin) -> float | None:
     """Share of the ways, over the whole circle, that coverage says are not seen in time."""
     ways = _prepared(model, own)[0]
-    seen = seen_by(ways, skin.link, skin.T_link_sensor)
+    seen = seen_by(ways, skin)
     return rounded(1.0 - covered(ways, seen).arm.ways.value)
 
 

@@ -1,0 +1,116 @@
+"""Types of sensor: what they see, in skin files, in recordings, and in perception."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from pretouch.errors import ParameterError, SkinError
+from pretouch.perception.obstacles import measured_distance, placed_sensors
+from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
+from pretouch.robot.body import no_capsules
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
+from pretouch.sensing.skin import load_skin, save_skin, sensor_unit
+from pretouch.types import RangeReadings, RangeStatus
+
+UNIT = """
+[[unit]]
+id = "{id}"
+link = "panda_hand"
+position_m = [0.0, -0.108, {z}]
+quaternion_wxyz = [0.7071067811865476, 0.7071067811865476, 0.0, 0.0]
+"""
+WIDE = """
+[sensor.wide]
+field_of_view_deg = 60
+nearest_m = 0.02
+farthest_m = 1.0
+"""
+
+
+@dataclass(frozen=True)
+class Whistle(Sensor, name="whistle"):
+    """An ultrasonic one of a test's."""
+
+    field_of_view_deg: float = 15.0
+    nearest_m: float = 0.2
+    farthest_m: float = 6.0
+    rate_hz: float = 10.0
+
+
+def skin_of(folder, model, text):
+    file = folder / "skin.toml"
+    file.write_text(text)
+    return load_skin(file, model)
+
+
+def test_a_unit_has_the_papers_sensor_unless_its_file_says_otherwise(panda_model, tmp_path):
+    text = WIDE + UNIT.format(id="a", z=0.045) + UNIT.format(id="b", z=0.02) + 'sensor = "wide"\n'
+    text += UNIT.format(id="c", z=0.0) + 'sensor = "whistle"\n'
+    skin = skin_of(tmp_path, panda_model, text)
+    a, b, c = (unit.sensor for unit in skin.units)
+    assert a == PAPER_SENSOR
+    assert (b.field_of_view_deg, b.farthest_m, b.rate_hz, b.label) == (60, 1.0, 50.0, "wide")
+    assert c == Whistle()
+    assert skin.cones.kind.tolist() == [0, 1, 2]
+    np.testing.assert_allclose(skin.cones.edge[:, 2], np.tan(np.deg2rad([13.5, 30.0, 7.5])))
+    save_skin(skin, tmp_path / "again.toml")
+    assert [unit.sensor for unit in load_skin(tmp_path / "again.toml", panda_model).units] == [a, b, c]
+
+
+def test_a_wider_cone_meets_what_a_narrow_one_misses(panda_model, tmp_path):
+    skin = skin_of(tmp_path, panda_model, WIDE + UNIT.format(id="a", z=0.045) + 'sensor = "wide"\n')
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    sensors = placed_sensors(skin, kin)
+    p, R = sensors.position[0], sensors.rotation[0]
+    # a wall along the beam, 0.1 m beside it: the edge of a cone of 60 degrees meets it at 0.1 m / sin 30, that of 27 at
+    # 0.1 m / sin 13.5; a ray of the rings lies up to 15 degrees beside that edge
+    wall = Fixtures(np.array([[*-R[:, 0], -R[:, 0] @ p - 0.1]]), no_capsules())
+    for sensor, angle in ((skin.units[0].sensor, 30.0), (PAPER_SENSOR, 13.5)):
+        seen = expected_range(kin, sensors, cones_of([sensor]), no_capsules(), wall)
+        assert seen[0] == pytest.approx(0.1 / np.sin(np.deg2rad(angle)), rel=0.04)
+
+
+def test_a_reading_counts_within_what_its_own_sensor_measures():
+    cones = cones_of([PAPER_SENSOR, Whistle()])
+    for distance, shown in ((0.1, (0.1, 0.2)), (5.0, (np.nan, 5.0)), (7.0, (np.nan, np.nan))):
+        readings = RangeReadings(np.zeros(2), np.full(2, distance), np.full(2, int(RangeStatus.OK)))
+        np.testing.assert_equal(measured_distance(readings, cones), shown)
+    near = RangeReadings(np.zeros(2), np.zeros(2), np.full(2, int(RangeStatus.MIN_RANGE)))
+    np.testing.assert_equal(measured_distance(near, cones), (0.04, 0.2))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (UNIT.format(id="a", z=0.0) + 'sensor = "radar9"\n', r"Unit a has the sensor 'radar9': choose from .*vl53l1x"),
+        (UNIT.format(id="a", z=0.0) + "sensor = 7\n", "Unit a has the sensor 7: choose from"),
+        ("[sensor.odd]\nfield_of_view_deg = 400\n", r"\[sensor.odd\] cannot be: .*field_of_view_deg.* at most 120"),
+        ("[sensor.odd]\nnearest_m = 5.0\n", r"\[sensor.odd\] cannot be: .*nearest_m is 5 and farthest_m 4"),
+        ("[sensor.odd]\nrate_hz = nan\n", r"\[sensor.odd\] cannot be: .*rate_hz"),
+        ("[sensor.odd]\nangle = 3\n", r"\[sensor.odd\] has the unknown key 'angle': use like, field_of_view_deg"),
+        ("[sensor.odd]\nown_name = 'x'\n", "has the unknown key 'own_name'"),
+        ('[sensor.odd]\nlike = "odder"\n', r"\[sensor.odd\] has the sensor 'odder': choose from"),
+        ("[sensor.vl53l1x]\nrate_hz = 10\n", r"\[sensor.vl53l1x\] is known by that name already"),
+        ("sensor = 4\n", "sensor is 4: write a table"),
+        ("sensor = {odd = 4}\n", r"\[sensor.odd\] is 4: write a table"),
+    ],
+)
+def test_a_type_that_cannot_be_is_named(panda_model, tmp_path, text, said):
+    with pytest.raises(SkinError, match=said) as error:
+        skin_of(tmp_path, panda_model, text if "[[unit]]" in text else text + UNIT.format(id="a", z=0.0))
+    assert "skin.toml" in str(error.value)
+
+
+def test_types_of_programs_are_checked_too():
+    with pytest.raises(ParameterError, match="field_of_view_deg"):
+        Sensor(field_of_view_deg=0.0)
+    assert sensor_unit(
+        id="a", link="panda_hand", position_m=np.zeros(3), quaternion_wxyz=[1.0, 0, 0, 0], sensor="whistle"
+    ).sensor == Whistle()  # fmt: skip
+
+
+def test_no_wall_is_no_return(panda_model, paper_skin):
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    seen = expected_range(kin, placed_sensors(paper_skin, kin), paper_skin.cones, no_capsules(), no_fixtures())
+    assert np.isinf(seen).all()
