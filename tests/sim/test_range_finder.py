@@ -6,9 +6,10 @@ from tests.sim.ranging import CONE_MEAN, EXACT, FORWARD, NO_ERROR, ball, wall
 
 from pretouch.errors import ParameterError
 from pretouch.perception.scene_filter import ray_capsule
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
-from pretouch.sim.range_finder import MODES, RangeFinderParams, RangeFinders, _flat_wall
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, _flat_wall
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import RangeStatus
 
@@ -55,6 +56,26 @@ def test_units_measure_at_the_rate_of_their_mode_each_at_its_own_phase(rig, mode
         assert np.diff(stamps) == pytest.approx(1.0 / rate, rel=0.15)
         phases.append(stamps[0])
     assert len(set(phases)) >= 5
+
+
+@pytest.mark.parametrize(
+    ("distance", "statuses"),
+    [
+        (0.1, {RangeStatus.MIN_RANGE}),
+        (0.5, {RangeStatus.OK}),
+        (1.5, {RangeStatus.OK}),
+        (2.5, {RangeStatus.SIGMA}),
+        (3.2, {RangeStatus.SIGNAL}),
+    ],
+)
+def test_a_sensor_of_another_type_measures_at_its_own_rate_and_range(rig, distance, statuses):
+    sonar = Sensor(field_of_view_deg=12.0, nearest_m=0.2, farthest_m=3.0, rate_hz=10.0, noise=2.0)
+    readings = rig(wall(distance), units=30, sensor=sonar, offset_max_m=0.0, dropout=0.0).collect(1.0)
+    assert len(readings["stamp"]) == pytest.approx(300, rel=0.1)
+    assert set(readings["status"]) == statuses
+    if statuses == {RangeStatus.OK}:
+        assert readings["distance"].mean() == pytest.approx(distance, abs=0.01)
+        assert readings["distance"].std() == pytest.approx(2.0 * (0.003 + 0.006 * distance), rel=0.15)
 
 
 @pytest.mark.parametrize(
@@ -243,6 +264,6 @@ def test_a_skin_without_units_reads_nothing(panda_model):
 
 
 def test_units_measure_as_often_as_they_are_told():
-    assert RangeFinderParams().period_s == MODES["short"].period_s
-    assert RangeFinderParams(mode="long").period_s == MODES["long"].period_s
+    assert RangeFinderParams().period_s == PAPER_SENSOR.ranging("short").period_s
+    assert RangeFinderParams(mode="long").period_s == PAPER_SENSOR.ranging("long").period_s
     assert RangeFinderParams(rate_hz=10.0).period_s == 0.1

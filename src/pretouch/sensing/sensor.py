@@ -17,6 +17,16 @@ RINGS = 2
 
 
 @dataclass(frozen=True)
+class RangingMode:
+    """How a sensor measures: a distance mode with a timing budget that serves it."""
+
+    period_s: float
+    """Time between readings: timing budget plus overhead [s]."""
+    distance_max_m: float
+    """Farthest target [m]."""
+
+
+@dataclass(frozen=True)
 class Sensor(Part, group="pretouch.sensors"):
     """A range finder that sees one cone about its axis.
 
@@ -31,6 +41,8 @@ class Sensor(Part, group="pretouch.sensors"):
     """Largest distance it measures [m]."""
     rate_hz: Positive = 50.0
     """Readings in a second, at most [Hz]."""
+    noise: Positive = 1.0
+    """Times the noise of the VL53L1X in the simulation."""
     own_name: str = ""
     """What a skin file calls it, where it is of a type of that file's own."""
 
@@ -41,6 +53,10 @@ class Sensor(Part, group="pretouch.sensors"):
                 f"{type(self).__name__}.nearest_m is {self.nearest_m:g} and farthest_m {self.farthest_m:g}: it must"
                 " measure farther than its nearest distance."
             )
+
+    def ranging(self, mode: str) -> RangingMode:
+        """Return how it measures in a distance mode of its own; one without modes does so in one way."""
+        return RangingMode(1.0 / self.rate_hz, self.farthest_m)
 
     @property
     def label(self) -> str:
@@ -53,9 +69,18 @@ class Sensor(Part, group="pretouch.sensors"):
         return float(np.deg2rad(self.field_of_view_deg))
 
 
+_MODES = {"short": RangingMode(period_s=0.02, distance_max_m=1.3), "long": RangingMode(0.14, 4.0)}
+"""50 Hz are to be had in short mode only; four metres need a budget of 140 ms (data sheet DS12385)."""
+
+
 @dataclass(frozen=True)
 class VL53L1X(Sensor, name="vl53l1x"):
     """ST's time-of-flight sensor of the paper (data sheet DS12385: 16 x 16 SPADs, 27 degrees, 4 cm to 4 m)."""
+
+    def ranging(self, mode: str) -> RangingMode:
+        """See `Sensor`; modes are short and long."""
+        own, fastest = _MODES[mode], 1.0 / self.rate_hz
+        return RangingMode(max(own.period_s, fastest), min(own.distance_max_m, self.farthest_m))
 
 
 PAPER_SENSOR = VL53L1X()

@@ -1,4 +1,4 @@
-"""Model of the VL53L1X time-of-flight sensors of a skin, seen through the simulated room."""
+"""Model of the range finders of a skin, seen through the simulated room: that of the VL53L1X, as each type has it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,28 +10,11 @@ import numpy as np
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled, entry
 from pretouch.errors import ParameterError
-from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, RangeReadings, RangeStatus
-
-
-@dataclass(frozen=True)
-class RangingMode:
-    """One distance mode of the sensor with a timing budget that serves it."""
-
-    period_s: float
-    """Time between readings: timing budget plus overhead [s]."""
-    distance_max_m: float
-    """Farthest target [m]."""
-
-
-MODES: dict[str, RangingMode] = {
-    "short": RangingMode(period_s=0.02, distance_max_m=1.3),
-    "long": RangingMode(period_s=0.14, distance_max_m=4.0),
-}
-"""50 Hz are to be had in short mode only; four metres need a budget of 140 ms (data sheet DS12385)."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +26,7 @@ class RangeFinderParams(Checked):
     rate_hz: NonNegative = 0.0
     """Readings of each unit in a second [Hz]; 0: as often as the mode allows, 50 in short mode and 7 in long mode."""
     rings: int = 2
-    """Circles of rays that fill the 27 degree cone; 2 make 19 rays."""
+    """Circles of rays that fill the cone; 2 make 19 rays."""
     reflectance: Fraction = 0.5
     """Diffuse reflectance of all surfaces at 940 nm; skin and light cloth reach 0.5 and more."""
     reflectance_limit: Positive = 0.17
@@ -74,8 +57,12 @@ class RangeFinderParams(Checked):
 
     @property
     def period_s(self) -> float:
-        """Time between a unit's readings [s]."""
-        return self.period_factor * (1.0 / self.rate_hz if self.rate_hz else MODES[self.mode].period_s)
+        """Time between readings of a unit with the paper's sensor [s]."""
+        return self.period_of(PAPER_SENSOR)
+
+    def period_of(self, sensor: Sensor) -> float:
+        """Time between readings of a unit with a sensor [s]."""
+        return self.period_factor * (1.0 / self.rate_hz if self.rate_hz else sensor.ranging(self.mode).period_s)
 
 
 class RangeSample(NamedTuple):
@@ -115,18 +102,18 @@ class RangeFinders:
         With `send`, that is handed each measurement as it is made and has to bring it to where it is read: latency,
         jitter and dropout are not these sensors' then, and `read` tells nothing. They measure the same either way.
         """
-        self._plant, self._skin, self._params, self._mode = plant, skin, params, MODES[params.mode]
+        self._plant, self._skin, self._params = plant, skin, params
+        self._rays = [cone_rays(params.rings, unit.sensor.angle) for unit in skin.units]
+        self._kinds = [_kind(unit.sensor, params, rays) for unit, rays in zip(skin.units, self._rays, strict=True)]
         self._rng = np.random.default_rng([seed, 3])
         self._send, self._light = send, np.random.default_rng([seed, 4])
-        self._rays = cone_rays(params.rings, PAPER_SENSOR.angle)
-        self._calibration = _flat_wall(self._rays[:, 2])
-        rays = len(self._rays)
+        rays = 1 + 3 * params.rings * (params.rings + 1)
         self._geom, self._hit, self._normal = np.zeros(rays, np.int32), np.zeros(rays), np.zeros(3 * rays)
         self._normals, self._errors = self._normal.reshape(-1, 3), _errors(params)
         self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
         count = len(skin)
         self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
-        self._due: list[float] = self._rng.uniform(0, params.period_s, count).tolist()
+        self._due: list[float] = self._rng.uniform(0, self._periods(), count).tolist()
         self._sent = UnderWay[tuple[int, float, float, int]]()
         self._stamp = np.full(count, -np.inf)
         self._distance = np.zeros(count)
@@ -150,6 +137,10 @@ class RangeFinders:
                 )
         self._params, self._errors = params, _errors(params)
 
+    def _periods(self) -> FloatArray:
+        """Time between the readings of each unit (K,) [s]."""
+        return np.array([self._params.period_of(unit.sensor) for unit in self._skin.units])
+
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""
         for unit, stamp, distance, status in self._sent.arrived(self._plant.time + ROUNDING_S):
@@ -160,10 +151,11 @@ class RangeFinders:
     def _sample(self, time: float) -> None:
         if time < self._next_due:
             return
-        p, rng, period = self._params, self._rng, self._params.period_s
+        p, rng = self._params, self._rng
         for unit, due in enumerate(self._due):
             if due > time:
                 continue
+            period = p.period_of(self._skin.units[unit].sensor)
             self._due[unit] = due + period * (1.0 + p.period_jitter * rng.standard_normal())
             distance, status, sigma, strength = self._measure(unit)
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
@@ -177,19 +169,17 @@ class RangeFinders:
         self._next_due = min(self._due)
 
     def _measure(self, unit: int) -> tuple[float, int, float, float]:
-        link = int(self._skin.link[unit])
-        origin, rays = _beams(self._xpos[link], self._xmat[link], self._skin.T_link_sensor[unit], self._rays)
+        link, kind = int(self._skin.link[unit]), self._kinds[unit]
+        origin, rays = _beams(self._xpos[link], self._xmat[link], self._skin.T_link_sensor[unit], self._rays[unit])
         mujoco.mj_multiRay(
             self._plant.mj_model, self._plant.mj_data, origin, rays.reshape(-1), None, True, link,
-            self._geom, self._hit, self._normal, len(rays), self._mode.distance_max_m,
+            self._geom, self._hit, self._normal, len(rays), kind.distance_max,
         )  # fmt: skip
         return _reading.flat(
-            self._hit, rays, self._normals, self._mode.distance_max_m, self._calibration, self._offset[unit],
-            self._rng.standard_normal(), *self._errors,
+            self._hit, rays, self._normals, *kind, self._offset[unit], self._rng.standard_normal(), *self._errors,
         )  # fmt: skip
 
 
-_NEAREST_M = PAPER_SENSOR.nearest_m
 _SIGNAL_LIMIT_MCPS = 1.024
 """Signal of a target that is just detected [Mcps] (data sheet: readings below 1024 kcps are rejected)."""
 _AMBIENT_MCPS = 0.3
@@ -243,6 +233,20 @@ _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
 )
 
 
+class _Kind(NamedTuple):
+    """How a type of sensor measures."""
+
+    distance_max: float  # farthest target [m]
+    nearest: float  # [m]
+    calibration: float  # of `_flat_wall`
+    noise: float  # times that of the VL53L1X
+
+
+def _kind(sensor: Sensor, params: RangeFinderParams, rays: FloatArray) -> _Kind:
+    farthest = sensor.ranging(params.mode).distance_max_m
+    return _Kind(farthest, sensor.nearest_m, _flat_wall(rays[:, 2]), sensor.noise)
+
+
 class _Returns(NamedTuple):
     """What N rays met."""
 
@@ -269,16 +273,16 @@ def _errors(params: RangeFinderParams) -> _Errors:
 
 @entry
 def _reading(
-    returns: _Returns, distance_max: float, calibration: float, offset: float, draw: float, errors: _Errors
+    returns: _Returns, kind: _Kind, offset: float, draw: float, errors: _Errors
 ) -> tuple[float, int, float, float]:
     """One reading [m], its status, its standard deviation [m], and the strength of what it shows.
 
     The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
     distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
     `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
-    `calibration` is that of `_flat_wall`, `offset` the sensor's constant error [m], `draw` normal.
+    `offset` is the sensor's constant error [m], `draw` normal.
     """
-    distance, rays, normal = returns.distance, returns.rays, returns.normal
+    distance, rays, normal, distance_max = returns.distance, returns.rays, returns.normal, kind.distance_max
     brightness = errors.reflectance / errors.reflectance_limit
     count = len(distance)
     strength = np.zeros(count)
@@ -310,13 +314,15 @@ def _reading(
         if total >= 1.0:
             break
         start = nearest + errors.merge_m
-    mean *= calibration / total
+    mean *= kind.calibration / total
     # shot noise: with a share of the light that a target filling the cone would return, 1 / sqrt(share) times the noise
     full = brightness * (distance_max / max(mean, 0.01)) ** 2
     sigma = errors.noise_floor_m + errors.noise_rate * mean * np.sqrt(max(1.0, full / total))
+    trusted = sigma <= errors.sigma_limit_m
+    sigma *= kind.noise
     measured = max(0.0, mean + offset + sigma * draw)
-    if sigma > errors.sigma_limit_m:
+    if not trusted:
         return measured, _SIGMA, sigma, total
-    if measured < _NEAREST_M:
+    if measured < kind.nearest:
         return measured, _MIN_RANGE, sigma, total
     return measured, _OK, sigma, total

@@ -1,6 +1,5 @@
 """The sensor units of the page: where they sit, what their cones cover, and what they see."""
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +16,6 @@ from pretouch.viewer.trail import binding
 
 if TYPE_CHECKING:
     from viser import BatchedMeshHandle, SceneApi
-
-FIELD_OF_VIEW = math.radians(27.0)
-"""Full angle of a unit's cone [rad] (VL53L1X data sheet)."""
 
 _IDLE_M = 0.06
 """Length at which a cone is drawn that shows nothing [m]."""
@@ -43,16 +39,19 @@ class Units:
             units = np.flatnonzero(skin.link == link)
             pose = skin.T_link_sensor[units]
             place = quaternions(pose[:, :3, :3]), pose[:, :3, 3]
-            node, idle = f"{root}/arm/{links[link]}", np.full(len(units), _IDLE_M)
+            node = f"{root}/arm/{links[link]}"
             plates = scene.add_batched_meshes_simple(
                 f"{node}/units", *_plate(), *place, batched_colors=_all(palette.UNIT, units), flat_shading=True, **plain
             )
-            cones = scene.add_batched_meshes_simple(
-                f"{node}/cones", *_cone(), *place, batched_scales=idle, batched_colors=_all(palette.CONE, units),
-                batched_opacities=np.full(len(units), _FAINT), opacity=0.5, side="double", **plain,
-            )  # fmt: skip
             self._plates.append((units, plates))
-            self._cones.append((units, cones))
+            for kind in np.unique(skin.cones.kind[units]):
+                alike = skin.cones.kind[units] == kind
+                cones = scene.add_batched_meshes_simple(
+                    f"{node}/cones{kind or ''}", *_cone(skin.cones.edge[kind, 2]), *(part[alike] for part in place),
+                    batched_scales=np.full(alike.sum(), _IDLE_M), batched_colors=_all(palette.CONE, units[alike]),
+                    batched_opacities=np.full(alike.sum(), _FAINT), opacity=0.5, side="double", **plain,
+                )  # fmt: skip
+                self._cones.append((units[alike], cones))
         self.points = scene.add_batched_meshes_simple(
             f"{root}/points", *_ball(), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
             batched_scales=np.full(count, _GONE), batched_colors=_all(palette.SENSED, np.arange(count)), **plain,
@@ -117,10 +116,9 @@ def _plate() -> tuple[FloatArray, IntArray]:
     return corners, np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
 
 
-def _cone(around: int = 28) -> tuple[FloatArray, IntArray]:
-    """The field of view out to 1 m along z, without a lid."""
+def _cone(radius: float, around: int = 28) -> tuple[FloatArray, IntArray]:
+    """A field of view out to 1 m along z, of a radius [m] there, without a lid."""
     angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
-    radius = math.tan(FIELD_OF_VIEW / 2)
     rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.ones(around)], axis=1)
     after = np.roll(np.arange(around), -1)
     faces = np.stack([np.zeros(around, dtype=int), after + 1, np.arange(around) + 1], axis=1)

@@ -20,7 +20,7 @@ from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import static_scene
 from pretouch.sim.plant import Plant
-from pretouch.sim.range_finder import MODES, RangeFinders
+from pretouch.sim.range_finder import RangeFinders
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep, FloatArray, Mode, QpOutcome
 from pretouch_lab.cell import Cell, Context, Grid
@@ -56,7 +56,7 @@ _STEADY_S = 0.2
 """A unit whose row was there all this time before the loss sees the board, and not its edge now and then [s]."""
 _Y = 1
 """The axis on which the board stands."""
-_PERIOD_S = MODES["short"].period_s
+_PERIOD_S = PAPER_SENSOR.ranging("short").period_s
 
 
 def cells(grid: Grid) -> list[Cell]:
@@ -113,7 +113,7 @@ def facing(plant: Plant, skin: Skin, name: str) -> list[int]:
         beams = (rays @ rotation[unit].T).reshape(-1)
         mujoco.mj_multiRay(
             plant.mj_model, plant.mj_data, position[unit], beams, None, True, int(link), geom, distance, None,
-            len(rays), MODES["short"].distance_max_m,
+            len(rays), PAPER_SENSOR.ranging("short").distance_max_m,
         )  # fmt: skip
         if wanted in geom[distance >= 0]:
             found.append(unit)
