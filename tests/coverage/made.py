@@ -6,6 +6,7 @@ from pretouch.coverage.surface import Surface
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 
@@ -28,12 +29,12 @@ def arm(folder, bar="0 0 0.3 0 0 0.4"):
     return RobotModel(RobotDescription("made", file, "two", 2 * two, 10 * two, 50 * two, 0 * two, "a test"))
 
 
-def unit_at(height=0.2, name="side"):
+def unit_at(height=0.2, name="side", sensor=PAPER_SENSOR):
     """A unit on the side of the first link at +x that looks along +x."""
     T = np.eye(4)
     T[:3, :3] = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     T[:3, 3] = RADIUS + HEIGHT, 0.0, height
-    return SensorUnit(name, "one", T)
+    return SensorUnit(name, "one", T, sensor=sensor)
 
 
 def skin(model, *units):

@@ -11,11 +11,11 @@ from pretouch.coverage.measure import covered, ratio
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by, ways_to
+from pretouch.sensing.sensor import VL53L1X
 from pretouch.sim.scene import SceneSpec, fixtures
 from tests.coverage.made import HEIGHT, ROOM, arm, below_it, skin, unit_at
 
 BRIGHT = CoverageParams(range_m=10.0, reflectance_limit=1e-3)
-HALF = np.deg2rad(13.5)
 READY = np.zeros((1, 2))
 
 
@@ -38,13 +38,14 @@ def test_directions_are_cosine_weighted(tmp_path):
     assert found.free.all(), "nothing is in the way"
 
 
-def test_the_share_of_one_point_below_one_unit(tmp_path):
+@pytest.mark.parametrize(("angle", "what"), [(27.0, 0.1453), (50.0, 0.3217)])
+def test_the_share_of_one_point_below_one_unit(tmp_path, angle, what):
     """A ball of radius r is in view up to s m away iff s sin(t - half) <= (r - h) sin(half) + r cos(half)."""
-    r, s = BRIGHT.object_radius_m, 0.01 * (BRIGHT.first + BRIGHT.run)
-    largest = HALF + np.arcsin(((r - HEIGHT) * np.sin(HALF) + r * np.cos(HALF)) / s)
+    r, s, half = BRIGHT.object_radius_m, 0.01 * (BRIGHT.first + BRIGHT.run), np.deg2rad(angle / 2)
+    largest = half + np.arcsin(((r - HEIGHT) * np.sin(half) + r * np.cos(half)) / s)
     expected = np.sin(largest) ** 2
-    assert expected == pytest.approx(0.1453, abs=1e-3)
-    found = share(arm(tmp_path), BRIGHT, [unit_at()])
+    assert expected == pytest.approx(what, abs=1e-3)
+    found = share(arm(tmp_path), BRIGHT, [unit_at(sensor=VL53L1X(field_of_view_deg=angle))])
     assert found == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / 20_000))
 
 
@@ -56,6 +57,17 @@ def test_range_latency_and_speed_end_it(tmp_path):
     assert share(model, replace(within, rate_hz=5.0), [unit_at()], 2000) == 0.0, "not for a whole reading"
     assert share(model, replace(within, object_speed_m_s=0.8), [unit_at()], 2000) == 0.0
     assert share(model, replace(within, deceleration_m_s2=0.4), [unit_at()], 2000) == 0.0
+
+
+def test_a_sensor_of_another_type_sees_as_far_and_as_often_as_it_measures(tmp_path):
+    """As above, with range and rate of the sensor in place of the parameters'."""
+    model, near = arm(tmp_path), VL53L1X(farthest_m=0.5)
+    usual = replace(BRIGHT, range_m=1.3)
+    assert usual.seen_by(near)[0] == pytest.approx(0.5)
+    assert share(model, replace(usual, latency_s=0.17), [unit_at(sensor=near)], 2000) > 0.03
+    assert share(model, replace(usual, latency_s=0.2), [unit_at(sensor=near)], 2000) == 0.0
+    assert share(model, usual, [unit_at(sensor=VL53L1X(rate_hz=25.0))], 2000) > 0.1
+    assert share(model, usual, [unit_at(sensor=VL53L1X(rate_hz=1.0))], 2000) == 0.0, "0.8 m pass between two readings"
 
 
 def test_what_the_arm_hides_is_not_seen(tmp_path):

@@ -54,9 +54,9 @@ def test_at_the_edge_behind_and_beyond_the_limit():
 def seen(start, way, first=10, last=50, run=2, limit=1.3, free=True):
     out = np.zeros((1, 1), np.bool_)
     ways_seen(
-        BallWays(np.array([start]), np.array([way]), 0.05), np.array([free]), Stretch(first, last, run),
+        BallWays(np.array([start]), np.array([way]), 0.05), np.array([free]), Stretch(first, last),
         Sensors(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1, np.int64)), cones_of([PAPER_SENSOR]),
-        View(np.array([limit]), 1e9), out,
+        View(np.array([limit]), np.full(1, 1e9), np.full(1, run)), out,
     )  # fmt: skip
     return bool(out[0, 0])
 

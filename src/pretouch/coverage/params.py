@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.errors import ParameterError
 from pretouch.perception.sighting import GRID_M
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,12 @@ class CoverageParams(Checked):
     def light_m2(self) -> float:
         """Square of the distance at which a ball that fills the cone is just seen [m^2]; a ball's mean slant is 2/3."""
         return 2.0 / 3.0 * self.reflectance / self.reflectance_limit * self.range_m**2
+
+    def seen_by(self, sensor: Sensor) -> tuple[float, float, int]:
+        """Return farthest target [m], `light_m2` and `run` of a sensor: these parameters are the VL53L1X's."""
+        own, usual = sensor.ranging("short"), PAPER_SENSOR.ranging("short")
+        farther, slower = own.distance_max_m / usual.distance_max_m, own.period_s / usual.period_s
+        return self.range_m * farther, self.light_m2 * farther**2, _steps(self.reading_m * slower)
 
     @property
     def first(self) -> int:

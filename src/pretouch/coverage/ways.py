@@ -14,7 +14,7 @@ from pretouch.perception.sighting import BallWays, Stretch, View, ways_free, way
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,16 +85,17 @@ def seen_by(ways: Ways, skin: Skin) -> BoolArray:
     A unit sees nothing behind the arm or the room in its own view, its own link included.
     """
     p = ways.params
+    farthest, light, run = np.array([p.seen_by(unit.sensor) for unit in skin.units]).reshape(-1, 3).T.copy()
     seen = np.zeros((len(skin), len(ways.postures), len(ways.point)), np.bool_)
     for s, kin in enumerate(ways.postures):
         position, rotation = sensor_poses(skin, kin)
         of_no_link = Sensors(position, rotation, np.full(len(skin), -1, np.int64))
         own_view = expected_range(kin, of_no_link, skin.cones, ways.model.capsules, ways.room)
-        limit = np.minimum(p.range_m, own_view - p.self_margin_m)
+        limit = np.minimum(farthest, own_view - p.self_margin_m)
         found = np.zeros((len(skin), len(ways.point)), np.bool_)
         ways_seen(
-            BallWays(ways.start[s], ways.way[s], p.object_radius_m), ways.free[s], Stretch(p.first, p.last, p.run),
-            Sensors(position, rotation, skin.link), skin.cones, View(limit, p.light_m2), found,
+            BallWays(ways.start[s], ways.way[s], p.object_radius_m), ways.free[s], Stretch(p.first, p.last),
+            Sensors(position, rotation, skin.link), skin.cones, View(limit, light, run.astype(WHOLE)), found,
         )  # fmt: skip
         seen[:, s] = found
     return seen

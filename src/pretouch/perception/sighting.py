@@ -39,8 +39,6 @@ class Stretch(NamedTuple):
     """Number of the nearest one, s = first GRID_M."""
     last: int
     """Number of the farthest."""
-    run: int
-    """So many steps of the grid the ball has to be in view."""
 
 
 @entry
@@ -80,8 +78,10 @@ class View(NamedTuple):
 
     limit: FloatArray
     """(K,) farthest reading that shows the ball, and not the arm or the room [m]."""
-    light: float
-    """Of `in_view` [m^2]."""
+    light: FloatArray
+    """(K,) of `in_view` [m^2]."""
+    run: IntArray
+    """(K,) steps of the grid for which the ball has to be in view."""
 
 
 @entry
@@ -89,7 +89,7 @@ def ways_seen(
     ways: BallWays, free: BoolArray, stretch: Stretch, sensors: Sensors, cones: Cones, view: View,
     seen: BoolArray,
 ) -> None:  # fmt: skip
-    """Write whether (K, W) each unit has the ball in view at `run` + 1 places of the grid in a row.
+    """Write whether (K, W) each unit has the ball in view at its `run` + 1 places of the grid in a row.
 
     Args:
         ways: of the ball.
@@ -101,15 +101,14 @@ def ways_seen(
         seen: (K, W) the answer.
     """
     start, way, radius = ways
-    first, last, run = stretch
-    limit, light = view
+    first, last = stretch
     position, rotation = sensors.position, sensors.rotation
     near, far = first * GRID_M, last * GRID_M
     for k in range(len(position)):
         ox, oy, oz = position[k, 0], position[k, 1], position[k, 2]
         zx, zy, zz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
-        widening = cones.edge[cones.kind[k], 2]
-        reach = limit[k] + radius
+        widening, limit, light, run = cones.edge[cones.kind[k], 2], view.limit[k], view.light[k], view.run[k]
+        reach = limit + radius
         for w in range(len(start)):
             seen[k, w] = False
             if not free[w]:
@@ -126,7 +125,7 @@ def ways_seen(
             in_row = 0
             for i in range(first, last + 1):
                 s = i * GRID_M
-                if in_view(depth + s * rise, offset2 + s * (2 * along + s), radius, widening, limit[k], light):
+                if in_view(depth + s * rise, offset2 + s * (2 * along + s), radius, widening, limit, light):
                     in_row += 1
                     if in_row > run:
                         seen[k, w] = True
