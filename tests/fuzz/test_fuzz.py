@@ -1,4 +1,4 @@
-"""Anything goes in, and what must hold holds: some steps by default, a million in the slow suite."""
+"""Anything goes in, and what must hold holds: some steps by default, half a million in the slow suite."""
 
 import os
 import subprocess
@@ -37,8 +37,8 @@ def test_some_thousand_steps(seed: int):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(20))
-def test_a_million_steps(seed: int, capsys: pytest.CaptureFixture[str]):
+@pytest.mark.parametrize("seed", range(10))
+def test_half_a_million_steps(seed: int, capsys: pytest.CaptureFixture[str]):
     reached = Machine(seed).run(50_000)
     with capsys.disabled():
         print(f"\n{summary(reached)}")

@@ -34,7 +34,9 @@ RESTS_S = 0.5
 is known of the truth is up to 0.1 s old."""
 _WARM_S = 120.0
 """Time after which a process has all it needs [s]."""
-_FULL_S = 60.0
+_FULL_S, _FULL_SHARE = 60.0, 0.1
+"""How long the disk is full [s], and at most for such a share of all."""
+_ENDS = "SIGINT", "SIGTERM", "program", "arm's process", "receiver", "robot"
 _STEP_S = 86400.0
 """Largest step of the wall clock [s]."""
 _SMALL = 64 * 1024
@@ -93,8 +95,10 @@ class Soak:
             with ExitStack() as serving:
                 self._serve(serving, relay)
                 self._one_run(page, begun + 0.5 * self._seconds, "SIGINT")
+                kinds: list[str] = []
                 while time.monotonic() < end:
-                    kind = str(self._rng.choice(("SIGINT", "SIGTERM", "program", "arm's process", "receiver", "robot")))
+                    kinds = kinds or self._rng.permutation(_ENDS).tolist()  # each comes before one comes again
+                    kind = kinds.pop()
                     self._one_run(page, time.monotonic() + self._rng.uniform(4.0, 20.0), kind)
                     if kind == "robot" or self._server.process.poll() is not None:
                         serving.close()
@@ -143,7 +147,7 @@ class Soak:
             if self._rng.random() < 0.02:
                 self._clock.step(self._rng.uniform(-_STEP_S, _STEP_S))
                 self.found.clock_steps += 1
-            if filled != (full <= now - begun < full + _FULL_S):
+            if filled != (full <= now - begun < full + min(_FULL_S, _FULL_SHARE * self._seconds)):
                 filled = not filled
                 run.fill_disk(_SMALL if filled else -1)
             if self._runs == 1:

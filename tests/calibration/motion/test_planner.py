@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import cycle, product
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ def assert_kept(arm: RobotModel, plan: Plan, params: PlanParams, rate: float = 1
     moving = arm.capsules.link > arm.link_index(f"{description.name}_link0")
     assert (ends[..., 2].min(axis=2) - radius)[:, moving].min() >= params.floor_m + params.clearance_m
     # two parts at that speed come nearer to each other by no more than twice the way of one
-    stride = round(rate / 50.0)
+    stride = max(1, round(rate / 250.0))
     coarse = self_distances(arm, ends[::stride]).min(axis=1)
     near = np.repeat(coarse < params.clearance_m + 2.0 * params.speed_m_s * stride / rate, stride)[: len(ends)]
     assert self_distances(arm, ends[near]).min(initial=np.inf) >= params.clearance_m
@@ -70,7 +71,7 @@ def assert_kept(arm: RobotModel, plan: Plan, params: PlanParams, rate: float = 1
 
 @pytest.mark.parametrize("name", ["panda", "fr3"])
 def test_the_motion_planned_by_default_keeps_all_limits(name: str):
-    assert_kept(model(name), planned(name), PlanParams(), rate=250.0)
+    assert_kept(model(name), planned(name), PlanParams(), rate=100.0)
 
 
 @pytest.mark.slow
@@ -93,9 +94,9 @@ def test_a_swing_that_loses_its_room_when_it_is_prolonged_is_not_left_out(monkey
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("variant", [0, 1, 5])
-@pytest.mark.parametrize("start", STARTS)
-@pytest.mark.parametrize("name", ["panda", "fr3"])
+@pytest.mark.parametrize(
+    ("name", "start", "variant"), zip(cycle(("panda", "fr3")), *zip(*product(STARTS, (0, 1, 5)), strict=True))
+)
 def test_motions_from_elsewhere_and_with_other_limits_keep_them(name: str, start: str, variant: int):
     params = replace(
         PlanParams(duration_s=45.0, poses=4, swings=2), variant=variant, speed_m_s=0.7 + 0.2 * variant,

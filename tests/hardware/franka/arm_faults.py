@@ -34,7 +34,7 @@ from tests.hardware.franka.served import Served, child
 from tests.soak.truth import Truth
 
 PERIOD_S = 0.01
-FAULT_S, LASTS_S, RESUME_S, ENDS_S = 3.0, 1.5, 5.0, 7.0
+FAULT_S, LASTS_S, RESUME_S, ENDS_S = 3.0, 1.5, 5.0, 6.0
 """When a fault begins and how long it lasts, when a person resumes, and when the run ends [s]."""
 _LOOK_S = 0.8
 """How long after a fault was noticed the truth is looked at: the arm rests by then, and has not been resumed [s]."""

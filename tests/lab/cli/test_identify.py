@@ -34,23 +34,18 @@ def test_identify_writes_arm_numbers_and_figure(table, tmp_path, capsys):
     assert plant.observer_gain_1_s == pytest.approx(found["observer_gain_1_s"][0], rel=1e-4)
 
 
-def test_the_other_sign_turns_offsets_round(table, tmp_path, capsys):
-    numbers = tmp_path / "numbers.json"
-    assert cli.main(["identify", str(table), "--sign", "by-robot", "--json", str(numbers)]) == 0
-    offsets = json.loads(numbers.read_text())["of_joints"][0]["values"]
-    assert offsets[2] == pytest.approx(-0.2, abs=0.1)
-    capsys.readouterr()
-
-
-def test_without_velocities_no_torque_noise_is_told(table, tmp_path, capsys):
+def test_without_velocities_no_torque_noise_is_told_and_the_other_sign_turns_offsets_round(table, tmp_path, capsys):
     lines = [line.split(",") for line in table.read_text().splitlines()]
     place, numbers = tmp_path / "still.csv", tmp_path / "numbers.json"
     place.write_text("\n".join(",".join(line[:8] + line[15:]) for line in lines) + "\n")
-    assert cli.main(["identify", str(place), "--json", str(numbers)]) == 0
+    assert cli.main(["identify", str(place), "--sign", "by-robot", "--json", str(numbers)]) == 0
     assert "Without velocities neither their noise nor the observer's gain is identified" in capsys.readouterr().out
-    told = {row["name"]: row["told"] for row in json.loads(numbers.read_text())["of_joints"]}
+    of_joints = json.loads(numbers.read_text())["of_joints"]
+    told = {row["name"]: row["told"] for row in of_joints}
     assert not any(told["torque noise [Nm]"])
     assert all(told["offset [Nm]"])
+    assert of_joints[0]["name"] == "offset [Nm]"
+    assert of_joints[0]["values"][2] == pytest.approx(-0.2, abs=0.1)
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,16 @@ from pretouch_lab.paper import avoidance
 from tests.lab.limits import assert_within_limits
 
 MODES = {"blind": "off", "paper": "slack"}
+FIRST_OVER_S = 19.0
+"""Five seconds after the hand has gone for the first time [s]."""
 
 
 @pytest.fixture(scope="module")
 def trials(context):
     cell = {name: Cell(avoidance.NAME, name, {"place": "beside", "restrictions": mode}) for name, mode in MODES.items()}
-    return {name: avoidance.trial(cell[name], 400, context) for name in cell}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(avoidance, "_DURATION_S", FIRST_OVER_S)
+        return {name: avoidance.trial(cell[name], 400, context) for name in cell}
 
 
 def test_the_arm_slows_for_the_hand_gives_way_and_recovers(trials):

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from shutil import copy, copytree
@@ -28,6 +29,7 @@ from pretouch_lab.paper.figures.force_difference import force_difference_figure
 from pretouch_lab.paper.figures.interaction import interaction_figure
 from pretouch_lab.registry import EXPERIMENTS
 from pretouch_lab.trace import trace_of
+from tests.recording.runs import controller_of, recorded_run
 
 S, UNITS = 400, tuple("abcdefg")
 PAPER = profile("paper")
@@ -55,7 +57,9 @@ def made_trace() -> RunRecord:
     )  # fmt: skip
 
 
-def drawn(trace):
+@cache
+def drawn():
+    trace = made_trace()
     pairs = {(t, s, p): trace for t in ("circle", "line") for s in ("-y", "+y") for p in ("blind", "paper")}
     return {
         "circle": circle_figure(trace, PAPER),
@@ -72,7 +76,7 @@ def line(axes, label):
 
 @pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference", "compared"])
 def test_what_must_be_told_apart_differs_without_colour(name):
-    for axes in drawn(made_trace())[name].axes:
+    for axes in drawn()[name].axes:
         looks = [
             (str(found._dash_pattern), found.get_linestyle(), found.get_marker(),
              round(np.mean(to_rgb(found.get_color())), 1), found.get_linewidth())
@@ -85,7 +89,7 @@ def test_what_must_be_told_apart_differs_without_colour(name):
 
 @pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
 def test_every_axis_says_its_unit(name):
-    figure = drawn(made_trace())[name]
+    figure = drawn()[name]
     said = [figure.get_supxlabel(), figure.get_supylabel()] if figure.get_supxlabel() else []
     for axes in figure.axes if not said else []:
         said += [axes.get_ylabel(), *([axes.get_xlabel()] if axes.get_xlabel() else [])]
@@ -105,7 +109,7 @@ def test_what_is_near_counts_from_the_end_effector():
 
 
 def test_the_circle_is_red_while_something_is_sensed_and_green_until_it_is_free():
-    plane = drawn(made_trace())["circle"].axes[0]
+    plane = drawn()["circle"].axes[0]
     shown = {
         name: np.flatnonzero(np.isfinite(line(plane, name).get_xdata())) for name in ("free", "avoidance", "recovery")
     }
@@ -119,7 +123,7 @@ def test_the_circle_is_red_while_something_is_sensed_and_green_until_it_is_free(
 
 
 def test_the_interaction_shades_slowed_and_touched_spans_and_names_the_push():
-    top, middle, bottom = drawn(made_trace())["interaction"].axes
+    top, middle, bottom = drawn()["interaction"].axes
     for axes in (top, middle, bottom):
         spans = {patch.get_label(): (patch.get_x(), patch.get_width()) for patch in axes.patches}
         assert spans["slowed"] == pytest.approx((1.0, 1.5))
@@ -135,7 +139,7 @@ def test_the_close_up_of_a_trace_without_a_touch_shows_all_of_it():
 
 
 def test_the_force_difference_counts_from_the_touch_away_from_the_object():
-    against, along = (drawn(made_trace())["force-difference"].axes[i] for i in (1, 0))
+    against, along = (drawn()["force-difference"].axes[i] for i in (1, 0))
     for axes, sign in ((along, 1.0), (against, -1.0)):
         estimate = line(axes, "blind: estimate")
         assert estimate.get_xdata()[300] == 0.0
@@ -284,8 +288,7 @@ def test_recordings_of_several_skins_make_no_figure(run_folder, context, tmp_pat
     run = copytree(run_folder, tmp_path / "run")
     other = next((run / "static" / "recordings").glob("static_circle_*blind*.mcap"))
     other.unlink()
-    few = replace(context, skin=Skin(context.skin.units[:2], context.model), recording=other)
-    between.trial(Cell(between.NAME, "paper", {"restrictions": "slack"}), 101, few)
+    recorded_run(other, controller_of(context.model, Skin(context.skin.units[:2], context.model)), 10)
     with pytest.raises(ExperimentError, match="are of several skins"):
         draw_figure("force-difference", run, tmp_path / "x.png")
 
