@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
-SERVED = "09_libfranka_program"
-"""Runs against an arm: `tests/hardware/franka/test_shielded_program.py`."""
+ELSEWHERE = "07_first_controller", "09_libfranka_program"
+"""The tutorial's runs below; the other against an arm: `tests/hardware/franka/test_shielded_program.py`."""
 
 
-@pytest.mark.parametrize("example", [e for e in EXAMPLES if e.stem != SERVED], ids=lambda path: path.stem)
+@pytest.mark.parametrize("example", [e for e in EXAMPLES if e.stem not in ELSEWHERE], ids=lambda path: path.stem)
 def test_an_example_runs_and_says_something(example, capsys):
     runpy.run_path(str(example), run_name="__main__")
     assert len(capsys.readouterr().out.splitlines()) >= 2

@@ -160,8 +160,8 @@ def test_what_bench_cycle_measured_before_it_was_stopped_is_kept(capsys, tmp_pat
         return measure(points, request, tell)
 
     monkeypatch.setattr(cycle, "measure", once)
-    file = tmp_path / "cycle.json"
-    code, said = run(capsys, "bench", "cycle", "--points", "3,5", "--cycles", "20", "--json", str(file))
+    file, quick = tmp_path / "cycle.json", ("--cycles", "20", "--rate", "100")
+    code, said = run(capsys, "bench", "cycle", "--points", "3,5", *quick, "--json", str(file))
     assert code == 130
     assert "No priority." in said.out
     written = json.loads(file.read_text())

@@ -50,7 +50,9 @@ def test_the_hand_stays_for_thirty_seconds():
     assert visit.leave - visit.arrive == 30.0
 
 
-def test_without_proximity_the_arm_runs_into_the_hand(context):
+def test_without_proximity_the_arm_runs_into_the_hand(context, monkeypatch):
+    for name, value in {"_LEAVES_S": 13.0, "_LOOKS_S": (2, 5, 10), "_COURSE_S": np.arange(0.0, 10.5, 0.5)}.items():
+        monkeypatch.setattr(creeping, name, value)
     row, _ = creeping.trial(Cell(creeping.NAME, "blind", {"restrictions": "off"}), 140, context)
     assert row["contact"] is True
     assert row["contacts"] >= 2
