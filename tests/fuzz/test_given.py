@@ -98,7 +98,7 @@ def test_another_type_or_layout_gives_the_same_and_compiles_nothing(moving: Movi
     answer = moving.step(changed(moving.next, change, names))
     # the numbers are the same, and what is published is in float64 of its own
     assert same(answer[0], expected[0])
-    assert compiled_versions() == before > 5
+    assert compiled_versions() == before >= 3  # perception, thresholds, motion
 
 
 def test_whole_and_short_numbers_are_numbers(moving: Moving):
