@@ -130,13 +130,13 @@ def test_a_message_that_cannot_be_made_ends_the_recording_and_not_the_run(contro
 def test_a_disk_that_does_not_keep_up_is_one_sentence(controller, tmp_path, monkeypatch):
     monkeypatch.setattr(disk, "_MOST_WAITING", 3)
     held = threading.Event()
-    add = disk.Disk._add
+    add = disk.ChunkWriter.add
 
     def wait(self, item):
         held.wait()
         add(self, item)
 
-    monkeypatch.setattr(disk.Disk, "_add", wait)
+    monkeypatch.setattr(disk.ChunkWriter, "add", wait)
     run = Run(controller)
     recording = Recording(tmp_path / "a.mcap", controller)
     for _ in range(20):

@@ -12,12 +12,11 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import BinaryIO
 
-from mcap.writer import CompressionType, Writer
-
 from pretouch.errors import RecordingError
+from pretouch.recording.chunk_writer import ChunkWriter
 from pretouch.recording.container import Contents, begins_as_mcap, scan
-from pretouch.recording.ending import Entry, ending, entry
-from pretouch.recording.messages import LIBRARY, Item, definition
+from pretouch.recording.ending import Entry, Index, ending, entry
+from pretouch.recording.messages import Item
 
 _FLUSH_S = 0.5
 """Time after which what was recorded is written [s]."""
@@ -76,15 +75,12 @@ class Disk:
         self._queue: SimpleQueue[tuple[list[Item], More] | None] = SimpleQueue()
         self._since: deque[float] = deque()
         """When each cycle was put that is not written yet [s]."""
-        self._writer = Writer(self._file, _CHUNK, CompressionType.ZSTD)  # type: ignore[arg-type]
         try:
-            self._writer.start("ros2", LIBRARY)
+            self._writer = ChunkWriter(self._file, _CHUNK)  # type: ignore[arg-type]
         except OSError as error:
             self._file.close()
             place.unlink()
             raise _refused(place, error) from error
-        self._channels: dict[str, int] = {}
-        self._schemas: dict[str, int] = {}
         self.trouble = ""
         """Why nothing more is written, as a sentence, or ''."""
         self._thread = threading.Thread(target=self._work, name=f"recording {place.name}", daemon=True)
@@ -125,7 +121,7 @@ class Disk:
     def _work(self) -> None:
         try:
             self._write_all()
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._writer.finish()
         except OSError as error:
             self._rescue(error)
         except Exception as error:  # the run goes on, whatever failed here
@@ -146,23 +142,12 @@ class Disk:
                     return
                 items, more = job
                 for item in chain(items, more()):
-                    self._add(item)
+                    self._writer.add(item)
                 self._since.popleft()
                 time.sleep(0)  # lets the control loop have the interpreter, if it waits for it
             if time.monotonic() >= due:
-                self._writer.flush()  # type: ignore[no-untyped-call]
+                self._writer.flush()
                 due = time.monotonic() + _FLUSH_S
-
-    def _add(self, item: Item) -> None:
-        channel = self._channels.get(item.topic)
-        if channel is None:
-            if item.kind not in self._schemas:
-                # the name by which ROS and the viewers know a type
-                text = definition(item.kind).encode()
-                self._schemas[item.kind] = self._writer.register_schema(item.kind, "ros2msg", text)
-            channel = self._writer.register_channel(item.topic, "cdr", self._schemas[item.kind])
-            self._channels[item.topic] = channel
-        self._writer.add_message(channel, item.time, item.data, item.time, item.sequence % 2**32)
 
     def _rescue(self, error: OSError | None) -> None:
         """End the file after as many whole chunks as leave room for the index."""
@@ -198,7 +183,7 @@ def _end(file: _File, contents: Contents, entries: list[Entry], ends: list[int])
     """Write the index, of fewer chunks if it does not fit, and say what the file then holds."""
     for count in range(len(entries), 0, -1):
         try:
-            file.end_at(ends[count - 1], ending(contents, entries[:count], ends[count - 1]))
+            file.end_at(ends[count - 1], ending(contents, Index.of(entries[:count]), ends[count - 1]))
         except OSError as error:
             if error.errno not in _FULL:
                 raise

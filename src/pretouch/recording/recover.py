@@ -6,7 +6,7 @@ from typing import BinaryIO
 
 from pretouch.errors import RecordingError
 from pretouch.recording.container import Contents, begins_as_mcap, scan
-from pretouch.recording.ending import ending, entry, header, in_chunk
+from pretouch.recording.ending import Index, ending, entry, header, in_chunk
 from pretouch.recording.messages import LIBRARY
 from pretouch.recording.reader import open_recording
 from pretouch.recording.skin_reader import holds_units, read_skin
@@ -61,7 +61,7 @@ def _held(place: Path) -> tuple[bool, int, str, float]:
 
 def _copy(source: BinaryIO, target: BinaryIO) -> None:
     """Write a file of all schemas and channels, the whole chunks, and their index."""
-    contents, entries = Contents(), []
+    contents, index = Contents(), Index()
     begins_as_mcap(source)
     for _ in scan(source, contents):
         pass  # what channels there are may only stand behind the chunk that first needs them
@@ -74,5 +74,5 @@ def _copy(source: BinaryIO, target: BinaryIO) -> None:
         whole = in_chunk(chunk)
         made = entry(whole, target.tell())
         target.write(whole.record + made.index)
-        entries.append(made)
-    target.write(ending(contents, entries, target.tell()))
+        index.add(made)
+    target.write(ending(contents, index, target.tell()))
