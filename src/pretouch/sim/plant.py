@@ -24,8 +24,8 @@ from pretouch.types import FloatArray, RobotState
 TOUCH_N = 1.0
 """True force above which there is a contact [N]."""
 _NO_FORCE = np.zeros(3)
-_Past = tuple[float, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-"""Time, q, qd, q_d, qd_d and external torques of an instant."""
+_Past = tuple[float, FloatArray]
+"""An instant, and (5, n) q, qd, q_d, qd_d and external torques at it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +199,7 @@ class Plant:
     def read(self) -> RobotState:
         """Return what the arm's interface reports now."""
         p = self.params
-        time, q, qd, q_d, qd_set, tau_ext = self._states[0] if p.state_delay_s else self._now()
+        time, (q, qd, q_d, qd_set, tau_ext) = self._states[0] if p.state_delay_s else self._now()
         kin = self.model.kinematics(q)
         wrench = wrench_from_torques(self.model.ee_jacobian(kin), tau_ext, p.wrench_damping, p.singular_value_min)
         late = p.stamp_jitter_s * self._wander.uniform() if p.stamp_jitter_s else 0.0
@@ -215,7 +215,7 @@ class Plant:
 
     def _now(self) -> _Past:
         own = self._computer
-        return self.time, own.q.copy(), own.qd.copy(), self._q_d.copy(), self._qd_set.copy(), own.residual.copy()
+        return self.time, np.array([own.q, own.qd, self._q_d, self._qd_set, own.residual])
 
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""
@@ -235,7 +235,7 @@ class Plant:
             )
             self.time = times[taken]
             if p.state_delay_s:
-                self._states.extend((times[i + 1], *past[i]) for i in range(first, taken))
+                self._states.extend(zip(times[first + 1 : taken + 1], past[first:taken], strict=True))
             self._note_contacts(times[first + 1 : taken + 1])
 
     def _prepare_step(self) -> float:
