@@ -1,8 +1,8 @@
-"""How much faster than real time the closed loop runs on one core.
+"""How much faster than real time closed-loop trials run on one core.
 
-Simulated arm at 1 kHz, seven units with 19 rays each at 50 Hz, controller at 100 Hz with the profile `paper`, on the
-paper's circle with nothing near. Counted is the CPU time of the process, so other load hardly disturbs it. A first,
-short run compiles everything and is not counted.
+Simulated arm at 1 kHz, units with 19 rays each at 50 Hz, controller at 100 Hz with the profile `paper`, on the paper's
+circle: with nothing near, and with a person who pushes three times, in the usual world or in `hard`. Counted is the CPU
+time of the process, so other load hardly disturbs it. A first, short run compiles everything and is not counted.
 
     python benchmarks/simulation.py
     python benchmarks/simulation.py 60    # simulated seconds, 30 unless given
@@ -12,50 +12,42 @@ import sys
 import time
 
 from pretouch.control.path import Circle
-from pretouch.control.posture import brought_to
-from pretouch.controller import Controller
-from pretouch.loop import Cycle, run
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch.sim.plant import Plant, PlantClock
-from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
-from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.sim.paper_scenes import dynamic_pushes
+from pretouch.sim.pushes import Pusher
+from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch_lab.benchmarks.workload import Workload
+from pretouch_lab.trial import Setup, play
+
+CASES = ((7, False, ""), (32, False, ""), (7, True, ""), (32, True, ""), (7, True, "hard"), (32, True, "hard"))
+"""Units, whether a person pushes, world."""
 
 
-class Tally:
-    """A recorder that only counts."""
-
-    def __init__(self) -> None:
-        self.steps = 0
-
-    def record(self, _cycle: Cycle) -> None:
-        """Count one step."""
-        self.steps += 1
-
-
-def simulate(duration: float) -> tuple[float, int]:
-    """Run the loop for some simulated seconds; return CPU seconds and control steps."""
-    model, scene, circle = RobotModel(panda()), SceneSpec(), Circle()
-    skin = paper_skin(model)
-    plant = Plant(model, scene, PlantParams(), brought_to(model, circle.point(0.0)), seed=0)
-    finders = RangeFinders(plant, skin, RangeFinderParams(), seed=0)
-    controller = Controller(model, skin, fixtures(scene), circle, profile("paper"))
-    plant.advance(0.1)  # every unit has spoken
-    tally, start = Tally(), time.process_time()
-    run(controller, plant, finders, PlantClock(plant, 0.01), tally, lambda step: step.stamp > duration)
-    return time.process_time() - start, tally.steps
+def simulate(units: int, person: bool, world: str, duration: float) -> tuple[float, int]:
+    """Run a trial for some simulated seconds; return CPU seconds and control steps."""
+    model, paper = RobotModel(panda()), profile("paper")
+    skin = paper_skin(model) if units == 7 else Workload(model, units, paper, seed=3).skin
+    setup = Setup(
+        model, skin, paper, SceneSpec(hand=HandSpec() if person else None), Circle(), seed=0, world=world,
+        hand=Pusher(model, dynamic_pushes(0)) if person else None,
+    )  # fmt: skip
+    start = time.process_time()
+    steps = play(setup, lambda step, _: step.stamp > duration).steps
+    return time.process_time() - start, len(steps)
 
 
 def main() -> None:
     """Warm up, measure, print."""
     duration = float(sys.argv[1]) if len(sys.argv) > 1 else 30.0
-    simulate(2.0)
-    spent, steps = simulate(duration)
-    print(f"{duration:g} s of simulated time in {spent:.2f} s of CPU time: {duration / spent:.1f} times real time")
-    print(f"{1e3 * spent / steps:.3f} ms for each 10 ms cycle ({steps} cycles)")
+    print(f"{'units':>5}  {'person':6}  {'world':7}  {'times real time':>15}  {'ms a 10 ms cycle':>16}")
+    for units, person, world in CASES:
+        simulate(units, person, world, 0.5)
+        spent, steps = simulate(units, person, world, duration)
+        row = f"{units:5}  {'yes' if person else 'no':6}  {world or 'nominal':7}"
+        print(f"{row}  {duration / spent:15.1f}  {1e3 * spent / steps:16.3f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.scene import SceneSpec
+from pretouch.sim.scene import Box, SceneSpec
 from pretouch.types import FloatArray, RobotState
 
 NONE = (0.0,) * 7
@@ -284,3 +284,41 @@ def test_a_clock_that_the_physics_cannot_keep_is_refused(panda_model, period):
     plant = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0)
     with pytest.raises(ParameterError, match=rf"control period is {period:g} s: give a multiple of .* 0.001 s"):
         PlantClock(plant, period)
+
+
+def test_who_says_until_when_it_has_nothing_to_do_is_not_called_before(panda_model):
+    plant, called = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0), []
+
+    def call(time: float) -> float:
+        called.append(time)
+        return time + 0.0035
+
+    plant.before_each_step(call)
+    plant.advance(0.01)
+    assert called == pytest.approx([0.0, 0.004, 0.008])
+    plant.before_each_step(called.append)
+    plant.advance(0.002)
+    assert called[3:] == pytest.approx([0.01, 0.011])
+
+
+def test_steps_in_one_go_are_those_taken_one_by_one_also_with_delays_and_through_a_touch(panda_model):
+    params, q = PlantParams(state_delay_s=0.003, command_delay_s=0.0045, drift_nm=0.1), panda_model.description.q_ready
+    hand = panda_model.kinematics(q).position[panda_model.ee]
+    scene = SceneSpec((Box("board", (hand[0], hand[1] + 0.25, hand[2]), (0.15, 0.02, 0.12), 25e3),))
+    plants = [Plant(panda_model, scene, params, q, seed=2) for _ in range(2)]
+    plants[1].before_each_step(lambda time: None)
+    for cycle in range(100):
+        for plant in plants:
+            plant.command(np.array([0.5, 0.0, 0.0, 0.001 * cycle, 0.0, 0.0, 0.0]))
+            plant.advance(0.01)
+        one, other = (plant.read() for plant in plants)
+        assert one.stamp == other.stamp
+        for name in ("q", "qd", "q_commanded", "qd_commanded", "tau_ext"):
+            assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    assert len(plants[0].touches) == len(plants[1].touches) > 0
+    for one, other in zip(plants[0].touches, plants[1].touches, strict=True):
+        assert (one.time, one.link) == (other.time, other.link)
+        assert np.array_equal(one.velocity, other.velocity)
+    for (time, force), (other_time, other_force) in zip(plants[0].true_log, plants[1].true_log, strict=True):
+        assert time == other_time
+        assert np.array_equal(force, other_force)

@@ -56,6 +56,8 @@ class RobotModel:
         self._model.dof_armature[:] = 0.0
         self._model.dof_damping[:] = 0.0
         self._data = mujoco.MjData(self._model)
+        self.scratch = self._model, self._data
+        """MuJoCo's model and data, for compiled code that does in them what the methods here do."""
         self.n: int = self._model.nv
         # views into MuJoCo's memory, taken once: looking an attribute up costs as much as the arithmetic
         data = self._data

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.types import FloatArray
 
 
@@ -72,7 +72,7 @@ class TorqueSensors(NamedTuple):
     damping: float  # as a fraction of critical
 
 
-@entry
+@compiled
 def drive(
     qd_set: FloatArray, bias: FloatArray, joints: Joints, generator: MotionGenerator, impedance: Impedance,
     friction: Friction, cogging: Cogging,
@@ -117,7 +117,7 @@ def _bent(qd: float, i: int, friction: Friction, dt: float) -> float:
     return float(friction.bristle_nm * friction.bristle[i] / z_c)
 
 
-@entry
+@compiled
 def sensed(
     tau: FloatArray, lost: FloatArray, drawn: FloatArray, q: FloatArray, qdd: FloatArray, sensors: TorqueSensors
 ) -> FloatArray:

@@ -1,28 +1,31 @@
 """The simulated arm behind its joint velocity interface: 1 kHz physics, joint impedance, sensors, observer."""
 
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import accumulate, repeat
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from pretouch.compiled import flattened
-from pretouch.contact.observer import ObserverState, observe, observer_init, wrench_from_torques
+from pretouch.contact.observer import observer_init, wrench_from_torques
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
-from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
+from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors
+from pretouch.sim.physics import Computer, Nominal, SimulatedArm, World, take_steps
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.scene import ArmError, CableSpec, SceneSpec, build, stiffen
+from pretouch.sim.scene import CONTACTS, ArmError, CableSpec, SceneSpec, build, stiffen
 from pretouch.sim.under_way import ROUNDING_S
 from pretouch.types import FloatArray, RobotState
 
 TOUCH_N = 1.0
 """True force above which there is a contact [N]."""
 _NO_FORCE = np.zeros(3)
-_Past = tuple[float, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-"""Time, q, qd, q_d, qd_d and external torques of an instant."""
+_Past = tuple[float, FloatArray]
+"""An instant, and (5, n) q, qd, q_d, qd_d and external torques at it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,8 @@ class Plant:
         self.mj_model = build(model, scene, self.error)
         self.mj_data = mujoco.MjData(self.mj_model)
         self._arm_geoms = {g for g in range(self.mj_model.ngeom) if self._on_arm(g)}
-        self._before_step: list[Callable[[float], None]] = []
+        self._before_step: list[Callable[[float], float | None]] = []
+        self._idle_until: list[float] = []
         self._reset(q)
 
     def _know(self, params: PlantParams) -> None:
@@ -102,7 +106,7 @@ class Plant:
         n, data = self._n, self.mj_data
         # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
         joints = Joints(data.qpos[:n], data.qvel[:n], data.qfrc_applied[:n])
-        self._q, self._qd, self._qdd = joints.q, joints.qd, data.qacc[:n]
+        self._q = joints.q
         self.link_position, self.link_rotation = data.xpos, data.xmat.reshape(-1, 3, 3)
         """(L', 3) origins [m] and (L', 3, 3) orientations of the links, then of whatever else moves; base frame."""
         self._q[:] = q
@@ -112,12 +116,13 @@ class Plant:
         damping = 2.0 * self.params.damping_ratio * np.sqrt(stiffness * inertia)
         # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
         self._q_d, self._qd_set = q + (data.qfrc_bias[:n] - bias) / stiffness, np.zeros(n)
-        self._q_meas, self._qd_meas = q.copy(), np.zeros(n)
-        self._bias = bias
-        self._group(joints, Impedance(stiffness, damping, self.model.description.tau_max))
-        self._observer: ObserverState = observer_init(mass, self._qd_meas)
-        self.time = 0.0
         dt = self.params.period_s
+        zero = observer_init(mass, np.zeros(n))
+        self._computer = Computer(
+            q.copy(), np.zeros(n), bias, zero.residual, zero.integral, mass, self.params.observer_gain_1_s, dt
+        )
+        self._group(joints, Impedance(stiffness, damping, self.model.description.tau_max))
+        self.time = 0.0
         self._states: deque[_Past] = deque(maxlen=1 + round(self.params.state_delay_s / dt))
         self._late_commands: deque[tuple[float, FloatArray]] = deque()
         self._states.append(self._now())
@@ -130,7 +135,7 @@ class Plant:
         mujoco.mj_forward(self.mj_model, data)
 
     def _group(self, joints: Joints, impedance: Impedance) -> None:
-        """Put together what `drive` and `sensed` are given at each step."""
+        """Put together what `take_steps` is given."""
         p, n = self.params, self._n
         keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
         follow = 1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s))
@@ -145,18 +150,31 @@ class Plant:
         self._err = self._offset.copy()
         sensors = TorqueSensors(
             self._err, ripple, cycles, self._ripple_phase, np.zeros(n), keep, p.armature_kg_m2,
-            p.friction_compensated, np.stack([self._bias, np.zeros(n)]), 2 * np.pi * p.ring_hz * p.period_s,
+            p.friction_compensated, np.stack([self._computer.bias, np.zeros(n)]), 2 * np.pi * p.ring_hz * p.period_s,
             p.ring_damping,
         )  # fmt: skip
         cogging = Cogging(p.cogging * ripple, cycles, self._ripple_phase)
-        self._driven = flattened(joints, generator, impedance, friction, cogging)
-        self._sensing = flattened(sensors)
+        data, (known, scratch) = self.mj_data, self.model.scratch
+        counted = int(self.mj_model.sensor(CONTACTS).adr[0])
+        world = World(self.mj_model._address, data._address, data.qacc[:n], data.sensordata[counted : counted + 1])
+        nominal = Nominal(known._address, scratch._address, scratch.qpos, scratch.qvel)
+        self._qd_before = np.zeros(n)
+        self._arm = flattened(
+            SimulatedArm(
+                world, joints, generator, impedance, friction, cogging, sensors, nominal, self._computer,
+                self._qd_before,
+            )
+        )  # fmt: skip
         # what is added to coloured noise at each step, so that its variance stays that of the sensor
         self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
 
-    def before_each_step(self, call: Callable[[float], None]) -> None:
-        """Have `call(time)` run before each physics step: hands and sensors are driven so."""
+    def before_each_step(self, call: Callable[[float], float | None]) -> None:
+        """Have `call(time)` run before each physics step: hands and sensors are driven so.
+
+        It may return until when it has nothing to do [s]. While nobody has, steps are taken in one go.
+        """
         self._before_step.append(call)
+        self._idle_until.append(-np.inf)
 
     def take_log(self) -> tuple[list[tuple[float, FloatArray]], list[Touch]]:
         """Return `true_log` and `touches`, and begin both anew: in a run without an end they would fill the memory."""
@@ -181,7 +199,7 @@ class Plant:
     def read(self) -> RobotState:
         """Return what the arm's interface reports now."""
         p = self.params
-        time, q, qd, q_d, qd_set, tau_ext = self._states[0] if p.state_delay_s else self._now()
+        time, (q, qd, q_d, qd_set, tau_ext) = self._states[0] if p.state_delay_s else self._now()
         kin = self.model.kinematics(q)
         wrench = wrench_from_torques(self.model.ee_jacobian(kin), tau_ext, p.wrench_damping, p.singular_value_min)
         late = p.stamp_jitter_s * self._wander.uniform() if p.stamp_jitter_s else 0.0
@@ -196,44 +214,50 @@ class Plant:
             self._qd_set = wanted
 
     def _now(self) -> _Past:
-        return self.time, self._q_meas, self._qd_meas, self._q_d.copy(), self._qd_set.copy(), self._observer.residual
-
-    def _take_late_commands(self) -> None:
-        """Let what was commanded long enough ago be the set-point."""
-        while self._late_commands and self._late_commands[0][0] <= self.time + ROUNDING_S:
-            self._qd_set = self._late_commands.popleft()[1]
+        own = self._computer
+        return self.time, np.array([own.q, own.qd, self._q_d, self._qd_set, own.residual])
 
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""
-        p, n, dt = self.params, self._n, self.params.period_s
-        steps = round(duration / dt)
+        p, n = self.params, self._n
+        steps, taken = round(duration / p.period_s), 0
         draws = self._rng.standard_normal((steps, 2, n))
         velocity_noise = p.velocity_noise_rad_s * draws[:, 0]
         torque_noise = self._torque_noise * draws[:, 1]
-        model, data, driving, sensing = self.mj_model, self.mj_data, drive.flat, sensed.flat
+        past = np.empty((steps if p.state_delay_s else 0, 5, n))
+        times = list(accumulate(repeat(p.period_s, steps), initial=self.time))
         self._age(duration)
-        for i in range(steps):
-            for call in self._before_step:
-                call(self.time)
-            if self._late_commands:
-                self._take_late_commands()
-            tau, lost = driving(self._qd_set, self._bias, *self._driven)
-            before = self._qd.copy()
-            mujoco.mj_step(model, data)
-            # the state after the step goes with the torques that led to it
-            q, qd = self._q.copy(), self._qd + velocity_noise[i]
-            measured = sensing(tau, lost, torque_noise[i], q, self._qdd, *self._sensing)
-            mass, self._bias = self.model.mass_matrix_and_bias(q, qd, np.empty(n))
-            self._observer = observe(self._observer, mass, self._bias, qd, measured, p.observer_gain_1_s, dt)
-            self.time += dt
-            self._q_meas, self._qd_meas = q, qd
+        while taken < steps:
+            first, until = taken, self._prepare_step()
+            last = bisect_left(times, until, first + 1, steps)
+            taken += take_steps.flat(
+                self._qd_set, velocity_noise[first:last], torque_noise[first:last], past[first:last], *self._arm
+            )
+            self.time = times[taken]
             if p.state_delay_s:
-                self._states.append(self._now())
-            touched = self.true_force is not _NO_FORCE
-            self.true_force = self._contact_force() if data.ncon else _NO_FORCE
-            self.true_log.append((self.time, self.true_force))
-            if self.true_force is not _NO_FORCE and not touched:
-                self.touches.append(self._touch(before))
+                self._states.extend(zip(times[first + 1 : taken + 1], past[first:taken], strict=True))
+            self._note_contacts(times[first + 1 : taken + 1])
+
+    def _prepare_step(self) -> float:
+        """Do what is due before the next physics step, and return up to when nothing else will be [s]."""
+        time = self.time
+        for i, call in enumerate(self._before_step):
+            if time >= self._idle_until[i]:
+                idle = call(time)
+                self._idle_until[i] = -np.inf if idle is None else idle
+        until, late = min(self._idle_until, default=np.inf), self._late_commands
+        while late and late[0][0] <= time + ROUNDING_S:
+            self._qd_set = late.popleft()[1]
+        return min(until, late[0][0] - 2 * ROUNDING_S) if late else until  # too early does no harm
+
+    def _note_contacts(self, times: list[float]) -> None:
+        """Note what touched in steps that ended at these instants [s]: nothing, but for the last of them."""
+        touched = self.true_force is not _NO_FORCE
+        self.true_force = self._contact_force() if self.touching else _NO_FORCE
+        self.true_log += zip(times[:-1], repeat(_NO_FORCE))
+        self.true_log.append((self.time, self.true_force))
+        if self.true_force is not _NO_FORCE and not (touched and len(times) == 1):
+            self.touches.append(self._touch(self._qd_before))
 
     def _age(self, duration: float) -> None:
         """Let the arm warm up and its sensors drift (Ornstein-Uhlenbeck) for a time [s]."""

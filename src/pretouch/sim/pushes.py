@@ -30,12 +30,11 @@ _CLEAR_M = 0.4
 
 def way_round(hand: FloatArray, goal: FloatArray) -> FloatArray:
     """Next point (3,) [m] on a way from hand to goal (3,) [m] that does not cross the arm."""
-    if abs(hand[1] - goal[1]) < 0.35 and hand[0] < _AISLE_X_M - 0.1:
-        return goal
-    if hand[0] < _AISLE_X_M - 0.1:
-        return np.array([_AISLE_X_M, hand[1], hand[2]])
-    beside = np.array([_AISLE_X_M, goal[1], goal[2]])
-    return beside if np.linalg.norm(hand - beside) > 0.1 and abs(hand[1] - goal[1]) > 0.1 else goal
+    x, y, z = hand.tolist()
+    aside = abs(y - goal[1])
+    if x < _AISLE_X_M - 0.1:
+        return goal if aside < 0.35 else np.array([_AISLE_X_M, y, z])
+    return np.array([_AISLE_X_M, goal[1], goal[2]]) if aside > 0.1 else goal
 
 
 @dataclass(frozen=True)
@@ -87,12 +86,13 @@ class Pusher:
 
         The direction follows the robot's hand as it turns until the touch, and stays from then on.
         """
-        palm = point_on_arm(plant, self._link, PALM)
-        number = len(self.contacts)
-        if time < self._release + 1.0:
-            return HandGoal(palm - _STAND_OFF_M * self._direction, _FREE_N)
-        if number == len(self.pushes) or time < self.pushes[number].start - _LEAD_S:
+        number, withdrawing = len(self.contacts), time < self._release + 1.0
+        over = number == len(self.pushes)
+        if not withdrawing and (over or time < self.pushes[number].start - _LEAD_S):
             return HandGoal(way_round(hand, _HOME), _FREE_N)
+        palm = point_on_arm(plant, self._link, PALM)
+        if withdrawing:
+            return HandGoal(palm - _STAND_OFF_M * self._direction, _FREE_N)
         push = self.pushes[number]
         if self._touch is None:
             self._direction = point_on_arm(plant, self._link, PALM + push.inwards) - palm

@@ -4,17 +4,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
-import mujoco
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled, entry, flattened
 from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
+from pretouch.sim.rays import Geoms, cast, geoms_of
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
-from pretouch.types import FloatArray, RangeReadings, RangeStatus
+from pretouch.types import FloatArray, IntArray, RangeReadings, RangeStatus
 
 
 @dataclass(frozen=True)
@@ -103,16 +103,15 @@ class RangeFinders:
         jitter and dropout are not these sensors' then, and `read` tells nothing. They measure the same either way.
         """
         self._plant, self._skin, self._params = plant, skin, params
-        self._rays = [cone_rays(params.rings, unit.sensor.angle) for unit in skin.units]
-        self._kinds = [_kind(unit.sensor, params, rays) for unit, rays in zip(skin.units, self._rays, strict=True)]
+        count, data, rays = len(skin), plant.mj_data, 1 + 3 * params.rings * (params.rings + 1)
+        cones = [cone_rays(params.rings, unit.sensor.angle) for unit in skin.units]
+        self._kinds = [_kind(unit.sensor, params, cone) for unit, cone in zip(skin.units, cones, strict=True)]
         self._rng = np.random.default_rng([seed, 3])
         self._send, self._light = send, np.random.default_rng([seed, 4])
-        rays = 1 + 3 * params.rings * (params.rings + 1)
-        self._geom, self._hit, self._normal = np.zeros(rays, np.int32), np.zeros(rays), np.zeros(3 * rays)
-        self._normals, self._errors = self._normal.reshape(-1, 3), _errors(params)
-        self._xpos, self._xmat = plant.mj_data.xpos, plant.mj_data.xmat
-        count = len(skin)
-        self._offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
+        offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
+        cone = np.array(cones).reshape(count, rays, 3)
+        mounting = _Mounting(data.xpos, data.xmat, skin.link, skin.T_link_sensor, cone, offset)
+        self._mounted, self._errors = flattened(mounting, geoms_of(plant.mj_model, data)), _errors(params)
         self._due: list[float] = self._rng.uniform(0, self._periods(), count).tolist()
         self._sent = UnderWay[tuple[int, float, float, int]]()
         self._stamp = np.full(count, -np.inf)
@@ -120,7 +119,6 @@ class RangeFinders:
         self._status = np.full(count, RangeStatus.NONE, dtype=np.int64)
         self.silenced: set[int] = set()
         """Indices of units that no longer send."""
-        self._next_due = min(self._due, default=np.inf)
         plant.before_each_step(self._sample)
 
     @property
@@ -148,16 +146,16 @@ class RangeFinders:
                 self._stamp[unit], self._distance[unit], self._status[unit] = stamp, distance, status
         return RangeReadings(self._stamp.copy(), self._distance.copy(), self._status.copy())
 
-    def _sample(self, time: float) -> None:
-        if time < self._next_due:
-            return
+    def _sample(self, time: float) -> float:
         p, rng = self._params, self._rng
         for unit, due in enumerate(self._due):
             if due > time:
                 continue
             period = p.period_of(self._skin.units[unit].sensor)
             self._due[unit] = due + period * (1.0 + p.period_jitter * rng.standard_normal())
-            distance, status, sigma, strength = self._measure(unit)
+            distance, status, sigma, strength = _measure.flat(
+                unit, rng.standard_normal(), *self._kinds[unit], *self._errors, *self._mounted
+            )
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
             lost = rng.random() < p.dropout
             if unit in self.silenced:
@@ -166,18 +164,7 @@ class RangeFinders:
                 self._send(RangeSample(unit, time, distance, status, sigma, *_light(strength, self._light)))
             elif not lost:
                 self._sent.send(arrival, (unit, time, distance, status))
-        self._next_due = min(self._due)
-
-    def _measure(self, unit: int) -> tuple[float, int, float, float]:
-        link, kind = int(self._skin.link[unit]), self._kinds[unit]
-        origin, rays = _beams(self._xpos[link], self._xmat[link], self._skin.T_link_sensor[unit], self._rays[unit])
-        mujoco.mj_multiRay(
-            self._plant.mj_model, self._plant.mj_data, origin, rays.reshape(-1), None, True, link,
-            self._geom, self._hit, self._normal, len(rays), kind.distance_max,
-        )  # fmt: skip
-        return _reading.flat(
-            self._hit, rays, self._normals, *kind, self._offset[unit], self._rng.standard_normal(), *self._errors,
-        )  # fmt: skip
+        return min(self._due, default=np.inf)
 
 
 _SIGNAL_LIMIT_MCPS = 1.024
@@ -206,26 +193,6 @@ def _flat_wall(cosines: FloatArray) -> float:
     Rays at an angle meet it farther away by 1 / cos, and with strength cos^3: slant, and the distance squared.
     """
     return float((cosines**3).sum() / (cosines**2).sum())
-
-
-@compiled
-def _beams(
-    xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray, cone: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Origin (3,) [m] and unit vectors (N, 3) of a sensor's rays in the base frame."""
-    origin, R = np.zeros(3), np.zeros((3, 3))
-    for i in range(3):
-        origin[i] = xpos[i]
-        for k in range(3):
-            origin[i] += xmat[3 * i + k] * T_link_sensor[k, 3]
-            for j in range(3):
-                R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
-    rays = np.zeros_like(cone)
-    for ray in range(len(cone)):
-        for i in range(3):
-            for j in range(3):
-                rays[ray, i] += R[i, j] * cone[ray, j]
-    return origin, rays
 
 
 _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
@@ -271,7 +238,51 @@ def _errors(params: RangeFinderParams) -> _Errors:
     return _Errors(*(getattr(params, name) for name in _Errors._fields))
 
 
+class _Mounting(NamedTuple):
+    """Where K sensors sit, and on what."""
+
+    position: FloatArray  # (L, 3) origins of the bodies [m], in MuJoCo's memory
+    rotation: FloatArray  # (L, 9) rows of their rotation matrices
+    link: IntArray  # (K,)
+    T_link_sensor: FloatArray  # (K, 4, 4)
+    cone: FloatArray  # (K, N, 3) unit vectors of the rays, sensor frame
+    offset: FloatArray  # (K,) constant errors [m]
+
+
 @entry
+def _measure(
+    unit: int, draw: float, kind: _Kind, errors: _Errors, mounting: _Mounting, geoms: Geoms
+) -> tuple[float, int, float, float]:
+    """Measure with a sensor; `draw` is normal. Return what `_reading` does."""
+    link = mounting.link[unit]
+    origin, rays = _beams(
+        mounting.position[link], mounting.rotation[link], mounting.T_link_sensor[unit], mounting.cone[unit]
+    )
+    distance, normal = cast(origin, rays, geoms, link, kind.distance_max)
+    return _reading(_Returns(distance, rays, normal), kind, mounting.offset[unit], draw, errors)
+
+
+@compiled
+def _beams(
+    xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray, cone: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) [m] and unit vectors (N, 3) of a sensor's rays in the base frame."""
+    origin, R = np.zeros(3), np.zeros((3, 3))
+    for i in range(3):
+        origin[i] = xpos[i]
+        for k in range(3):
+            origin[i] += xmat[3 * i + k] * T_link_sensor[k, 3]
+            for j in range(3):
+                R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
+    rays = np.zeros_like(cone)
+    for ray in range(len(cone)):
+        for i in range(3):
+            for j in range(3):
+                rays[ray, i] += R[i, j] * cone[ray, j]
+    return origin, rays
+
+
+@compiled
 def _reading(
     returns: _Returns, kind: _Kind, offset: float, draw: float, errors: _Errors
 ) -> tuple[float, int, float, float]:

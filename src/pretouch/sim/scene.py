@@ -9,6 +9,8 @@ from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
+CONTACTS = "contacts"
+"""Name of the sensor that counts the contacts of a scene."""
 _IMPEDANCE = 0.01
 """Constant solver impedance d of all contacts; with it and an elliptic cone solref means N/m, see `stiffen`."""
 
@@ -139,6 +141,8 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
             geomname1=one, geomname2=other, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
             solimp=[_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0],
         )  # fmt: skip
+    found = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
+    mj.add_sensor(name=CONTACTS, type=mujoco.mjtSensor.mjSENS_CONTACT, intprm=[found, 0, 1])
     built = mj.compile()
     links = len(model.links)
     built.body_mass[:links] *= error.mass_factor

@@ -1,0 +1,76 @@
+"""Rays into a simulated room: MuJoCo's own geometry, for geoms that a ray can meet at all.
+
+A handful of rays from one place meets few of them. MuJoCo's function for many rays first finds, for each geom, between
+which angles it is seen, which costs more than the rays.
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from pretouch.compiled import compiled
+from pretouch.sim.mujoco_calls import mju_rayGeom
+from pretouch.types import FloatArray, IntArray
+
+_MARGIN_M2 = 1e-9
+"""Rounding must not make a ray miss what it touches [m^2]."""
+
+
+class Geoms(NamedTuple):
+    """The visible geoms (G,) of a scene, all of the kinds that the simulation is built of, in MuJoCo's memory."""
+
+    seen: IntArray  # (V,) those that are visible
+    kind: IntArray  # (G,) plane, sphere, capsule or box
+    body: IntArray  # (G,)
+    size: FloatArray  # (G, 3)
+    reach: FloatArray  # (G,) radius of a ball round each [m]; 0 of a plane, which has none
+    position: FloatArray  # (G, 3) centres [m], base frame
+    rotation: FloatArray  # (G, 9) rows of the rotation matrices
+
+
+def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
+    """Return what rays can meet in a simulation: all but transparent geoms."""
+    own = model.geom_matid < 0
+    alpha = np.where(own, model.geom_rgba[:, 3], 0.0)
+    if not own.all():
+        alpha[~own] = model.mat_rgba[model.geom_matid[~own], 3]
+    return Geoms(
+        np.flatnonzero(alpha), model.geom_type, model.geom_bodyid, model.geom_size, model.geom_rbound, data.geom_xpos,
+        data.geom_xmat,
+    )  # fmt: skip
+
+
+@compiled
+def cast(
+    origin: FloatArray, rays: FloatArray, geoms: Geoms, without: int, farthest: float
+) -> tuple[FloatArray, FloatArray]:
+    """Distance (N,) [m] and outward normal (N, 3) where unit vectors (N, 3) from `origin` (3,) first meet something.
+
+    The distance is -1 where they meet nothing. Not met are geoms of the body `without` and those that are all farther
+    than `farthest` [m].
+    """
+    nearest, normal = np.full(len(rays), -1.0), np.zeros_like(rays)
+    to, there = np.empty(3), np.empty(3)
+    for geom in geoms.seen:
+        if geoms.body[geom] == without:
+            continue
+        reach, bounded = geoms.reach[geom], geoms.reach[geom] > 0.0
+        for i in range(3):
+            to[i] = geoms.position[geom, i] - origin[i]
+        away = to[0] * to[0] + to[1] * to[1] + to[2] * to[2]
+        if bounded and away > (farthest + reach) ** 2 + _MARGIN_M2:
+            continue
+        for k in range(len(rays)):
+            along = rays[k, 0] * to[0] + rays[k, 1] * to[1] + rays[k, 2] * to[2]
+            # past its ball, or with it behind
+            if bounded and away - (along * along if along > 0.0 else 0.0) > reach * reach + _MARGIN_M2:
+                continue
+            distance = mju_rayGeom(
+                geoms.position[geom].ctypes.data, geoms.rotation[geom].ctypes.data, geoms.size[geom].ctypes.data,
+                origin.ctypes.data, rays[k].ctypes.data, geoms.kind[geom], there.ctypes.data,
+            )  # fmt: skip
+            if distance >= 0.0 and (distance < nearest[k] or nearest[k] < 0.0):
+                nearest[k] = distance
+                normal[k] = there
+    return nearest, normal
