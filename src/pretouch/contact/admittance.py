@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
 from pretouch.contact.detector import Body
 from pretouch.contact.reach import axis_ends, within_reach
@@ -20,7 +21,16 @@ from pretouch.contact.repeated_contact import (
     wait_to_retry,
 )
 from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
-from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
+from pretouch.contact.virtual_mass import (
+    VirtualMass,
+    begun,
+    dead_band,
+    fastest_point,
+    is_known,
+    learnt,
+    mass_init,
+    yielded,
+)
 from pretouch.modes import Event, ModeState
 from pretouch.params.reaction import AdmittanceParams, ClampParams
 from pretouch.robot.model import Kinematics, RobotModel
@@ -120,7 +130,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
 
     def _near(self, inputs: ReactionInputs) -> bool:
         """Whether something is seen near the body, or may be missed."""
-        return inputs.unseen or float(inputs.obstacles.body_distance.min(initial=np.inf)) < self.near_m
+        return inputs.unseen or _any_nearer(inputs.obstacles.body_distance, self.near_m)
 
     def _moved(self, state: AdmittanceState, doing: Doing, body: Body, inputs: ReactionInputs) -> VirtualMass:
         """Let the mass learn in free motion, and yield to the external torque in a reaction or a soft hold."""
@@ -257,7 +267,16 @@ def _met(model: RobotModel, inputs: ReactionInputs, torque: FloatArray) -> Met |
 def _residual(mass: VirtualMass, inputs: ReactionInputs) -> FloatArray:
     """Return the external torques (n,) [Nm]; without an estimate, those of free motion, which drive nothing."""
     found = inputs.detection.residual
-    return mass.mean[1] if np.isnan(found).any() else found
+    return found if is_known(found) else mass.mean[1]
+
+
+@compiled
+def _any_nearer(distance: FloatArray, bound: float) -> bool:
+    """Whether one of the distances (K,) is less than a bound [m]."""
+    for one in distance:  # noqa: SIM110  compiled code knows no generators
+        if one < bound:
+            return True
+    return False
 
 
 def _caught(clamp: ClampState) -> str:

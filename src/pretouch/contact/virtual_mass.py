@@ -68,7 +68,7 @@ def learnt(state: VirtualMass, residual: FloatArray, dt: float, params: Admittan
     none, mean, torque = np.zeros(len(residual)), np.empty((2, len(residual))), np.empty(len(residual))
     _learn(state.mean, residual, weight, mean, torque)
     return VirtualMass(
-        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros_like(mean), none,
+        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros(mean.shape), none,
         0.0, 0.0, math.inf,
     )  # fmt: skip
 
@@ -80,6 +80,15 @@ def _learn(before: FloatArray, residual: FloatArray, weight: float, mean: FloatA
         mean[0, j] = before[0, j] + weight * (residual[j] - before[0, j])
         mean[1, j] = before[1, j] + weight * (mean[0, j] - before[1, j])
         torque[j] = residual[j] - mean[1, j]
+
+
+@compiled
+def is_known(residual: FloatArray) -> bool:
+    """Whether there is a residual (n,): no number is NaN."""
+    for torque in residual:  # noqa: SIM110  compiled code knows no generators
+        if np.isnan(torque):
+            return False
+    return True
 
 
 def begun(
