@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
-from pretouch.contact.detector import Body
+from pretouch.contact.detector import Body, is_known
 from pretouch.contact.reach import axis_ends, within_reach
 from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
 from pretouch.contact.repeated_contact import (
@@ -26,7 +26,6 @@ from pretouch.contact.virtual_mass import (
     begun,
     dead_band,
     fastest_point,
-    is_known,
     learnt,
     mass_init,
     yielded,

@@ -82,15 +82,6 @@ def _learn(before: FloatArray, residual: FloatArray, weight: float, mean: FloatA
         torque[j] = residual[j] - mean[1, j]
 
 
-@compiled
-def is_known(residual: FloatArray) -> bool:
-    """Whether there is a residual (n,): no number is NaN."""
-    for torque in residual:  # noqa: SIM110  compiled code knows no generators
-        if np.isnan(torque):
-            return False
-    return True
-
-
 def begun(
     state: VirtualMass, model: RobotModel, kin: Kinematics, torque: FloatArray, before: FloatArray,
     band: FloatArray, params: AdmittanceParams,

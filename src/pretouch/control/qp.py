@@ -205,8 +205,7 @@ def _solve_hard(
         outcome, flag = (QpOutcome.INFEASIBLE, _INFEASIBLE) if contradict else (QpOutcome.FAILED, flag)
         return _braking(stop, rows, outcome, _EXIT.get(flag, f"the solver failed with exit code {flag}"))
     # the box holds to the solver's tolerance only; the clip makes it exact
-    x = np.clip(x, lower, upper)
-    n = len(x)
+    x, n = np.minimum(np.maximum(x, lower), upper), len(x)
     multipliers = np.zeros(n + len(rows.h))
     multipliers[:n], multipliers[n + which] = info["lam"][:n], info["lam"][n:]
     return QpSolution(x, np.maximum(rows.G @ x - rows.h, 0.0), multipliers, QpOutcome.SOLVED, "solved")
