@@ -7,14 +7,12 @@ import numpy as np
 from benchmarks.peers.geometry import Arm, Array
 from benchmarks.peers.problem import TERMS, Problem
 
-from pretouch.control.approach_restriction import ApproachRestriction
-from pretouch.control.interface import MotionBody, MotionRequest
-from pretouch.control.joint_box import JointLimits
-from pretouch.control.motion import MotionState, joint_motion
+from pretouch.control.joint_box import JointLimits, brake, joint_box
 from pretouch.control.path import line
-from pretouch.control.setup import motion_setup
+from pretouch.control.qp import solve, task_cost
+from pretouch.control.restriction import approach_rows
 from pretouch.controller import Controller, ControllerState
-from pretouch.params import FailureParams, TaskParams
+from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
@@ -59,40 +57,37 @@ def _moved(T: Array, points: Array) -> Array:
 
 
 class Rows:
-    """Kinematics, closest points, rows, joint box and QP, by the calls that a control step makes: the very problem."""
+    """Kinematics, closest points, rows, joint box and QP, and nothing else: the very problem."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.model = problem, RobotModel(panda())
         arm, count = problem.arm, problem.points.shape[1]
-        limits = JointLimits(arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, TERMS.period)
-        task = TaskParams(
-            orientation="free", damping_max=TERMS.damping_max, manipulability_threshold=TERMS.manipulability_threshold,
+        self.limits = JointLimits(arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, TERMS.period)
+        self.task = TaskParams(
+            damping_max=TERMS.damping_max, manipulability_threshold=TERMS.manipulability_threshold,
             mid_joint_gain=TERMS.mid_joint_gain, mid_joint_time_s=TERMS.mid_joint_time,
         )  # fmt: skip
-        self.body = MotionBody(self.model, count, limits, task)
-        self.setup = motion_setup(self.body, None, FailureParams().solver_iterations)
-        restriction = ApproachRestriction(
+        self.restriction = RestrictionParams(
             rows="hard", v_max_m_s=TERMS.v_max, beta=TERMS.beta, d_repulse_m=TERMS.d_repulse,
             d_crit_m=TERMS.d_crit, d_notice_m=TERMS.d_notice,
         )  # fmt: skip
-        self.approach, self.state = restriction.on(self.body), MotionState(np.zeros(len(arm.q_min)))
-        self.none, self.goal = np.zeros(len(arm.q_min)), np.eye(3)
         self.unit, self.direction = np.arange(count), np.tile([0.0, 0.0, 1.0], (count, 1))
 
     def solve(self, s: int) -> Array:
         """Joint velocities (n,) [rad/s] of one snapshot."""
         p, model = self.problem, self.model
-        robot = RobotState(0.0, p.q[s], p.qd[s], p.q[s], p.qd[s], self.none, None)
-        kin = model.kinematics(robot.q)
+        q, qd = p.q[s], p.qd[s]
+        kin = model.kinematics(q)
         obstacles = closest_points(
             kin, model.body, kin.position[model.ee], self.unit, p.points[s], self.direction
         )  # fmt: skip
-        request = MotionRequest(p.velocity[s], self.goal, tracks=True)
-        allowed, _ = self.approach.step(None, self.body, kin, robot, obstacles, request)
-        motion, _ = joint_motion(self.state, self.setup, kin, robot, obstacles, request, allowed)
-        if motion.qp.outcome.value != "solved":
-            raise RuntimeError(motion.qp.status)
-        return motion.qp.qd
+        rows, _ = approach_rows(kin, model.moved_by, obstacles, self.restriction)
+        lower, upper = joint_box(q, qd, self.limits)
+        cost = task_cost(model.ee_jacobian(kin)[:3], p.velocity[s], q, model.q_mid, self.task)
+        solution = solve(cost, lower, upper, rows, self.restriction.slack_weight, brake(qd, lower, upper, self.limits))
+        if solution.outcome.value != "solved":
+            raise RuntimeError(solution.status)
+        return solution.qd
 
 
 class Step:

@@ -21,15 +21,7 @@ from pretouch.contact.repeated_contact import (
     wait_to_retry,
 )
 from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
-from pretouch.contact.virtual_mass import (
-    VirtualMass,
-    begun,
-    dead_band,
-    fastest_point,
-    learnt,
-    mass_init,
-    yielded,
-)
+from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
 from pretouch.modes import Event, ModeState
 from pretouch.params.reaction import AdmittanceParams, ClampParams
 from pretouch.robot.model import Kinematics, RobotModel
@@ -129,6 +121,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
 
     def _near(self, inputs: ReactionInputs) -> bool:
         """Whether something is seen near the body, or may be missed."""
+        # a compiled loop: NumPy's least of seven numbers takes longer than all else here
         return inputs.unseen or _any_nearer(inputs.obstacles.body_distance, self.near_m)
 
     def _moved(self, state: AdmittanceState, doing: Doing, body: Body, inputs: ReactionInputs) -> VirtualMass:

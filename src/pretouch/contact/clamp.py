@@ -76,7 +76,7 @@ def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
         marked, path = 0.0, np.tile(q, (_MARKS, 1))
     elif marked >= _APART_S:
         marked, path = 0.0, np.vstack((q[None], path[:-1]))
-    # each step of the task does this, and `replace` takes ten times as long
+    # each step of the task does this, and `replace` takes several times as long
     return ClampState(
         state.course, state.pushed, state.opposed, state.turns, state.turned, state.trail, marked, state.torque,
         state.opening, state.open, path, state.came, state.between, state.force,

@@ -24,6 +24,7 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
         robot, position = sample.robot, sample.kin.position[body.model.ee]
         force = None if robot.wrench is None else robot.wrench[:3]
         found = self.judged(sample.window, force, sample.armed, position, sample.obstacles)
+        # made anew, for `replace` takes several times as long
         return Detection(found.thresholds, found.contact, found.armed, robot.tau_ext, found.evidence), None
 
     def judged(
