@@ -109,7 +109,7 @@ def examine(
         robot = replace(robot, q_commanded=_moved_on(robot, now, sent), qd_commanded=command)
     if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
         robot = replace(robot, wrench=None)
-    missing = np.isnan(robot.tau_ext).any() if torques else robot.wrench is None
+    missing = not below(robot.tau_ext, _STRONGEST) if torques else robot.wrench is None
     force_stamp = min(watch.force_stamp, now) if missing else now
     if now - watch.stamp > params.overrun_s:
         faults[Event.OVERRUN] = f"{now - watch.stamp:.3f} s"
@@ -149,51 +149,57 @@ def _time(stamp: float) -> float | None:
 
 
 def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | None, str]:
-    """Copy a robot's state as arrays of float64, or say what keeps it from being that of an arm with these limits."""
+    """Copy a robot's state as arrays of float64, or say what keeps it from being that of an arm with these limits.
+
+    External torques that an arm cannot have are NaN.
+    """
+    n = len(qd_max)
     try:
         stamp, given = _time(robot.stamp), (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
-        tau_ext = _torques(robot.tau_ext, len(qd_max))
-        wrench = None if robot.wrench is None else np.array(robot.wrench, dtype=np.float64)
+        tau_ext, wrench = robot.tau_ext, None if robot.wrench is None else np.array(robot.wrench, dtype=np.float64)
     except AttributeError:
         return None, f"it is {robot!r}"
     except (TypeError, ValueError, OverflowError):
         return None, "its force estimate is not an array of numbers"
     if stamp is None:
         return None, f"its time stamp is {robot.stamp}"
-    try:
-        numbers = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        return None, _misfit(given, len(qd_max))
-    if numbers.shape != (4, len(qd_max)):
-        return None, _misfit(given, len(qd_max))
+    numbers = _numbers((*given, tau_ext), n)
+    if numbers is None:  # the torques may be missing, the others not
+        numbers = _numbers((*given, np.full(n, np.nan)), n)
+    if numbers is None:
+        return None, _misfit(given, n)
     if wrench is not None and wrench.shape != (6,):
         return None, f"its force estimate has the shape {wrench.shape}, not (6,)"
     if not _plausible(numbers, qd_max):
-        bounds = np.vstack([np.full((3, len(qd_max)), _LARGEST), _FASTEST * qd_max])
-        i, j = np.argwhere(~(np.abs(numbers) < bounds))[0]
+        bounds = np.vstack([np.full((3, n), _LARGEST), _FASTEST * qd_max])
+        i, j = np.argwhere(~(np.abs(numbers[:4]) < bounds))[0]
         return None, f"{_PARTS[i]} hold {numbers[i, j]:g}"
-    return RobotState(stamp, numbers[0], numbers[1], numbers[2], numbers[3], tau_ext, wrench), ""
+    return RobotState(stamp, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], wrench), ""
 
 
-def _torques(given: object, joints: int) -> FloatArray:
-    """Copy external torques as (n,) of float64; what an arm cannot have is NaN."""
+def _numbers(given: tuple[object, ...], joints: int) -> FloatArray | None:
+    """Copy what is a number a joint to one array (5, n) of float64; None if a part is something else."""
     try:
-        torques = np.array(given, dtype=np.float64)
+        numbers = np.array(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        torques = np.zeros(0)
-    sound = torques.shape == (joints,) and below(torques, _STRONGEST)
-    return torques if sound else np.full(joints, np.nan)
+        return None
+    return numbers if numbers.shape == (len(given), joints) else None
 
 
 @compiled
 def _plausible(numbers: FloatArray, qd_max: FloatArray) -> bool:
-    """Whether an arm can have these (4, n) positions, velocities, and commanded ones; not if one is NaN."""
+    """Whether an arm can have these (5, n) positions, velocities, and commanded ones; not if one is NaN.
+
+    The last row are external torques: all of them are made NaN where an arm cannot have one.
+    """
     for j in range(len(qd_max)):
         for i in range(3):
             if not abs(numbers[i, j]) < _LARGEST:
                 return False
         if not abs(numbers[3, j]) < _FASTEST * qd_max[j]:
             return False
+    if not below(numbers[4], _STRONGEST):
+        numbers[4] = np.nan
     return True
 
 

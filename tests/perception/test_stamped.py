@@ -66,7 +66,9 @@ def test_poses_go_back_as_the_arm_came(panda_model, paper_skin):
     sensors = placed(panda_model, paper_skin, q)
     kin, age = panda_model.kinematics(q), 0.001
     stamp = np.full(len(paper_skin), 7.0 - age)
-    move_back(sensors, stamp, Chain(kin.anchor, kin.axis, panda_model.moved_by, QD), 7.0, 0.06)
+    move_back(
+        sensors, np.ones(len(stamp), np.bool_), stamp, Chain(kin.anchor, kin.axis, panda_model.moved_by, QD), 7.0, 0.06
+    )
     position, rotation, _ = sensors
     at, turned, _ = placed(panda_model, paper_skin, q - QD * age)
     np.testing.assert_allclose(position, at, atol=1e-6)
@@ -80,11 +82,11 @@ def test_no_reading_is_moved_back_by_more_than_it_lasts_nor_into_the_future(pand
     chain = Chain(kin.anchor, kin.axis, panda_model.moved_by, QD)
     here = placed(panda_model, paper_skin, q)
     stays = placed(panda_model, paper_skin, q)
-    move_back(stays, np.full(len(paper_skin), 7.5), chain, 7.0, 0.06)
+    move_back(stays, np.ones(len(paper_skin), np.bool_), np.full(len(paper_skin), 7.5), chain, 7.0, 0.06)
     np.testing.assert_array_equal(stays.position, here.position)
     for stamp, same in ((-np.inf, 6.94), (6.0, 6.94)):
         first, second = placed(panda_model, paper_skin, q), placed(panda_model, paper_skin, q)
         for at, pose in ((stamp, first), (same, second)):
             stamps = np.full(len(paper_skin), at)
-            move_back(pose, stamps, chain, 7.0, 0.06)
+            move_back(pose, np.ones(len(stamps), np.bool_), stamps, chain, 7.0, 0.06)
         np.testing.assert_allclose(first[0], second[0], atol=1e-12)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.params.reaction import ClampParams
 from pretouch.types import FloatArray
 from pretouch.values import value
@@ -69,12 +70,26 @@ def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
 
     Where it has been moved meanwhile, by a reaction or by hand, the path begins anew.
     """
+    marked, path = state.marked + dt, state.path
     # farther from one mark than the task goes until the next: something else has moved the arm
-    if np.abs(q - state.path[0]).max() > _MOVED_RAD:
-        return replace(state, marked=0.0, path=np.tile(q, (_MARKS, 1)))
-    if state.marked + dt < _APART_S:
-        return replace(state, marked=state.marked + dt)
-    return replace(state, marked=0.0, path=np.vstack((q[None], state.path[:-1])))
+    if _farther(q, path, _MOVED_RAD):
+        marked, path = 0.0, np.tile(q, (_MARKS, 1))
+    elif marked >= _APART_S:
+        marked, path = 0.0, np.vstack((q[None], path[:-1]))
+    # each step of the task does this, and `replace` takes several times as long
+    return ClampState(
+        state.course, state.pushed, state.opposed, state.turns, state.turned, state.trail, marked, state.torque,
+        state.opening, state.open, path, state.came, state.between, state.force,
+    )  # fmt: skip
+
+
+@compiled
+def _farther(q: FloatArray, path: FloatArray, bound: float) -> bool:
+    """Whether a joint is farther than a bound from the newest place (M, n) of a path [rad]."""
+    for j in range(len(q)):  # noqa: SIM110  compiled code knows no generators
+        if abs(q[j] - path[0, j]) > bound:
+            return True
+    return False
 
 
 def caught_between(state: ClampState, between: str, force: float, torque: FloatArray) -> ClampState:

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.composition import Part
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import WindowState
@@ -144,9 +145,18 @@ class Detector(Part, group="pretouch.detectors"):
 
 def no_torques(body: Body, sample: Sample) -> Detection | None:
     """Return what a detector by torques says where there are none, or None where there are."""
-    if not math.isnan(sample.robot.tau_ext.sum()):  # NaN if one of them is
+    if is_known(sample.robot.tau_ext):
         return None
     return Detection(Thresholds(np.full((6, 3), np.nan)), None, False, np.full(body.model.n, np.nan), 0.0)
+
+
+@compiled
+def is_known(torque: FloatArray) -> bool:
+    """Whether there are torques (n,): none is NaN."""
+    for number in torque:  # noqa: SIM110  compiled code knows no generators
+        if np.isnan(number):
+            return False
+    return True
 
 
 def strongest(force: FloatArray, bands: Thresholds) -> Contact:

@@ -13,7 +13,7 @@ from pretouch.contact.residual_windows import LENGTHS, LONGEST
 from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.sequential_step import detect_contact
 from pretouch.contact.turning import turning_init
-from pretouch.contact.window_scatter import scatter_init
+from pretouch.contact.window_scatter import learns_scatter, scatter_init
 from pretouch.groups import ObstacleArrays
 from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
 from pretouch.robot.model import Kinematics, RobotModel
@@ -140,7 +140,9 @@ def sequential_step(
             prior = prior_of(n, p)
             weights, weights_covariance = weights.copy(), weights_covariance.copy()
             noise, learnt = noise.copy(), learnt.copy()
-    scatter, level = (state.scatter.copy(), state.level.copy()) if p.misfit else (state.scatter, state.level)
+    # the largest of them, written in one of eight samples
+    scatter = state.scatter.copy() if p.misfit and learns_scatter(state.at) else state.scatter
+    level = state.level.copy() if p.misfit else state.level
     lasting, turning = state.lasting.copy(), state.turning.copy()
     misfit, nearness = p.misfit or _NO_MISFIT, p.proximity or _NO_PROXIMITY
     count = min(state.count + 1, LONGEST)

@@ -68,7 +68,7 @@ def learnt(state: VirtualMass, residual: FloatArray, dt: float, params: Admittan
     none, mean, torque = np.zeros(len(residual)), np.empty((2, len(residual))), np.empty(len(residual))
     _learn(state.mean, residual, weight, mean, torque)
     return VirtualMass(
-        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros_like(mean), none,
+        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros(mean.shape), none,
         0.0, 0.0, math.inf,
     )  # fmt: skip
 

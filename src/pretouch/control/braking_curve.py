@@ -20,8 +20,9 @@ from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, 
 from pretouch.control.motion_entry import Allowed, Ended, Fixed, Step, motion_within
 from pretouch.control.restriction import Rows
 from pretouch.control.touch_speed import TouchLimits, touch_limits
-from pretouch.groups import Chain, ObstacleArrays
+from pretouch.groups import Chain, Links, Mechanism, ObstacleArrays
 from pretouch.params import BrakingParams
+from pretouch.robot.mass_matrix import mass_matrix_into
 from pretouch.robot.model import Kinematics
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState
 
@@ -48,17 +49,12 @@ class BrakingCurve(BrakingParams, Restriction, name="braking"):
         return _OnBody(self, body).step(state, body, kin, robot, obstacles, request)
 
 
-_NO_MASS = np.zeros((0, 0))  # stands for none: compiled code wants an array, whatever counts
-
-
 class _OnBody(Restriction):
     """A `BrakingCurve` that works for one body."""
 
     def __init__(self, params: BrakingParams, body: MotionBody) -> None:
         p, across, mass = params, params.tangential, params.effective_mass
         self._weight = p.slack_weight
-        # M is of the links alone; an impact has to stop the rotors too: I_r of docs/explanation/anticipation.md
-        self._rotors = None if mass is None else mass.rotor_inertia_kg_m2 * np.eye(body.model.n)
         self._limits = BrakingLimits(
             p.d_notice_m, p.deceleration_m_s2, p.latency_s, p.margin_m, p.retreat_max_m_s,
             # what is switched off never binds: no speed is above this deadband, no distance below -inf
@@ -66,7 +62,10 @@ class _OnBody(Restriction):
             -np.inf if across is None else across.distance_m, 0.0 if across is None else across.speed_m_s,
             body.task.speed_m_s, p.tighten_m_s2, p.loosen_m_s2, body.limits.period,
         )  # fmt: skip
-        self._numbers = flattened(touch_limits(p), self._limits, self._weight)
+        # M is of the links alone; an impact has to stop the rotors too: I_r of docs/explanation/anticipation.md
+        inertia = 0.0 if mass is None else mass.rotor_inertia_kg_m2
+        self._arm = Inertia(mass is not None, inertia, body.model.mechanism.links)
+        self._numbers = flattened(touch_limits(p), self._limits, self._weight, self._arm)
 
     def step(
         self, state: Slots, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
@@ -75,17 +74,13 @@ class _OnBody(Restriction):
         slots = widened(state, request.units)
         count, most = len(obstacles.unit), MOST_ROWS * (len(slots.link) // 2)
         room = np.empty((most, len(robot.q))), np.empty(most), np.empty(count, WHOLE)
-        # the mass matrix is a call of MuJoCo: not without anything near
-        counts, mass = False, _NO_MASS
-        if self._rotors is not None and count > 0:
-            counts, mass = True, body.model.mass_matrix(robot.q) + self._rotors
         numbers = self._numbers
         if request.touch is not None:
             # a touch speed whatever the mass, and no heed of what moves by itself
             still = self._limits._replace(deadband_m_s=np.inf)
-            numbers = flattened(TouchLimits(np.inf, 1.0, 1.0, request.touch), still, self._weight)
+            numbers = flattened(TouchLimits(np.inf, 1.0, 1.0, request.touch), still, self._weight, self._arm)
         return CompiledRows(
-            _motion, room, self._weight, (obstacles.unit, obstacles.closing_speed, *slots, counts, mass, *numbers)
+            _motion, room, self._weight, (obstacles.unit, obstacles.closing_speed, *slots, *numbers)
         ), slots
 
 
@@ -98,28 +93,43 @@ class _Seen(NamedTuple):
     """(K,) speed of the object itself towards the body [m/s]."""
 
 
+class Inertia(NamedTuple):
+    """What the arm's effective mass is made of."""
+
+    counts: bool
+    """Whether the touch speed follows from it."""
+    rotor_inertia_kg_m2: float
+    """Of each joint."""
+    links: Links
+
+
 class _Slowing(NamedTuple):
     """What the rows are made of."""
 
     touching: TouchLimits
     limits: BrakingLimits
     weight: float
+    inertia: Inertia
 
 
 @entry
 def _motion(
-    step: Step, rows: Rows, fixed: Fixed, seen: _Seen, slots: Slots, mass_counts: bool, mass: FloatArray, p: _Slowing
-) -> Ended:
+    step: Step, rows: Rows, fixed: Fixed, seen: _Seen, slots: Slots, p: _Slowing
+) -> Ended:  # fmt: skip
     """Change the slots, and write the rows and the answer within them."""
-    kin, near, L = step.kin, step.near, np.eye(len(step.robot.q))
+    kin, near, n = step.kin, step.near, len(step.robot.q)
     obstacles = ObstacleArrays(
         seen.unit, near.link, near.body_point, near.direction, near.body_distance, seen.closing_speed
     )
     # posture as measured, speeds as commanded: a row tightens from what the arm was sent last
     chain = Chain(kin.anchor, kin.axis, fixed.arm.moved_by, step.robot.qd_commanded)
-    # a mass matrix that cannot be factored leaves the largest touch speed
-    factored = Mass(mass_counts and factor(mass, L), L)
-    count, found = braking_rows(slots, obstacles, chain, factored, p.touching, p.limits, rows)
+    M, L, counts = np.empty((n, n)), np.eye(n), p.inertia.counts and len(near.link) > 0
+    if counts:
+        mass_matrix_into(kin, Mechanism(fixed.arm, p.inertia.links), M)
+        for j in range(n):
+            M[j, j] += p.inertia.rotor_inertia_kg_m2
+        counts = factor(M, L)  # a mass matrix that cannot be factored leaves the largest touch speed
+    count, found = braking_rows(slots, obstacles, chain, Mass(counts, L), p.touching, p.limits, rows)
     none = np.empty(0)
     allowed = Allowed(rows.G[:found], rows.h[:found], rows.which[:count], p.weight, none, none, False)
     return motion_within(step, allowed, fixed)

@@ -8,7 +8,7 @@ from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, 
 from pretouch.control.joint_box import box_and_brake
 from pretouch.control.motion_entry import given_motion
 from pretouch.control.penalty import SOLVED
-from pretouch.control.qp import ENDING, Cost, solve
+from pretouch.control.qp import ENDING, Cost, solve_hard
 from pretouch.control.restriction import ApproachRows
 from pretouch.control.setup import MotionSetup
 from pretouch.errors import ParameterError
@@ -88,7 +88,7 @@ def joint_motion(
     )  # fmt: skip
     after = MotionState(null_velocity, blocked) if setup.remembers else state
     which, limit = which[:seen], h[:seen]
-    if violated and hard and not request.hold:
+    if violated and hard and not request.hold and ending == SOLVED:
         qp = _with_hard_rows(setup, robot, ApproachRows(G[:found], h[:found], soft=False), speeds, cost)
         J = setup.body.model.ee_jacobian(kin)[:3]
         # a step reports the rows of obstacles; those that a restriction adds behind them belong to none
@@ -117,7 +117,7 @@ def _with_hard_rows(
     if speeds is not None:
         slowest, fastest = speeds
         lower, upper = np.clip(slowest, lower, upper), np.clip(fastest, lower, upper)
-    return solve(Cost(cost[:-1], cost[-1]), lower, upper, rows, 0.0, stop, setup.numbers.budget)
+    return solve_hard(Cost(cost[:-1], cost[-1]), lower, upper, rows, stop, setup.numbers.budget)
 
 
 def _given(a: Restricted, n: int) -> CompiledRows:

@@ -133,9 +133,10 @@ def _finite(problem: Problem) -> bool:
         for j in range(len(f)):
             spoilt += 0.0 * H[i, j]
     for k in range(len(h)):
-        spoilt += 0.0 * h[k]
+        row = 0.0 * h[k]  # a sum of its own: one after the other, all of them would wait for each other
         for i in range(len(f)):
-            spoilt += 0.0 * G[k, i]
+            row += 0.0 * G[k, i]
+        spoilt += row
     return bool(spoilt == 0.0)
 
 

@@ -13,6 +13,7 @@ from pretouch.control.penalty import (
     SOLVED,
     Minimum,
     Problem,
+    excesses,
     minimise,
     possible_rows,
 )
@@ -171,7 +172,7 @@ def solve(
     if ending != SOLVED:
         return _braking(stop, rows, QpOutcome.FAILED, ENDING[ending])
     if len(slack) and not rows.soft and slack.max() > 0:
-        return _solve_hard(cost, lower, upper, rows, stop, budget)
+        return solve_hard(cost, lower, upper, rows, stop, budget)
     violated = len(slack) > 0 and slack.max() > 0
     status = "solved, an approach row is violated" if violated else "solved"
     return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, status)
@@ -187,10 +188,10 @@ def _minimise(problem: Problem, budget: int, answer: Minimum) -> int:
     return minimise(problem, budget, answer)
 
 
-def _solve_hard(
+def solve_hard(
     cost: Cost, lower: FloatArray, upper: FloatArray, rows: ApproachRows, stop: FloatArray, budget: int
 ) -> QpSolution:
-    """Minimise the cost, all of it finite, where hard rows are in the way."""
+    """Answer of `solve` where hard rows are in the way of a minimum that it found, so that all numbers are finite."""
     which = possible_rows(rows.G, rows.h, lower, upper)
     # The first n bounds are those of x itself. -1e30 is the least bound that DAQP takes for none; a sense of 0 is a
     # hard inequality. With its own tolerance, 1e-6, a row that is violated by as much would count as met.
@@ -205,11 +206,11 @@ def _solve_hard(
         outcome, flag = (QpOutcome.INFEASIBLE, _INFEASIBLE) if contradict else (QpOutcome.FAILED, flag)
         return _braking(stop, rows, outcome, _EXIT.get(flag, f"the solver failed with exit code {flag}"))
     # the box holds to the solver's tolerance only; the clip makes it exact
-    x = np.clip(x, lower, upper)
-    n = len(x)
-    multipliers = np.zeros(n + len(rows.h))
+    x, n = np.minimum(np.maximum(x, lower), upper), len(x)
+    slack, multipliers = np.empty(len(rows.h)), np.zeros(n + len(rows.h))
+    excesses(rows.G, rows.h, x, slack)
     multipliers[:n], multipliers[n + which] = info["lam"][:n], info["lam"][n:]
-    return QpSolution(x, np.maximum(rows.G @ x - rows.h, 0.0), multipliers, QpOutcome.SOLVED, "solved")
+    return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, "solved")
 
 
 def _contradict(lower: FloatArray, upper: FloatArray, rows: ApproachRows, budget: int) -> bool:

@@ -76,16 +76,19 @@ def poses(
     """Return the poses of `sensor_poses` from those of the links."""
     position, rotation = np.empty((len(link), 3)), np.empty((len(link), 3, 3))
     for k in range(len(link)):
-        m = link[k]
-        for i in range(3):
-            # row i of R_O_link; written out, for calling a linear algebra library for 3 x 3 numbers is slow
-            x, y, z = link_rotation[m, i, 0], link_rotation[m, i, 1], link_rotation[m, i, 2]
-            for j in range(3):
-                rotation[k, i, j] = x * T_link_sensor[k, 0, j] + y * T_link_sensor[k, 1, j] + z * T_link_sensor[k, 2, j]
-            position[k, i] = link_position[m, i] + (
-                x * T_link_sensor[k, 0, 3] + y * T_link_sensor[k, 1, 3] + z * T_link_sensor[k, 2, 3]
-            )
+        pose_into(link_position[link[k]], link_rotation[link[k]], T_link_sensor[k], position[k], rotation[k])
     return position, rotation
+
+
+@compiled
+def pose_into(p: FloatArray, R: FloatArray, T: FloatArray, position: FloatArray, rotation: FloatArray) -> None:
+    """Write the pose, (3,) and (3, 3), of a sensor at T_link_sensor (4, 4) on a link with position and rotation."""
+    for i in range(3):
+        # row i of R_O_link; written out, for calling a linear algebra library for 3 x 3 numbers is slow
+        x, y, z = R[i, 0], R[i, 1], R[i, 2]
+        for j in range(3):
+            rotation[i, j] = x * T[0, j] + y * T[1, j] + z * T[2, j]
+        position[i] = p[i] + (x * T[0, 3] + y * T[1, 3] + z * T[2, 3])
 
 
 @compiled

@@ -21,7 +21,7 @@ from pretouch.perception.obstacles import (
     measured,
     measured_distance,
     newer,
-    poses,
+    pose_into,
     take_in,
     tells_anything,
 )
@@ -285,7 +285,11 @@ def _take_readings(
 ) -> None:  # fmt: skip
     """Take the readings that are new and show what is not known to be there into the tracks."""
     times, distance, fresh, now, cones = tracks.times, shown.distance, shown.fresh, instant.now, skin.cones
-    position, rotation = poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
+    position, rotation = np.zeros((len(fresh), 3)), np.zeros((len(fresh), 3, 3))
+    for k in range(len(fresh)):
+        if fresh[k]:
+            m = skin.link[k]
+            pose_into(kin.position[m], kin.rotation[m], skin.T_link_sensor[k], position[k], rotation[k])
     sensors = Sensors(position, rotation, skin.link)
     tells, shows = (
         tells_anything(readings.distance, readings.status, distance, cones),
@@ -303,7 +307,7 @@ def _take_readings(
         # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
         chain = Chain(kin.anchor, kin.axis, scene.moved_by, instant.qd)
         # changes `position` and `rotation`, the arrays of `sensors`, for all that follows
-        move_back(sensors, readings.stamp, chain, instant.posed, p.persistence_s)
+        move_back(sensors, fresh, readings.stamp, chain, instant.posed, p.persistence_s)
     if p.filters:
         leave_out(shows, fresh, distance, ends, p.aside_m, sensors, placed_capsules(scene.others, kin), cones)
         leave_out_planes(shows, fresh, ends, sensors, scene.planes, cones)

@@ -6,11 +6,13 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.groups import Chain, Sensors
-from pretouch.types import FloatArray
+from pretouch.types import BoolArray, FloatArray
 
 
 @compiled
-def move_back(sensors: Sensors, stamp: FloatArray, chain: Chain, posed: float, longest: float) -> None:
+def move_back(
+    sensors: Sensors, moved: BoolArray, stamp: FloatArray, chain: Chain, posed: float, longest: float
+) -> None:  # fmt: skip
     """Move sensor poses, (K, 3) [m] and (K, 3, 3), from the instant of the arm's posture back to their stamps (K,) [s].
 
     That is the motion of their links at the joint velocities (n,) [rad/s], to first order in the place; the rotation is
@@ -18,6 +20,7 @@ def move_back(sensors: Sensors, stamp: FloatArray, chain: Chain, posed: float, l
 
     Args:
         sensors: changed.
+        moved: (K,) which of them.
         stamp: of the readings.
         chain: of the arm.
         posed: instant of the arm's posture [s].
@@ -29,7 +32,7 @@ def move_back(sensors: Sensors, stamp: FloatArray, chain: Chain, posed: float, l
     for k in range(len(unit_link)):
         age = min(posed - stamp[k], longest)
         # measured after the posture: how the arm goes on is not known
-        if not age > 0.0:
+        if not moved[k] or not age > 0.0:
             continue
         v[:], w[:] = 0.0, 0.0
         # v = sum of qd_j a_j x (p - p_j) and w = sum of qd_j a_j, over the joints that move the link
