@@ -49,7 +49,7 @@ def test_surfaces_are_made_once_and_kept(
     monkeypatch.setattr(vendor, "kept_in", lambda: str(tmp_path))
     vendor._surfaces.cache_clear()
     made, _ = vendor_surfaces(panda_model)
-    (place,) = tmp_path.iterdir()
+    (place,) = (tmp_path / "__pycache__").iterdir()
     vendor._surfaces.cache_clear()
     with monkeypatch.context() as nothing:
         nothing.delattr(vendor, "_surface")

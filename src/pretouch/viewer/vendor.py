@@ -45,15 +45,18 @@ def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
 @cache
 def _surfaces(folder: Path, links: tuple[str, ...]) -> tuple[Mesh, ...]:
     """Make the surfaces of links, which takes a second and a half, or take what was kept beside compiled functions."""
-    place = Path(kept_in(), f"surfaces-{version(_PACKAGE)}-{source_digest(coarse)[:12]}.npz") if kept_in() else None
+    name = f"surfaces-{version(_PACKAGE)}-{source_digest(coarse)[:12]}.npz"
+    place = Path(kept_in(), "__pycache__", name) if kept_in() else None  # elsewhere it would count as a source
     if place is not None:
         with suppress(OSError, EOFError, ValueError, KeyError, BadZipFile), np.load(place) as kept:
             return tuple(Mesh(*(kept[f"{link}.{part}"] for part in _PARTS)) for link in links)
     meshes = tuple(_surface(folder, link) for link in links)
     if place is not None:
         parts = {f"{link}.{part}": getattr(m, part) for link, m in zip(links, meshes, strict=True) for part in _PARTS}
-        with suppress(OSError), atomic_replacement(place) as unfinished, unfinished.open("wb") as file:
-            np.savez(file, **parts)
+        with suppress(OSError):
+            place.parent.mkdir(exist_ok=True)
+            with atomic_replacement(place) as unfinished, unfinished.open("wb") as file:
+                np.savez(file, **parts)
     return meshes
 
 
