@@ -7,6 +7,7 @@ from subprocess import run
 
 import pytest
 
+import pretouch
 from pretouch.errors import SourceError
 from pretouch.robot.vectors import dot
 from pretouch.source_digest import Sources, source_digest
@@ -14,15 +15,11 @@ from pretouch.source_digest import Sources, source_digest
 TREE = {
     "__init__.py": """
 from importlib import import_module
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from house.arm import Arm as Arm
-    from house import loop as loop
 
 def __getattr__(name):
     return import_module(f"house.{name}")
 """,
+    "__init__.pyi": "from house.arm import Arm as Arm\nfrom house import loop as loop\n",
     "bottom.py": "NEAREST = 0.04",
     "loop.py": "",
     "arm/__init__.py": "from .joints import seven\nArm = seven",
@@ -124,6 +121,10 @@ def test_a_function_of_a_script_rests_on_its_file_and_on_ours(house, tmp_path):
     after = Sources(house).digest(script)
     script.write_text("import house.bottom")
     assert len({before, after, Sources(house).digest(script)}) == 3
+
+
+def test_a_module_of_ours_does_not_rest_on_what_the_package_loads_by_name():
+    assert Sources(Path(pretouch.__file__).parent).closure("pretouch.errors") == {"pretouch", "pretouch.errors"}
 
 
 SCRIPT = """

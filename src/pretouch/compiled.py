@@ -11,6 +11,8 @@ from typing import Annotated, Any, Protocol, TypeVar, cast
 
 from numba import njit
 from numba.core import event
+from numba.core.caching import FunctionCache
+from numba.core.runtime.nrt import rtsys
 
 from pretouch.errors import SourceError
 from pretouch.source_digest import source_digest
@@ -27,39 +29,39 @@ def compiled(function: Function) -> Function:
     kept beside the module, or in the user's cache where an installation is read-only. Where neither can be written it
     is compiled anew in each process: that takes seconds, and works.
     """
-    return _kept(function, forceinline=False)
+    # Numba looks at the function's own file only to tell whether what it kept is out of date. What got into a function
+    # from another file, a constant or a call, it would go on using as it was: so the name it keeps it under tells all.
+    with suppress(RuntimeError, SourceError):  # nowhere to keep it, or no text to tell whether it is out of date
+        function.__qualname__ += f"-{source_digest(function)[:12]}"
+        cache = _Cache(function)
+        kept = njit(error_model="numpy")(function)
+        kept._cache = cache
+        return cast(Function, kept)
+    return cast(Function, njit(error_model="numpy")(function))
 
 
 def inlined(function: Function) -> Function:
-    """Compile a function into the one that calls it, at one place: large groups are not copied to it.
+    """Make a function part of the compiled one that calls it, at one place: large groups are not copied to it.
 
-    Elsewhere it would only make the machine code longer, and what does not fit the processor's cache is slow.
+    It is compiled there alone. Elsewhere it would only make the machine code longer, and what does not fit the
+    processor's cache is slow.
     """
-    return _kept(function, forceinline=True)
+    return cast(Function, njit(error_model="numpy", inline="always")(function))
 
 
-def _kept(function: Function, forceinline: bool) -> Function:
-    # Numba looks at the function's own file only to tell whether what it kept is out of date. What got into a function
-    # from another file, a constant or a call, it would go on using as it was: so the name it keeps it under tells all.
-    try:
-        function.__qualname__ += f"-{source_digest(function)[:12]}"
-        kept = njit(cache=True, error_model="numpy", forceinline=forceinline)(function)
-    except (RuntimeError, SourceError):  # nowhere to keep it, or no text to tell whether it is out of date
-        return cast(Function, njit(error_model="numpy", forceinline=forceinline)(function))
-    _keep_if_possible(kept)
-    return cast(Function, kept)
+class _Cache(FunctionCache):  # type: ignore[misc]  # not typed
+    """Numba's cache, with less to do where all is kept."""
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load machine code: what Numba's own registers before, all that can be compiled, takes a tenth of a second."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
-def _keep_if_possible(kept: Any) -> None:
-    """Let a full disk be no reason to stop: Numba raises where it cannot write what it just compiled."""
-    cache = kept._cache
-    save = cache.save_overload
-
-    def try_to_save(*given: object) -> None:
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Let a full disk be no reason to stop: Numba raises where it cannot write what it just compiled."""
         with suppress(OSError):
-            save(*given)
-
-    cache.save_overload = try_to_save
+            super().save_overload(sig, data)
 
 
 class Entry(Protocol[Result]):

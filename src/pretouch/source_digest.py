@@ -84,7 +84,7 @@ class Sources:
         for node, types_only in _imports(text):
             if not types_only:
                 needed |= set(self._resolved(node, seed, text))
-        if not self._lazy(seed):  # a package that loads names by text says what they are to a type checker
+        if not self._lazy(seed):  # a package that loads names by text says in its stub what they are
             named = _NAMED.findall(text) if "import_module(" in text or "files(" in text else ()
             needed |= {module for name, end in named for module in self._named(name, end == "{")}
         for name in needed:
@@ -119,10 +119,13 @@ class Sources:
             yield lazy[name]
 
     def _find_lazy(self, seed: Seed) -> dict[str, str]:
-        """Return the module of each name that a package loads when it is asked for."""
+        """Return the module of each name that a package loads when it is asked for: they stand in its stub."""
         found: dict[str, str] = {}
-        for node, types_only in _imports(self._text(seed)) if self._is_package(seed) else ():
-            if types_only and isinstance(node, ast.ImportFrom):
+        stub = self._file(seed).with_suffix(".pyi") if self._is_package(seed) else None
+        if stub is None or not stub.is_file():
+            return found
+        for node, _ in _imports(stub.read_text(encoding="utf-8")):
+            if isinstance(node, ast.ImportFrom):
                 base = self._base(node, seed)
                 for alias in node.names:
                     module = f"{base}.{alias.name}"

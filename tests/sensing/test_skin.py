@@ -13,7 +13,7 @@ from pretouch.errors import SkinError
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing import skin as sensing_skin
-from pretouch.sensing.skin import Skin, load_skin, save_skin
+from pretouch.sensing.skin import Skin, load_skin, save_skin, sensor_unit
 from pretouch.sensing.unit import SensorUnit
 
 PRINTABLE = st.characters(codec="utf-8", exclude_categories=("C", "Z"), include_characters=" ")
@@ -207,6 +207,14 @@ def test_a_quaternion_begins_with_w(panda_model, tmp_path):
     # turned about x by 2 atan2(0.8, 0.6): cosine 0.36 - 0.64, sine 2 * 0.48; the beam is the third column
     np.testing.assert_allclose(skin.T_link_sensor[0, :3, 2], [0.0, -0.96, -0.28], atol=1e-12)
     np.testing.assert_allclose(skin.T_link_sensor[0, :3, 3], [0.0, -0.108, 0.045])
+
+
+def test_the_matrix_of_a_quaternion_is_that_of_scipy_to_the_bit():
+    place = {"id": "a", "link": "panda_link3", "position_m": np.zeros(3)}
+    for drawn in np.random.default_rng(0).normal(size=(200, 4)):
+        quaternion = (drawn / np.linalg.norm(drawn)).round(4)
+        T = sensor_unit(**place, quaternion_wxyz=quaternion).T_link_sensor
+        np.testing.assert_array_equal(T[:3, :3], Rotation.from_quat(quaternion, scalar_first=True).as_matrix())
 
 
 def test_a_rounded_quaternion_is_taken(panda_model, tmp_path):

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -38,6 +40,28 @@ def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(
     found, said = vendor_surfaces(panda_model)
     assert found == {}
     assert said == f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
+
+
+def test_surfaces_are_made_once_and_kept(
+    panda_model: RobotModel, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    skip_without(MESHES)
+    monkeypatch.setattr(vendor, "kept_in", lambda: str(tmp_path))
+    vendor._surfaces.cache_clear()
+    made, _ = vendor_surfaces(panda_model)
+    (place,) = (tmp_path / "__pycache__").iterdir()
+    vendor._surfaces.cache_clear()
+    with monkeypatch.context() as nothing:
+        nothing.delattr(vendor, "_surface")
+        kept, _ = vendor_surfaces(panda_model)
+    place.write_bytes(b"PK")
+    vendor._surfaces.cache_clear()
+    anew, _ = vendor_surfaces(panda_model)
+    for other in (kept, anew):
+        for link, mesh in made.items():
+            for part in ("vertices", "faces", "normals"):
+                np.testing.assert_array_equal(getattr(mesh, part), getattr(other[link], part))
+    assert place.stat().st_size > 2
 
 
 def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model: RobotModel) -> None:

@@ -1,16 +1,22 @@
 """The vendor's surfaces of an arm, made coarse enough for a page; from the extra `meshes`, if it is installed."""
 
+from contextlib import suppress
 from functools import cache
-from importlib.metadata import PackageNotFoundError, files
+from importlib.metadata import PackageNotFoundError, files, version
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
-import trimesh
 
+from pretouch.atomic_write import atomic_replacement
+from pretouch.compiled import kept_in
 from pretouch.extras import MESHES
 from pretouch.robot.model import RobotModel
+from pretouch.source_digest import source_digest
 from pretouch.types import FloatArray, IntArray
 from pretouch.viewer.surface import Mesh
+
+_PACKAGE = "example-robot-data"
 
 CELL_M = 0.006
 """Size of the cells whose vertices are merged into one [m]."""
@@ -21,6 +27,8 @@ _EDGE_M = 0.015
 _FINGER_HEIGHT_M = 0.0584
 """Height of a finger's frame over the hand's (the vendor's URDF)."""
 
+_PARTS = ("vertices", "faces", "normals")
+
 
 def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
     """Surfaces by link index, link frame, and a sentence: none and why, or all and ''."""
@@ -30,12 +38,29 @@ def vendor_surfaces(model: RobotModel) -> tuple[dict[int, Mesh], str]:
     if folder is None or MESHES.missing():
         return {}, f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
 
-    return {i: _surface(folder, link) for i, link in enumerate(model.links) if _has_one(link)}, ""
+    links = {i: link for i, link in enumerate(model.links) if _has_one(link)}
+    return dict(zip(links, _surfaces(folder, tuple(links.values())), strict=True)), ""
 
 
 @cache
+def _surfaces(folder: Path, links: tuple[str, ...]) -> tuple[Mesh, ...]:
+    """Make the surfaces of links, which takes a second and a half, or take what was kept beside compiled functions."""
+    name = f"surfaces-{version(_PACKAGE)}-{source_digest(coarse)[:12]}.npz"
+    place = Path(kept_in(), "__pycache__", name) if kept_in() else None  # elsewhere it would count as a source
+    if place is not None:
+        with suppress(OSError, EOFError, ValueError, KeyError, BadZipFile), np.load(place) as kept:
+            return tuple(Mesh(*(kept[f"{link}.{part}"] for part in _PARTS)) for link in links)
+    meshes = tuple(_surface(folder, link) for link in links)
+    if place is not None:
+        parts = {f"{link}.{part}": getattr(m, part) for link, m in zip(links, meshes, strict=True) for part in _PARTS}
+        with suppress(OSError):
+            place.parent.mkdir(exist_ok=True)
+            with atomic_replacement(place) as unfinished, unfinished.open("wb") as file:
+                np.savez(file, **parts)
+    return meshes
+
+
 def _surface(folder: Path, link: str) -> Mesh:
-    """Make the surface of a link, once in a process: that takes half a second."""
     mesh = coarse(*_read(folder / f"{link.removeprefix('panda_')}.dae"))
     if link != "panda_hand":
         return mesh
@@ -45,6 +70,8 @@ def _surface(folder: Path, link: str) -> Mesh:
 
 
 def _read(file: Path) -> tuple[FloatArray, IntArray]:
+    import trimesh  # takes a third of a second, and is not needed where surfaces are kept
+
     mesh = trimesh.load_scene(file).to_mesh()
     vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=_EDGE_M)
     return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
@@ -63,7 +90,9 @@ def coarse(vertices: FloatArray, faces: IntArray, cell: float = CELL_M) -> Mesh:
     kept = kept[np.sort(first)]
     used, renumbered = np.unique(kept, return_inverse=True)
     corners = renumbered.reshape(-1, 3).astype(np.int64)
-    found = trimesh.Trimesh(merged[used], corners, process=False)
+    from trimesh import Trimesh
+
+    found = Trimesh(merged[used], corners, process=False)
     return Mesh(merged[used], corners, np.array(found.vertex_normals))
 
 
@@ -83,7 +112,7 @@ def _joined(*meshes: Mesh) -> Mesh:
 def _folder() -> Path | None:
     """Where the package keeps the surfaces; it is no Python package, only files."""
     try:
-        listed = files("example-robot-data") or []
+        listed = files(_PACKAGE) or []
     except PackageNotFoundError:
         return None
     found = [f for f in listed if f.name == "link0.dae" and "panda_description/meshes/visual" in f.as_posix()]
