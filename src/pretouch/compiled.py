@@ -33,8 +33,8 @@ def compiled(function: Function) -> Function:
     # from another file, a constant or a call, it would go on using as it was: so the name it keeps it under tells all.
     with suppress(RuntimeError, SourceError):  # nowhere to keep it, or no text to tell whether it is out of date
         function.__qualname__ += f"-{source_digest(function)[:12]}"
-        cache = _Cache(function)
-        kept = njit(error_model="numpy")(function)
+        cache = _Cache(function)  # type: ignore[no-untyped-call]
+        kept: Any = njit(error_model="numpy")(function)
         kept._cache = cache
         return cast(Function, kept)
     return cast(Function, njit(error_model="numpy")(function))
@@ -49,19 +49,19 @@ def inlined(function: Function) -> Function:
     return cast(Function, njit(error_model="numpy", inline="always")(function))
 
 
-class _Cache(FunctionCache):  # type: ignore[misc]  # not typed
+class _Cache(FunctionCache):
     """Numba's cache, with less to do where all is kept."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load machine code: what Numba's own registers before, all that can be compiled, takes a tenth of a second."""
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)
+            return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Let a full disk be no reason to stop: Numba raises where it cannot write what it just compiled."""
         with suppress(OSError):
-            super().save_overload(sig, data)
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
 class Entry(Protocol[Result]):

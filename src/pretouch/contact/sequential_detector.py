@@ -140,10 +140,8 @@ def sequential_step(
             prior = prior_of(n, p)
             weights, weights_covariance = weights.copy(), weights_covariance.copy()
             noise, learnt = noise.copy(), learnt.copy()
-    # the largest of them, written in one of eight samples
     scatter = state.scatter.copy() if p.misfit and learns_scatter(state.at) else state.scatter
-    level = state.level.copy() if p.misfit else state.level
-    lasting, turning = state.lasting.copy(), state.turning.copy()
+    lasting, turning, level = state.lasting.copy(), state.turning.copy(), state.level.copy()
     misfit, nearness = p.misfit or _NO_MISFIT, p.proximity or _NO_PROXIMITY
     count = min(state.count + 1, LONGEST)
     # The fields of Joints, ObstacleArrays, Memory, Situation, DetectionNumbers, Results, Kinematics and Mechanism in
