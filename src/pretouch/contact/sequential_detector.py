@@ -140,7 +140,6 @@ def sequential_step(
             prior = prior_of(n, p)
             weights, weights_covariance = weights.copy(), weights_covariance.copy()
             noise, learnt = noise.copy(), learnt.copy()
-    # the largest of them, written in one of eight samples
     scatter = state.scatter.copy() if p.misfit and learns_scatter(state.at) else state.scatter
     level = state.level.copy() if p.misfit else state.level
     lasting, turning = state.lasting.copy(), state.turning.copy()
