@@ -60,6 +60,7 @@ def scatter_init(n: int) -> FloatArray:
 
 def learns_scatter(at: int) -> bool:
     """Whether `learn_scatter` may change a scatter at this count of samples."""
+    # the scatter is the largest part of the detector's state: it is copied only to be written
     return at % _LEAST_STRIDE == 0
 
 
