@@ -2,6 +2,7 @@
 
 import os
 import platform
+import resource
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -93,6 +94,7 @@ def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = la
         **{f"{run}_{name}": value for run, took in others.items() for name, value in _spread(took).items()},
         "cycles": request.cycles,
         "missed_ticks": at_rate.missed,
+        "memory_gained_kib": at_rate.gained // 1024,
         "wake_up_median_us": at_rate.wake_up_us,
         "restricting_median": float(np.median(steps.restricting)),
         "tracking": float(steps.tracking.mean()),
@@ -117,6 +119,8 @@ class _Timed:
     missed: int
     wake_up_us: float | None
     """Median of how late the machine woke the loop [us], None if the loop was never early enough to wait."""
+    gained: int
+    """Memory that the process holds at the end and did not hold before the first step [B]."""
 
 
 def _settled(controller: Controller, work: Workload) -> ControllerState:
@@ -130,8 +134,10 @@ def _settled(controller: Controller, work: Workload) -> ControllerState:
 
 def _timed(controller: Controller, work: Workload, cycles: int, clock: MonotonicClock | None) -> _Timed:
     """Time each step, at the ticks of a clock or back to back."""
-    cpu, wall, restricting, tracking = (np.zeros(cycles, np.int64) for _ in range(4))
+    # filled: pages that are first written to in the run would count as gained
+    cpu, wall, restricting, tracking = np.full((4, cycles), 0)
     state = _settled(controller, work)
+    held = _resident()
     begin = state.path.phase
     for i in range(cycles):
         if clock:
@@ -143,10 +149,16 @@ def _timed(controller: Controller, work: Workload, cycles: int, clock: Monotonic
         cpu[i], wall[i] = cpu_after - cpu_before, after - before
         restricting[i], tracking[i] = len(step.restricted), step.mode is Mode.TRACK
         work.move(step.command)
+    gained = _resident() - held
     late = clock.timing().wake_up if clock else None
     wake_up_us = 1e6 * late.median if late and late.max > 0 else None
     missed = clock.missed if clock else 0
-    return _Timed(cpu, wall, restricting, tracking, state.path.phase - begin, missed, wake_up_us)
+    return _Timed(cpu, wall, restricting, tracking, state.path.phase - begin, missed, wake_up_us, gained)
+
+
+def _resident() -> int:
+    """Memory that this process holds [B]."""
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize()
 
 
 def _stages(model: RobotModel, points: int, params: Profile, request: CycleRequest) -> dict[str, float]:

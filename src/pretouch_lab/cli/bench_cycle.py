@@ -62,6 +62,8 @@ def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
     console.print("Share of each stage [%]", style="bold", markup=False)
     console.print(_shares(rows))
     console.print()
+    gained = ", ".join(f"{row['memory_gained_kib']} KiB with {row['points']}" for row in rows)
+    console.print(f"Memory gained in the run at {request.rate:g} Hz: {gained}.", soft_wrap=True, markup=False)
     for sentence in missing:
         console.print(sentence, soft_wrap=True, markup=False)
     idle = [str(row["points"]) for row in rows if row["tracking"] < 1]

@@ -155,6 +155,22 @@ def test_slow_steps_are_overruns_in_wall_time_alone(monkeypatch: pytest.MonkeyPa
     assert row["missed_ticks"] >= 1
 
 
+@pytest.mark.usefixtures("short")
+def test_memory_that_steps_keep_is_told(monkeypatch: pytest.MonkeyPatch):
+    kept = []
+
+    class Hoarder(Controller):
+        """Each step keeps a megabyte."""
+
+        def step(self, state: object, inputs: Inputs) -> object:
+            kept.append(np.ones(2**17))
+            return super().step(state, inputs)
+
+    assert measure(2, CycleRequest(cycles=30))["memory_gained_kib"] < 5_000
+    monkeypatch.setattr(cycle, "Controller", Hoarder)
+    assert measure(2, CycleRequest(cycles=30))["memory_gained_kib"] >= 28 * 1024
+
+
 def test_a_spread_is_numpys():
     values = np.random.default_rng(0).exponential(100.0, 20_000)
     spread = cycle._spread(values)
