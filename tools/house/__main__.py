@@ -65,7 +65,7 @@ def measures() -> list[Measure]:
     return [
         Measure("lines of the product, comments aside", product.lines, 56_754, 35_000),
         Measure("files of the product", len(product.files), 473, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 79_612, 50_000),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 79_625, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
