@@ -187,7 +187,7 @@ def follow(path: Path, state: PathState, position: FloatArray, params: TaskParam
     `position` (3,) [m] is the end-effector origin.
     """
     # for three numbers, floats are faster than arrays
-    point = np.asarray(path.point(state.phase), dtype=np.float64)
+    point = np.array(path.point(state.phase), dtype=np.float64)  # a copy: a path may hand out the same array again
     tx, ty, tz = np.asarray(path.tangent(state.phase), dtype=np.float64).tolist()
     (px, py, pz), (x, y, z) = point.tolist(), position.tolist()
     ex, ey, ez = px - x, py - y, pz - z
