@@ -27,7 +27,6 @@ if (!window.pretouchKeys) {
   const say = () => {
     const input = field();
     if (!input) {
-      held.clear();
       driving = false;
       return;
     }
@@ -45,10 +44,10 @@ if (!window.pretouchKeys) {
     say();
   };
   addEventListener("keydown", (event) => {
-    if (!(event.code in ways) || !field() || typing(event.target) || event.ctrlKey || event.metaKey || event.altKey)
-      return;
+    if (!(event.code in ways) || typing(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
+    held.add(event.code);  // counts from when the arm is driven on: a slow page shows that late
+    if (!field()) return;
     event.stopPropagation();  // else the camera moves too
-    held.add(event.code);
     if (!event.repeat) say();
   }, true);
   addEventListener("keyup", (event) => held.delete(event.code) && say(), true);
