@@ -119,6 +119,8 @@ class Cones(NamedTuple):
     """(T, 2) nearest and farthest distance that is measured [m]."""
     rays: FloatArray
     """(T, R, 3) unit vectors that fill the cone, sensor frame, the axis first."""
+    spread: FloatArray
+    """(T,) standard deviation of the direction a target lies in, beside what is not known of the unit's own [rad]."""
 
 
 class SkinArrays(NamedTuple):

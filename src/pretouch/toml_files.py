@@ -18,12 +18,37 @@ _HIDDEN = re.compile(
 """Comments and texts, in which a dot parts no key. One that is not closed ends with the line or file: to look into it
 again from each quote within would take quadratic time."""
 _TOO_DEEP = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_DEEPEST_KEY}}}")
+_HEADER = re.compile(r"[ \t]*\[\[[ \t]*([\w-]+)[ \t]*\]\]|[ \t]*\[[ \t]*([\w-]+)[ \t]*\.[ \t]*([\w-]+)[ \t]*\]")
+
+
+def lines_of(text: str) -> dict[tuple[str, str | int], int]:
+    """Return the line of each [name.key] and of each [[name]], the latter by its number from 0 on."""
+    found, count = dict[tuple[str, str | int], int](), dict[str, int]()
+    for number, line in enumerate(_HIDDEN.sub(_blank, text).split("\n"), 1):
+        if header := _HEADER.match(line):
+            name, table, key = header.groups()
+            if name:
+                found[name, count.get(name, 0)] = number
+                count[name] = count.get(name, 0) + 1
+            else:
+                found[table, key] = number
+    return found
+
+
+def _blank(hidden: re.Match[str]) -> str:
+    """Keep the line ends of what is left out."""
+    return "\n" * hidden.group().count("\n")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file. Raises OSError, and ValueError for what is not TOML, UTF-8 or within the bounds above."""
+    return parsed_toml(bytes_of(path))
+
+
+def bytes_of(path: Path) -> bytes:
+    """Return the bytes of a TOML file, at most one more than it may have."""
     with path.open("rb") as file:
-        return parsed_toml(file.read(LARGEST_FILE + 1))
+        return file.read(LARGEST_FILE + 1)
 
 
 def parsed_toml(data: bytes) -> dict[str, Any]:

@@ -15,7 +15,6 @@ from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
 from pretouch.errors import RecordingError
-from pretouch.recording.codec import decode_step, encode_step
 from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
 from pretouch.recording.messages import TOPICS, decoded, definition, encoded
 from pretouch.recording.reader import Recorded, open_recording
@@ -63,26 +62,6 @@ def tiny(controller, tmp_path_factory) -> tuple[Path, Run]:
             recording.record(run.turn())
     rewritten(folder / "whole.mcap", folder / "tiny.mcap", 7)
     return folder / "tiny.mcap", run
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda step: replace(step, q=step.q[:6]),
-        lambda step: replace(step, qp=replace(step.qp, qd=np.zeros(8))),
-        lambda step: replace(step, range_distance=step.range_distance[:2]),
-        lambda step: replace(step, obstacles=replace(step.obstacles, ee_distance=np.zeros(9))),
-        lambda step: replace(step, touched=replace(step.touched, point=np.zeros((2, 3)))),
-        lambda step: replace(step, approach_limit=np.zeros(5)),
-    ],
-)
-def test_a_step_that_is_not_of_the_recordings_arm_is_named(tiny, change):
-    recorded = open_recording(tiny[0])
-    steps = recorded._raw["/pretouch/step"]
-    steps[3] = encode_step(3, change(decode_step(steps[3])[1]))
-    assert [recorded[i].step.stamp for i in range(3)] == recorded.stamps()[:3].tolist()
-    with pytest.raises(RecordingError, match=r"Step 3 of .*tiny\.mcap is not of the arm and skin"):
-        _ = recorded[3]
 
 
 def opened(place: Path) -> Recorded | None:

@@ -12,6 +12,7 @@ from pretouch.recording.writer import Recording
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit
 from tests.fuzz.invariants import same
@@ -94,6 +95,16 @@ def test_arm_skin_and_fixtures_are_made_again_to_the_bit(tmp_path):
     assert same(made.fixtures.capsules.radius, capsules.radius)
     assert made.profile == own.profile
     recorded_run(tmp_path / "b.mcap", made, 2)  # whoever has it may record with it again
+
+
+def test_zones_are_made_again_to_the_bit(tmp_path, panda_model, paper_skin):
+    skin = Skin([*paper_skin.units[:2], replace(paper_skin.units[2], sensor=VL53L5CX())], panda_model)
+    recorded_run(tmp_path / "a.mcap", controller_of(panda_model, skin), 2)
+    made = open_recording(tmp_path / "a.mcap").runs[0].controller().skin
+    assert (made.ids, made.boards) == (skin.ids, skin.boards)
+    assert same(made.T_link_sensor, skin.T_link_sensor)
+    assert same(made.first, skin.first)
+    assert [unit.id for unit in made.mounted] == [unit.id for unit in skin.mounted]
 
 
 def test_the_envelope_of_an_arm_is_made_again(tmp_path):

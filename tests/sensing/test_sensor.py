@@ -1,6 +1,6 @@
 """Types of sensor: what they see, in skin files, in recordings, and in perception."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from pretouch.errors import ParameterError, SkinError
 from pretouch.perception.obstacles import measured_distance, placed_sensors
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
 from pretouch.robot.body import no_capsules
-from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
-from pretouch.sensing.skin import load_skin, save_skin, sensor_unit
+from pretouch.sensing.sensor import PAPER_SENSOR, VL53L5CX, VL53L7CX, Sensor, cones_of
+from pretouch.sensing.skin import Skin, load_skin, save_skin, sensor_unit
 from pretouch.types import RangeReadings, RangeStatus
 
 UNIT = """
@@ -114,3 +114,61 @@ def test_no_wall_is_no_return(panda_model, paper_skin):
     kin = panda_model.kinematics(panda_model.description.q_ready)
     seen = expected_range(kin, placed_sensors(paper_skin, kin), paper_skin.cones, no_capsules(), no_fixtures())
     assert np.isinf(seen).all()
+
+
+ZONES = 'sensor = "vl53l5cx"\ntouch = true\n'
+
+
+def test_each_zone_looks_along_its_own_beam_and_the_file_keeps_the_unit_whole(panda_model, tmp_path):
+    skin = skin_of(tmp_path, panda_model, UNIT.format(id="a", z=0.045) + UNIT.format(id="b", z=0.02) + ZONES)
+    assert len(skin) == 17
+    assert skin.ids[:3] == ("a", "b/0", "b/1")
+    assert skin.ids[-1] == "b/15"
+    assert skin.boards == ("a", *["b"] * 16)
+    assert skin.first.tolist() == [0, 1]
+    assert skin.touching.tolist() == [1]
+    assert [unit.id for unit in skin.mounted] == ["a", "b"]
+    beam = skin.T_link_sensor[1:, :3, :3] @ [0.0, 0.0, 1.0]
+    own = beam @ skin.mounted[1].T_link_sensor[:3, :3]  # in the unit's axes
+    # from side to side 45 degrees: four zones of 11.25, the outer ones 16.875 off the axis
+    across = np.rad2deg(np.arctan2(own[:, 0], own[:, 2])).reshape(4, 4)
+    np.testing.assert_allclose(across, [[-16.875, -5.625, 5.625, 16.875]] * 4)
+    np.testing.assert_allclose(np.rad2deg(np.arctan2(own[:, 1], own[:, 2])).reshape(4, 4), across.T)
+    # the corners' edges: near the 63 degrees from corner to corner of the data sheet
+    corner = np.rad2deg(np.arccos(own[0] @ own[15]))
+    assert 45.0 < corner < 63.0
+    turns = skin.T_link_sensor[1:, :3, :3]
+    np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (16, 3, 3)), atol=1e-12)
+    save_skin(skin, tmp_path / "again.toml")
+    again = load_skin(tmp_path / "again.toml", panda_model)
+    assert again.ids == skin.ids
+    assert (tmp_path / "again.toml").read_text().count("[[unit]]") == 2
+    np.testing.assert_allclose(again.T_link_sensor, skin.T_link_sensor, atol=1e-12)
+
+
+def test_zones_that_a_sensor_does_not_have_are_named_with_their_line(panda_model, tmp_path):
+    text = '[sensor.mine]\nlike = "vl53l5cx"\nzones = 5\n' + UNIT.format(id="a", z=0.045)
+    with pytest.raises(SkinError, match=r"zones is 5: it measures 4 x 4 or 8 x 8. \(in .*skin.toml, line 1\)"):
+        skin_of(tmp_path, panda_model, text)
+    with pytest.raises(SkinError, match=r"zones is 9: it must be at most 8"):
+        skin_of(tmp_path, panda_model, "[sensor.many]\nzones = 9\n" + UNIT.format(id="a", z=0.045))
+
+
+def test_what_is_wrong_with_a_unit_is_said_with_its_line(panda_model, tmp_path):
+    text = '# [[unit]] in a comment\n"x y" = """\n[[unit]]\n"""\n' + UNIT.format(id="a", z=0.045)
+    text += UNIT.format(id="b", z=0.02) + 'sensor = "sonar"\n'
+    line = text.split("\n").index('id = "b"')  # that of its header, counted from 1
+    with pytest.raises(SkinError, match=rf"Unit b has the sensor 'sonar': .* line {line}\)"):
+        skin_of(tmp_path, panda_model, text)
+
+
+def test_zones_of_more_units_than_a_step_can_take_are_refused(panda_model, paper_skin):
+    eight = [replace(paper_skin.units[0], id=str(k), sensor=VL53L5CX(zones=8)) for k in range(33)]
+    with pytest.raises(SkinError, match="has 2112 units, each zone counted: give at most 2048"):
+        Skin(eight, panda_model)
+
+
+def test_eight_by_eight_zones_measure_slower():
+    assert VL53L5CX().ranging("short").period_s == pytest.approx(1 / 60)
+    assert VL53L5CX(zones=8).ranging("short").period_s == pytest.approx(1 / 15)
+    assert VL53L7CX().angle == pytest.approx(np.deg2rad(15.0) * 2 / np.sqrt(np.pi))  # a cone as large as a zone

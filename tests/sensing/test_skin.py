@@ -313,6 +313,6 @@ def test_another_arm_has_no_skin_yet():
         sensing_skin.paper_skin(other)
 
 
-def test_a_skin_of_far_too_many_units_is_refused_before_they_are_looked_at(panda_model, paper_skin):
-    with pytest.raises(SkinError, match="has 40000 units: give at most 1000"):
+def test_a_skin_of_far_too_many_units_is_refused(panda_model, paper_skin):
+    with pytest.raises(SkinError, match="has 40000 units, each zone counted: give at most 2048"):
         Skin([paper_skin.units[0]] * 40_000, panda_model)

@@ -11,7 +11,7 @@ K = 7
 
 
 def test_a_history_holds_the_last_seconds_and_no_more(some_step: ControlStep) -> None:
-    history = History(K)
+    history = History(np.arange(K))
     for i in range(6000):
         history.add(replace(some_step, stamp=i / 100))
     time = history.columns()[0]
@@ -22,7 +22,7 @@ def test_a_history_holds_the_last_seconds_and_no_more(some_step: ControlStep) ->
 
 
 def test_a_short_peak_of_force_is_not_lost(some_step: ControlStep) -> None:
-    history = History(K)
+    history = History(np.arange(K))
     for i in range(500):
         force = np.array([0.0, -40.0 if i == 251 else 0.0, 0.0])
         history.add(replace(some_step, stamp=i / 100, force=force))
@@ -30,14 +30,14 @@ def test_a_short_peak_of_force_is_not_lost(some_step: ControlStep) -> None:
 
 
 def test_a_short_peak_of_evidence_is_not_lost(some_step: ControlStep) -> None:
-    history = History(K)
+    history = History(np.arange(K))
     for i in range(500):
         history.add(replace(some_step, stamp=i / 100, evidence=1.2 if i == 251 else 0.0))
     assert history.columns()[12 + K].max() == 1.2
 
 
 def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
-    history = History(K, more=1)
+    history = History(np.arange(K), more=1)
     for i in range(50):
         history.add(replace(some_step, stamp=i / 100), (5.0,))
     last = history.columns()[:, -1]
@@ -52,7 +52,7 @@ def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
 
 
 def test_time_going_back_begins_anew(some_step: ControlStep) -> None:
-    history = History(K)
+    history = History(np.arange(K))
     for stamp in (*np.arange(0, 5, 0.01), *np.arange(0, 1, 0.01)):
         history.add(replace(some_step, stamp=float(stamp)))
     time = history.columns()[0]
@@ -62,7 +62,7 @@ def test_time_going_back_begins_anew(some_step: ControlStep) -> None:
 
 @pytest.mark.parametrize("samples", [0, 1])
 def test_a_history_of_little_can_be_drawn(some_step: ControlStep, samples: int) -> None:
-    history = History(K)
+    history = History(np.arange(K))
     for _ in range(samples):
         history.add(some_step)
     columns = history.columns()
@@ -72,7 +72,7 @@ def test_a_history_of_little_can_be_drawn(some_step: ControlStep, samples: int) 
 
 
 def test_time_counts_from_the_start(some_step: ControlStep) -> None:
-    history = History(K, start=100.0)
+    history = History(np.arange(K), start=100.0)
     for i in range(100):
         history.add(replace(some_step, stamp=100.0 + i / 100))
     time = history.columns()[0]
@@ -81,14 +81,14 @@ def test_time_counts_from_the_start(some_step: ControlStep) -> None:
 
 
 def test_a_unit_whose_reading_is_late_shows_nothing(some_step: ControlStep) -> None:
-    history, step = History(K), replace(some_step, range_distance=np.full(K, 0.5))
+    history, step = History(np.arange(K)), replace(some_step, range_distance=np.full(K, 0.5))
     history.add(step, late=np.arange(K) == 3)
     distances = history.columns()[1 : 1 + K, -1]
     assert np.flatnonzero(distances > 1.0).tolist() == [3]  # the axis ends at 1 m
 
 
 def test_axes_of_force_are_symmetric_and_grow_with_the_force(some_step: ControlStep) -> None:
-    history, gui = History(K), FakeGui()
+    history, gui = History(np.arange(K)), FakeGui()
     plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
     gui.more.value = True
     limits = replace(some_step.thresholds, parts=np.zeros((6, 3)))
@@ -104,7 +104,7 @@ def test_axes_of_force_are_symmetric_and_grow_with_the_force(some_step: ControlS
 
 
 def test_no_scale_changes_for_a_page_would_no_longer_follow_the_time(some_step: ControlStep) -> None:
-    history, gui = History(K), FakeGui()
+    history, gui = History(np.arange(K)), FakeGui()
     plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
     before = [plot.scales for plot in gui.plots]
     for i, force in enumerate((3.0, -20.0, 65.0, 0.0)):
@@ -115,7 +115,7 @@ def test_no_scale_changes_for_a_page_would_no_longer_follow_the_time(some_step: 
 
 
 def test_what_is_folded_is_sent_only_while_it_is_shown(some_step: ControlStep) -> None:
-    history, gui = History(K), FakeGui()
+    history, gui = History(np.arange(K)), FakeGui()
     plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
     history.add(some_step)
     before = [plot.data for plot in gui.plots]
@@ -130,7 +130,7 @@ def test_what_is_folded_is_sent_only_while_it_is_shown(some_step: ControlStep) -
 
 def test_a_second_profile_has_its_plots_shown(some_step: ControlStep) -> None:
     gui = FakeGui()
-    Plots(gui, History(K, 6), ["unit"] * K, "blind")  # type: ignore[arg-type]
+    Plots(gui, History(np.arange(K), 6), ["unit"] * K, "blind")  # type: ignore[arg-type]
     assert all(plot.visible for plot in gui.plots[3:])
 
 

@@ -46,6 +46,8 @@ class Coverage:
     """Seed of the random postures and paths: the same seed gives the same numbers."""
     suggest: int = 0
     """Number of additional units to place where they help most."""
+    sensor: str = "vl53l1x"
+    """Type of the sensor of additional units: vl53l1x, vl53l5cx, vl53l7cx, or one that the skin file describes."""
     out: str = ""
     """Skin file to write, with --suggest: the existing units and the new ones."""
     figure: str = ""

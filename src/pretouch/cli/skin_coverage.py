@@ -14,13 +14,14 @@ from pretouch.coverage.blind import BlindSpot, blind_spots
 from pretouch.coverage.measure import Coverage, Share, covered
 from pretouch.coverage.measuring import Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
-from pretouch.coverage.suggest import Suggestions, suggest
+from pretouch.coverage.suggest import Suggestions, candidates, suggest
 from pretouch.coverage.ways import Ways
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.extras import FIGURES
 from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
+from pretouch.sensing.sensor_types import sensor_called
 from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file
 
 if TYPE_CHECKING:
@@ -55,7 +56,8 @@ def _measured(command: "Asked", model: RobotModel, skin: Skin) -> dict[str, Any]
     numbers = _numbers(command, setting, found, spots)
     shown, new = skin, frozenset[str]()
     if command.suggest:
-        suggested = suggest(ways, skin, command.suggest)
+        sensor = sensor_called(command.sensor, "--sensor", {unit.sensor.label: unit.sensor for unit in skin.mounted})
+        suggested = suggest(ways, skin, command.suggest, candidates(ways, skin, sensor))
         shown, new = Skin((*skin.units, *suggested.units), model), frozenset(unit.id for unit in suggested.units)
         found, numbers["suggested"] = _suggested(console, setting, skin, shown, suggested)
         if command.out:
@@ -115,7 +117,7 @@ def _suggested(
     """Print what the new units add, by ways that they were not chosen by."""
     fresh = setting.ways(1)
     after, sees = coverage_of(fresh, more)
-    before = covered(fresh, sees[: len(skin)])
+    before = covered(fresh, sees[: len(skin.first)])
     show(console, [suggestion_table(suggested, before, after)])
     return after, {
         "units": [

@@ -36,20 +36,20 @@ def link_table(found: Coverage, setting: Setting) -> TextTable:
 
 
 def unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
-    """Show what each unit sees, and what would be lost without it; `sees` (K, S, W)."""
+    """Show what each unit sees, and what would be lost without it; `sees` (B, S, W)."""
     weight = ways.surface.area[ways.point] * ways.free
     weight /= max(float(weight.sum()), 1e-12)
     alone = sees.sum(axis=0) == 1
     columns = (
-        ("unit", lambda k: skin.ids[k]),
-        ("link", lambda k: skin.units[k].link),
+        ("unit", lambda k: skin.mounted[k].id),
+        ("link", lambda k: skin.mounted[k].link),
         ("ways\n[%]", lambda k: f"{100 * float((weight * sees[k]).sum()):.2f}"),
         ("alone\n[%]", lambda k: f"{100 * float((weight * (sees[k] & alone)).sum()):.2f}"),
     )
     return tabulated(
         "What each unit sees",
         columns,
-        range(len(skin)),
+        range(len(skin.mounted)),
         "Share of all free paths to the arm. Alone: paths that no other unit sees, which would be lost without this"
         " unit.",
     )

@@ -48,8 +48,8 @@ def coverage_figure(ways: Ways, coverage: Coverage, skin: Skin, new: frozenset[s
     bar.set_label("share of the paths to it seen in time")
     seen = 100 * coverage.arm.ways.value
     figure.suptitle(
-        f"{ways.model.description.name}, {len(skin)} units: {seen:.0f} % of the paths to its surface are seen in time"
-        " (grey: the base, or no free path)",
+        f"{ways.model.description.name}, {len(skin.first)} units: {seen:.0f} % of the paths to its surface are seen in"
+        " time (grey: the base, or no free path)",
         fontsize="medium",
     )
     return figure
@@ -106,7 +106,7 @@ def _skin_faces(kin: Kinematics, skin: Skin, new: frozenset[str]) -> Faces:
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
     faces: Faces = []
     for unit, p, R in zip(skin.units, position, rotation, strict=True):
-        name, half = unit.id, unit.sensor.angle / 2
+        name, half = unit.board, unit.sensor.angle / 2
         colour = _NEW if name in new else _OLD
         faces.append((p + 0.014 * ring @ R.T, colour, colour))
         rim = p + (_BEAM_M * np.array([0, 0, 1]) + _BEAM_M * np.tan(half) * ring) @ R.T

@@ -56,7 +56,7 @@ class Coverage:
 
 
 def covered(ways: Ways, sees: BoolArray) -> Coverage:
-    """Bring together, by point and by link, what each of K units (K, S, W) sees in time."""
+    """Bring together, by point and by link, what each of B mounted units (B, S, W) sees in time."""
     count, seen = len(ways.surface), np.logical_or.reduce(sees)
     free = np.array([np.bincount(ways.point, row, count) for row in ways.free])
     found = np.array([np.bincount(ways.point, row, count) for row in seen & ways.free])

@@ -39,6 +39,6 @@ class Setting:
 
 
 def coverage_of(ways: Ways, skin: Skin) -> tuple[Coverage, BoolArray]:
-    """Return what a skin sees, and which of its units (K, S, W) see each way in time."""
+    """Return what a skin sees, and which of its mounted units (B, S, W) see each way in time."""
     seen = seen_by(ways, skin)
     return covered(ways, seen), seen

@@ -4,7 +4,7 @@ What a set of units sees grows with each unit, and by less the more there are (i
 way see at least 1 - 1/e, 63 %, of what the best N of the same places could add (Nemhauser, Wolsey and Fisher 1978).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from pretouch.groups import Sensors
 from pretouch.perception.obstacles import poses
 from pretouch.perception.scene_filter import expected_range
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.sensor import cones_of
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import BoolArray, FloatArray
@@ -54,8 +54,11 @@ class Suggestions:
         return tuple(one.unit for one in self.chosen)
 
 
-def candidates(ways: Ways, skin: Skin) -> tuple[SensorUnit, ...]:
-    """Places all over the arm, looking outwards along the normal, whose beams leave the arm in the ready posture."""
+def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[SensorUnit, ...]:
+    """Units with a sensor all over the arm, looking outwards along the normal.
+
+    The beam of the paper's sensor leaves the arm there in the ready posture.
+    """
     model = ways.model
     kin = model.kinematics(model.description.q_ready)
     at = surface_of(model, PLACES)
@@ -68,7 +71,7 @@ def candidates(ways: Ways, skin: Skin) -> tuple[SensorUnit, ...]:
     view = expected_range(kin, of_no_link, cones_of([unit.sensor for unit in units]), model.capsules, ways.room)
     taken = [(unit.link, unit.T_link_sensor[:3, 3]) for unit in skin.units]
     return tuple(
-        unit
+        replace(unit, sensor=sensor)
         for unit, free in zip(units, view, strict=True)
         if free > _CLEAR_M and _fits(unit, model) and not _beside(unit, taken)
     )
@@ -85,13 +88,12 @@ def suggest(ways: Ways, skin: Skin, count: int, places: tuple[SensorUnit, ...] |
     weight = (ways.surface.area[ways.point] * ways.free).ravel()
     weight /= max(float(weight.sum()), 1e-12)
     by_skin = seen_by(ways, skin).any(axis=0).ravel()
-    offered = Skin(places, ways.model)
-    by_place = seen_by(ways, offered).reshape(len(places), -1)
+    # each place alone: together they may be more zones than a skin has
+    by_place = np.concatenate([seen_by(ways, Skin([place], ways.model)) for place in places]).reshape(len(places), -1)
     order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), count)
     ids = _free_ids(skin, count)
     chosen = tuple(
-        Suggestion(SensorUnit(name, places[i].link, places[i].T_link_sensor), gain)
-        for name, i, gain in zip(ids, order, gains, strict=True)
+        Suggestion(replace(places[i], id=name), gain) for name, i, gain in zip(ids, order, gains, strict=True)
     )
     added = sum(gains)
     most = min(added / (1 - 1 / np.e), added + left, float(weight[~by_skin].sum()))
@@ -139,7 +141,7 @@ def _beside(unit: SensorUnit, taken: list[tuple[str, FloatArray]]) -> bool:
 
 
 def _free_ids(skin: Skin, count: int) -> list[str]:
-    taken, ids, number = set(skin.ids), list[str](), 1
+    taken, ids, number = set(skin.boards), list[str](), 1
     while len(ids) < count:
         if (name := f"suggested_{number}") not in taken:
             ids.append(name)

@@ -80,13 +80,13 @@ def cosine_weighted(normal: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 
 def seen_by(ways: Ways, skin: Skin) -> BoolArray:
-    """Whether (K, S, W) each of the K units of a skin sees the ball of each way in time.
+    """Whether (B, S, W) each of the B mounted units of a skin sees the ball of each way in time, in any of its zones.
 
     A unit sees nothing behind the arm or the room in its own view, its own link included.
     """
     p = ways.params
     farthest, light, run = np.array([p.seen_by(unit.sensor) for unit in skin.units]).reshape(-1, 3).T.copy()
-    seen = np.zeros((len(skin), len(ways.postures), len(ways.point)), np.bool_)
+    seen = np.zeros((len(skin.first), len(ways.postures), len(ways.point)), np.bool_)
     for s, kin in enumerate(ways.postures):
         position, rotation = sensor_poses(skin, kin)
         of_no_link = Sensors(position, rotation, np.full(len(skin), -1, np.int64))
@@ -97,5 +97,5 @@ def seen_by(ways: Ways, skin: Skin) -> BoolArray:
             BallWays(ways.start[s], ways.way[s], p.object_radius_m), ways.free[s], Stretch(p.first, p.last),
             Sensors(position, rotation, skin.link), skin.cones, View(limit, light, run.astype(WHOLE)), found,
         )  # fmt: skip
-        seen[:, s] = found
+        seen[:, s] = np.logical_or.reduceat(found, skin.first)
     return seen

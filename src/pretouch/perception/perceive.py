@@ -341,6 +341,7 @@ def silent_units(
     if silence <= params.slow_after_s:
         return 1.0, ""
     silent = np.flatnonzero(now - state.heard >= params.silent_after_s).tolist()
-    names = ", ".join(skin.ids[k] + _FAILURES.get(int(status[k]), "") for k in silent)
+    # of a unit with zones the unit is named, once
+    names = ", ".join(dict.fromkeys(skin.boards[k] + _FAILURES.get(int(status[k]), "") for k in silent))
     # from 1 at `slow_after_s` to 0 at `silent_after_s`; the silence of a unit never heard is infinite
     return max(0.0, (params.silent_after_s - silence) / (params.silent_after_s - params.slow_after_s)), names

@@ -1,4 +1,4 @@
-"""What is not known of where a unit sits, as a length at the point it shows: the point's spread."""
+"""What is not known of where a unit sits, and where in a zone a target lies, as a length at the point: its spread."""
 
 import numpy as np
 
@@ -52,6 +52,7 @@ def bring_nearer(
             for j in range(3):
                 at += R[i, j] * skin.T_link_sensor[k, j, 3]
             away2 += (point[m, i] - at) ** 2
-        u = spread(sigmas, skin.position_sigma[k], skin.orientation_sigma[k], np.sqrt(away2))
+        turned = np.sqrt(skin.orientation_sigma[k] ** 2 + skin.cones.spread[skin.cones.kind[k]] ** 2)
+        u = spread(sigmas, skin.position_sigma[k], turned, np.sqrt(away2))
         body_distance[m] -= u
         ee_distance[m] = max(0.0, ee_distance[m] - u)

@@ -215,14 +215,15 @@ def _touch(skin: Skin) -> dict[str, JSON]:
     return {_TOUCH: [None if u.touch is None else asdict(u.touch) for u in skin.units]} if len(skin.touching) else {}
 
 
-_SENSOR = "unit_sensor"
+_SENSOR, _ZONE = "unit_sensor", "unit_zone"
 
 
 def _units(skin: Skin) -> dict[str, JSON]:
     """Describe what is not as usual of the units of a skin: uncertain places, touch sensors, types of sensor."""
     sensors = [unit.sensor for unit in skin.units]
     own = {_SENSOR: [as_table(sensor) for sensor in sensors]} if any(s != PAPER_SENSOR for s in sensors) else {}
-    return _sigmas(skin) | _touch(skin) | own
+    zones = [unit.zone for unit in skin.units]
+    return _sigmas(skin) | _touch(skin) | own | ({} if all(z is None for z in zones) else {_ZONE: zones})
 
 
 def _skin(m: Any, model: RobotModel) -> Skin:
@@ -231,11 +232,12 @@ def _skin(m: Any, model: RobotModel) -> Skin:
     patches = from_json(m.robot).get(_TOUCH, [None] * len(poses))
     tables = from_json(m.robot).get(_SENSOR)
     sensors = [from_table(Sensor, table, "unit_sensor", []) for table in tables or []] or [PAPER_SENSOR] * len(poses)
-    units = zip(m.unit_id, m.unit_link, poses, sigmas, patches, sensors, strict=True)
+    zones = from_json(m.robot).get(_ZONE, [None] * len(poses))
+    units = zip(m.unit_id, m.unit_link, poses, sigmas, patches, sensors, zones, strict=True)
     return Skin(
         [
-            SensorUnit(name, link, pose, at, turn, None if patch is None else TouchPatch(**patch), sensor)
-            for name, link, pose, (at, turn), patch, sensor in units
+            SensorUnit(name, link, pose, at, turn, None if patch is None else TouchPatch(**patch), sensor, zone)
+            for name, link, pose, (at, turn), patch, sensor, zone in units
         ],
         model,
     )

@@ -1,5 +1,6 @@
 """What a unit measures with: a type of range finder, as its data sheet describes it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -12,8 +13,12 @@ from pretouch.errors import ParameterError
 from pretouch.groups import Cones
 from pretouch.types import FloatArray
 
+MOST_ZONES = 8
+"""Zones along a side: a type with more is a depth camera, whose points are an outside source."""
 RINGS = 2
 """Circles of rays that stand for what a sensor sees: with its axis 19 rays."""
+_Angle = Annotated[float, Check(low=0.0, high=120.0, open_low=True)]
+_Zones = Annotated[int, Check(low=1, high=MOST_ZONES)]
 
 
 @dataclass(frozen=True)
@@ -28,13 +33,15 @@ class RangingMode:
 
 @dataclass(frozen=True)
 class Sensor(Part, group="pretouch.sensors"):
-    """A range finder that sees one cone about its axis.
+    """A range finder that sees one cone about its axis, or a square of zones that each measure a distance.
 
     A type of one's own is a subclass with a name and defaults of its own, or a table in a skin file.
     """
 
-    field_of_view_deg: Annotated[float, Check(low=0.0, high=120.0, open_low=True)] = 27.0
-    """Full angle of the cone [deg]. More than 120 needs a sensor of several beams."""
+    field_of_view_deg: _Angle = 27.0
+    """Full angle of the cone, or of the square from side to side [deg]."""
+    zones: _Zones = 1
+    """Zones along each side of the square; 1: one cone."""
     nearest_m: Positive = 0.04
     """Smallest distance it measures [m]; what is nearer is taken to be there."""
     farthest_m: Positive = 4.0
@@ -65,8 +72,37 @@ class Sensor(Part, group="pretouch.sensors"):
 
     @property
     def angle(self) -> float:
-        """Full angle of the cone [rad]."""
-        return float(np.deg2rad(self.field_of_view_deg))
+        """Full angle of the cone [rad]; of several zones that of a cone as large as one of them."""
+        side = float(np.deg2rad(self.field_of_view_deg))
+        return side if self.zones == 1 else side / self.zones * 2.0 / math.sqrt(math.pi)
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the direction in which a zone's target lies, anywhere in it [rad].
+
+        0 of a single cone, whose target eq. 1 takes to be on its axis.
+        """
+        return 0.0 if self.zones == 1 else float(np.deg2rad(self.field_of_view_deg)) / self.zones / math.sqrt(12.0)
+
+    def looks(self) -> FloatArray:
+        """Rotations (zones^2, 3, 3) from each zone's frame, z along its beam, to the sensor's.
+
+        Zones are numbered along x, then along y, and lie at equal angles.
+        """
+        tilt = np.tan(np.deg2rad(self.field_of_view_deg) * ((np.arange(self.zones) + 0.5) / self.zones - 0.5))
+        y, x = np.meshgrid(tilt, tilt, indexing="ij")
+        beams = np.stack([x.ravel(), y.ravel(), np.ones(self.zones**2)], axis=1)
+        return np.array([_turned(beam / np.linalg.norm(beam)) for beam in beams])
+
+
+def _turned(beam: FloatArray) -> FloatArray:
+    """Return the least rotation (3, 3) that takes the z axis to a unit vector (3,) of the same half-space."""
+    x, y, z = beam.tolist()
+    return np.array([
+        [1.0 - x * x / (1.0 + z), -x * y / (1.0 + z), x],
+        [-x * y / (1.0 + z), 1.0 - y * y / (1.0 + z), y],
+        [-x, -y, z],
+    ])  # fmt: skip
 
 
 _MODES = {"short": RangingMode(period_s=0.02, distance_max_m=1.3), "long": RangingMode(0.14, 4.0)}
@@ -81,6 +117,45 @@ class VL53L1X(Sensor, name="vl53l1x"):
         """See `Sensor`; modes are short and long."""
         own, fastest = _MODES[mode], 1.0 / self.rate_hz
         return RangingMode(max(own.period_s, fastest), min(own.distance_max_m, self.farthest_m))
+
+
+@dataclass(frozen=True)
+class VL53L5CX(Sensor, name="vl53l5cx"):
+    """ST's 4 x 4 zones at 60 Hz (data sheet DS13754: 45 degrees from side to side, 2 cm to 4 m; VL53L8CX likewise).
+
+    `zones = 8` measures 8 x 8 at 15 Hz. The sensor has to be told to report the nearest target of each zone, for by
+    itself it reports the strongest.
+    """
+
+    field_of_view_deg: _Angle = 45.0
+    zones: _Zones = 4
+    nearest_m: Positive = 0.02
+    rate_hz: Positive = 60.0
+    noise: Positive = 2.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.zones not in _FASTEST_HZ:
+            raise ParameterError(f"{type(self).__name__}.zones is {self.zones}: it measures 4 x 4 or 8 x 8.")
+
+    def ranging(self, mode: str) -> RangingMode:
+        """See `Sensor`; mode short is that of the paper's skins, in which nobody looks farther than it."""
+        rate = min(self.rate_hz, _FASTEST_HZ[self.zones])
+        return RangingMode(1.0 / rate, min(_GREY_M[self.zones], self.farthest_m))
+
+
+_FASTEST_HZ = {4: 60.0, 8: 15.0}
+"""Most frames a second (data sheet)."""
+_GREY_M = {4: 1.7, 8: 1.2}
+"""Distance at which a grey target that fills a zone is just seen [m]: ours, below what 4 m of a white one in the dark
+allows; to be measured with the sensor in use."""
+
+
+@dataclass(frozen=True)
+class VL53L7CX(VL53L5CX, name="vl53l7cx"):
+    """The same with 60 degrees from side to side, 90 along the diagonal (UM3038)."""
+
+    field_of_view_deg: _Angle = 60.0
 
 
 PAPER_SENSOR = VL53L1X()
@@ -109,4 +184,5 @@ def cones_of(sensors: Sequence[Sensor]) -> Cones:
         np.array([[np.cos(a), np.sin(a), np.tan(a)] for a in half]),
         np.array([[kind.nearest_m, kind.farthest_m] for kind in kinds]),
         np.array([cone_rays(RINGS, kind.angle) for kind in kinds]),
+        np.array([kind.spread for kind in kinds]),
     )

@@ -18,14 +18,15 @@ def sensor_called(name: Any, of: str, types: dict[str, Sensor]) -> Sensor:
     return types[name] if name in types else cast(Sensor, Sensor.called(name)())
 
 
-def own_types(tables: Any) -> dict[str, Sensor]:
-    """Return the types that a skin file describes, by name: a type that is known, and what differs from it."""
+def sensor_tables(tables: Any) -> dict[str, Any]:
+    """Return what a skin file has of its own types, by name."""
     if not isinstance(tables, dict):
         raise SkinError(f"sensor is {tables!r}: write a table [sensor.NAME] for each type of your own.")
-    return {name: _own_type(name, table) for name, table in tables.items()}
+    return tables
 
 
-def _own_type(name: str, table: Any) -> Sensor:
+def own_type(name: str, table: Any) -> Sensor:
+    """Return a type that a skin file describes: a type that is known, and what differs from it."""
     of = f"The type [sensor.{name}]" if name.isprintable() else f"The type {name!r}"
     if not isinstance(table, dict):
         raise SkinError(f"{of} is {table!r}: write a table [sensor.NAME].")

@@ -1,7 +1,8 @@
 """A set of sensor units on one arm, and the TOML file that describes it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -16,22 +17,24 @@ from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.seat import seat
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
-from pretouch.sensing.sensor_types import own_types, sensor_called, tables_of
+from pretouch.sensing.sensor_types import own_type, sensor_called, sensor_tables, tables_of
 from pretouch.sensing.unit import (
     LARGEST_NUMBER,
     LARGEST_ORIENTATION_SIGMA,
     LARGEST_POSITION_SIGMA,
     SensorUnit,
     TouchPatch,
+    mounted,
+    zones_of,
 )
-from pretouch.toml_files import read_toml
+from pretouch.toml_files import bytes_of, lines_of, parsed_toml
 from pretouch.types import FloatArray, IntArray
 
 _FAR = 0.5
 """Distance from its link beyond which a unit cannot be mounted on it [m]: millimetres taken for metres, most likely."""
 
-_MOST_UNITS = 1000
-"""Units on one arm: what a step and a model's check take grows with their number, and each is a board of its own."""
+_MOST_UNITS = 2048
+"""Units and zones on one arm, 32 units of 8 x 8: what a step and a model's check take grows with their number."""
 _LARGEST_COMPONENT = 10.0
 """Largest component of a quaternion that is looked at any further."""
 
@@ -44,21 +47,28 @@ LIVE_SKIN = PAPER_SKIN.with_name("panda_live.toml")
 class Skin:
     """K sensor units on an arm, checked against its model. The order of the units is the order of all readings.
 
+    Each zone of a sensor that has several counts as a unit of its own, which looks along the zone's beam.
+
     Raises SkinError for too many units, duplicate ids, a link the arm does not have, and a unit inside its own link or
     far off it.
     """
 
     def __init__(self, units: Sequence[SensorUnit], model: RobotModel) -> None:
-        self.units = tuple(units)
-        if len(self.units) > _MOST_UNITS:
-            raise SkinError(f"The skin has {len(self.units)} units: give at most {_MOST_UNITS}.")
+        _check_count(sum(unit.sensor.zones**2 if unit.zone is None else 1 for unit in units))
+        self.units = tuple(zone for unit in units for zone in zones_of(unit))
         ids = [unit.id for unit in self.units]
         twice = sorted({i for i in ids if ids.count(i) > 1})
         if twice:
             raise SkinError(f"The unit id {', '.join(twice)} is used more than once: give each unit its own id.")
-        for unit in self.units:
+        for unit in units:
             _check_place(unit, model)
         self.ids: tuple[str, ...] = tuple(ids)
+        self.boards: tuple[str, ...] = tuple(unit.board for unit in self.units)
+        """(K,) id of the mounted unit each belongs to: its own, but for zones."""
+        self.mounted = mounted(self.units)
+        """The B units as they are mounted: those with zones whole."""
+        self.first: IntArray = np.array([k for k, unit in enumerate(self.units) if not unit.zone], dtype=np.int64)
+        """(B,) index of each one's first zone, or its own."""
         self.link: IntArray = np.array([model.link_index(u.link) for u in self.units], dtype=np.int64)
         """(K,) index of the link each unit sits on."""
         self.T_link_sensor: FloatArray = np.array([u.T_link_sensor for u in self.units]).reshape(-1, 4, 4)
@@ -71,13 +81,18 @@ class Skin:
         """What each unit sees, for compiled code."""
         self.arrays = SkinArrays(self.link, self.T_link_sensor, self.position_sigma, self.orientation_sigma, self.cones)
         """The same for compiled code."""
-        self.exact = not (self.position_sigma.any() or self.orientation_sigma.any())
-        """Whether the place of every unit is taken as exact."""
+        self.exact = not (self.position_sigma.any() or self.orientation_sigma.any() or self.cones.spread.any())
+        """Whether the place of every unit is taken as exact, and that of what it sees."""
         self.touching: IntArray = np.array([k for k, u in enumerate(self.units) if u.touch is not None], dtype=np.int64)
         """(M,) indices of the units with a touch sensor."""
 
     def __len__(self) -> int:
         return len(self.units)
+
+
+def _check_count(count: int) -> None:
+    if count > _MOST_UNITS:
+        raise SkinError(f"The skin has {count} units, each zone counted: give at most {_MOST_UNITS}.")
 
 
 def _check_place(unit: SensorUnit, model: RobotModel) -> None:
@@ -101,10 +116,11 @@ def _check_place(unit: SensorUnit, model: RobotModel) -> None:
 
 
 def load_skin(path: Path | str, model: RobotModel) -> Skin:
-    """Read a skin file. What is wrong with it is a SkinError that names the file, the unit and the way out."""
+    """Read a skin file. What is wrong with it is a SkinError that names the file, line and unit, and the way out."""
     path = Path(path)
     try:
-        data = read_toml(path)
+        text = bytes_of(path)
+        data = parsed_toml(text)
     except OSError as error:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
@@ -114,11 +130,28 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
     entries = data.get("unit")
     if not isinstance(entries, list) or not entries:
         raise SkinError(f"The skin file {path} has no unit: give at least one [[unit]] with id, link and pose.")
+    lines = lines_of(text.decode())
+    types, units = dict[str, Sensor](), list[SensorUnit]()
+    with _said_where(path):
+        tables = sensor_tables(data.get("sensor", {}))
+        _check_count(len(entries))
+    for name, table in tables.items():
+        with _said_where(path, lines.get(("sensor", name))):
+            types[name] = own_type(name, table)
+    for number, entry in enumerate(entries):
+        with _said_where(path, lines.get(("unit", number))):
+            units.append(_unit_from(entry, types))
+            _check_place(units[-1], model)
+    with _said_where(path):
+        return Skin(units, model)
+
+
+@contextmanager
+def _said_where(path: Path, line: int | None = None) -> Iterator[None]:
     try:
-        types = own_types(data.get("sensor", {}))
-        return Skin([_unit_from(entry, types) for entry in entries], model)
+        yield
     except SkinError as error:
-        raise SkinError(f"{error} (in {path})") from error
+        raise SkinError(f"{error} (in {path}{f', line {line}' if line else ''})") from error
 
 
 def save_skin(skin: Skin, path: Path) -> None:
@@ -128,7 +161,7 @@ def save_skin(skin: Skin, path: Path) -> None:
     it leads to is replaced.
     """
     try:
-        units = {"unit": [_entry(unit) for unit in skin.units]}
+        units = {"unit": [_entry(unit) for unit in skin.mounted]}
         atomic_write(path, tomli_w.dumps(tables_of(unit.sensor for unit in skin.units) | units))
     except OSError as error:
         raise SkinError(f"The skin cannot be written to {path}: {error.strerror}.") from error

@@ -1,6 +1,7 @@
-"""One sensor unit: a range finder at a known place on a link."""
+"""One sensor unit: a range finder at a known place on a link, of one beam or of zones."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,6 +72,8 @@ class SensorUnit:
     """Its touch sensor, if it has one."""
     sensor: Sensor = PAPER_SENSOR
     """Its range finder."""
+    zone: int | None = None
+    """Which zone of its sensor this is, which then looks along the zone's beam; None for the whole unit."""
 
     def __post_init__(self) -> None:
         if not self.id:
@@ -102,3 +105,38 @@ class SensorUnit:
                 f"Unit {self.id}: its {name} is {sigma!r}: give a standard deviation from 0 to {largest:.4g} {si}."
             )
         object.__setattr__(self, name, float(sigma))
+
+    @property
+    def board(self) -> str:
+        """The id of the unit that this is, or is a zone of."""
+        return self.id if self.zone is None else self.id.rpartition(_OF)[0]
+
+
+_OF = "/"
+"""Between the id of a unit and the number of a zone."""
+
+
+def zones_of(unit: SensorUnit) -> tuple[SensorUnit, ...]:
+    """Return what measures a distance each: the unit, or its zones; the first has the unit's touch sensor."""
+    if unit.zone is not None or unit.sensor.zones == 1:
+        return (unit,)
+    found = []
+    for zone, look in enumerate(unit.sensor.looks()):
+        T = unit.T_link_sensor.copy()
+        T[:3, :3] = T[:3, :3] @ look
+        touch = None if zone else unit.touch
+        found.append(replace(unit, id=f"{unit.id}{_OF}{zone}", T_link_sensor=T, zone=zone, touch=touch))
+    return tuple(found)
+
+
+def mounted(units: Iterable[SensorUnit]) -> tuple[SensorUnit, ...]:
+    """Return whole units, in order, where zones are given: what is mounted on the arm."""
+    whole = []
+    for unit in units:
+        if unit.zone is None:
+            whole.append(unit)
+        elif unit.zone == 0:
+            T = unit.T_link_sensor.copy()
+            T[:3, :3] = T[:3, :3] @ unit.sensor.looks()[0].T
+            whole.append(replace(unit, id=unit.board, T_link_sensor=T, zone=None))
+    return tuple(whole)

@@ -89,8 +89,8 @@ class RangeSample(NamedTuple):
 class RangeFinders:
     """All sensors of a skin in a simulated room: the port `Skin`, sampled and held.
 
-    Each unit measures at its own phase and rate; a reading arrives late, out of step with the others, or not at
-    all. A unit sees everything but its own link: objects, hand, floor, and the rest of the arm.
+    Each unit measures at its own phase and rate, all of its zones at once; a reading arrives late, out of step with
+    the others, or not at all. A unit sees everything but its own link: objects, hand, floor, and the rest of the arm.
     """
 
     def __init__(
@@ -112,7 +112,12 @@ class RangeFinders:
         cone = np.array(cones).reshape(count, rays, 3)
         mounting = _Mounting(data.xpos, data.xmat, skin.link, skin.T_link_sensor, cone, offset)
         self._mounted, self._errors = flattened(mounting, geoms_of(plant.mj_model, data)), _errors(params)
-        self._due: list[float] = self._rng.uniform(0, self._periods(), count).tolist()
+        boards: dict[str, list[int]] = {}
+        for unit, board in enumerate(skin.boards):
+            boards.setdefault(board, []).append(unit)
+        self._boards = [tuple(units) for units in boards.values()]
+        periods = [params.period_of(skin.units[units[0]].sensor) for units in self._boards]
+        self._due: list[float] = self._rng.uniform(0, periods, len(periods)).tolist()
         self._sent = UnderWay[tuple[int, float, float, int]]()
         self._stamp = np.full(count, -np.inf)
         self._distance = np.zeros(count)
@@ -135,10 +140,6 @@ class RangeFinders:
                 )
         self._params, self._errors = params, _errors(params)
 
-    def _periods(self) -> FloatArray:
-        """Time between the readings of each unit (K,) [s]."""
-        return np.array([self._params.period_of(unit.sensor) for unit in self._skin.units])
-
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""
         for unit, stamp, distance, status in self._sent.arrived(self._plant.time + ROUNDING_S):
@@ -148,22 +149,25 @@ class RangeFinders:
 
     def _sample(self, time: float) -> float:
         p, rng = self._params, self._rng
-        for unit, due in enumerate(self._due):
+        for board, due in enumerate(self._due):
             if due > time:
                 continue
-            period = p.period_of(self._skin.units[unit].sensor)
-            self._due[unit] = due + period * (1.0 + p.period_jitter * rng.standard_normal())
-            distance, status, sigma, strength = _measure.flat(
-                unit, rng.standard_normal(), *self._kinds[unit], *self._errors, *self._mounted
-            )
+            zones = self._boards[board]
+            period = p.period_of(self._skin.units[zones[0]].sensor)
+            self._due[board] = due + period * (1.0 + p.period_jitter * rng.standard_normal())
+            measured = [
+                (unit, _measure.flat(unit, rng.standard_normal(), *self._kinds[unit], *self._errors, *self._mounted))
+                for unit in zones
+            ]
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
             lost = rng.random() < p.dropout
-            if unit in self.silenced:
-                continue
-            if self._send:
-                self._send(RangeSample(unit, time, distance, status, sigma, *_light(strength, self._light)))
-            elif not lost:
-                self._sent.send(arrival, (unit, time, distance, status))
+            for unit, (distance, status, sigma, strength) in measured:
+                if unit in self.silenced:
+                    continue
+                if self._send:
+                    self._send(RangeSample(unit, time, distance, status, sigma, *_light(strength, self._light)))
+                elif not lost:
+                    self._sent.send(arrival, (unit, time, distance, status))
         return min(self._due, default=np.inf)
 
 

@@ -155,7 +155,8 @@ class Controls:
     def _fault_controls(self) -> None:
         gui, simulation = self._gui, self._simulation
         self._units = {
-            unit: gui.add_checkbox(unit, True, hint=("Off: the unit is silent.")) for unit in simulation.skin.ids
+            unit.id: gui.add_checkbox(unit.id, True, hint="Off: the unit is silent.")
+            for unit in simulation.skin.mounted
         }
         for unit, box in self._units.items():
             self._choice(box, self._set_faults, "faults", partial(self._is_enabled, unit))

@@ -60,8 +60,8 @@ class LivePage:
         self._status.notice = self._scene.said
         self.controls.on_view = self._scene.show
         self._scene.on_hand(self._drag)
-        self._history = History(len(simulation.skin))
-        self._plots = Plots(server.gui, self._history, simulation.skin.ids)
+        self._history = History(simulation.skin.first)
+        self._plots = Plots(server.gui, self._history, [unit.id for unit in simulation.skin.mounted])
         self.controls.fold_rest()
 
     @property

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pretouch.types import BoolArray, ControlStep, FloatArray
+from pretouch.types import BoolArray, ControlStep, FloatArray, IntArray
 from pretouch.viewer import palette
 
 if TYPE_CHECKING:
@@ -33,14 +33,16 @@ SAMPLES = int(SPAN_S / SAMPLE_S)
 
 
 class History:
-    """Samples of the last `SPAN_S`: time, distances (K), then force, upper and lower threshold (3 each), two speeds.
+    """Samples of the last `SPAN_S`: time, distance of each mounted unit (B), then what the steps say.
 
-    After these the evidence of a contact, the distance of what is nearest to the body, and what else is given.
+    That is force, upper and lower threshold (3 each), two speeds, the evidence of a contact, the distance of what is
+    nearest to the body, and what else is given.
     """
 
-    def __init__(self, units: int, more: int = 0, start: float = 0.0) -> None:
-        """Take the number of units and of further columns that `add` is given, and the stamp of time 0 [s]."""
-        self._units, self._width, self._start = units, 1 + units + 9 + 2 + 2 + more, start
+    def __init__(self, first: IntArray, more: int = 0, start: float = 0.0) -> None:
+        """Take `Skin.first`, the number of further columns that `add` is given, and the stamp of time 0 [s]."""
+        self._first, self._units, self._start = first, len(first), start
+        self._width = 1 + self._units + 9 + 2 + 2 + more
         self._rows: deque[FloatArray] = deque(maxlen=SAMPLES)
         self._open: FloatArray | None = None
 
@@ -59,7 +61,8 @@ class History:
             self.clear()
         thresholds, force = step.thresholds, slice(1 + self._units, 4 + self._units)
         reading = step.range_distance if late is None else np.where(late, np.nan, step.range_distance)
-        distance = np.nan_to_num(reading, nan=_NOTHING_M)
+        # of zones the nearest counts
+        distance = np.minimum.reduceat(np.nan_to_num(reading, nan=_NOTHING_M), self._first)
         nearest = float(step.obstacles.body_distance.min(initial=_NOTHING_M))
         row = np.concatenate(
             [

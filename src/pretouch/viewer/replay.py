@@ -88,8 +88,8 @@ class ReplayPage:
         self._controls(server)
         self._scene = Scene(server, world)
         other = comparison.other.name if comparison else ""
-        self.history = History(len(world.skin), 6 if other else 0, stamps[0])
-        self._plots = Plots(server.gui, self.history, world.skin.ids, other)
+        self.history = History(world.skin.first, 6 if other else 0, stamps[0])
+        self._plots = Plots(server.gui, self.history, [unit.id for unit in world.skin.mounted], other)
         with server.gui.add_folder("View", expand_by_default=False):
             add_view_boxes(server.gui, self._actions, self._scene.show)
             server.gui.add_html(legend())

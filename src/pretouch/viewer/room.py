@@ -129,12 +129,12 @@ class Room:
             if faults != Faults():
                 raise ParameterError("These units are real: unplug or cover one to see what the arm does.")
             return
-        unknown = sorted(faults.silenced - set(self._skin.ids))
+        unknown = sorted(faults.silenced - set(self._skin.boards))
         if unknown:
-            known = ", ".join(self._skin.ids)
+            known = ", ".join(unit.id for unit in self._skin.mounted)
             raise ParameterError(f"Unknown unit {', '.join(unknown)}: choose from {known}.")
         sound = self._nominal
-        self._simulated.silenced = {i for i, name in enumerate(self._skin.ids) if name in faults.silenced}
+        self._simulated.silenced = {i for i, name in enumerate(self._skin.boards) if name in faults.silenced}
         self._simulated.change(replace(
             sound, noise_floor_m=sound.noise_floor_m * faults.noise_factor,
             noise_rate=sound.noise_rate * faults.noise_factor, latency_s=sound.latency_s + faults.latency_s,
