@@ -10,6 +10,7 @@ from pretouch.calibration.mounting import moved_out
 from pretouch.calibration.skin_of import skin_of
 from pretouch.errors import CalibrationError
 from pretouch.sensing.seat import seat
+from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.sensing.unit import TouchPatch
 from tests.calibration.faulty import on_the_table
@@ -41,11 +42,12 @@ def test_a_unit_that_is_refused_stays_where_the_skin_had_it_or_is_left_out(panda
     assert kept.skin.units[0] is pair.units[0]
 
 
-def test_a_unit_that_is_calibrated_keeps_its_touch_sensor(panda_model, found, pair):
-    before = Skin([replace(pair.units[0], touch=TouchPatch(radius=0.03)), pair.units[1]], panda_model)
-    made = skin_of(found, panda_model, before)
+def test_a_unit_that_is_calibrated_keeps_its_sensors(panda_model, found, pair):
+    first = replace(pair.units[0], touch=TouchPatch(radius=0.03), sensor=VL53L5CX())
+    made = skin_of(found, panda_model, Skin([first, pair.units[1]], panda_model))
     assert made.located == pair.ids
-    assert [unit.touch for unit in made.skin.units] == [TouchPatch(radius=0.03), None]
+    assert [unit.touch for unit in made.skin.mounted] == [TouchPatch(radius=0.03), None]
+    assert [unit.sensor.zones for unit in made.skin.mounted] == [4, 1]
 
 
 def test_units_that_were_not_calibrated_stay(panda_model, found, whole_skin):

@@ -168,6 +168,13 @@ def test_zones_of_more_units_than_a_step_can_take_are_refused(panda_model, paper
         Skin(eight, panda_model)
 
 
+def test_units_with_zones_are_not_asked_for_over_the_network(panda_model, paper_skin):
+    assert paper_skin.network_ids == paper_skin.ids
+    zoned = Skin([paper_skin.units[0], replace(paper_skin.units[1], sensor=VL53L5CX())], panda_model)
+    with pytest.raises(SkinError, match="hand_right: readings of zones cannot come over the units' network yet"):
+        _ = zoned.network_ids
+
+
 def test_eight_by_eight_zones_measure_slower():
     assert VL53L5CX().ranging("short").period_s == pytest.approx(1 / 60)
     assert VL53L5CX(zones=8).ranging("short").period_s == pytest.approx(1 / 15)

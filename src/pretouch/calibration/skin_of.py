@@ -35,10 +35,11 @@ def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = Non
     located = {
         name: _sensor_unit(unit, model, calibration.orientation_floor) for name, unit in found.items() if unit.accepted
     }
-    old = {unit.id: unit for unit in keep.units} if keep else {}
+    old = {unit.id: unit for unit in keep.mounted} if keep else {}
     for name, unit in located.items():
         if name in old:
-            located[name] = replace(unit, touch=old[name].touch)  # where a unit is says nothing of its touch sensor
+            # where a unit is says nothing of its sensors
+            located[name] = replace(unit, touch=old[name].touch, sensor=old[name].sensor)
     names = [*old, *(name for name in found if name not in old)]
     units = {name: located.get(name) or old.get(name) for name in names}
     there = [unit for unit in units.values() if unit is not None]

@@ -1,6 +1,6 @@
 """What `pretouch live` does: a simulated arm served as a page."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -17,6 +17,7 @@ from pretouch.viewer.server import ServeOptions, browser_here, check_port
 
 if TYPE_CHECKING:
     from pretouch.cli.commands import Live
+    from pretouch.sensing.skin import Skin
     from pretouch.viewer.real_units import RealUnits
 
 
@@ -49,7 +50,7 @@ def live(command: "Live") -> None:
         if not command.keys:
             believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), command.seed)
     prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick(), first_contact=True)
-    with _units(command, skin.ids) as real:
+    with _units(command, skin) as real:
         simulation = LiveSimulation(settings, model, believed, real, skin)
         if command.opening and not real and not command.record:
             simulation.play_opening()
@@ -59,7 +60,7 @@ def live(command: "Live") -> None:
 
 
 @contextmanager
-def _units(command: "Live", ids: Sequence[str]) -> Iterator["RealUnits | None"]:
+def _units(command: "Live", skin: "Skin") -> Iterator["RealUnits | None"]:
     """Hear the real units of a skin, if there is a file of their keys."""
     if not command.keys:
         yield None
@@ -70,7 +71,7 @@ def _units(command: "Live", ids: Sequence[str]) -> Iterator["RealUnits | None"]:
     from pretouch.hardware.network_skin import NetworkSkin
     from pretouch.viewer.real_units import RealUnits
 
-    with NetworkSkin(ids, load_keys(Path(command.keys)), command.units_host, command.units_port) as source:
+    with NetworkSkin(skin.network_ids, load_keys(Path(command.keys)), command.units_host, command.units_port) as source:
         heard = "anywhere" if command.units_host == EVERYWHERE else f"{command.units_host} only"
         print(f"Receiving units from {heard}, at UDP port {source.address[1]}.", flush=True)
         yield RealUnits(source)

@@ -100,8 +100,8 @@ def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[tuple[str, .
     model = RobotModel(robot_named(command.arm))
     skin = load_skin(Path(command.skin), model)
     if not command.posture:
-        return skin.ids, None
-    return skin.ids, Posture(
+        return skin.network_ids, None
+    return skin.network_ids, Posture(
         _posture(command.posture, model), ModelCheck(model, skin, no_fixtures(), ModelCheckParams())
     )
 

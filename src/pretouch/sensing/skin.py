@@ -89,6 +89,17 @@ class Skin:
     def __len__(self) -> int:
         return len(self.units)
 
+    @property
+    def network_ids(self) -> tuple[str, ...]:
+        """The ids of units that send datagrams; a SkinError where one has zones, which a datagram has no room for."""
+        if len(self.mounted) < len(self.units):
+            zoned = ", ".join(unit.id for unit in self.mounted if unit.sensor.zones > 1)
+            raise SkinError(
+                f"{zoned}: readings of zones cannot come over the units' network yet: simulate them (`pretouch live`),"
+                " send each zone's as a sensor_msgs/Range over ROS 2, or write a `pretouch.ports.Skin`."
+            )
+        return self.ids
+
 
 def _check_count(count: int) -> None:
     if count > _MOST_UNITS:

@@ -85,7 +85,7 @@ class SimulatedArm:
         A receiver that cannot be found, and a unit without a key, are a HardwareError.
         """
         skin, seed = options.skin, options.seed
-        self.fleet = Fleet(skin.ids, options.keys, options.fleet, seed, (options.host, options.port))
+        self.fleet = Fleet(skin.network_ids, options.keys, options.fleet, seed, (options.host, options.port))
         """Its units."""
         try:
             for name, unit in zip(skin.ids, self.fleet.units, strict=True):

@@ -39,11 +39,11 @@ class WireSkin:
         the arm.
         """
         self._plant = plant
-        keys, rng = made_keys(skin.ids, seed), np.random.default_rng([seed, 8])
-        self.receiver = SkinReceiver(skin.ids, keys, clock=lambda: plant.time, draw=rng.bytes, params=link)
+        keys, rng = made_keys(skin.network_ids, seed), np.random.default_rng([seed, 8])
+        self.receiver = SkinReceiver(skin.network_ids, keys, clock=lambda: plant.time, draw=rng.bytes, params=link)
         """What came of it all: traffic of each unit, what was rejected, samples."""
         try:
-            self.fleet = Fleet(skin.ids, keys, params, seed, self.receiver.address)
+            self.fleet = Fleet(skin.network_ids, keys, params, seed, self.receiver.address)
             """The units, to be silenced, stuck, rebooted."""
         except BaseException:
             self.receiver.close()
