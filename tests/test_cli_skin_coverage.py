@@ -32,6 +32,16 @@ def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model
     assert "exists already: give another name, or --replace" in capsys.readouterr().err
 
 
+def test_a_unit_with_zones_is_suggested_and_shown_whole(tmp_path, capsys, panda_model):
+    told = ["skin", "coverage", "--postures", "2", "--suggest", "1", "--sensor", "vl53l5cx"]
+    assert main([*told, "--out", str(tmp_path / "more.toml")]) == 0
+    printed = capsys.readouterr().out
+    assert "suggested_1" in printed
+    assert "suggested_1/" not in printed
+    made = load_skin(tmp_path / "more.toml", panda_model)
+    assert (len(made), len(made.mounted), made.mounted[-1].sensor.zones) == (23, 8, 4)
+
+
 def test_an_imported_arm_has_its_own_skin(tmp_path, capsys):
     from tests.importing.made import six_axis, written
 
@@ -52,6 +62,7 @@ def test_an_imported_arm_has_its_own_skin(tmp_path, capsys):
         (["--seed", "-1"], "The seed is -1: give 0 or more"),
         (["--workspace", "moon"], "The workspace is 'moon': give circle"),
         (["--suggest", "400", "--postures", "2"], "400 more units were requested, but only"),
+        (["--suggest", "1", "--sensor", "sonar"], "--sensor has the sensor 'sonar': choose from"),
         (["no-such.toml"], "The skin file no-such.toml cannot be read"),
         (["--arm", "no-such-arm"], "no-such-arm"),
         (["--json", "a.json", "--figure", "a.json/b.png"], "is also another input or output file"),

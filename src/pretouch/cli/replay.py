@@ -118,7 +118,7 @@ def told(recorded: Recorded) -> str:
     command = run.about.get("command")
     what = f"{plain_text(command)}: " if isinstance(command, str) else ""
     return (
-        f"{what}profile {profiles} on {run.model.description.name} with {_many(len(run.skin), 'unit')},"
+        f"{what}profile {profiles} on {run.model.description.name} with {_many(len(run.skin.mounted), 'unit')},"
         f" {stamps[-1] - stamps[0]:.1f} s, {_many(len(recorded), 'step')}."
     )
 

@@ -36,14 +36,14 @@ class Units:
         self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
         plain: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False, "lod": "off"}
         for link in np.unique(skin.link):
-            units = np.flatnonzero(skin.link == link)
-            pose = skin.T_link_sensor[units]
-            place = quaternions(pose[:, :3, :3]), pose[:, :3, 3]
+            units, boards = np.flatnonzero(skin.link == link), np.flatnonzero(skin.link[skin.first] == link)
+            place = _places(skin.T_link_sensor[units])
             node = f"{root}/arm/{links[link]}"
             plates = scene.add_batched_meshes_simple(
-                f"{node}/units", *_plate(), *place, batched_colors=_all(palette.UNIT, units), flat_shading=True, **plain
-            )
-            self._plates.append((units, plates))
+                f"{node}/units", *_plate(), *_places(np.array([skin.mounted[b].T_link_sensor for b in boards])),
+                batched_colors=_all(palette.UNIT, boards), flat_shading=True, **plain,
+            )  # fmt: skip
+            self._plates.append((boards, plates))
             for kind in np.unique(skin.cones.kind[units]):
                 alike = skin.cones.kind[units] == kind
                 cones = scene.add_batched_meshes_simple(
@@ -67,13 +67,10 @@ class Units:
 
         A controller that is not `perceiving` has no obstacles: then every reading is a sensed point.
         """
-        seeing, limiting = self._glowing(step)
-        plates, cones = (
-            palette.as_vertex(np.select(
-                [silent[:, None], limiting[:, None], seeing[:, None]],
-                [palette.UNIT_SILENT, palette.LIMITING, palette.SEEING], plain,
-            )) for plain in (palette.UNIT, palette.CONE)
-        )  # fmt: skip
+        marks = [silent, *reversed(self._glowing(step))]
+        cones = _coloured(marks, palette.CONE)
+        # of zones, what any of them says
+        plates = _coloured([np.logical_or.reduceat(mark, self._skin.first) for mark in marks], palette.UNIT)
         reading = np.where(silent, np.nan, step.range_distance)
         points = self._sensed(step, kin, reading, perceiving)
         seen = np.isfinite(points[:, 0])
@@ -103,6 +100,17 @@ class Units:
         if not perceiving:
             return locate(*sensor_poses(self._skin, kin), reading)
         return points_of_units(step.obstacles, len(reading))
+
+
+def _coloured(marks: Sequence[BoolArray], plain: palette.Colour) -> NDArray[np.uint8]:
+    """Colour of each that is silent, limits, sees something (3, N), or none of it."""
+    colours = [palette.UNIT_SILENT, palette.LIMITING, palette.SEEING]
+    return palette.as_vertex(np.select([mark[:, None] for mark in marks], colours, plain))
+
+
+def _places(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Orientations and places of poses (N, 4, 4)."""
+    return quaternions(pose[:, :3, :3]), pose[:, :3, 3]
 
 
 def _all(colour: palette.Colour, units: IntArray) -> NDArray[np.uint8]:
