@@ -168,6 +168,12 @@ def test_zones_of_more_units_than_a_step_can_take_are_refused(panda_model, paper
         Skin(eight, panda_model)
 
 
+@pytest.mark.parametrize("zone", [16, -1, "0", True, 1.0])
+def test_a_zone_that_the_sensor_does_not_have_is_refused(paper_skin, zone):
+    with pytest.raises(SkinError, match=r"Unit hand_left is zone .* of its sensor: give one from 0 to 15"):
+        replace(paper_skin.units[0], sensor=VL53L5CX(), zone=zone)
+
+
 def test_units_with_zones_are_not_asked_for_over_the_network(panda_model, paper_skin):
     assert paper_skin.network_ids == paper_skin.ids
     zoned = Skin([paper_skin.units[0], replace(paper_skin.units[1], sensor=VL53L5CX())], panda_model)

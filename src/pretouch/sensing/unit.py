@@ -94,6 +94,9 @@ class SensorUnit:
         frozen = T.copy()
         frozen.flags.writeable = False
         object.__setattr__(self, "T_link_sensor", frozen)
+        zone, count = self.zone, self.sensor.zones**2
+        if zone is not None and (type(zone) is not int or not 0 <= zone < count):
+            raise SkinError(f"Unit {self.id} is zone {zone!r} of its sensor: give one from 0 to {count - 1}.")
         self._check_sigma("position_sigma", LARGEST_POSITION_SIGMA, "m")
         self._check_sigma("orientation_sigma", LARGEST_ORIENTATION_SIGMA, "rad")
 
