@@ -167,8 +167,8 @@ def _numbers(
     stamps, run = recorded.stamps(), recorded.runs[0]
     return {
         "recording": str(recorded.place), "complete": recorded.complete, "arm": run.model.description.name,
-        "profiles": [run.profile.name for run in recorded.runs], "units": run.skin.ids, "steps": len(recorded),
-        "duration_s": stamps[-1] - stamps[0], **(asdict(found) if found else {}),
+        "profiles": [run.profile.name for run in recorded.runs], "units": [unit.id for unit in run.skin.mounted],
+        "steps": len(recorded), "duration_s": stamps[-1] - stamps[0], **(asdict(found) if found else {}),
         **({"verified": _verdict_numbers(verdict)} if verdict else {}),
         **({"compared": _comparison_numbers(comparison)} if comparison else {}),
     }  # fmt: skip
