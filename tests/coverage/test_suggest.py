@@ -39,7 +39,7 @@ def test_a_greedy_choice_is_near_the_best(seed, count):
 
 
 def test_gains_fall_and_add_up_to_what_the_larger_skin_sees(made, panda_model, paper_skin):
-    found = suggest(made, paper_skin, 4)
+    found = suggest((made,), paper_skin, 4)
     gains = [one.gain for one in found.chosen]
     assert gains == sorted(gains, reverse=True)
     assert gains[-1] > 0
@@ -63,12 +63,12 @@ def test_places_sit_on_the_surface_and_look_off_the_arm(made, panda_model, paper
 
 
 def test_the_file_with_new_units_keeps_the_old_ones(made, panda_model, paper_skin, tmp_path):
-    found = suggest(made, paper_skin, 2)
+    found = suggest((made,), paper_skin, 2)
     save_skin(Skin((*paper_skin.units, *found.units), panda_model), tmp_path / "more.toml")
     read = load_skin(tmp_path / "more.toml", panda_model)
     assert read.ids == (*paper_skin.ids, "suggested_1", "suggested_2")
     np.testing.assert_allclose(read.T_link_sensor[:7], paper_skin.T_link_sensor, atol=1e-12)
-    again = suggest(made, read, 1)
+    again = suggest((made,), read, 1)
     assert again.chosen[0].unit.id == "suggested_3"
     assert again.chosen[0].gain <= found.chosen[1].gain + 1e-12
 
@@ -77,4 +77,4 @@ def test_more_units_than_there_are_places(made, paper_skin):
     with pytest.raises(
         SkinError, match=r"5 more units were requested, but only 3 positions were found: request 1 to 3"
     ):
-        suggest(made, paper_skin, 5, candidates(made, paper_skin)[:3])
+        suggest((made,), paper_skin, 5, candidates(made, paper_skin)[:3])

@@ -16,7 +16,7 @@ ROOM = fixtures(SceneSpec())
 
 
 def drawn(model, workspace, count=6):
-    return postures(model, ROOM, workspace, count, np.random.default_rng(1))
+    return postures(model, ROOM, workspace, count, np.random.default_rng(1)).q
 
 
 def hands(model, q):
@@ -31,6 +31,9 @@ def test_the_hand_is_on_the_path_all_along_it(panda_model):
     assert np.diff(turn).max() < 2 * 2 * np.pi / 8
     both = hands(panda_model, drawn(panda_model, "paths", 6))
     assert np.sum(np.isclose(both[:, 0], 0.4, atol=1e-5)) == 3, "half of them on the line"
+    along = postures(panda_model, ROOM, "circle", 8, np.random.default_rng(1)).along
+    out = hand - np.array([0.5, 0.0, 0.25])
+    np.testing.assert_allclose(along, np.cross([1.0, 0.0, 0.0], out) / 0.25, atol=1e-4)
 
 
 def test_a_box_and_the_whole_range_of_the_joints(panda_model):

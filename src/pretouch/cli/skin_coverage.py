@@ -12,10 +12,10 @@ from pretouch.cli.tables import show
 from pretouch.cli.writing import STANDARD_OUTPUT, check_writable, numbers_to, unwritable_said
 from pretouch.coverage.blind import BlindSpot, blind_spots
 from pretouch.coverage.measure import Coverage, Share, covered
-from pretouch.coverage.measuring import Setting, coverage_of
+from pretouch.coverage.measuring import Both, Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, candidates, suggest
-from pretouch.coverage.ways import Ways
+from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.extras import FIGURES
 from pretouch.perception.scene_filter import floor_and_pedestal
@@ -23,6 +23,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sensing.sensor_types import sensor_called
 from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file
+from pretouch.types import BoolArray
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Coverage as Asked
@@ -46,18 +47,19 @@ def _measured(command: "Asked", model: RobotModel, skin: Skin) -> dict[str, Any]
         model, floor_and_pedestal(command.floor), _params(command), command.workspace,
         command.postures, command.seed,
     )  # fmt: skip
-    ways = setting.ways()
+    ways, met = setting.ways(), setting.met()
     console = Console(highlight=False)
     found, sees = coverage_of(ways, skin)
+    both = found, coverage_of(met, skin)[0]
     spots = blind_spots(ways, found)
-    show(console, [link_table(found, setting), unit_table(skin, ways, sees)])
+    show(console, [link_table(both, setting), unit_table(skin, ways, sees)])
     for line in spot_lines(spots, _SPOTS):
         console.print(line, markup=False, soft_wrap=True)
-    numbers = _numbers(command, setting, found, spots)
+    numbers = _numbers(command, setting, both, spots)
     shown, new = skin, frozenset[str]()
     if command.suggest:
         sensor = sensor_called(command.sensor, "--sensor", {unit.sensor.label: unit.sensor for unit in skin.mounted})
-        suggested = suggest(ways, skin, command.suggest, candidates(ways, skin, sensor))
+        suggested = suggest((ways, met), skin, command.suggest, candidates(ways, skin, sensor))
         shown, new = Skin((*skin.units, *suggested.units), model), frozenset(unit.id for unit in suggested.units)
         found, numbers["suggested"] = _suggested(console, setting, skin, shown, suggested)
         if command.out:
@@ -115,11 +117,12 @@ def _suggested(
     console: Console, setting: Setting, skin: Skin, more: Skin, suggested: Suggestions
 ) -> tuple[Coverage, dict[str, Any]]:
     """Print what the new units add, by ways that they were not chosen by."""
-    fresh = setting.ways(1)
-    after, sees = coverage_of(fresh, more)
-    before = covered(fresh, sees[: len(skin.first)])
+    fresh = setting.ways(1), setting.met(1)
+    seen = [seen_by(ways, more) for ways in fresh]
+    before = _both(fresh, [sees[: len(skin.first)] for sees in seen])
+    after = _both(fresh, seen)
     show(console, [suggestion_table(suggested, before, after)])
-    return after, {
+    return after[0], {
         "units": [
             {"id": s.unit.id, "link": s.unit.link, "T_link_sensor": s.unit.T_link_sensor.tolist(), "gain": s.gain}
             for s in suggested.chosen
@@ -131,6 +134,10 @@ def _suggested(
     }  # fmt: skip
 
 
+def _both(ways: tuple[Ways, Ways], seen: list[BoolArray]) -> Both:
+    return covered(ways[0], seen[0]), covered(ways[1], seen[1])
+
+
 def _draw(file: str, ways: Ways, found: Coverage, skin: Skin, new: frozenset[str]) -> None:
     from pretouch.coverage.figure import coverage_figure
 
@@ -138,11 +145,11 @@ def _draw(file: str, ways: Ways, found: Coverage, skin: Skin, new: frozenset[str
         coverage_figure(ways, found, skin, new).savefig(file, dpi=110)
 
 
-def _numbers(command: "Asked", setting: Setting, found: Coverage, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
+def _numbers(command: "Asked", setting: Setting, both: Both, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
     return {
         "asked": asdict(command),
         "parameters": asdict(setting.params) | {"warning_m": setting.params.warning_m},
-        "links": _links(found),
+        "links": _links(both),
         "blind_spots": [
             {
                 "name": s.sentence, "link": s.link, "facing": s.facing, "side": s.side, "area_m2": s.area_m2,
@@ -153,11 +160,16 @@ def _numbers(command: "Asked", setting: Setting, found: Coverage, spots: tuple[B
     }  # fmt: skip
 
 
-def _links(found: Coverage) -> list[dict[str, Any]]:
+def _links(both: Both) -> list[dict[str, Any]]:
+    found, met = both
+    meets = {one.name: _share(one.ways) for one in (*met.links, met.arm)}
     return [
-        {"link": one.name, "area_m2": one.area_m2, "ways": _share(one.ways), "surface": _share(one.surface)}
+        {
+            "link": one.name, "area_m2": one.area_m2, "ways": _share(one.ways), "surface": _share(one.surface),
+            "met": meets.get(one.name),
+        }
         for one in (*found.links, found.arm)
-    ]
+    ]  # fmt: skip
 
 
 def _share(share: Share) -> dict[str, float]:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from pretouch.coverage.blind import BLIND, BlindSpot
-from pretouch.coverage.measure import Coverage, Share
-from pretouch.coverage.measuring import Setting
+from pretouch.coverage.measure import Share
+from pretouch.coverage.measuring import Both, Setting
 from pretouch.coverage.suggest import Suggestions
 from pretouch.coverage.ways import Ways
 from pretouch.sensing.skin import Skin
@@ -12,9 +12,10 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch.types import BoolArray
 
 
-def link_table(found: Coverage, setting: Setting) -> TextTable:
+def link_table(both: Both, setting: Setting) -> TextTable:
     """Show the shares of each link and of the arm."""
-    p = setting.params
+    p, (found, met) = setting.params, both
+    meets = {one.name: one.ways for one in (*met.links, met.arm)}
     columns = (
         ("link", lambda one: one.name),
         ("area\n[cm^2]", lambda one: f"{1e4 * one.area_m2:.0f}"),
@@ -22,6 +23,8 @@ def link_table(found: Coverage, setting: Setting) -> TextTable:
         ("95 %", lambda one: _bounds(one.ways)),
         ("surface\n[%]", lambda one: f"{100 * one.surface.value:.1f}"),
         ("95 %", lambda one: _bounds(one.surface)),
+        ("met\n[%]", lambda one: f"{100 * meets[one.name].value:.1f}" if one.name in meets else "-"),
+        ("95 %", lambda one: _bounds(meets[one.name]) if one.name in meets else "-"),
     )
     return tabulated(
         f"Seen in time: {setting.model.description.name}, {setting.postures} postures of {setting.workspace}",
@@ -30,16 +33,15 @@ def link_table(found: Coverage, setting: Setting) -> TextTable:
         f"A ball of {100 * p.object_radius_m:g} cm radius approaches a point in a straight line at"
         f" {p.object_speed_m_s:g} m/s, and the arm moves towards it at {p.arm_speed_m_s:g} m/s: it must be seen"
         f" {p.warning_m:.2f} m before contact. Paths: share of the free paths to the surface that are seen in time."
-        " Surface: points to which at least half of the paths are seen in time.",
+        " Surface: points to which at least half of the paths are seen in time. Met: share of what stands in the way of"
+        f" the moving arm that is seen, {p.standing().warning_m:.2f} m before contact at the latest.",
         names=1,
     )
 
 
 def unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
     """Show what each unit sees, and what would be lost without it; `sees` (B, S, W)."""
-    weight = ways.surface.area[ways.point] * ways.free
-    weight /= max(float(weight.sum()), 1e-12)
-    alone = sees.sum(axis=0) == 1
+    weight, alone = ways.share, sees.sum(axis=0) == 1
     columns = (
         ("unit", lambda k: skin.mounted[k].id),
         ("link", lambda k: skin.mounted[k].link),
@@ -55,8 +57,9 @@ def unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
     )
 
 
-def suggestion_table(suggested: Suggestions, before: Coverage, after: Coverage) -> TextTable:
+def suggestion_table(suggested: Suggestions, before: Both, after: Both) -> TextTable:
     """Show the places of the new units, and what they change."""
+    was, now = ([_said(one.arm.ways) for one in both] for both in (before, after))
     columns = (
         ("unit", lambda one: one.unit.id),
         ("link", lambda one: one.unit.link),
@@ -65,10 +68,11 @@ def suggestion_table(suggested: Suggestions, before: Coverage, after: Coverage) 
         ("gain\n[%]", lambda one: f"{100 * one.gain:.2f}"),
     )
     return tabulated(
-        f"{len(suggested.chosen)} more units: {_said(before.arm.ways)} before, {_said(after.arm.ways)} after",
+        f"{len(suggested.chosen)} more units: {was[0]} before, {now[0]} after; met {was[1]} and {now[1]}",
         columns,
         suggested.chosen,
-        f"Chosen one by one from {suggested.candidates} positions, each where it adds most. Gains are measured on the"
+        f"Chosen one by one from {suggested.candidates} positions, each where it adds most to what comes at the arm and"
+        " to what it meets, which count the same. Gains are measured on the"
         " paths used for choosing, before and after on others. No choice of as many positions could add more than"
         f" {100 * suggested.most:.1f} %; this greedy choice adds at least 63 % (1 - 1/e) of the optimum.",
     )

@@ -41,9 +41,9 @@ class Coverage:
 
     surface: Surface
     free: FloatArray
-    """(S, P) ways that can be come by, of each posture and point."""
+    """(S, P) weight of the ways to each point in each posture."""
     seen: FloatArray
-    """(S, P) of these, ways on which the ball is seen in time."""
+    """(S, P) weight of those on which the ball is seen in time."""
     links: tuple[LinkShare, ...]
     """Each link, in the arm's order."""
     arm: LinkShare
@@ -52,14 +52,14 @@ class Coverage:
     def point_share(self) -> FloatArray:
         """Share of the ways to each point that are seen (P,), NaN where nothing can come."""
         free = self.free.sum(axis=0)
-        return np.where(free > 0, self.seen.sum(axis=0) / np.maximum(free, 1.0), np.nan)
+        return np.where(free > 0, self.seen.sum(axis=0) / np.where(free > 0, free, 1.0), np.nan)
 
 
 def covered(ways: Ways, sees: BoolArray) -> Coverage:
     """Bring together, by point and by link, what each of B mounted units (B, S, W) sees in time."""
     count, seen = len(ways.surface), np.logical_or.reduce(sees)
-    free = np.array([np.bincount(ways.point, row, count) for row in ways.free])
-    found = np.array([np.bincount(ways.point, row, count) for row in seen & ways.free])
+    free = np.array([np.bincount(ways.point, row, count) for row in ways.weight])
+    found = np.array([np.bincount(ways.point, row, count) for row in np.where(seen, ways.weight, 0.0)])
     reached, link = free.sum(axis=0) > 0, ways.surface.link
     links = tuple(
         _of(ways.model.links[i], ways.surface, free, found, (link == i) & reached)
@@ -73,7 +73,7 @@ def _of(name: str, surface: Surface, free: FloatArray, seen: FloatArray, points:
     area, f, s = surface.area[points], free[:, points], seen[:, points]
     # each point weighs as its area: capsules' points differ a little in what they stand for
     weight = area / area.sum()
-    good = s.sum(axis=0) >= COVERED * np.maximum(f.sum(axis=0), 1.0)
+    good = s.sum(axis=0) >= COVERED * f.sum(axis=0)
     return LinkShare(name, float(area.sum()), ratio(weight * s, weight * f), ratio((weight * good)[None], weight[None]))
 
 

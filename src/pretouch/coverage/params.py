@@ -1,7 +1,7 @@
 """What comes at the arm, what the units can do, and how early is early enough."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.errors import ParameterError
@@ -44,6 +44,11 @@ class CoverageParams(Checked):
                 f"At these speeds an object must be seen {self.warning_m:.2f} m before contact, but the paths are only"
                 f" {self.way_m:g} m long: give lower speeds, a greater deceleration, or longer paths (way_m)."
             )
+
+    def standing(self) -> "CoverageParams":
+        """Return the same for what stands in the arm's way, looked for on twice the way it takes to stop before it."""
+        still = replace(self, object_speed_m_s=0.0)
+        return replace(still, way_m=2 * still.warning_m)
 
     @property
     def closing_m_s(self) -> float:

@@ -4,6 +4,7 @@ What a set of units sees grows with each unit, and by less the more there are (i
 way see at least 1 - 1/e, 63 %, of what the best N of the same places could add (Nemhauser, Wolsey and Fisher 1978).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,19 +78,21 @@ def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[S
     )
 
 
-def suggest(ways: Ways, skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None) -> Suggestions:
-    """Choose so many places for more units. Raises SkinError if there are not as many."""
-    places = candidates(ways, skin) if places is None else places
+def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None) -> Suggestions:
+    """Choose so many places for more units, by one or more sets of ways, each of which counts the same.
+
+    Raises SkinError if there are not as many.
+    """
+    places = candidates(ways[0], skin) if places is None else places
     if not 1 <= count <= len(places):
         raise SkinError(
             f"{count} more units were requested, but only {len(places)} positions were found: request 1 to"
             f" {len(places)}."
         )
-    weight = (ways.surface.area[ways.point] * ways.free).ravel()
-    weight /= max(float(weight.sum()), 1e-12)
-    by_skin = seen_by(ways, skin).any(axis=0).ravel()
+    weight = np.concatenate([some.share.ravel() for some in ways]) / len(ways)
+    by_skin = _seen(ways, skin).any(axis=0)
     # each place alone: together they may be more zones than a skin has
-    by_place = np.concatenate([seen_by(ways, Skin([place], ways.model)) for place in places]).reshape(len(places), -1)
+    by_place = np.concatenate([_seen(ways, Skin([place], ways[0].model)) for place in places])
     order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), count)
     ids = _free_ids(skin, count)
     chosen = tuple(
@@ -98,6 +101,11 @@ def suggest(ways: Ways, skin: Skin, count: int, places: tuple[SensorUnit, ...] |
     added = sum(gains)
     most = min(added / (1 - 1 / np.e), added + left, float(weight[~by_skin].sum()))
     return Suggestions(chosen, float(most), len(places))
+
+
+def _seen(ways: Sequence[Ways], skin: Skin) -> BoolArray:
+    """Whether (B, W) each mounted unit sees the ball of each way of all sets and postures."""
+    return np.hstack([seen_by(some, skin).reshape(len(skin.first), -1) for some in ways])
 
 
 def greedy(sees: BoolArray, weight: FloatArray, count: int) -> tuple[list[int], list[float], float]:

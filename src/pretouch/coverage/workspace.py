@@ -1,5 +1,7 @@
 """The postures that coverage is averaged over: on the paper's paths, in a box, or in the joints' whole range."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pretouch.control.posture import brought_to
@@ -18,8 +20,18 @@ _DRAWN = 40
 """Postures drawn at most for each that is wanted: many meet the arm itself or the floor."""
 
 
-def postures(model: RobotModel, room: Fixtures, workspace: str, count: int, rng: np.random.Generator) -> FloatArray:
-    """Draw postures (count, n) [rad] of a workspace.
+@dataclass(frozen=True, eq=False)
+class Postures:
+    """S postures of a workspace."""
+
+    q: FloatArray
+    """(S, n) joint positions [rad]."""
+    along: FloatArray | None = None
+    """(S, 3) unit tangents of the hand's path, base frame; None where it has none."""
+
+
+def postures(model: RobotModel, room: Fixtures, workspace: str, count: int, rng: np.random.Generator) -> Postures:
+    """Draw `count` postures of a workspace.
 
     `circle` and `line` are the paper's, `paths` both, the hand upright; `joints` is the whole range of the joints,
     where the arm is clear of itself and of the room; six numbers with commas are opposite corners of a box of hand
@@ -28,20 +40,22 @@ def postures(model: RobotModel, room: Fixtures, workspace: str, count: int, rng:
     if count < 2:
         raise ExperimentError(f"The number of postures is {count}: give at least 2.")
     if workspace == "joints":
-        return _anywhere(model, room, count, rng)
+        return Postures(_anywhere(model, room, count, rng))
     if workspace in KINDS:
         place = placement_for(model)
         names = ("circle", "line") if workspace == "paths" else (workspace,)
         parts = np.array_split((np.arange(count) + rng.uniform(size=count)) / count, len(names))
-        q = [_along(model, place, name, part * len(names) % 1.0) for name, part in zip(names, parts, strict=True)]
-        return np.vstack(q)
+        found = [_along(model, place, name, part * len(names) % 1.0) for name, part in zip(names, parts, strict=True)]
+        return Postures(np.vstack([q for q, _ in found]), np.vstack([along for _, along in found]))
     low, high = _corners(workspace)
-    return _in_box(model, low, high, count, rng)
+    return Postures(_in_box(model, low, high, count, rng))
 
 
-def _along(model: RobotModel, place: Placement, name: str, phases: FloatArray) -> FloatArray:
+def _along(model: RobotModel, place: Placement, name: str, parts: FloatArray) -> tuple[FloatArray, FloatArray]:
     path = place.path(name, 1.0)
-    return np.array([brought_to(model, path.point(phase * path.length)) for phase in phases])
+    phases = parts * path.length
+    q = np.array([brought_to(model, path.point(phase)) for phase in phases])
+    return q, np.array([path.tangent(phase) for phase in phases])
 
 
 def _corners(text: str) -> tuple[FloatArray, FloatArray]:

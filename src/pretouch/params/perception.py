@@ -69,6 +69,9 @@ class PerceptionParams(Checked):
     keep_while_silent: bool = False
     """Whether the point that a unit showed last is kept until it tells something else, or counts as silent: silence
     is never free space. Off, it goes after `persistence_s`."""
+    out_of_view_s: NonNegative = 0.0
+    """How long a point is kept from which the arm has carried its unit's beam away, so that no reading says it is gone
+    [s]: worth it with sensors with zones (docs/results/skins.md). 0: as any other point."""
     closing: ClosingSpeed | None = None
     """Whether the objects' own closing speeds are estimated, `Obstacles.closing_speed`."""
     outside: OutsidePoints | None = None

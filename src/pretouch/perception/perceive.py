@@ -25,6 +25,7 @@ from pretouch.perception.obstacles import (
     take_in,
     tells_anything,
 )
+from pretouch.perception.out_of_view import give_up, looks_at
 from pretouch.perception.scene_filter import Fixtures, leave_out, leave_out_planes
 from pretouch.perception.spread import bring_nearer, widen
 from pretouch.perception.stamped import move_back
@@ -83,6 +84,8 @@ class SightNumbers(NamedTuple):
     """Whether points nearer than a sensor measures are placed where they were last seen."""
     silence_s: float
     """How long the point of a silent unit is kept, 0 for no longer than others."""
+    out_of_view_s: float
+    """How long the point is kept that its unit no longer looks at."""
     sigmas: float
     """How many standard deviations of a unit's place are taken off, 0 where all places are exact."""
 
@@ -112,7 +115,7 @@ def perception_setup(model: RobotModel, skin: Skin, fixtures: Fixtures, params: 
     numbers = SightNumbers(
         p.persistence_s, p.self_margin_m or 0.0, p.self_aside_m, p.self_margin_m is not None, estimates, memory,
         p.reckon_below_minimum, p.silent_after_s if p.keep_while_silent else 0.0,
-        0.0 if skin.exact else p.spread_sigmas,
+        p.out_of_view_s, 0.0 if skin.exact else p.spread_sigmas,
     )  # fmt: skip
     o = p.outside
     points = None if o is None else PointNumbers(
@@ -241,7 +244,10 @@ def _perceive(
     for k in range(len(unit)):
         # nothing was heard since the point was seen: silence is no free space, and keeps it for `silence_s`
         unanswered = times[HEARD, k] <= times[SEEN, k]
-        if now - times[SEEN, k] <= (max(p.persistence_s, p.silence_s) if unanswered else p.persistence_s):
+        lasts = max(p.persistence_s, p.silence_s) if unanswered else p.persistence_s
+        if p.out_of_view_s > lasts and not looks_at(kin, skin, k, tracks.point[k]):
+            lasts = p.out_of_view_s
+        if now - times[SEEN, k] <= lasts:
             unit[found] = k
             for i in range(3):
                 near[found, i], direction[found, i] = tracks.point[k, i], tracks.direction[k, i]
@@ -291,14 +297,9 @@ def _take_readings(
             m = skin.link[k]
             pose_into(kin.position[m], kin.rotation[m], skin.T_link_sensor[k], position[k], rotation[k])
     sensors = Sensors(position, rotation, skin.link)
-    tells, shows = (
-        tells_anything(readings.distance, readings.status, distance, cones),
-        np.empty(len(distance), np.bool_),
-    )
+    tells, shows = tells_anything(readings.distance, readings.status, distance, cones), ~np.isnan(distance)
     # a return expected before `ends`, up to `margin_m` behind the reading, explains it: nothing is seen through a body
     ends = distance + p.margin_m
-    for k in range(len(shows)):
-        shows[k] = not np.isnan(distance[k])
     if p.filters:
         if p.sigmas > 0:
             widen(ends, p.sigmas, skin.position_sigma, skin.orientation_sigma, distance, p.margin_m)
@@ -319,6 +320,8 @@ def _take_readings(
     if p.estimates:
         taken = fresh & shows & (now - readings.stamp <= p.persistence_s)  # by `take_in`
         follow_points(tracks.motion, tracks.point, times[SEEN], points, readings.stamp, taken, p.memory_s)
+    if p.out_of_view_s > 0:
+        give_up(tracks.point, times[SEEN], sensors, fresh & tells, distance, now - p.persistence_s)
     new = NewReadings(readings.stamp, points, fresh, shows, tells)
     take_in(tracks.point, times, new, now, p.persistence_s)
 
