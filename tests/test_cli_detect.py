@@ -164,6 +164,7 @@ def test_long_names_of_profiles_are_numbered_in_tables_and_whole_in_numbers(caps
     assert json.loads(numbers.read_text())["profiles"][0]["profile"] == name
 
 
+@pytest.mark.slow
 def test_with_a_force_beside_torques_each_can_be_had(capsys, pushed_arm, tmp_path):
     _, moving = pushed_arm
     kinds = (("q*_rad", moving.q), ("tau_ext*_Nm", moving.tau_ext))

@@ -169,6 +169,7 @@ def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tm
     assert "ree motion" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_no_pushes")
 def test_what_was_learnt_is_kept_after_ctrl_c_in_the_file_that_was_named(tmp_path, capsys, monkeypatch):
     at_begin(monkeypatch, 3.0, lambda _: os.kill(os.getpid(), signal.SIGINT))
@@ -187,6 +188,7 @@ def test_a_named_file_of_free_motion_must_be_one_and_the_profile_must_learn(tmp_
     assert "does not learn free motion" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_no_pushes")
 def test_an_approach_that_is_broken_off_is_reported_and_no_refusal(tmp_path, capsys, monkeypatch):
     def fail(arm):

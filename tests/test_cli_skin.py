@@ -72,6 +72,7 @@ def test_units_that_are_well_are_shown_recorded_and_written_as_numbers(keys, por
         assert np.allclose(np.median(unit.imu.acceleration, axis=0), [0, 0, 9.80665], atol=0.1)
 
 
+@pytest.mark.slow
 def test_a_unit_that_goes_silent_is_a_fault_and_the_exit_code_says_so(keys, port, tmp_path, capsys):
     with Desk(keys, port) as desk:
         timer = threading.Timer(1.0, lambda: setattr(desk.fleet.units[1], "silent", True))
@@ -84,6 +85,7 @@ def test_a_unit_that_goes_silent_is_a_fault_and_the_exit_code_says_so(keys, port
     assert "fault: wrist" not in said
 
 
+@pytest.mark.slow
 def test_a_stuck_unit_is_named(keys, port, tmp_path, capsys):
     with Desk(keys, port) as desk:
         desk.fleet.units[0].stuck = True

@@ -15,6 +15,8 @@ from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.traces import JointTrace
 from tests.calibrated_arm import record_motion
 
+pytestmark = pytest.mark.slow
+
 LATE = 1.7e9
 """Of the joints' clock in a file of their own [s]: the time of day against a monotonic clock."""
 

@@ -58,7 +58,7 @@ def expected(state: ModeState, events: dict[Event, str], resume: bool) -> tuple[
     return Mode.TRACK, False, None
 
 
-@pytest.mark.parametrize("resume", [False, True])
+@pytest.mark.parametrize("resume", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("state", STATES, ids=lambda s: f"{s.mode.value}{'-latched' if s.latched else ''}")
 def test_every_set_of_events_ends_in_the_mode_the_rules_say(state: ModeState, resume: bool):
     for events in every_set_of_events():

@@ -11,6 +11,8 @@ import pytest
 from pretouch.extras import BAGS, FIGURES, LIVE
 from tests.importing.made import six_axis, written
 
+pytestmark = pytest.mark.slow
+
 HIDDEN = ("pretouch_lab", "matplotlib", "mpl_toolkits", "rosbags", "SALib", "pyarrow", "distributed", "viser")
 _ALONE = f"""
 import sys

@@ -73,7 +73,7 @@ def test_a_soft_hold_stands_exactly_still_with_a_bias_too(held: Noisy, joint: in
     assert {s.mode for s in steps} == {Mode.HOLD}, "what moves nothing is no contact to a held arm"
 
 
-@pytest.mark.parametrize("bias", [0.0, 1.0])
+@pytest.mark.parametrize("bias", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_push_of_15_n_moves_a_held_arm(held: Noisy, bias: float):
     biases = np.full(7, bias) * np.array([1, -1, 1, -1, 1, -1, 1])
     used_to_it = held.again(1010, biases)
@@ -88,7 +88,7 @@ def test_a_push_of_15_n_moves_a_held_arm(held: Noisy, bias: float):
         assert not any(s.command.any() for s in stood), f"and it stands where it is left: {link}, {force}"
 
 
-@pytest.mark.parametrize("joint", [0, 3, 5])
+@pytest.mark.parametrize("joint", [0, *(pytest.param(joint, marks=pytest.mark.slow) for joint in (3, 5))])
 def test_under_a_bias_that_is_not_learnt_a_reacting_arm_holds_and_says_why(going: Noisy, joint: int):
     arm = going.again(1020 + joint, 2.0 * np.eye(7)[joint])
     seen = {0: 0.2}  # with something near nothing is learnt

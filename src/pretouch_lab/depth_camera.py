@@ -5,7 +5,6 @@ from itertools import product
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive, PositiveCount
 from pretouch.sim.plant import Plant
@@ -74,6 +73,8 @@ class DepthCamera:
 
     def __init__(self, plant: Plant, T_O_camera: FloatArray, params: DepthCameraParams, seed: int) -> None:
         """Put a camera where it is believed to be, T_O_camera (4, 4), z along its view and x to the right of it."""
+        from scipy.spatial.transform import Rotation  # a fifth of a second, and most trials have no camera
+
         self._plant, self._params = plant, params
         self._rng = np.random.default_rng([seed, 5])
         self.T_O_camera = np.array(T_O_camera, dtype=np.float64)

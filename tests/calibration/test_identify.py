@@ -82,6 +82,7 @@ def test_data_of_another_motion_fit_no_link(panda_model, moving_arm, good):
         assert unit.place is None
 
 
+@pytest.mark.slow
 def test_links_fixed_to_each_other_are_told_apart_by_where_the_unit_sits_and_looks(panda_model, moving_arm):
     right = []
     for seed in range(12):

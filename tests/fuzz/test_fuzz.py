@@ -30,7 +30,7 @@ EXPECTED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", [1001, 1002])
+@pytest.mark.parametrize("seed", [1001, pytest.param(1002, marks=pytest.mark.slow)])
 def test_some_thousand_steps(seed: int):
     reached = Machine(seed).run(2_400, each=120)
     assert all(reached[f"mode {mode}"] > 100 for mode in MODES)

@@ -34,7 +34,7 @@ def found_in(recording):
     return result_of(recording, profile("pretouch"))
 
 
-@pytest.mark.parametrize("kind", ["external", "raw"])
+@pytest.mark.parametrize("kind", ["external", pytest.param("raw", marks=pytest.mark.slow)])
 def test_pushes_are_found_with_their_link_and_force_and_nothing_else(tmp_path, pushed, kind):
     file = getattr(pushed, f"{kind}_csv")(tmp_path / "a.csv")
     recording = read_torques(file, Choice())
@@ -60,6 +60,7 @@ def test_our_observer_follows_the_external_torques_as_an_observer_of_the_vendors
     assert (found - pushed.tau_ext[:n])[known].std() < 0.1
 
 
+@pytest.mark.slow
 def test_after_a_gap_what_was_learnt_is_kept_and_nothing_is_found_in_it(tmp_path, panda_model, pushed):
     kept = (pushed.time < 12.0) | (pushed.time > 15.0)
     columns = {
@@ -165,6 +166,7 @@ def test_external_torques_with_gravity_or_in_millinewtons_are_refused(tmp_path, 
         read_torques(heavy, Choice())
 
 
+@pytest.mark.slow
 def test_currents_need_gains_and_are_then_torques(tmp_path, short):
     gains = np.array([10.0, 11.0, 9.0, 8.0, 5.0, 4.0, 3.0])
     columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("current*_A", short.driving / gains))

@@ -292,6 +292,7 @@ def mjcf():
     return MJCF.format(body=body + '<body name="tip" pos="0 0 .2"/>' + "</body>" * 6)
 
 
+@pytest.mark.slow
 def test_an_mjcf_file_keeps_its_mechanics(tmp_path):
     file = written(tmp_path, mjcf(), "arm.xml")
     found = import_robot(file, ImportOptions(ready=READY, capsules=1))

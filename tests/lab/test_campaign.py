@@ -73,6 +73,7 @@ def test_tasks_take_all_cells_seed_by_seed():
     assert len({trial_file(Path("x"), *task) for task in tasks}) == 20
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
     one = replace(SMALL, seeds=1)
     seen = []
@@ -308,7 +309,7 @@ def long_run(tmp_path):
         yield process, out
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.1, 0.4, 0.8])
+@pytest.mark.parametrize("delay", [0.1, *(pytest.param(s, marks=pytest.mark.slow) for s in (0.0, 0.4, 0.8))])
 def test_ctrl_c_while_workers_start_leaves_no_traceback(tmp_path, delay):
     with started(tmp_path) as process:
         wait_for(process, (tmp_path / "run.json").exists)
@@ -319,6 +320,7 @@ def test_ctrl_c_while_workers_start_leaves_no_traceback(tmp_path, delay):
     assert "Traceback" not in said
 
 
+@pytest.mark.slow
 def test_a_killed_worker_is_said_in_a_sentence(long_run):
     process, out = long_run
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()

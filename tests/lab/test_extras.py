@@ -94,6 +94,7 @@ def test_every_command_is_asked_for():
     assert {words[0] for words, _ in ASKED} == set(command_names())
 
 
+@pytest.mark.slow
 def test_without_an_extra_a_command_does_without_it_or_says_what_to_run(tmp_path, monkeypatch):
     (tmp_path / "arm.urdf").write_text(URDF)
     for name in ("a.dae", "a.bag"):

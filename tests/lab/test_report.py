@@ -20,6 +20,8 @@ from pretouch_lab.report import write_report
 from pretouch_lab.trace import read_trace, trace_of
 from pretouch_lab.trial import record_of
 
+pytestmark = pytest.mark.slow
+
 LINE = ("line", "-y")
 
 

@@ -72,6 +72,7 @@ class Nowhere(BytesIO):
         return self.at
 
 
+@pytest.mark.slow
 def test_an_hour_of_chunks_leaves_little_in_memory():
     """Two chunks a second: the library's writer kept 33 MB of an hour of a run, and some 10 MB of these."""
     given = items(30)

@@ -222,7 +222,10 @@ def test_a_killed_process_loses_at_most_the_last_second(tmp_path):
     assert verify(open_recording(out)).agrees
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, None)])
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGTERM, 143), pytest.param(signal.SIGHUP, 129, marks=pytest.mark.slow), (signal.SIGINT, None)],
+)
 def test_ctrl_c_and_sigterm_leave_a_whole_file(tmp_path, number, code):
     last, returned, errors = ended(tmp_path / "a.mcap", "with", 0.5, number)
     assert returned == code or "KeyboardInterrupt" in errors

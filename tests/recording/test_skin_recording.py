@@ -216,6 +216,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 def test_a_killed_process_loses_at_most_the_last_second(tmp_path):
     place = tmp_path / "killed.mcap"
     root = Path(__file__).parents[2]

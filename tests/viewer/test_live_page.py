@@ -297,6 +297,7 @@ def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(
     assert simulation.opening is None
 
 
+@pytest.mark.slow
 def test_three_arms_with_one_hand_go_through_the_same_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
     model = RobotModel(panda())
     simulation = LiveSimulation(LiveSettings(profile=PROFILES["pretouch"]), model, load_skin(LIVE_SKIN, model))

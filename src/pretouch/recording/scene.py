@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pretouch.controller import Controller
 from pretouch.recording.messages import Item, encoded, make
@@ -110,6 +109,8 @@ class Scene:
 
 def _capsule_markers(capsules: Capsules, links: tuple[str, ...], time: int) -> list[Any]:
     """Return a cylinder and two spheres for each capsule."""
+    from scipy.spatial.transform import Rotation  # a fifth of a second, and many runs record nothing
+
     markers = []
     for i, (link, a, b, r) in enumerate(
         zip(capsules.link.tolist(), capsules.a, capsules.b, capsules.radius.tolist(), strict=True)
@@ -144,6 +145,8 @@ def _marker(
 
 
 def _quaternions(rotations: FloatArray) -> list[Any]:
+    from scipy.spatial.transform import Rotation  # see `_capsule_markers`
+
     if not len(rotations):
         return []
     return [make(QUATERNION, *q) for q in Rotation.from_matrix(rotations).as_quat().tolist()]

@@ -6,7 +6,6 @@ from typing import Annotated, Literal, NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled, entry, flattened
@@ -193,6 +192,8 @@ def imu_counts(params: ImuParams) -> FloatArray:
 
 def _errors(params: ImuParams, count: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Draw how sensors err: matrices (K, 2, 3, 3) from true to sensed values, and biases (K, 6), gyroscope first."""
+    from scipy.spatial.transform import Rotation  # a fifth of a second, and many runs have no IMU
+
     angle = np.deg2rad(params.misalignment_deg) * rng.uniform(-1, 1, (count, 3))
     turn = Rotation.from_rotvec(angle.reshape(-1, 3)).as_matrix().reshape(count, 1, 3, 3)
     scale = 1.0 + params.scale_error * rng.uniform(-1, 1, (count, 2, 3, 1))

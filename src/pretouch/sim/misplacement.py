@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pretouch.errors import SkinError
 from pretouch.robot.model import RobotModel
@@ -46,6 +45,8 @@ def _telling(unit: SensorUnit, error: Misplacement) -> SensorUnit:
 def _believed(
     unit: SensorUnit, model: RobotModel, error: Misplacement, rng: np.random.Generator
 ) -> tuple[SensorUnit, int]:
+    from scipy.spatial.transform import Rotation  # a fifth of a second, and few skins are misplaced
+
     T, refused = unit.T_link_sensor.copy(), 0
     while True:
         off, axis = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))

@@ -127,6 +127,7 @@ def test_no_two_joints_swing_at_one_frequency():
         assert 0.2 <= tones[0] <= tones[-1] <= 1.2
 
 
+@pytest.mark.slow
 def test_the_same_request_gives_the_same_motion_and_another_variant_another(panda_model: RobotModel):
     first, again = plan_motion(panda_model, QUICK), plan_motion(panda_model, QUICK)
     np.testing.assert_array_equal(first.sampled(50.0).q, again.sampled(50.0).q)

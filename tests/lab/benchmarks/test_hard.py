@@ -46,6 +46,7 @@ def test_a_hard_motion_is_within_the_limits_and_as_fast_as_it_says(name):
         assert hand[:, 2].min() > 0.0
 
 
+@pytest.mark.slow
 def test_a_hard_stream_has_what_the_arm_carried_and_somebody_stands_beside_it(tmp_path):
     cell = HardCell("pick-and-place", "standing", 1003, 1.0)
     record_hard(cell, True, tmp_path / "one.npz")

@@ -241,6 +241,7 @@ def real(*words):
     return cli.main(["bench", "real", *map(str, words)])
 
 
+@pytest.mark.slow
 def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, tmp_path, capsys):
     (folder / "lwr4.npz").write_bytes(b"")
     place = tmp_path / "rows.json"

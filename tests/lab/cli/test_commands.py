@@ -133,6 +133,7 @@ def test_bench_free_motion_is_a_campaign(monkeypatch):
     assert json == ""
 
 
+@pytest.mark.slow
 def test_bench_cycle_shows_and_writes_what_it_measured(capsys, tmp_path):
     file = tmp_path / "cycle.json"
     code, said = run(capsys, "bench", "cycle", "--points", "3,5", "--cycles", "20", "--json", str(file))

@@ -70,6 +70,7 @@ def test_the_file_sets_a_simulation_to_that_arm(found, tmp_path):
     assert len(tomllib.loads(place.read_text())["plant"]["mass_factors"]["value"]) == len(MODEL.links)
 
 
+@pytest.mark.slow
 def test_a_contact_is_found_and_left_out():
     found = identify(free_motion(replace(MADE, push=(30.0, 31.0))), MODEL, USUAL)
     assert len(found.spans) == 1

@@ -12,6 +12,8 @@ from pretouch_lab.identification.identify import identify
 from pretouch_lab.identification.samples import ArmSamples
 from tests.lab.identification.made import MODEL, PLANT, USUAL, Made, free_motion
 
+pytestmark = pytest.mark.slow
+
 MADE = Made()
 
 

@@ -30,6 +30,7 @@ def test_gymnasium_finds_nothing_wrong(shield, action):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_processes_play_what_one_plays_and_a_seed_decides_all():
     moves = np.random.default_rng(0).uniform(-1, 1, (10, 2, 6)).astype(np.float32)
     anew = {"context": "spawn"}  # a fork of a process with threads, as JAX has some, is no way to start

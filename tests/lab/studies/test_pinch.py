@@ -8,6 +8,8 @@ from pretouch.sensing.skin import Skin
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.studies import pinch
 
+pytestmark = pytest.mark.slow
+
 
 def played(model: RobotModel, skin: Skin, place: str, profile: str):
     cell = Cell(pinch.NAME, profile, {"place": place, "speed_m_s": 0.1, "restrictions": "off"})

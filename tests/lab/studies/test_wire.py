@@ -12,6 +12,8 @@ from tests.lab.limits import assert_within_limits
 from tests.lab.rows import made_up
 from tests.lab.width import width
 
+pytestmark = pytest.mark.slow
+
 PLACES = [("circle", "-y"), ("circle", "+y"), ("line", "-y"), ("line", "+y")]
 
 

@@ -40,6 +40,7 @@ def played(sweep, tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_the_indices_of_a_function_in_closed_form():
     found = sobol_indices(made.ishigami(1024), values_of(made.ishigami(1024)))
     rows = found["rows"]

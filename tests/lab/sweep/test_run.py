@@ -155,6 +155,7 @@ def test_a_cell_whose_worker_is_killed_is_played_again(tmp_path):
     assert [run.results[cell.key].metrics["value"] for cell in run.cells] == [known(cell) for cell in run.cells]
 
 
+@pytest.mark.slow
 def test_a_cell_whose_worker_is_killed_each_time_is_given_up_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "TRIES", 1)
     run = opened_ishigami(tmp_path, samples=2)

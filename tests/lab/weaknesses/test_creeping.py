@@ -10,6 +10,8 @@ from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper.avoidance import gaps
 from pretouch_lab.weaknesses import creeping
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def slack(context):

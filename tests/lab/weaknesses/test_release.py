@@ -13,6 +13,8 @@ from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.trial import Record
 from pretouch_lab.weaknesses import release
 
+pytestmark = pytest.mark.slow
+
 PUSH = {
     "push_n", "watched", "touching_fraction", "estimated_fraction", "detected", "reactions", "against_while_held",
     "against_after_release", "mean_peak_n", "speed_towards_m_s", "reaction_speed_towards_m_s",

@@ -12,6 +12,8 @@ from pretouch_lab.studies.calibration.watanabe import pose, watanabe
 from tests.lab.studies.calibration.ideal import ideal_data
 from tests.lab.studies.calibration.motions import short_plan
 
+pytestmark = pytest.mark.slow
+
 PLAN = short_plan()
 
 
