@@ -22,6 +22,8 @@ from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
 
+_AT_ONCE = 1000
+"""Units that a skin wears, of more than it may have."""
 VERSIONS = {name: version(name) for name in ("pretouch", "mujoco-core", "numba", "daqp", "numpy")}
 
 
@@ -106,11 +108,16 @@ class Step:
             return
         drawn = 3 * count + 30
         units, distance = _units(self.model, drawn), np.random.default_rng(1).uniform(0.15, 0.5, drawn)
-        self._equip(Skin(units, self.model), distance, "approach=none")
         # only units that never see the arm itself: so each shows a point in every snapshot
-        steps = (self.controller.step(self.state, self._inputs(self.time, s))[0] for s in range(len(problem.q)))
-        shown = sorted(set.intersection(*(set(step.obstacles.unit.tolist()) for step in steps)))[:count]
+        shown = [k for first in range(0, drawn, _AT_ONCE) for k in self._shown(units, distance, first)][:count]
         self._equip(Skin([units[k] for k in shown], self.model), distance[shown], "approach.rows=slack")
+
+    def _shown(self, units: list[SensorUnit], distance: Array, first: int) -> list[int]:
+        """Return which of `_AT_ONCE` units from the first on show a point in all snapshots."""
+        some = slice(first, first + _AT_ONCE)
+        self._equip(Skin(units[some], self.model), distance[some], "approach=none")
+        steps = (self.controller.step(self.state, self._inputs(self.time, s))[0] for s in range(len(self.problem.q)))
+        return [first + k for k in sorted(set.intersection(*(set(step.obstacles.unit.tolist()) for step in steps)))]
 
     def _equip(self, skin: Skin, distance: Array, rows: str) -> None:
         """Put a skin on the arm with what its units read [m], NaN for no target, and run until the arm tracks."""

@@ -27,3 +27,16 @@ def test_a_warning_that_no_way_is_long_enough_for():
         CoverageParams(object_speed_m_s=1.8)
     with pytest.raises(ParameterError, match=r"CoverageParams\.range_m is -1"):
         CoverageParams(range_m=-1.0)
+
+
+def test_what_stands_is_looked_for_on_twice_the_way_it_takes_to_stop():
+    # 0.3 m/s for 0.04 and 0.02 s, and 0.075 m of braking
+    standing = CoverageParams().standing()
+    assert standing.warning_m == pytest.approx(0.093)
+    assert (standing.first, standing.run, standing.last) == (9, 1, 18)
+
+
+@pytest.mark.parametrize("speed", [0.001, 0.05, 0.5])
+def test_at_any_speed_that_way_is_long_enough_for_a_reading(speed):
+    standing = CoverageParams(object_speed_m_s=0.0, arm_speed_m_s=speed).standing()
+    assert standing.first + standing.run <= standing.last

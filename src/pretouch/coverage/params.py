@@ -48,7 +48,7 @@ class CoverageParams(Checked):
     def standing(self) -> "CoverageParams":
         """Return the same for what stands in the arm's way, looked for on twice the way it takes to stop before it."""
         still = replace(self, object_speed_m_s=0.0)
-        return replace(still, way_m=2 * still.warning_m)
+        return replace(still, way_m=max(2 * still.warning_m, (still.first + still.run) * GRID_M))
 
     @property
     def closing_m_s(self) -> float:
