@@ -51,6 +51,8 @@ class Scene:
 
     def __init__(self, controller: Controller, about: Mapping[str, Any], model: RobotModel) -> None:
         """Take a controller, the caller's facts, and a model of the same arm for that thread alone."""
+        import scipy.spatial.transform  # noqa: F401  now, not while a loop runs: it takes a fifth of a second
+
         self._model = model
         self._skin = controller.skin
         self._path = _sampled(controller)
@@ -109,7 +111,7 @@ class Scene:
 
 def _capsule_markers(capsules: Capsules, links: tuple[str, ...], time: int) -> list[Any]:
     """Return a cylinder and two spheres for each capsule."""
-    from scipy.spatial.transform import Rotation  # a fifth of a second, and many runs record nothing
+    from scipy.spatial.transform import Rotation  # loaded by `Scene`
 
     markers = []
     for i, (link, a, b, r) in enumerate(
@@ -145,7 +147,7 @@ def _marker(
 
 
 def _quaternions(rotations: FloatArray) -> list[Any]:
-    from scipy.spatial.transform import Rotation  # see `_capsule_markers`
+    from scipy.spatial.transform import Rotation  # loaded by `Scene`
 
     if not len(rotations):
         return []
