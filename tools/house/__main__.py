@@ -36,7 +36,7 @@ class Measure:
     that are of another arm than the recording says, by 214 and 2 files for types of sensor, and by 118
     and 1 for recordings of hours that keep little in memory, and by 408 and 3 for physics steps and rays in compiled
     calls, a step and a start that are faster, and
-    by 12 for a page whose memory stays flat, and by 211 for sensors with zones, and by 169
+    by 12 for a page whose memory stays flat, and by 211 for sensors with zones, and by 171
     and 1 for what the arm runs into by itself (coverage), and points that are kept where nobody looks any more, which
     is a parameter of a profile.
     """
@@ -66,9 +66,9 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 57_146, 35_000),
+        Measure("lines of the product, comments aside", product.lines, 57_148, 35_000),
         Measure("files of the product", len(product.files), 474, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 80_018, 50_000),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 80_020, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
