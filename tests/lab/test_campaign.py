@@ -278,13 +278,7 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
 def started(out):
     """A run of many trials as its own process and group."""
     command = [sys.executable, "-m", "pretouch.cli", "reproduce", "static", "--seeds", "50", "--out", str(out)]
-    process = subprocess.Popen(
-        command,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        process_group=0,
-    )
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0)
     with process:
         try:
             yield process
