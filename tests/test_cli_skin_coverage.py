@@ -26,6 +26,8 @@ def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model
     before, after = (found["suggested"][when][-1]["ways"]["share"] for when in ("before", "after"))
     assert after > before
     assert found["links"][-1]["link"] == "whole arm"
+    met = [found["suggested"][when][-1]["met"]["share"] for when in ("before", "after")]
+    assert met[1] > met[0] > 0
     areas = [spot["area_m2"] for spot in found["blind_spots"]]
     assert areas == sorted(areas, reverse=True)
     assert main(told) == 2

@@ -11,7 +11,7 @@ from pretouch.coverage.measure import covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import HEIGHT_M, candidates, greedy, suggest
 from pretouch.coverage.surface import surface_of
-from pretouch.coverage.ways import seen_by, ways_to
+from pretouch.coverage.ways import seen_by, ways_met, ways_to
 from pretouch.errors import SkinError
 from pretouch.sensing.seat import seat
 from pretouch.sensing.skin import Skin, load_skin, save_skin
@@ -47,6 +47,18 @@ def test_gains_fall_and_add_up_to_what_the_larger_skin_sees(made, panda_model, p
     more = Skin((*paper_skin.units, *found.units), panda_model)
     before, after = (covered(made, seen_by(made, worn)).arm.ways.value for worn in (paper_skin, more))
     assert after - before == pytest.approx(sum(gains), rel=1e-6)
+
+
+def test_what_comes_and_what_is_met_count_the_same(made, panda_model, paper_skin):
+    q = np.array([panda_model.description.q_ready])
+    met = ways_met(panda_model, made.room, made.params, made.surface, q, np.array([[0.0, 1.0, 0.0]]))
+    found = suggest((made, met), paper_skin, 3)
+    more = Skin((*paper_skin.units, *found.units), panda_model)
+    rise = [
+        covered(some, seen_by(some, more)).arm.ways.value - covered(some, seen_by(some, paper_skin)).arm.ways.value
+        for some in (made, met)
+    ]
+    assert sum(one.gain for one in found.chosen) == pytest.approx(sum(rise) / 2, rel=1e-6)
 
 
 def test_places_sit_on_the_surface_and_look_off_the_arm(made, panda_model, paper_skin):
