@@ -70,7 +70,8 @@ def test_eq_3_is_said_with_its_factor_and_the_unit_nearest_to_the_end_effector(s
     found = said(step, obstacles=seen((1, 0.5, 0.1, 1), (0, 0.136, 0.18, 2)), **slowed)
     assert found == Explanation(Doing.SLOWED, "Slowed to 17 %: hand_front sees something at 0.18 m.")
     gone = said(step, **slowed)
-    assert gone == Explanation(Doing.SLOWED, "Slowed to 17 %: what was seen has gone from view, or a unit is late.")
+    why = "what was seen has gone from view, a unit is late, or none looks where it goes"
+    assert gone == Explanation(Doing.SLOWED, f"Slowed to 17 %: {why}.")
 
 
 def test_what_an_outside_source_sees_is_of_no_unit(step: ControlStep) -> None:

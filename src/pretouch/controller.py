@@ -31,6 +31,7 @@ from pretouch.perception.obstacles import TrackState, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
 from pretouch.perception.perceive import Perception, nothing_seen, perceive, perception_setup, silent_units
 from pretouch.perception.scene_filter import Fixtures
+from pretouch.perception.unseen import unseen_on, unseen_scale
 from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
@@ -96,6 +97,7 @@ class Controller:
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
         see = profile.perception
         self._sight = None if see is None else perception_setup(model, skin, fixtures, see)
+        self._unseen = unseen_on(profile.unseen, model, skin, fixtures, see)
         self._motion_body = MotionBody(model, len(skin), self.limits, profile.task)
         self._approach = restriction_on(profile.approach, self._motion_body)
         self._setup = motion_setup(self._motion_body, profile.null_space, profile.failure.solver_iterations)
@@ -103,8 +105,7 @@ class Controller:
         self._detector = profile.detect.on(self.body)
         self._units, self._most_kg = len(skin), most_kg(model)
         self._touching = "touch" in profile.detect.reads and len(skin.touching) > 0
-        self._shaken = "imu" in self._detector.reads
-        self._mark = mark
+        self._shaken, self._mark = "imu" in self._detector.reads, mark
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
         """Return the state before the first step; a robot state that cannot be used is a RobotStateError.
@@ -191,7 +192,7 @@ class Controller:
         # along the path, or as a commander asks, as fast as eqs. 3-4 leave it, or as the reaction says
         slowed = 1.0 if p.slow is None else speed_scale(near.seen.nearest, p.slow.d_max_m)
         scale, reduction = reduce_speed(state.reduction, min(near.scale, slowed), p.task.restore_cycles)
-        asked = self._asked(state, given, kin, scale)
+        asked, scale = self._asked(state, given, kin, scale)
         answer, react = p.react.move(react, self.body, noticed, mode)
         desired = asked.velocity if answer is None else answer.velocity
         mark("path")
@@ -274,13 +275,16 @@ class Controller:
         detection, detector = self._detector.step(state.detector, self.body, sample)
         return detection, before if reacting and p.freeze_while_reacting else window, detector
 
-    def _asked(self, state: ControllerState, given: "_Given", kin: Kinematics, scale: float) -> Asked:
-        """Return what is asked times a factor: what follows the path, or what a commander wants."""
+    def _asked(self, state: ControllerState, given: "_Given", kin: Kinematics, scale: float) -> tuple[Asked, float]:
+        """Return what follows the path, or what a commander wants, slower where no unit looks, and the whole factor."""
         task, goal = self.profile.task, state.rotation_goal
         if given.desired is None:
             following = paths.follow(self.path, state.path, kin.position[self.model.ee], task)
-            return Asked(following.scaled(scale), following.point, goal, goal, None, following)
-        return asked_by(given.desired, given.watch.stamp, kin, given.robot, self.model, goal, task, scale)
+            asked = Asked(following.scaled(scale), following.point, goal, goal, None, following)
+        else:
+            asked = asked_by(given.desired, given.watch.stamp, kin, given.robot, self.model, goal, task, scale)
+        slower = 1.0 if self._unseen is None else unseen_scale(self._unseen, kin, asked.velocity, asked.qd)
+        return asked.times(slower), slower * scale
 
     def _moved(
         self, state: ControllerState, noticed: ReactionInputs, near: "_Near", mode: ModeState, asked: Asked,

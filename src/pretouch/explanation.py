@@ -119,7 +119,8 @@ def _on_the_way(step: ControlStep, names: _Names) -> Explanation:
         moves = np.linalg.norm(step.desired_velocity) >= ASKED_M_S
         return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In its place: ") + seen)
     cause, share = limited.obstacle, limited.share if restricted else step.speed_scale
-    why = names.sees(step, cause) if cause >= 0 else "what was seen has gone from view, or a unit is late"
+    gone = "what was seen has gone from view, a unit is late, or none looks where it goes"
+    why = names.sees(step, cause) if cause >= 0 else gone
     if restricted and off >= OFF_PATH_M:
         kept = f"{off:.2f} m from its path: {why}."
         if speed < _REST_M_S:

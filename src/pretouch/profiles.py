@@ -36,6 +36,7 @@ from pretouch.params import (
     SpeedReduction,
     Tangential,
     TaskParams,
+    UnseenSpeed,
     WindowParams,
 )
 from pretouch.plugins import load, names
@@ -57,6 +58,8 @@ class Profile(Checked):
     """How the hand follows its path (eq. 2)."""
     slow: SpeedReduction | None = field(default_factory=SpeedReduction)
     """What slows the arm near obstacles (eq. 3); none: nothing but silent units does."""
+    unseen: UnseenSpeed | None = None
+    """How fast the body may go where no unit looks; none: as fast as is asked."""
     approach: Restriction | None = field(default_factory=ApproachRestriction)
     """What keeps the body from what is near (eqs. 5-7, or other rows of the QP); none: nothing does."""
     null_space: NullSpaceMotion | None = None
