@@ -30,11 +30,12 @@ def test_rays_meet_what_mujoco_finds_to_the_bit_anywhere_in_the_room(panda_model
         mujoco.mj_multiRay(
             built, data, origin, rays.reshape(-1), None, True, link, geom, hit, normal.reshape(-1), len(rays), farthest
         )
-        distance, outwards = cast(origin, rays, geoms, link, farthest)
+        distance, outwards, which = cast(origin, rays, geoms, link, farthest)
         within = (hit >= 0.0) & (hit <= farthest)
         assert np.array_equal(within, (distance >= 0.0) & (distance <= farthest))
         assert np.array_equal(distance[within], hit[within])
         assert np.array_equal(outwards[within], normal[within])
+        assert np.array_equal(which[within], geom[within])
         met += int(within.sum())
     assert met > 1000
 

@@ -11,7 +11,7 @@ from pretouch.checks import Check, Positive
 from pretouch.composition import Part
 from pretouch.errors import ParameterError
 from pretouch.groups import Cones
-from pretouch.types import FloatArray
+from pretouch.types import FloatArray, Number
 
 MOST_ZONES = 8
 """Zones along a side: a type with more is a depth camera, whose points are an outside source."""
@@ -156,6 +156,46 @@ class VL53L7CX(VL53L5CX, name="vl53l7cx"):
     """The same with 60 degrees from side to side, 90 along the diagonal (UM3038)."""
 
     field_of_view_deg: _Angle = 60.0
+
+
+@dataclass(frozen=True)
+class Capacitive(Sensor, name="capacitive"):
+    """A self-capacitance electrode, with the map from its signal to a distance that `pretouch skin map` learns.
+
+    signal = gain / (distance + offset)^power, 0 with nothing near. The map here is that of the simulation's electrode,
+    of a finger, a fist, a forearm and a flat hand; a printed skin has reached 18 cm (GenTact-Prox, 2026).
+    """
+
+    field_of_view_deg: _Angle = 120.0
+    """Full angle of the cone in which it feels [deg]: ours."""
+    nearest_m: Positive = 0.005
+    farthest_m: Positive = 0.18
+    rate_hz: Positive = 60.0
+    gain: Positive = 1.84e-4
+    """Signal at a distance of 1 m less the offset [1]."""
+    offset_m: Positive = 0.036
+    """About the size of the electrode [m]."""
+    power: Positive = 2.58
+    """How fast the signal falls [1]."""
+    spread_1: Positive = 0.46
+    """Standard deviation of the distance, as a part of it, over what may come [1]."""
+
+    def distance(self, signal: float) -> float:
+        """Distance [m] at which what the map was learnt of gives a signal: 0 at the least, infinite without any."""
+        return math.inf if signal <= 0.0 else max(0.0, (self.gain / signal) ** (1.0 / self.power) - self.offset_m)
+
+    def signal(self, distance: Number) -> Number:
+        """Signal of what is at a distance [m]."""
+        return self.gain / (distance + self.offset_m) ** self.power
+
+    @property
+    def spread(self) -> float:
+        """As a direction [rad], what two of it take off the distance, as the profiles do.
+
+        Something at the edge of the field, at half an angle a from the axis, is d cos a high over a flat body, so that
+        two of (1 - cos a) / 2 leave that. What comes may give another signal than what the map was learnt of, too.
+        """
+        return math.hypot((1.0 - math.cos(self.angle / 2)) / 2, self.spread_1)
 
 
 PAPER_SENSOR = VL53L1X()

@@ -11,8 +11,9 @@ from pretouch.compiled import compiled, entry, flattened
 from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
+from pretouch.sim.capacitive import Electrodes
 from pretouch.sim.plant import Plant
-from pretouch.sim.rays import Geoms, cast, geoms_of
+from pretouch.sim.rays import Geoms, cast, geoms_of, placed_rays
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, IntArray, RangeReadings, RangeStatus
 
@@ -111,7 +112,9 @@ class RangeFinders:
         offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
         cone = np.array(cones).reshape(count, rays, 3)
         mounting = _Mounting(data.xpos, data.xmat, skin.link, skin.T_link_sensor, cone, offset)
-        self._mounted, self._errors = flattened(mounting, geoms_of(plant.mj_model, data)), _errors(params)
+        geoms = geoms_of(plant.mj_model, data)
+        self._mounted, self._errors = flattened(mounting, geoms), _errors(params)
+        self._electrodes = Electrodes(skin, data, geoms, seed)
         boards: dict[str, list[int]] = {}
         for unit, board in enumerate(skin.boards):
             boards.setdefault(board, []).append(unit)
@@ -155,10 +158,7 @@ class RangeFinders:
             zones = self._boards[board]
             period = p.period_of(self._skin.units[zones[0]].sensor)
             self._due[board] = due + period * (1.0 + p.period_jitter * rng.standard_normal())
-            measured = [
-                (unit, _measure.flat(unit, rng.standard_normal(), *self._kinds[unit], *self._errors, *self._mounted))
-                for unit in zones
-            ]
+            measured = [(unit, self._measured(unit, time, rng.standard_normal())) for unit in zones]
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
             lost = rng.random() < p.dropout
             for unit, (distance, status, sigma, strength) in measured:
@@ -169,6 +169,12 @@ class RangeFinders:
                 elif not lost:
                     self._sent.send(arrival, (unit, time, distance, status))
         return min(self._due, default=np.inf)
+
+    def _measured(self, unit: int, time: float, draw: float) -> tuple[float, int, float, float]:
+        """Return distance [m], status, standard deviation [m], and strength of a measurement; `draw` is normal."""
+        if unit in self._electrodes:
+            return self._electrodes.measure(unit, time, draw)
+        return _measure.flat(unit, draw, *self._kinds[unit], *self._errors, *self._mounted)
 
 
 _SIGNAL_LIMIT_MCPS = 1.024
@@ -259,31 +265,11 @@ def _measure(
 ) -> tuple[float, int, float, float]:
     """Measure with a sensor; `draw` is normal. Return what `_reading` does."""
     link = mounting.link[unit]
-    origin, rays = _beams(
+    origin, rays = placed_rays(
         mounting.position[link], mounting.rotation[link], mounting.T_link_sensor[unit], mounting.cone[unit]
     )
-    distance, normal = cast(origin, rays, geoms, link, kind.distance_max)
+    distance, normal, _ = cast(origin, rays, geoms, link, kind.distance_max)
     return _reading(_Returns(distance, rays, normal), kind, mounting.offset[unit], draw, errors)
-
-
-@compiled
-def _beams(
-    xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray, cone: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Origin (3,) [m] and unit vectors (N, 3) of a sensor's rays in the base frame."""
-    origin, R = np.zeros(3), np.zeros((3, 3))
-    for i in range(3):
-        origin[i] = xpos[i]
-        for k in range(3):
-            origin[i] += xmat[3 * i + k] * T_link_sensor[k, 3]
-            for j in range(3):
-                R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
-    rays = np.zeros_like(cone)
-    for ray in range(len(cone)):
-        for i in range(3):
-            for j in range(3):
-                rays[ray, i] += R[i, j] * cone[ray, j]
-    return origin, rays
 
 
 @compiled

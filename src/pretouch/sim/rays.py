@@ -42,15 +42,42 @@ def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
 
 
 @compiled
+def placed_rays(
+    xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray, cone: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) [m] and unit vectors (N, 3) of a sensor's rays in the base frame.
+
+    Args:
+        xpos: (3,) origin of its body [m].
+        xmat: (9,) rows of its body's rotation matrix.
+        T_link_sensor: (4, 4) where it sits on the body.
+        cone: (N, 3) unit vectors, sensor frame.
+    """
+    origin, R = np.zeros(3), np.zeros((3, 3))
+    for i in range(3):
+        origin[i] = xpos[i]
+        for k in range(3):
+            origin[i] += xmat[3 * i + k] * T_link_sensor[k, 3]
+            for j in range(3):
+                R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
+    rays = np.zeros_like(cone)
+    for ray in range(len(cone)):
+        for i in range(3):
+            for j in range(3):
+                rays[ray, i] += R[i, j] * cone[ray, j]
+    return origin, rays
+
+
+@compiled
 def cast(
     origin: FloatArray, rays: FloatArray, geoms: Geoms, without: int, farthest: float
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, IntArray]:
     """Distance (N,) [m] and outward normal (N, 3) where unit vectors (N, 3) from `origin` (3,) first meet something.
 
-    The distance is -1 where they meet nothing. Not met are geoms of the body `without` and those that are all farther
-    than `farthest` [m].
+    And which geom (N,) that is. The distance is -1 where they meet nothing. Not met are geoms of the body `without` and
+    those that are all farther than `farthest` [m].
     """
-    nearest, normal = np.full(len(rays), -1.0), np.zeros_like(rays)
+    nearest, normal, met = np.full(len(rays), -1.0), np.zeros_like(rays), np.zeros(len(rays), np.int64)
     to, there = np.empty(3), np.empty(3)
     for geom in geoms.seen:
         if geoms.body[geom] == without:
@@ -71,6 +98,6 @@ def cast(
                 origin.ctypes.data, rays[k].ctypes.data, geoms.kind[geom], there.ctypes.data,
             )  # fmt: skip
             if distance >= 0.0 and (distance < nearest[k] or nearest[k] < 0.0):
-                nearest[k] = distance
+                nearest[k], met[k] = distance, geom
                 normal[k] = there
-    return nearest, normal
+    return nearest, normal, met

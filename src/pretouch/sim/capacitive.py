@@ -1,0 +1,105 @@
+"""Model of an electrode in a simulated room: the field lines that end on what is near, each by how far that is."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from pretouch.compiled import entry
+from pretouch.sensing.sensor import Capacitive, cone_rays
+from pretouch.sensing.skin import Skin
+from pretouch.sim.rays import Geoms, cast, placed_rays
+from pretouch.types import FloatArray, RangeStatus
+
+ELECTRODE_M = 0.03
+"""Size of the electrode: at this distance its signal of a wall is half of that of a touch [m]. Ours."""
+DIELECTRIC = 0.3
+"""Signal of what stands in the room, wood or plastic, in that of a person or an arm, which are grounded [1]. Ours."""
+NOISE = 0.001
+"""Standard deviation of a signal, of 1 at the touch of a wall [1]. Ours, as the next two: a fist is felt at 18 cm."""
+DRIFT, DRIFT_S = 0.001, 60.0
+"""Standard deviation of how far the baseline has drifted [1], and for how long it remembers [s]."""
+_FELT = 4.0
+"""Standard deviations of noise and drift from which on a signal tells something."""
+LEAST = _FELT * float(np.hypot(NOISE, DRIFT))
+_RINGS = 8
+"""217 field lines: a fist at 18 cm has seven."""
+_STREAM = 64
+"""Number of the random stream of drift."""
+
+_OK, _SIGNAL, _MIN_RANGE = (int(s) for s in (RangeStatus.OK, RangeStatus.SIGNAL, RangeStatus.MIN_RANGE))
+
+
+class Electrode(NamedTuple):
+    """Where an electrode sits, and its field lines."""
+
+    body: int
+    T_body: FloatArray
+    """(4, 4)"""
+    rays: FloatArray
+    """(N, 3) unit vectors, sensor frame."""
+
+
+def electrode_on(sensor: Capacitive, body: int, T_body: FloatArray) -> Electrode:
+    """Return an electrode on a body of MuJoCo's, at T_body (4, 4) in its frame."""
+    return Electrode(body, T_body, cone_rays(_RINGS, sensor.angle))
+
+
+@entry
+def field(electrode: Electrode, position: FloatArray, rotation: FloatArray, geoms: Geoms, farthest: float) -> float:
+    """Signal of an electrode without noise, 1 at the touch of a grounded wall.
+
+    Each field line that meets something adds cos(a) e / (e + d), with a its angle to the axis, d its length and e the
+    electrode's size: together that of a plate before a wall. `position` (L, 3) [m] and `rotation` (L, 9) are of the
+    bodies.
+    """
+    body, T_body, rays = electrode
+    origin, lines = placed_rays(position[body], rotation[body], T_body, rays)
+    distance, normal, met = cast(origin, lines, geoms, body, farthest)
+    total, all_of_it = 0.0, 0.0
+    for i in range(len(rays)):
+        all_of_it += rays[i, 2]
+        if 0.0 <= distance[i] <= farthest:
+            outwards = lines[i, 0] * normal[i, 0] + lines[i, 1] * normal[i, 1] + lines[i, 2] * normal[i, 2]
+            away = 0.0 if outwards > 0.0 else distance[i]  # it began inside what presses on the electrode
+            of_it = 1.0 if geoms.body[met[i]] > 0 else DIELECTRIC
+            total += of_it * rays[i, 2] * ELECTRODE_M / (ELECTRODE_M + away)
+    return total / all_of_it
+
+
+class Electrodes:
+    """The electrodes among the units of a skin, in a simulated room. Each has a baseline of its own that drifts."""
+
+    def __init__(self, skin: Skin, data: mujoco.MjData, geoms: Geoms, seed: int) -> None:
+        self._units = {k: unit.sensor for k, unit in enumerate(skin.units) if isinstance(unit.sensor, Capacitive)}
+        self._mounted = {
+            k: electrode_on(sensor, int(skin.link[k]), skin.T_link_sensor[k]) for k, sensor in self._units.items()
+        }
+        self._room = data.xpos, data.xmat, geoms
+        self._rng = np.random.default_rng([seed, _STREAM])
+        self._drift = dict.fromkeys(self._units, 0.0)
+        self._last = dict.fromkeys(self._units, -np.inf)
+
+    def __contains__(self, unit: int) -> bool:
+        return unit in self._units
+
+    def measure(self, unit: int, time: float, draw: float) -> tuple[float, int, float, float]:
+        """Return distance [m], status, its standard deviation [m], and the signal, as a unit tells them by its map.
+
+        `draw` is normal.
+        """
+        sensor = self._units[unit]
+        clean = field(self._mounted[unit], *self._room, sensor.farthest_m)
+        kept = float(np.exp((self._last[unit] - time) / DRIFT_S))  # Ornstein and Uhlenbeck; 0 at first
+        self._drift[unit] = kept * self._drift[unit] + DRIFT * np.sqrt(1.0 - kept**2) * self._rng.standard_normal()
+        self._last[unit] = time
+        return told(sensor, clean + self._drift[unit] + NOISE * draw)
+
+
+def told(sensor: Capacitive, signal: float) -> tuple[float, int, float, float]:
+    """Return distance [m], status, its standard deviation [m], and the signal, as the unit tells them by its map."""
+    distance = sensor.distance(signal)
+    if signal < LEAST or distance > sensor.farthest_m:
+        return 0.0, _SIGNAL, 0.0, signal
+    status = _MIN_RANGE if distance < sensor.nearest_m else _OK
+    return distance, status, sensor.spread_1 * distance, signal
